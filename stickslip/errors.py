@@ -1,0 +1,82 @@
+"""The errors a user can meet, each one message that says what, where and how to mend it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class StickslipError(Exception):
+    """Base of every error this program raises on purpose."""
+
+    exit_code = 1
+
+
+class InputError(StickslipError):
+    """Something a person wrote cannot be used.
+
+    Args:
+        what: the fault, in one sentence.
+        file: the file it stands in.
+        key: the key, column or line in that file (``"rig.mass"``, ``"line 12"``).
+        value: the offending value.
+        allowed: the range or the list of what would be accepted.
+        hint: how to mend it.
+    """
+
+    exit_code = 2
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        file: str | Path | None = None,
+        key: str | None = None,
+        value: object = None,
+        allowed: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        self.what, self.file, self.key, self.value, self.allowed, self.hint = what, file, key, value, allowed, hint
+        super().__init__(str(self))
+
+    def at(self, *, file: str | Path | None = None, key: str | None = None) -> InputError:
+        """The same error with the place filled in where it was not known yet."""
+        return type(self)(
+            self.what,
+            file=self.file or file,
+            key=self.key or key,
+            value=self.value,
+            allowed=self.allowed,
+            hint=self.hint,
+        )
+
+    def __str__(self) -> str:
+        where = ": ".join(str(p) for p in (self.file, self.key) if p)
+        text = f"{where}: {self.what}" if where else self.what
+        if self.value is not None:
+            text += f" (got {self.value!r})"
+        if self.allowed:
+            text += f"\n  allowed: {self.allowed}"
+        if self.hint:
+            text += f"\n  to mend: {self.hint}"
+        return text
+
+
+class SolveError(StickslipError):
+    """The equation of motion could not be integrated; says at what time and what to change."""
+
+
+class FitError(StickslipError):
+    """A fit did not reach a usable optimum."""
+
+
+class RunFolderError(InputError):
+    """A run folder cannot be written or read (exists, read-only, full, incomplete)."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint that names the valid spelling closest to ``name``, or lists all of them."""
+    known = sorted(known)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"did you mean '{close[0]}'?" if close else f"one of: {', '.join(known)}"
