@@ -1,0 +1,73 @@
+"""Tangential loading of a contact under constant normal force, in closed form.
+
+The Ciavarella-Jaeger theorem, exact for a spring foundation: F_t(u) = mu [F_n(d) - F_n(d - G* u/(mu E*))]. The second
+term is the normal force at which only the part that still sticks would touch.
+"""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from .elastic import Moduli
+from .indentation import Indentation
+
+
+class StaticContact(eqx.Module):
+    """A contact pressed by a constant normal force and pulled from the force-free state.
+
+    Fields broadcast against the leading axes of ``indentation`` (lines last), as do the arguments of the methods.
+
+    Fields:
+        indentation: table of the lines.
+        normal_force: F_n in N, of one contact.
+        friction: Coulomb friction coefficient mu of every spring.
+        moduli: E* and G* in Pa.
+    """
+
+    indentation: Indentation
+    normal_force: ArrayLike
+    friction: ArrayLike
+    moduli: Moduli
+
+    @property
+    def depth(self) -> Array:
+        """Indentation depth d of the highest point, m."""
+        return self.indentation.depth(self.normal_force, self.moduli.normal)
+
+    @property
+    def strength(self) -> Array:
+        """Largest tangential force mu F_n, N."""
+        return jnp.asarray(self.friction * self.normal_force)
+
+    @property
+    def u_max(self) -> Array:
+        """Displacement mu (E*/G*) d at which the last spring slides, m (Grzemba 2014, eq. 4)."""
+        return self.depth * self._reach
+
+    @property
+    def stiffness(self) -> Array:
+        """Tangential stiffness (G*/E*) dF_n/dd of the unloaded contact, N/m."""
+        return self.indentation.contact_length(self.depth) * self.moduli.tangential
+
+    @property
+    def contact_share(self) -> Array:
+        """Share of the springs in contact (see `check_saturation`)."""
+        return self.indentation.contact_share(self.depth)
+
+    def force(self, u: ArrayLike) -> Array:
+        """Tangential force F_t in N at displacement ``u >= 0`` in m."""
+        sticking = self.indentation.force(self.depth - u / self._reach, self.moduli.normal)
+        return jnp.asarray((self.normal_force - sticking) * self.friction)
+
+    def displacement(self, tau: ArrayLike) -> Array:
+        """Displacement u in m at the share ``tau`` (0 to 1) of the full friction force; the inverse of `force`."""
+        left = self.indentation.depth((1.0 - jnp.asarray(tau)) * self.normal_force, self.moduli.normal)
+        return (self.depth - left) * self._reach
+
+    @property
+    def _reach(self) -> Array:
+        """Tangential displacement at which a spring slides for each unit of its depth, mu E*/G*."""
+        return jnp.asarray(self.friction) * self.moduli.normal / self.moduli.tangential

@@ -1,0 +1,265 @@
+"""The block: inertia, driving spring, a bank of Jenkins elements with lagged weakening, and any set of effects.
+
+``m x'' = c_s (load point - x) - c x' - sum(f_i)`` with ``|f_i| <= mu(psi) f_n,i`` and
+``mu(psi)/mu_s = r + (1 - r) psi``, ``psi' = (1 - psi)/t_h - |x'| psi/D_c``. The model knows how to take the contact and
+the effects through one increment of motion; when increments begin and end is the solver's business.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array
+
+from .contact import Bank
+from .effects.base import (
+    BodyForce,
+    Contact,
+    Drive,
+    Effect,
+    Flow,
+    Geometry,
+    Memory,
+    Motion,
+    Sensor,
+    Spring,
+    Stiffness,
+    Threshold,
+)
+from .params import parameter
+
+
+class Block(eqx.Module):
+    """The moving body and the spring that pulls it."""
+
+    mass: Array = parameter(0.0894, unit="kg", lower=1e-9, upper=1e6, doc="mass of the block", symbol="m")
+    spring_stiffness: Array = parameter(
+        1000.0, unit="N/m", lower=1e-6, upper=1e9, log=True, doc="stiffness of the driving spring", symbol="c_s"
+    )
+    damping: Array = parameter(
+        10.0, unit="N s/m", lower=0.0, upper=1e6, log=True, doc="viscous damping of the block", symbol="c"
+    )
+
+
+class Weakening(eqx.Module):
+    """Lagged weakening of all caps by slip, healing by rest; Coulomb's constant friction in the limit v -> 0."""
+
+    ratio: Array = parameter(
+        0.85, unit="1", lower=0.0, upper=1.0, null=1.0, doc="kinetic over static friction", symbol=r"\mu_k/\mu_s"
+    )
+    slip_distance: Array = parameter(
+        1e-6, unit="m", lower=1e-10, upper=1e-2, log=True, doc="slip over which strength is lost", symbol="D_c"
+    )
+    healing_time: Array = parameter(
+        0.02, unit="s", lower=1e-6, upper=1e4, log=True, doc="time over which strength returns", symbol="t_h"
+    )
+
+    def advance(self, psi: Array, motion: Motion) -> Array:
+        """psi at the end of an increment."""
+        rate = 1.0 / self.healing_time
+        return motion.relax(psi, rate, rate, 1.0 / self.slip_distance)
+
+    def strength(self, psi: Array) -> Array:
+        """Factor mu(psi)/mu_s on the caps."""
+        return self.ratio + (1.0 - self.ratio) * psi
+
+    def steady(self, speed: Array) -> Array:
+        """psi of steady sliding at ``speed`` (m/s): 1/(1 + v/v_c), v_c = D_c/t_h."""
+        return 1.0 / (1.0 + speed * self.healing_time / self.slip_distance)
+
+
+class LoadPoint(eqx.Module):
+    """Piecewise linear displacement of the load point; beyond the last node it goes on at the last velocity.
+
+    Attributes:
+        times: nodes (s), shape (n,), increasing, n >= 2.
+        positions: displacement at the nodes (m), shape (n,).
+    """
+
+    times: Array
+    positions: Array
+
+    def __call__(self, t: Array) -> Array:
+        """Displacement (m) at time ``t`` (s)."""
+        i = jnp.clip(jnp.searchsorted(self.times, t, side="right") - 1, 0, self.times.size - 2)
+        t0, t1 = self.times[i], self.times[i + 1]
+        p0, p1 = self.positions[i], self.positions[i + 1]
+        return p0 + (p1 - p0) * (t - t0) / (t1 - t0)
+
+
+class State(eqx.Module):
+    """Everything that evolves.
+
+    Attributes:
+        x, v: displacement (m) and velocity (m/s) of the block.
+        force: force of every Jenkins element (N), shape (n,).
+        cap: cap of every element as it was last (N), shape (n,); for the books of energy and sliding only.
+        psi: weakening state, 1 rested ... 0 fully weakened.
+        memory: one state for each effect, in their order (``()`` where it has none).
+        work: energies since the start (J).
+    """
+
+    x: Array
+    v: Array
+    force: Array
+    cap: Array
+    psi: Array
+    memory: tuple[Any, ...]
+    work: Work
+
+
+class Work(NamedTuple):
+    """Energies since the start (J): done by the spring, lost in friction, in viscous damping, and by effects' forces."""
+
+    spring: Array
+    friction: Array
+    viscous: Array
+    body: Array
+
+
+class Forces(NamedTuple):
+    """Forces at the end of an increment (N): pull of the spring, contact (holding back), viscous, of effects.
+
+    ``dissipated`` is the energy lost by sliding and flow within the increment (J).
+    """
+
+    spring: Array
+    contact: Array
+    viscous: Array
+    body: Array
+    dissipated: Array
+
+    @property
+    def net(self) -> Array:
+        return self.spring - self.contact - self.viscous + self.body
+
+
+class Model(eqx.Module):
+    """A spring-driven block on a rough contact.
+
+    Attributes:
+        block: mass, spring, damping.
+        bank: Jenkins elements of all contacts together, at full strength.
+        weakening: the base law of friction.
+        load_point: where the spring is pulled to.
+        effects: what else acts, in the order of application.
+    """
+
+    block: Block
+    bank: Bank
+    weakening: Weakening
+    load_point: LoadPoint
+    effects: tuple[Effect, ...] = ()
+
+    def shaped(self) -> Bank:
+        """The bank with all geometric effects in it."""
+        bank = self.bank
+        for effect in self.effects:
+            if isinstance(effect, Geometry):
+                bank = effect.reshape(bank)
+        return bank
+
+    def lead(self, t: Array) -> Array:
+        """Displacement of the load point (m) at time ``t`` (s), drive effects included."""
+        at = self.load_point(t)
+        return at + sum(e.lead(t, at) for e in self.effects if isinstance(e, Drive))
+
+    def pull(self, stretch: Array) -> Array:
+        """Force of the spring (N) at the elongation ``stretch`` (m)."""
+        force = self.block.spring_stiffness * stretch
+        for effect in self.effects:
+            if isinstance(effect, Spring):
+                force = effect.pull(stretch, force)
+        return force
+
+    def rest(self, t: float | Array = 0.0, x: float | Array = 0.0, v: float | Array = 0.0) -> State:
+        """A virgin contact: no force in any element, full strength."""
+        zero = jnp.zeros(())
+        return State(
+            x=jnp.asarray(x, float) + zero,
+            v=jnp.asarray(v, float) + zero,
+            force=jnp.zeros_like(self.bank.stiffness),
+            cap=self.shaped().strength,
+            psi=jnp.ones(()),
+            memory=tuple(e.start(self.bank) if isinstance(e, Memory) else () for e in self.effects),
+            work=Work(zero, zero, zero, zero),
+        )
+
+    def contact(self, state: State, bank: Bank, t: Array) -> Contact:
+        """What effects may know of the contact at the start of an increment."""
+        return Contact(state.force, bank.stiffness, bank.strength, self.pull(self.lead(t) - state.x))
+
+    def advance(self, state: State, bank: Bank, contact: Contact, motion: Motion) -> tuple[State, Forces]:
+        """Take contact and effects through one increment.
+
+        Args:
+            state: at the start.
+            bank: :meth:`shaped`, made once.
+            contact: :meth:`contact` of the start.
+            motion: the increment.
+
+        Returns:
+            The state at the end (its ``work`` is not touched) and the forces there.
+        """
+        memory = tuple(
+            e.advance(m, motion, contact) if isinstance(e, Memory) else m
+            for e, m in zip(self.effects, state.memory, strict=True)
+        )
+        psi = self.weakening.advance(state.psi, motion)
+        cap = bank.strength * self.weakening.strength(psi)
+        stiffness = bank.stiffness
+        body = jnp.zeros(())
+        for e, m in zip(self.effects, memory, strict=True):
+            if isinstance(e, Threshold):
+                cap = cap * e.strength(m, motion, contact)
+            if isinstance(e, Stiffness):
+                stiffness = stiffness * e.stiffness(m, motion, contact)
+            if isinstance(e, BodyForce):
+                body = body + e.force(m, motion, contact)
+        dissipated = jnp.zeros(())
+        slides = jnp.abs(state.force) >= (1.0 - 1e-9) * state.cap
+        mean_cap = jnp.where(slides, 0.5 * (state.cap + cap), cap)
+        force, lost = _return_map(state.force + stiffness * motion.turn, stiffness, cap, mean_cap)
+        dissipated = dissipated + lost
+        trial = force + stiffness * (motion.dx - motion.turn)
+        for e, m in zip(self.effects, memory, strict=True):
+            if isinstance(e, Flow):
+                flowed = e.flow(m, motion, trial, contact)
+                dissipated = dissipated + jnp.sum(0.5 * (trial**2 - flowed**2) * _compliance(stiffness))
+                trial = flowed
+        force, lost = _return_map(trial, stiffness, cap, mean_cap)
+        dissipated = dissipated + lost
+        forces = Forces(
+            spring=self.pull(motion.load_point - motion.x),
+            contact=jnp.sum(force),
+            viscous=self.block.damping * motion.v,
+            body=body,
+            dissipated=dissipated,
+        )
+        return State(motion.x, motion.v, force, cap, psi, memory, state.work), forces
+
+    def read(self, state: State, motion: Motion, contact_force: Array) -> Array:
+        """Displacement (m) that the sensor shows."""
+        reading = motion.x
+        for e, m in zip(self.effects, state.memory, strict=True):
+            if isinstance(e, Sensor):
+                reading = e.read(m, reading, motion, contact_force)
+        return reading
+
+    def stored(self, state: State, bank: Bank, t: Array) -> Array:
+        """Kinetic energy plus what is stored in the Jenkins elements (J)."""
+        return 0.5 * self.block.mass * state.v**2 + jnp.sum(0.5 * state.force**2 * _compliance(bank.stiffness))
+
+
+def _return_map(trial: Array, stiffness: Array, cap: Array, mean_cap: Array) -> tuple[Array, Array]:
+    """The cap on the elastic trial forces, and the energy lost in sliding against the mean cap of the increment (J)."""
+    clipped = jnp.clip(trial, -cap, cap)
+    return clipped, jnp.sum(abs(trial - clipped) * _compliance(stiffness) * mean_cap)
+
+
+def _compliance(stiffness: Array) -> Array:
+    """1/k (m/N), zero for an element that holds no spring."""
+    empty = stiffness <= 0.0
+    return jnp.where(empty, 0.0, 1.0 / jnp.where(empty, 1.0, stiffness))

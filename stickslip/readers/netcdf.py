@@ -1,0 +1,41 @@
+"""NetCDF: version 3 by scipy, version 4 by h5netcdf, both through xarray."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import InputError
+from .base import Columns, add_array, need_columns
+
+
+class NetcdfReader:
+    """NetCDF 3 and 4."""
+
+    name = "netcdf"
+    suffixes = (".nc", ".cdf", ".nc4")
+    description = "NetCDF (3 and 4)"
+
+    def sniff(self, path: Path, head: bytes) -> bool:
+        return head[:4] in (b"CDF\x01", b"CDF\x02") or (
+            head.startswith(b"\x89HDF") and path.suffix.lower() in self.suffixes
+        )
+
+    def read(self, path: Path) -> Columns:
+        import xarray
+
+        with path.open("rb") as stream:
+            classic = stream.read(3) == b"CDF"
+        columns = Columns({})
+        try:
+            # decode_times=False: "seconds since ..." stays a number
+            with xarray.open_dataset(path, engine="scipy" if classic else "h5netcdf", decode_times=False) as data:
+                for name, variable in data.variables.items():
+                    unit = variable.attrs.get("units", variable.attrs.get("unit"))
+                    if isinstance(unit, str):
+                        unit = unit.split(" since ")[0]
+                    add_array(columns, str(name), variable.values, unit if isinstance(unit, str) else None)
+        except InputError:
+            raise
+        except Exception as error:  # the engines raise many kinds on a damaged file
+            raise InputError(f"not a readable NetCDF file ({type(error).__name__}: {error})", file=path) from None
+        return need_columns(columns, path)

@@ -1,0 +1,63 @@
+"""Sensor noise and resolution, from the record itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def estimate_resolution(values: Array, samples: int = 200_000) -> float | None:
+    """One count of a quantised record, in its unit, or None where the values are not on a grid.
+
+    Args:
+        values: shape (n,), SI or raw.
+        samples: at most so many values are looked at, in stretches over the whole record.
+    """
+    x = _sample(values, samples)
+    steps = np.abs(np.diff(x))
+    scale = float(np.max(np.abs(x), initial=0.0))
+    steps = steps[steps > 1e-12 * scale]
+    if steps.size < 10:
+        return None
+    # one count is the commonest of the smallest steps; rounding in a file's decimals smears it
+    smallest = float(np.min(steps))
+    count = float(np.median(steps[steps < 1.5 * smallest]))
+    multiples = steps / count
+    tolerance = 0.02 * np.maximum(1.0, multiples / 50)
+    on_grid = np.abs(multiples - np.round(multiples)) < tolerance
+    few = multiples < 25  # far multiples fall on the grid of any count by chance
+    if few.sum() < 10 or on_grid[few].mean() < 0.98 or np.unique(np.round(multiples[few])).size > 0.5 * few.sum():
+        return None
+    near = few & on_grid
+    return float(np.sum(steps[near] * np.round(multiples[near])) / np.sum(np.round(multiples[near]) ** 2))
+
+
+def noise_level(values: Array, resolution: float | None = None, windows: int = 400, length: int = 64) -> float:
+    """Standard deviation of one sample, in the unit of the values, from the quiet stretches of a record.
+
+    Third differences take out position, velocity and acceleration, so that a moving block counts as quiet unless it
+    jerks; their rms over sqrt(20) is the standard deviation of white noise. Of many short windows the lower quarter
+    is taken. Counts: never below the LSB/sqrt(12) of rounding itself, which a still, undithered counter hides.
+
+    Args:
+        values: shape (n,).
+        resolution: one count, or None.
+    """
+    n = values.size
+    floor = (resolution or 0.0) / np.sqrt(12.0)
+    if n < 8:
+        return float(floor)
+    length = min(length, n)
+    starts = np.unique(np.linspace(0, n - length, min(windows, max(n // length, 1))).astype(int))
+    blocks = values[starts[:, None] + np.arange(length)]
+    rms = np.sqrt(np.mean(np.diff(blocks, n=3, axis=1) ** 2, axis=1) / 20.0)
+    return float(max(np.quantile(rms, 0.25), floor))
+
+
+def _sample(values: Array, samples: int, length: int = 2000) -> Array:
+    if values.size <= samples:
+        return values
+    starts = np.linspace(0, values.size - length, samples // length).astype(int)
+    return values[(starts[:, None] + np.arange(length)).ravel()]

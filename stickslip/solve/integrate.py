@@ -1,0 +1,180 @@
+"""Integrate a model from a state to a time, in pieces of bounded memory, with progress and errors that teach."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..contact import Bank
+from ..effects.base import Motion
+from ..errors import SolveError
+from ..model import Model, State
+from .stepper import ContactStepper, Step, Tolerance
+from .trajectory import Stats, Steps, Trajectory, energy_error
+
+PIECE = 4096  # steps between two looks at the clock; bounds the memory of one compiled call
+SMALLEST_STEP = 1e-10  # s; four orders below the period of any contact resonance a vibrometer could see
+
+_TERM = diffrax.ODETerm(lambda t, y, args: y)  # never called: the solver takes the model through an increment itself
+
+
+def error_norm(error: State) -> jax.Array:
+    """Largest of the two scaled errors the solver reports."""
+    return jnp.maximum(jnp.abs(error.x), jnp.abs(error.v))
+
+
+def step_control(dtmax: Any = None) -> diffrax.PIDController:
+    """The step-size controller; the solver's error is already scaled, so one is the limit."""
+    return diffrax.PIDController(
+        rtol=0.0, atol=1.0, pcoeff=0.2, icoeff=0.5, norm=error_norm, dtmin=SMALLEST_STEP, dtmax=dtmax, factormax=5.0
+    )
+
+
+def observe(t: Any, y: State, args: tuple[Model, Bank]) -> Steps:
+    """What is recorded at the end of a step."""
+    model, bank = args
+    lead = model.lead(t)
+    zero = jnp.zeros(())
+    contact_force = jnp.sum(y.force)
+    still = Motion(t + zero, zero + 1e-12, y.x, y.v, zero, zero, lead)
+    return Steps(
+        t=t + zero,
+        x=y.x,
+        v=y.v,
+        reading=model.read(y, still, contact_force),
+        spring_force=model.pull(lead - y.x),
+        contact_force=contact_force,
+        psi=y.psi,
+        sliding=jnp.sum(jnp.where(jnp.abs(y.force) >= (1 - 1e-9) * y.cap, bank.strength, 0.0)) / jnp.sum(bank.strength),
+        spring_work=y.work.spring,
+        friction_work=y.work.friction,
+        viscous_work=y.work.viscous,
+        body_work=y.work.body,
+        stored=model.stored(y, bank, t),
+    )
+
+
+def _leaves(t: Any, y: State, args: Any) -> list[jax.Array]:
+    """The state as a flat list: diffrax cannot buffer a tree with an empty tuple in it."""
+    return jax.tree.leaves(y)
+
+
+@eqx.filter_jit
+def _piece(model: Model, bank: Bank, tolerance: Tolerance, times: jax.Array, y: State, carried: Any) -> Any:
+    """At most PIECE steps; ``times`` are start, end, first and largest step (s)."""
+    t0, t1, dt, dtmax = times
+    saves = diffrax.SaveAt(
+        subs=[diffrax.SubSaveAt(steps=True, fn=observe), diffrax.SubSaveAt(t1=True, fn=_leaves)],
+        solver_state=True,
+        controller_state=True,
+    )
+    solver_state, controller_state = (None, None) if carried is None else carried
+    solution = diffrax.diffeqsolve(
+        _TERM,
+        ContactStepper(tolerance=tolerance),
+        t0,
+        t1,
+        dt,
+        y,
+        args=(model, bank),
+        saveat=saves,
+        stepsize_controller=step_control(dtmax),
+        adjoint=diffrax.ForwardMode(),
+        max_steps=PIECE,
+        throw=False,
+        solver_state=solver_state,
+        controller_state=controller_state,
+        made_jump=None if carried is None else False,
+    )
+    steps, leaves = solution.ys
+    last = jax.tree.unflatten(jax.tree.structure(y), leaves)
+    return solution.stats, solution.result, (solution.solver_state, solution.controller_state), steps, last
+
+
+def integrate(
+    model: Model,
+    t1: float,
+    *,
+    t0: float = 0.0,
+    state: State | None = None,
+    tolerance: Tolerance | None = None,
+    stops: Sequence[float] = (),
+    largest_step: float = 0.05,
+    most_steps: int = 50_000_000,
+    progress: Callable[[float, Steps], None] | None = None,
+) -> tuple[Trajectory, State]:
+    """Integrate the equation of motion.
+
+    Args:
+        model: block, contact, drive and effects.
+        t1, t0: end and start (s).
+        state: state at ``t0``; a virgin contact at rest at the load point's first position if not given.
+        tolerance: error allowed in a step.
+        stops: times (s) to land on: kinks of the drive.
+        largest_step: longest step (s).
+        most_steps: give up after so many steps.
+        progress: called now and then with the time reached (s) and the last piece's steps.
+
+    Returns:
+        The trajectory and the state at ``t1``.
+
+    Raises:
+        SolveError: the step size fell below its limit or a number was lost; says when and what to change.
+    """
+    began = time.perf_counter()
+    tolerance = Tolerance() if tolerance is None else tolerance
+    bank = model.shaped()
+    state = model.rest(t0) if state is None else state
+    kinks = sorted({float(s) for s in stops if t0 < s < t1} | {float(t1)})
+    pieces = [jax.tree.map(lambda a: np.asarray(a)[None], observe(jnp.asarray(float(t0)), state, (model, bank)))]
+    accepted = rejected = 0
+    now, dt, carried = float(t0), 1e-5, None
+    for stop in kinks:
+        while now < stop:
+            times = jnp.asarray([now, stop, dt, largest_step])
+            stats, result, carried, steps, last = _piece(model, bank, tolerance, times, state, carried)
+            state = jax.tree.map(lambda a: a[0], last)
+            n = int(stats["num_accepted_steps"])
+            accepted, rejected = accepted + n, rejected + int(stats["num_rejected_steps"])
+            piece = jax.tree.map(lambda a, n=n: np.asarray(a[:n]), steps)
+            if n:
+                pieces.append(piece)
+            reached = float(piece.t[-1]) if n else now
+            _refuse_failure(result, reached, state, accepted, most_steps)
+            if n > 1:
+                dt = float(piece.t[-1] - piece.t[-2])
+            now = reached
+            if progress is not None:
+                progress(now, piece)
+        dt = min(dt, 1e-4)
+    steps = Steps(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
+    stats = Stats(accepted, rejected, energy_error(steps), time.perf_counter() - began)
+    return Trajectory(steps, stats), state
+
+
+def _refuse_failure(result: Any, now: float, state: State, accepted: int, most_steps: int) -> None:
+    """Turn what diffrax reports into an error that says when and what to change."""
+    good = diffrax.RESULTS.successful, diffrax.RESULTS.max_steps_reached
+    finite = bool(np.isfinite(state.x)) and bool(np.isfinite(state.v))
+    if any(bool(result == r) for r in good) and finite and accepted < most_steps:
+        return
+    if accepted >= most_steps:
+        why = f"{accepted} steps were not enough; loosen the tolerance, raise the damping, or simulate less time"
+    elif not finite:
+        why = "position or velocity is no longer a number; look for a parameter far outside its usual range"
+    else:
+        why = (
+            f"the step size fell below {SMALLEST_STEP:g} s without the error of a step coming down; loosen the "
+            "tolerance, or look for an effect with a force that jumps"
+        )
+    raise SolveError(f"the integration stopped at t = {now:.6g} s (v = {float(state.v):.3g} m/s): {why}")
+
+
+__all__ = ["Step", "Tolerance", "integrate"]

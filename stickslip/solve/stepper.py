@@ -1,0 +1,220 @@
+"""TR-BDF2 for a block on a bank of Jenkins elements: a diffrax solver whose step contains the return map.
+
+A vector field with kinks handed to a stock solver is an invalid input: the kinks lie wherever an element starts or
+stops to slide. Here a step is an increment, as in finite elements: position and velocity follow TR-BDF2 (Bank et al.
+1985; L-stable, second order, third-order error estimate of Hosea & Shampine 1996), while contact and effects are
+taken by their own exact or implicit update from the start of the step to each of its two stages. Each stage is one scalar
+equation in the velocity, solved by Newton's method. A reversal inside the step is a turning point of the path, so
+hysteresis is kept without landing on it.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from ..contact import Bank
+from ..effects.base import Contact, Motion
+from ..model import Forces, Model, State, Work
+
+GAMMA = 2.0 - math.sqrt(2.0)
+D = GAMMA / 2.0  # weight of the implicit end point in both stages
+W = math.sqrt(2.0) / 4.0  # weight of the start and of the first stage in the second
+# embedded third-order weights minus those of the method
+E0, E1, E2 = (1.0 - W) / 3.0 - W, (3.0 * W + 1.0) / 3.0 - W, D / 3.0 - D
+
+
+class HermiteInterpolation(diffrax.AbstractLocalInterpolation):
+    """Cubic in the displacement, its derivative in the velocity, linear in the rest."""
+
+    t0: Array
+    t1: Array
+    y0: State
+    y1: State
+
+    def evaluate(self, t0: Any, t1: Any = None, left: bool = True) -> State:
+        if t1 is not None:
+            return jax.tree.map(jnp.subtract, self.evaluate(t1), self.evaluate(t0))
+        h = self.t1 - self.t0
+        s = jnp.where(h > 0, (t0 - self.t0) / jnp.where(h > 0, h, 1.0), 0.0)
+        y = jax.tree.map(lambda a, b: a + s * (b - a), self.y0, self.y1)
+        dx = self.y1.x - self.y0.x
+        x = self.y0.x + hermite(s, h, dx, self.y0.v, self.y1.v)
+        return eqx.tree_at(lambda y: y.x, y, x)
+
+
+def hermite(s: Array, h: Array, dx: Array, v0: Array, v1: Array) -> Array:
+    """Displacement since the start of a step at its fraction ``s``, from increment and end velocities (cubic)."""
+    return s * s * (3 - 2 * s) * dx + h * s * (1 - s) * ((1 - s) * v0 - s * v1)
+
+
+class Tolerance(eqx.Module):
+    """What the error of a step is measured against: the scale of the contact, not of the travel.
+
+    Creep moves picometres a step where the contact is stiff; a tolerance relative to the travelled distance sees nothing.
+
+    Attributes:
+        relative: share of the step's own increment and of its velocity.
+        displacement: absolute part (m).
+        velocity: absolute part (m/s).
+    """
+
+    relative: Array = eqx.field(default=1e-2, converter=jnp.asarray)
+    displacement: Array = eqx.field(default=1e-11, converter=jnp.asarray)
+    velocity: Array = eqx.field(default=1e-7, converter=jnp.asarray)
+
+
+class Step(eqx.Module):
+    """What the solver carries from step to step: the acceleration at its start and the share of sliding elements."""
+
+    acceleration: Array
+    failed: Array
+
+
+class ContactStepper(diffrax.AbstractAdaptiveSolver):
+    """The solver. ``terms`` is ``ODETerm(model)``-like: its vector field is never called, the model is ``args``.
+
+    Attributes:
+        tolerance: see :class:`Tolerance`; the returned error is already divided by it.
+        newton_steps: most Newton iterations of a stage; a stage that needs more makes the step fail and be halved.
+    """
+
+    tolerance: Tolerance
+    newton_steps: int = eqx.field(default=12, static=True)
+
+    term_structure: ClassVar = diffrax.AbstractTerm
+    interpolation_cls: ClassVar[Callable[..., HermiteInterpolation]] = HermiteInterpolation
+
+    def order(self, terms: Any) -> int:
+        return 2
+
+    def error_order(self, terms: Any) -> int:
+        return 3
+
+    def init(self, terms: Any, t0: Any, t1: Any, y0: State, args: tuple[Model, Bank]) -> Step:
+        return Step(self.func(terms, t0, y0, args).v, jnp.zeros((), bool))
+
+    def func(self, terms: Any, t0: Any, y0: State, args: tuple[Model, Bank]) -> State:
+        """Rate of position and velocity at a point (the rest of the state has no rate of its own)."""
+        model, bank = args
+        zero = jnp.zeros(())
+        lead = model.lead(t0)
+        still = Motion(t0 + zero, zero + 1e-12, y0.x, y0.v, zero, zero, lead)
+        _, forces = model.advance(y0, bank, model.contact(y0, bank, t0), still)
+        rate = jax.tree.map(jnp.zeros_like, y0)
+        return eqx.tree_at(lambda y: (y.x, y.v), rate, (y0.v, forces.net / model.block.mass))
+
+    def step(
+        self, terms: Any, t0: Any, t1: Any, y0: State, args: tuple[Model, Bank], solver_state: Step, made_jump: Any
+    ) -> tuple[State, State, dict, Step, diffrax.RESULTS]:
+        model, bank = args
+        h = t1 - t0
+        a0, v0 = solver_state.acceleration, y0.v
+        contact = model.contact(y0, bank, t0)
+        tol = self.tolerance
+        dh = D * h
+        exact = 1e-3 * tol.velocity
+
+        def stage(t: Array, dt: Array, known_dx: Array, known_v: Array, guess: Array) -> tuple:
+            """Solve v = known_v + D h a(v), dx = known_dx + D h v; the path runs from the start of the step."""
+            problem = (model, bank, y0, contact, t, dt, known_dx, known_v, model.lead(t), dh)
+            v, slope, converged = _root(problem, guess, exact, self.newton_steps)
+            _, state, forces, motion = _increment(v, *problem)
+            return v, (v - known_v) / dh, state, forces, motion, slope, converged
+
+        tg = t0 + GAMMA * h
+        v1, a1, _, f1, m1, _, ok1 = stage(tg, GAMMA * h, dh * v0, v0 + dh * a0, v0)
+        wh = W * h
+        v2, a2, y1, f2, m2, slope, ok2 = stage(t1, h, wh * (v0 + v1), v0 + wh * (a0 + a1), v1)
+
+        ex = h * (E0 * v0 + E1 * v1 + E2 * v2)
+        ev = h * (E0 * a0 + E1 * a1 + E2 * a2)
+        # stiff part of the estimate damped by (1 - D h J)^-1, J the tangent of the second stage
+        ex, ev = (ex + dh * ev) / slope, (ev - (slope - 1.0) / dh * ex) / slope
+        sx = tol.displacement + tol.relative * m2.path
+        sv = tol.velocity + tol.relative * jnp.maximum(abs(v0), abs(v2))
+        ok = ok1 & ok2
+        error = jax.tree.map(jnp.zeros_like, y0)
+        error = eqx.tree_at(
+            lambda y: (y.x, y.v), error, (jnp.where(ok, ex / sx, jnp.inf), jnp.where(ok, ev / sv, jnp.inf))
+        )
+        y1 = eqx.tree_at(lambda y: y.work, y1, _work(y0, contact, (v0, v1, v2), (f1, f2), h, model))
+        return y1, error, {"y0": y0, "y1": y1}, Step(a2, ~ok), diffrax.RESULTS.successful
+
+
+def _work(y0: State, contact: Contact, v: tuple, f: tuple, h: Array, model: Model) -> Work:
+    """Energies of the step, by the method's own weights."""
+    v0, v1, v2 = v
+    f1, f2 = f
+
+    def quadrature(p0: Array, p1: Array, p2: Array) -> Array:
+        return h * (W * (p0 + p1) + D * p2)
+
+    spring = quadrature(contact.spring_force * v0, f1.spring * v1, f2.spring * v2)
+    viscous = quadrature(model.block.damping * v0 * v0, f1.viscous * v1, f2.viscous * v2)
+    body = quadrature(f1.body * v0, f1.body * v1, f2.body * v2)
+    w = y0.work
+    return Work(w.spring + spring, w.friction + f2.dissipated, w.viscous + viscous, w.body + body)
+
+
+def _path(t: Array, dt: Array, x0: Array, v0: Array, v: Array, dx: Array, lead: Array) -> Motion:
+    """The increment, with its turning point where the velocity changes sign (parabola through the end velocities)."""
+    reverses = v0 * v < 0.0
+    turn = jnp.where(reverses, 0.5 * dt * v0 * v0 / jnp.where(reverses, v0 - v, 1.0), 0.0)
+    return Motion(t, dt, x0 + dx, v, turn, dx, lead)
+
+
+def _increment(
+    v: Array,
+    model: Model,
+    bank: Bank,
+    y0: State,
+    contact: Contact,
+    t: Array,
+    dt: Array,
+    known_dx: Array,
+    known_v: Array,
+    lead: Array,
+    dh: Array,
+) -> tuple[Array, State, Forces, Motion]:
+    """Residual of a stage's equation for the end velocity ``v``, and what the increment then leads to."""
+    motion = _path(t, dt, y0.x, y0.v, v, known_dx + dh * v, lead)
+    state, forces = model.advance(y0, bank, contact, motion)
+    return v - known_v - dh * forces.net / model.block.mass, state, forces, motion
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
+def _root(problem: tuple, guess: Array, exact: Array, most: int) -> tuple[Array, Array, Array]:
+    """Root of the scalar, monotone, piecewise smooth residual; slope at the root; whether it was reached."""
+
+    def cond(carry: tuple) -> Array:
+        _, _, step, n = carry
+        return (abs(step) > exact) & (n < most)
+
+    def body(carry: tuple) -> tuple:
+        v, _, _, n = carry
+        value, slope = jax.jvp(lambda v: _increment(v, *problem)[0], (v,), (jnp.ones(()),))
+        step = value / slope
+        return v - step, slope, step, n + 1
+
+    v, slope, step, _ = jax.lax.while_loop(cond, body, (guess, jnp.ones(()), jnp.full((), jnp.inf), 0))
+    return v, slope, abs(step) <= exact
+
+
+@_root.defjvp
+def _root_jvp(most: int, primals: tuple, tangents: tuple) -> tuple:
+    """Implicit function theorem; the slope only serves the error estimate and carries no derivative."""
+    problem, guess, exact = primals
+    v, slope, converged = _root(problem, guess, exact, most)
+    _, change = jax.jvp(lambda *p: _increment(v, *p)[0], problem, tangents[0])
+    zero = np.zeros((), jax.dtypes.float0)
+    return (v, slope, converged), (-change / slope, jnp.zeros_like(slope), zero)

@@ -1,0 +1,81 @@
+"""What an integration leaves behind: the accepted steps, and any time in between by the solver's own interpolant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .stepper import hermite
+
+
+class Steps(NamedTuple):
+    """Accepted steps, the start included; every field has shape (n,).
+
+    Units: s, m, m/s, m, N, N, 1, 1, and J for the energies (done by the spring; lost in friction; lost in viscous
+    damping; given by effects' forces; stored, kinetic energy included).
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    reading: np.ndarray
+    spring_force: np.ndarray
+    contact_force: np.ndarray
+    psi: np.ndarray
+    sliding: np.ndarray
+    spring_work: np.ndarray
+    friction_work: np.ndarray
+    viscous_work: np.ndarray
+    body_work: np.ndarray
+    stored: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stats:
+    """What the integration cost and how well it kept its books.
+
+    Attributes:
+        steps, rejected: accepted and rejected steps.
+        energy_error: largest imbalance of the energies over the work done by the spring (1).
+        seconds: wall time.
+    """
+
+    steps: int
+    rejected: int
+    energy_error: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """An integration from start to end.
+
+    Attributes:
+        steps: the accepted steps.
+        stats: cost and energy balance.
+    """
+
+    steps: Steps
+    stats: Stats
+
+    def at(self, t: np.ndarray) -> Steps:
+        """Everything at the times ``t`` (s), shape (m,): cubic in the displacement, linear in the rest."""
+        s = self.steps
+        t = np.clip(np.asarray(t, float), s.t[0], s.t[-1])
+        i = np.clip(np.searchsorted(s.t, t, side="right") - 1, 0, max(s.t.size - 2, 0))
+        h = s.t[i + 1] - s.t[i]
+        w = (t - s.t[i]) / h
+        linear = Steps(*(f[i] + w * (f[i + 1] - f[i]) for f in s))
+        bend = s.x[i] + hermite(w, h, s.x[i + 1] - s.x[i], s.v[i], s.v[i + 1]) - linear.x
+        return linear._replace(t=t, x=linear.x + bend, reading=linear.reading + bend)
+
+
+def energy_error(s: Steps) -> float:
+    """Largest |spring + effects - stored - friction - viscous| over the largest work done by the spring."""
+    gap = (s.spring_work + s.body_work) - (s.stored - s.stored[0]) - s.friction_work - s.viscous_work
+    scale = np.max(np.abs(s.spring_work)) + np.max(np.abs(s.stored))
+    return float(np.max(np.abs(gap)) / scale) if scale > 0 else 0.0
+
+

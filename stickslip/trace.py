@@ -1,0 +1,278 @@
+"""One measured (or simulated) run: SI arrays that nobody can change, where they came from and what was mended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InputError
+
+Array = NDArray[np.float64]
+SIGNALS = {"displacement": "m", "velocity": "m/s", "spring_force": "N"}
+
+
+@dataclass(frozen=True)
+class Repair:
+    """Something changed or left out between the file and the trace.
+
+    Args:
+        kind: a short name such as ``"spike"``, ``"wrap"``, ``"nan"``, ``"dropped-samples"``.
+        count: how many samples or places.
+        where: the channel and the first place.
+        reason: why it was necessary, in words.
+    """
+
+    kind: str
+    count: int
+    where: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.count} ({self.where}): {self.reason}"
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a trace came from: file, its SHA-256, the reader, and quantity -> column and unit."""
+
+    file: str = ""
+    sha256: str = ""
+    reader: str = ""
+    columns: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """The load point's position against time, piecewise linear.
+
+    Args:
+        times: breakpoints, s, shape (k,), k >= 2, strictly increasing.
+        positions: load-point positions there, m, shape (k,).
+
+    Beyond its ends the drive goes on with the velocity of its first and last piece.
+    """
+
+    times: Array
+    positions: Array
+
+    def __post_init__(self) -> None:
+        times, positions = _frozen(self.times, "drive times"), _frozen(self.positions, "drive positions")
+        if times.size < 2 or times.shape != positions.shape:
+            raise InputError("a drive needs at least two times and as many positions", value=(times.size, positions.size))
+        if not (np.all(np.isfinite(times)) and np.all(np.isfinite(positions)) and np.all(np.diff(times) > 0)):
+            raise InputError("the times of a drive must be finite and increase", hint="check the drive's 'until' times")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "positions", positions)
+
+    @classmethod
+    def constant(cls, velocity: float, start: float = 0.0, stop: float | None = None) -> Drive:
+        """A drive at one velocity (m/s), at position zero at ``start`` (s)."""
+        end = start + 1.0 if stop is None or stop <= start else stop
+        return cls(np.array([start, end]), np.array([0.0, velocity * (end - start)]))
+
+    @classmethod
+    def from_pieces(cls, until: ArrayLike, velocities: ArrayLike, start: float = 0.0) -> Drive:
+        """A drive of constant velocities (m/s), each lasting until a time (s), at position zero at ``start``."""
+        ends, speeds = np.asarray(until, float), np.asarray(velocities, float)
+        if ends.shape != speeds.shape or ends.ndim != 1 or ends.size == 0:
+            raise InputError("every piece of a drive needs one end time and one velocity")
+        times = np.concatenate([[start], ends])
+        if not np.all(np.diff(times) > 0):
+            raise InputError("the times of a drive must be finite and increase", hint="check the drive's 'until' times")
+        return cls(times, np.concatenate([[0.0], np.cumsum(speeds * np.diff(times))]))
+
+    @classmethod
+    def from_samples(cls, time: ArrayLike, position: ArrayLike, tolerance: float) -> Drive:
+        """The fewest straight pieces that stay within ``tolerance`` (m) of sampled positions.
+
+        The "swinging door" of process historians: a piece is stretched as long as one slope serves all its
+        samples, so a million samples of steady drive become one piece while ripple above the tolerance stays.
+        """
+        t, y = np.asarray(time, float), np.asarray(position, float)
+        knots, values, i, n = [0], [float(y[0])], 0, t.size
+        while i < n - 1:
+            stop, slope = _longest_piece(t, y, i, values[-1], tolerance)
+            values.append(values[-1] + slope * (t[stop] - t[i]))
+            knots.append(stop)
+            i = stop
+        return cls(t[knots], np.array(values))
+
+    def _piece(self, time: ArrayLike) -> NDArray[np.intp]:
+        return np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, self.times.size - 2)
+
+    def velocity(self, time: ArrayLike) -> Array:
+        """Load-point velocity, m/s, same shape as ``time``; at a breakpoint that of the piece it opens."""
+        speeds = np.diff(self.positions) / np.diff(self.times)
+        return speeds[self._piece(time)]
+
+    def position(self, time: ArrayLike) -> Array:
+        """Load-point position, m, same shape as ``time`` (s)."""
+        t = np.asarray(time, float)
+        if self.times.size == 2:  # one piece: no search through millions of samples
+            speed = (self.positions[1] - self.positions[0]) / (self.times[1] - self.times[0])
+            return np.asarray(self.positions[0] + speed * (t - self.times[0]))
+        piece = self._piece(t)
+        speeds = np.diff(self.positions) / np.diff(self.times)
+        return self.positions[piece] + speeds[piece] * (t - self.times[piece])
+
+    @property
+    def breakpoints(self) -> Array:
+        """Times (s) where the velocity changes, the two ends left out."""
+        return self.times[1:-1]
+
+    @property
+    def speed(self) -> float:
+        """The speed at which the drive moves when it moves: the time-weighted median of |v| over moving pieces, m/s."""
+        lengths = np.diff(self.times)
+        speeds = np.abs(np.diff(self.positions) / lengths)
+        moving = speeds > 0.05 * speeds.max(initial=0.0)
+        if not moving.any():
+            return 0.0
+        order = np.argsort(speeds[moving])
+        weight = np.cumsum(lengths[moving][order])
+        return float(speeds[moving][order][np.searchsorted(weight, 0.5 * weight[-1])])
+
+    def holds(self, start: float, stop: float, fraction: float = 0.05) -> list[tuple[float, float]]:
+        """Stretches (s, s) within [start, stop] where the drive is slower than ``fraction`` of its usual speed."""
+        limit = fraction * self.speed
+        if limit == 0:
+            return [(start, stop)]
+        slow = np.abs(np.diff(self.positions) / np.diff(self.times)) < limit
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))
+        found = []
+        for first, last in edges.reshape(-1, 2):
+            a = start if first == 0 else max(start, self.times[first])
+            b = stop if last == slow.size else min(stop, self.times[last])
+            if b > a:
+                found.append((float(a), float(b)))
+        return found
+
+
+def _longest_piece(t: Array, y: Array, i: int, anchor: float, tolerance: float) -> tuple[int, float]:
+    """Last index reachable from sample ``i`` by one line through ``anchor``, and that line's slope."""
+    low, high, j, chunk = -np.inf, np.inf, i + 1, 64
+    while j < t.size:
+        part = slice(j, min(j + chunk, t.size))
+        dt = t[part] - t[i]
+        lows = np.maximum.accumulate(np.maximum((y[part] - tolerance - anchor) / dt, low))
+        highs = np.minimum.accumulate(np.minimum((y[part] + tolerance - anchor) / dt, high))
+        bad = np.flatnonzero(lows > highs)
+        if bad.size:
+            k = int(bad[0])
+            if k:
+                low, high = float(lows[k - 1]), float(highs[k - 1])
+            return max(j + k - 1, i + 1), 0.5 * (low + high)
+        low, high, j, chunk = float(lows[-1]), float(highs[-1]), part.stop, min(2 * chunk, 1 << 20)
+    return t.size - 1, 0.5 * (low + high)
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A run in SI units; every array read-only, shape (n,).
+
+    Args:
+        name: unique within its campaign.
+        time: s, strictly increasing.
+        displacement, velocity, spring_force: of the block in m, m/s, N; at least one.
+        drive: the load point, if known.
+        drive_position: the measured load point, m, if there is a channel.
+        normal_load: N, if measured.
+        resolution: one count of the leading signal, in its unit.
+        noise: standard deviation of one sample of the leading signal, in its unit.
+        spring_stiffness: N/m, where this run's spring is known.
+        virgin: whether the run starts from a freshly set down, never loaded contact.
+        role: ``"train"``, ``"held-out"`` or ``""`` (undecided).
+        missing: times (s) of the last sample before each gap in the record.
+        repairs, warnings, provenance: what was mended, what looks odd, where it came from.
+
+    Raises:
+        InputError: no signal, lengths that differ, time that does not increase, values that are not finite.
+    """
+
+    name: str
+    time: Array
+    displacement: Array | None = None
+    velocity: Array | None = None
+    spring_force: Array | None = None
+    drive: Drive | None = None
+    drive_position: Array | None = None
+    normal_load: Array | None = None
+    resolution: float | None = None
+    noise: float | None = None
+    spring_stiffness: float | None = None
+    virgin: bool = False
+    role: str = ""
+    missing: tuple[float, ...] = ()
+    repairs: tuple[Repair, ...] = ()
+    warnings: tuple[str, ...] = ()
+    provenance: Provenance = field(default_factory=Provenance)
+
+    def __post_init__(self) -> None:
+        time = _frozen(self.time, f"{self.name}: time")
+        if time.size < 2:
+            raise InputError(f"trace '{self.name}' has {time.size} samples", allowed="at least 2")
+        # one pass without a copy of the differences: long records must fit in memory
+        if not (time[1:] > time[:-1]).all():
+            row = int(np.flatnonzero(~(time[1:] > time[:-1]))[0]) + 1
+            raise InputError(f"trace '{self.name}': time does not increase at sample {row}", value=float(time[row]))
+        object.__setattr__(self, "time", time)
+        if all(getattr(self, name) is None for name in SIGNALS):
+            raise InputError(f"trace '{self.name}' has no signal", allowed="displacement, velocity or spring_force")
+        for name in (*SIGNALS, "drive_position", "normal_load"):
+            values = getattr(self, name)
+            if values is None:
+                continue
+            array = _frozen(values, f"{self.name}: {name}")
+            if array.shape != time.shape:
+                raise InputError(f"trace '{self.name}': {name} has {array.size} samples, time has {time.size}")
+            if not np.isfinite(array).all():
+                raise InputError(f"trace '{self.name}': {name} holds values that are not finite")
+            object.__setattr__(self, name, array)
+
+    @property
+    def leading(self) -> str:
+        """Name of the signal that is measured best known to tell events: displacement, else velocity, else force."""
+        return next(name for name in SIGNALS if getattr(self, name) is not None)
+
+    @property
+    def signal(self) -> Array:
+        """The leading signal, SI, shape (n,)."""
+        return getattr(self, self.leading)
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, s."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def sampling_rate(self) -> float:
+        """Mean sampling rate, Hz."""
+        return (self.time.size - 1) / self.duration
+
+    @property
+    def drive_velocity(self) -> float | None:
+        """The drive's usual speed, m/s, or None where no drive is known."""
+        return None if self.drive is None else self.drive.speed
+
+    def replace(self, **changes: object) -> Trace:
+        """A copy with some fields changed."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+
+def _frozen(values: ArrayLike, what: str) -> Array:
+    """A read-only float view; copies only what someone else could still write to."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 1:
+        raise InputError(f"{what} must be one-dimensional", value=array.shape)
+    if array.flags.writeable:
+        array = array.copy() if array.base is not None or array is values else array
+        array.flags.writeable = False
+    return array
