@@ -21,6 +21,7 @@ from .effects.base import (
     Effect,
     Flow,
     Geometry,
+    Inertia,
     Memory,
     Motion,
     Sensor,
@@ -166,6 +167,14 @@ class Model(eqx.Module):
         at = self.load_point(t)
         return at + sum(e.lead(t, at) for e in self.effects if isinstance(e, Drive))
 
+    def mass(self) -> Array:
+        """Moving mass (kg), effects included."""
+        mass = self.block.mass
+        for effect in self.effects:
+            if isinstance(effect, Inertia):
+                mass = effect.mass(mass)
+        return mass
+
     def pull(self, stretch: Array) -> Array:
         """Force of the spring (N) at the elongation ``stretch`` (m)."""
         force = self.block.spring_stiffness * stretch
@@ -189,7 +198,7 @@ class Model(eqx.Module):
 
     def contact(self, state: State, bank: Bank, t: Array) -> Contact:
         """What effects may know of the contact at the start of an increment."""
-        return Contact(state.force, bank.stiffness, bank.strength, self.pull(self.lead(t) - state.x))
+        return Contact(state.force, bank.stiffness, bank.strength, self.pull(self.lead(t) - state.x), self.mass())
 
     def advance(self, state: State, bank: Bank, contact: Contact, motion: Motion) -> tuple[State, Forces]:
         """Take contact and effects through one increment.
@@ -203,6 +212,7 @@ class Model(eqx.Module):
         Returns:
             The state at the end (its ``work`` is not touched) and the forces there.
         """
+        motion = motion._replace(pull=self.pull(motion.load_point - motion.x))
         memory = tuple(
             e.advance(m, motion, contact) if isinstance(e, Memory) else m
             for e, m in zip(self.effects, state.memory, strict=True)
@@ -232,7 +242,7 @@ class Model(eqx.Module):
         force, lost = _return_map(trial, stiffness, cap, mean_cap)
         dissipated = dissipated + lost
         forces = Forces(
-            spring=self.pull(motion.load_point - motion.x),
+            spring=jnp.asarray(motion.pull),
             contact=jnp.sum(force),
             viscous=self.block.damping * motion.v,
             body=body,
@@ -250,7 +260,7 @@ class Model(eqx.Module):
 
     def stored(self, state: State, bank: Bank, t: Array) -> Array:
         """Kinetic energy plus what is stored in the Jenkins elements (J)."""
-        return 0.5 * self.block.mass * state.v**2 + jnp.sum(0.5 * state.force**2 * _compliance(bank.stiffness))
+        return 0.5 * self.mass() * state.v**2 + jnp.sum(0.5 * state.force**2 * _compliance(bank.stiffness))
 
 
 def _return_map(trial: Array, stiffness: Array, cap: Array, mean_cap: Array) -> tuple[Array, Array]:

@@ -66,7 +66,9 @@ class Drive:
     def __post_init__(self) -> None:
         times, positions = _frozen(self.times, "drive times"), _frozen(self.positions, "drive positions")
         if times.size < 2 or times.shape != positions.shape:
-            raise InputError("a drive needs at least two times and as many positions", value=(times.size, positions.size))
+            raise InputError(
+                "a drive needs at least two times and as many positions", value=(times.size, positions.size)
+            )
         if not (np.all(np.isfinite(times)) and np.all(np.isfinite(positions)) and np.all(np.diff(times) > 0)):
             raise InputError("the times of a drive must be finite and increase", hint="check the drive's 'until' times")
         object.__setattr__(self, "times", times)
@@ -91,18 +93,21 @@ class Drive:
 
     @classmethod
     def from_samples(cls, time: ArrayLike, position: ArrayLike, tolerance: float) -> Drive:
-        """The fewest straight pieces that stay within ``tolerance`` (m) of sampled positions.
+        """Few straight pieces that stay within about ``tolerance`` (m) of sampled positions (never beyond its double).
 
         The "swinging door" of process historians: a piece is stretched as long as one slope serves all its
-        samples, so a million samples of steady drive become one piece while ripple above the tolerance stays.
+        samples, so a million samples of steady drive become one piece while ripple above the tolerance stays. Each
+        piece ends at the mean of a few samples: one that ended at the tolerance's edge would make the next one short.
         """
         t, y = np.asarray(time, float), np.asarray(position, float)
-        knots, values, i, n = [0], [float(y[0])], 0, t.size
-        while i < n - 1:
-            stop, slope = _longest_piece(t, y, i, values[-1], tolerance)
-            values.append(values[-1] + slope * (t[stop] - t[i]))
+        knots, values, n = [0], [float(y[0])], t.size
+        while knots[-1] < n - 1:
+            i = knots[-1]
+            stop = _reach(t, y, i, values[-1], tolerance)
+            near = min(3, stop - i - 1, n - 1 - stop)
+            value = float(y[stop - near : stop + near + 1].mean())
             knots.append(stop)
-            i = stop
+            values.append(min(max(value, float(y[stop]) - tolerance), float(y[stop]) + tolerance))
         return cls(t[knots], np.array(values))
 
     def _piece(self, time: ArrayLike) -> NDArray[np.intp]:
@@ -156,8 +161,8 @@ class Drive:
         return found
 
 
-def _longest_piece(t: Array, y: Array, i: int, anchor: float, tolerance: float) -> tuple[int, float]:
-    """Last index reachable from sample ``i`` by one line through ``anchor``, and that line's slope."""
+def _reach(t: Array, y: Array, i: int, anchor: float, tolerance: float) -> int:
+    """Last index that one line from ``anchor`` at sample ``i`` reaches within the tolerance."""
     low, high, j, chunk = -np.inf, np.inf, i + 1, 64
     while j < t.size:
         part = slice(j, min(j + chunk, t.size))
@@ -166,12 +171,9 @@ def _longest_piece(t: Array, y: Array, i: int, anchor: float, tolerance: float) 
         highs = np.minimum.accumulate(np.minimum((y[part] + tolerance - anchor) / dt, high))
         bad = np.flatnonzero(lows > highs)
         if bad.size:
-            k = int(bad[0])
-            if k:
-                low, high = float(lows[k - 1]), float(highs[k - 1])
-            return max(j + k - 1, i + 1), 0.5 * (low + high)
+            return max(j + int(bad[0]) - 1, i + 1)
         low, high, j, chunk = float(lows[-1]), float(highs[-1]), part.stop, min(2 * chunk, 1 << 20)
-    return t.size - 1, 0.5 * (low + high)
+    return t.size - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,6 +192,7 @@ class Trace:
         spring_stiffness: N/m, where this run's spring is known.
         virgin: whether the run starts from a freshly set down, never loaded contact.
         role: ``"train"``, ``"held-out"`` or ``""`` (undecided).
+        minimum_slip: m, the smallest slip that counts as an event, where somebody stated it.
         missing: times (s) of the last sample before each gap in the record.
         repairs, warnings, provenance: what was mended, what looks odd, where it came from.
 
@@ -210,6 +213,7 @@ class Trace:
     spring_stiffness: float | None = None
     virgin: bool = False
     role: str = ""
+    minimum_slip: float | None = None
     missing: tuple[float, ...] = ()
     repairs: tuple[Repair, ...] = ()
     warnings: tuple[str, ...] = ()

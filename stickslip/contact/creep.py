@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Literal, NamedTuple
 
 import jax
@@ -15,7 +16,7 @@ from ._ranges import check_within, concrete
 from .elastic import Moduli, equal_bodies
 from .indentation import Indentation, check_saturation, indentation
 from .profiles import Profile, from_heights
-from .roughness import rough_lines
+from .roughness import check_line, line_phasors, lines_from_phasors
 from .tangential import StaticContact
 
 Average = Literal["displacement", "force"]
@@ -151,22 +152,13 @@ def creep_curve(
     else:
         table = indentation(profile)
     contact = static_contact(table, normal_force, friction, moduli)
-    share = contact.contact_share
+    tau_out, u, u_max, stiffness, share = _evaluate(contact, jnp.asarray(loads), average)
     if concrete(share) and (profile is None or jnp.any(profile.gaps > 0.0)):  # a flat punch is meant to touch all over
         check_saturation(share, key="contact")
-    tau_out, u = line_average(contact, loads, average)
     force = tau_out * contact.strength * contacts
-    return CreepCurve(
-        tau_out,
-        u,
-        virtual_time(force, u, spring_stiffness, velocity, time),
-        force,
-        jnp.mean(contact.u_max),
-        jnp.std(contact.u_max),
-        jnp.mean(contact.stiffness),
-        jnp.mean(share),
-        table.gaps.shape[-1],
-    )
+    t = virtual_time(force, u, spring_stiffness, velocity, time)
+    reach, spread = jnp.mean(u_max), jnp.std(u_max)
+    return CreepCurve(tau_out, u, t, force, reach, spread, jnp.mean(stiffness), jnp.mean(share), table.gaps.shape[-1])
 
 
 def creep_displacements(
@@ -183,7 +175,7 @@ def creep_displacements(
     seed: int = 0,
     memory: float = 2.0e8,
 ) -> np.ndarray:
-    """Displacements at given loads for many parameter sets, mean over the lines (a sweep; for derivatives: `creep_curve`).
+    """Displacements at given loads for many parameter sets, mean over the lines. For derivatives: `creep_curve`.
 
     The first four arguments broadcast to one axis of P sets. Lines are made and sorted once for each distinct H;
     sets are worked off in chunks.
@@ -228,7 +220,8 @@ def rough_table(
     Args: as of `creep_curve`, but ``roll_off`` and ``cut_off`` as shares of the length.
     """
     check_within("the length of the line", length, above=0.0, key="line_length", unit="m")
-    return _sorted(from_heights(rough_lines(H, lines, n_springs, seed, **waves), length / n_springs))
+    check_line(H, lines, n_springs)
+    return _table(H, line_phasors(lines, n_springs, seed), length / n_springs, waves)
 
 
 def static_contact(
@@ -239,7 +232,14 @@ def static_contact(
     return StaticContact(table, normal_force, friction, moduli or equal_bodies())
 
 
-_sorted = jax.jit(indentation)
+@jax.jit
+def _table(H: ArrayLike, phasors: ArrayLike, dx: ArrayLike, waves: dict[str, ArrayLike | None]) -> Indentation:
+    return indentation(from_heights(lines_from_phasors(H, phasors, **waves), dx))
+
+
+@partial(jax.jit, static_argnames="average")
+def _evaluate(contact: StaticContact, tau: Array, average: Average) -> tuple[Array, Array, Array, Array, Array]:
+    return *line_average(contact, tau, average), contact.u_max, contact.stiffness, contact.contact_share
 
 
 @jax.jit

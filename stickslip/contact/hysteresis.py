@@ -84,5 +84,8 @@ def power_law_damping_ratio(amplitude: ArrayLike, u_max: ArrayLike, p: ArrayLike
 def microslip_ring_down(
     t: ArrayLike, start: ArrayLike, angular_frequency: ArrayLike, u_max: ArrayLike, p: ArrayLike
 ) -> ArrayLike:
-    """Amplitude (m) at time t (s) of ringing that only microslip damps: hyperbolic, A0/(1 + (p-1) omega A0 t/(3 pi u_max))."""
+    """Amplitude (m) at time ``t`` (s) of ringing that only microslip damps.
+
+    Hyperbolic, A0/(1 + (p - 1) omega A0 t/(3 pi u_max)), while the amplitude is small against u_max.
+    """
     return start / (1.0 + power_law_damping_ratio(start, u_max, p) * angular_frequency * t)

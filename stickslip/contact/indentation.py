@@ -49,9 +49,9 @@ class Indentation(eqx.Module):
 
     def force(self, depth: ArrayLike, modulus: ArrayLike) -> Array:
         """Normal force in N at indentation ``depth`` in m of the top, zero out of contact; ``modulus``: E*, Pa."""
-        level = jnp.maximum(jnp.asarray(depth) / self.height, 0.0)
+        level = jnp.asarray(depth) / self.height
         count, gap, total = self._search(self.gaps, level)
-        return (total + count * (level - gap)) * modulus * self.dx * self.height
+        return (total + count * jnp.maximum(level - gap, 0.0)) * modulus * self.dx * self.height
 
     def depth(self, force: ArrayLike, modulus: ArrayLike) -> Array:
         """Indentation in m at which the normal force is ``force`` (N, not negative); ``modulus`` E* in Pa."""
@@ -61,25 +61,30 @@ class Indentation(eqx.Module):
 
     def contact_length(self, depth: ArrayLike) -> Array:
         """Length in m of the springs that touch; dF_n/d(depth) is E* times it."""
-        level = jnp.asarray(depth) / self.height
-        return jnp.where(level > 0.0, self._search(self.gaps, level)[0] * self.dx, 0.0)
+        return self.contact_share(depth) * (self.gaps.shape[-1] * self.dx)
 
     def contact_share(self, depth: ArrayLike) -> Array:
         """Share of the springs that touch, 0 to 1."""
-        return self.contact_length(depth) / (self.gaps.shape[-1] * self.dx)
+        level = jnp.asarray(depth) / self.height
+        count, gap, _ = self._search(self.gaps, level)
+        return jnp.where(level > gap, count, count - 1.0) / self.gaps.shape[-1]
 
     def _search(self, table: Array, query: ArrayLike) -> tuple[Array, Array, Array]:
         """How many entries of ``table`` are at or below each query (at least one), and the gap and sum at the last."""
         lead = table.shape[:-1]
         shape = jnp.broadcast_shapes(jnp.shape(query), lead)
-        extra = shape[: len(shape) - len(lead)]
-        if shape != (*extra, *lead):
+        if shape[len(shape) - len(lead) :] != lead:
             raise ValueError(f"a query of shape {jnp.shape(query)} does not broadcast against lines of shape {lead}")
-        rows = jnp.broadcast_to(query, shape).reshape(-1, int(np.prod(lead))).T
-        n = table.shape[-1]
-        found = jax.vmap(_last_below)(table.reshape(-1, n), self.gaps.reshape(-1, n), self.sums.reshape(-1, n), rows)
-        count, gap, total = (part.T.reshape(shape) for part in found)
-        return count, gap, total
+        return _find(table, self.gaps, self.sums, jnp.broadcast_to(query, shape))
+
+
+@jax.jit
+def _find(table: Array, gaps: Array, sums: Array, queries: Array) -> tuple[Array, Array, Array]:
+    n = table.shape[-1]
+    rows = queries.reshape(-1, int(np.prod(table.shape[:-1]))).T
+    found = jax.vmap(_last_below)(table.reshape(-1, n), gaps.reshape(-1, n), sums.reshape(-1, n), rows)
+    count, gap, total = (part.T.reshape(queries.shape) for part in found)
+    return count, gap, total
 
 
 def _last_below(table: Array, gaps: Array, sums: Array, queries: Array) -> tuple[Array, Array, Array]:

@@ -61,7 +61,7 @@ def arrest(bank: Bank, ratio: ArrayLike, force: ArrayLike | None = None, kept: A
 
 
 def reload_displacement(bank: Bank, element_force: ArrayLike, load: ArrayLike) -> Array:
-    """Displacement (m) from a state of the bank to a tangential force ``load`` (N), motion in one direction, caps rested.
+    """Displacement (m) from a state of the bank to a tangential force ``load`` (N), caps rested.
 
     The static creep curve of an event that starts from residual forces; ``load`` may have any shape, from the present
     force up to the total strength.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
+from jax import Array
 from jax.typing import ArrayLike
 
 from .bank import Bank, bank_from_backbone, default_edges
@@ -16,7 +17,7 @@ def bank_from_contact(contact: StaticContact, n: int = 128) -> Bank:
     lead = contact.indentation.gaps.shape[:-1]
     contacts = tuple(range(-len(lead), 0))
 
-    def backbone(u: ArrayLike) -> ArrayLike:
+    def backbone(u: Array) -> Array:
         return jnp.sum(contact.force(jnp.reshape(u, (-1,) + (1,) * len(lead))), axis=contacts)
 
     return bank_from_backbone(backbone, jnp.max(contact.u_max), default_edges(n))

@@ -50,7 +50,7 @@ def rough_lines(
     Raises:
         InputError: a value out of its range.
     """
-    _check_line(H, n_lines, n_springs)
+    check_line(H, n_lines, n_springs)
     return lines_from_phasors(H, line_phasors(n_lines, n_springs, seed), roll_off=roll_off, cut_off=cut_off)
 
 
@@ -97,7 +97,8 @@ def cut_to_line_factor(H: ArrayLike) -> Array:
     return jnp.exp(0.5 * (0.5 * jnp.log(jnp.pi) + gammaln(H + 1.0) - gammaln(H + 0.5)))
 
 
-def _check_line(H: ArrayLike, n_lines: int, n_springs: int) -> None:
+def check_line(H: ArrayLike, n_lines: int, n_springs: int) -> None:
+    """Raise InputError unless H, the number of lines and the number of springs are usable."""
     check_within("the Hurst exponent", H, above=0.0, below=1.0, key="H")
     if n_lines < 1:
         raise InputError("no rough line", key="lines", value=n_lines, allowed="1 or more")

@@ -44,8 +44,11 @@ class StaticContact(eqx.Module):
 
     @property
     def u_max(self) -> Array:
-        """Displacement mu (E*/G*) d at which the last spring slides, m (Grzemba 2014, eq. 4)."""
-        return self.depth * self._reach
+        """Displacement mu (E*/G*) d at which the last spring slides, m (Grzemba 2014, eq. 4).
+
+        The depth counts from first touch, where a profile's highest spring lies beside its apex.
+        """
+        return self.displacement(1.0)
 
     @property
     def stiffness(self) -> Array:

@@ -29,6 +29,7 @@ class Motion(NamedTuple):
         turn: displacement from the start to the turning point (m); zero where there is none.
         dx: displacement from the start to the end (m).
         load_point: displacement of the load point at the end (m).
+        pull: force of the driving spring at the end (N); filled in by the model.
     """
 
     t: Array
@@ -38,6 +39,7 @@ class Motion(NamedTuple):
     turn: Array
     dx: Array
     load_point: Array
+    pull: Array | float = 0.0
 
     @property
     def path(self) -> Array:
@@ -73,12 +75,14 @@ class Contact(NamedTuple):
         stiffness: stiffness of every element (N/m), shape (n,).
         strength: cap of every element at full strength, psi = 1 (N), shape (n,).
         spring_force: force of the driving spring at the end of the last increment (N).
+        mass: inertia of the block (kg).
     """
 
     force: Array
     stiffness: Array
     strength: Array
     spring_force: Array
+    mass: Array | float = 0.0
 
 
 class Effect(eqx.Module):
@@ -148,6 +152,14 @@ class Flow(Effect):
     @abc.abstractmethod
     def flow(self, state: Any, motion: Motion, force: Array, contact: Contact) -> Array:
         """Trial forces (N) after the flow; the cap is applied to what is returned."""
+
+
+class Inertia(Effect):
+    """Adds to the mass that moves."""
+
+    @abc.abstractmethod
+    def mass(self, mass: Array) -> Array:
+        """Moving mass (kg) made of the ``mass`` without the effect."""
 
 
 class BodyForce(Effect):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..registry import Registry
 from .base import HEAD_BYTES, Columns, Reader, split_unit
 from .hdf import HdfReader
@@ -27,14 +27,23 @@ def _instance(loaded: object) -> Reader:
 
 READERS: Registry[Reader] = Registry("stickslip.readers", "reader", _instance)
 # a file that many could read goes to the first: NetCDF and MATLAB 7.3 are HDF5 too, and text is the last resort
-for _reader in (NetcdfReader(), MatReader(), HdfReader(), NpyReader(), TdmsReader(), UffReader()):
+_BUILT_IN: tuple[Reader, ...] = (
+    NetcdfReader(),
+    MatReader(),
+    HdfReader(),
+    NpyReader(),
+    TdmsReader(),
+    UffReader(),
+)
+for _reader in _BUILT_IN:
     READERS.register(_reader.name, _reader)
-_TEXT = TextReader()
+_TEXT: Reader = TextReader()
 
 
 def supported() -> str:
     """The formats that can be read, for a message."""
-    readers = [*dict(READERS).values(), _TEXT]
+    readers: list[Reader] = [reader for _, reader in READERS.items()]
+    readers.append(_TEXT)
     return "; ".join(f"{reader.description}: {' '.join(reader.suffixes)}" for reader in readers)
 
 
@@ -47,8 +56,6 @@ def find_reader(path: str | Path, name: str | None = None) -> Reader:
     path = Path(path)
     if not path.exists():
         beside = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
-        from ..errors import nearest
-
         raise InputError("the file is not there", file=path, hint=nearest(path.name, beside) if beside else None)
     if not path.is_file():
         raise InputError("not a file", file=path)

@@ -16,7 +16,7 @@ class HdfReader:
     """HDF5."""
 
     name = "hdf5"
-    suffixes = (".h5", ".hdf5", ".hdf", ".he5")
+    suffixes: tuple[str, ...] = (".h5", ".hdf5", ".hdf", ".he5")
     description = "HDF5"
 
     def sniff(self, path: Path, head: bytes) -> bool:
@@ -27,7 +27,7 @@ class HdfReader:
 
 
 def read_hdf(path: Path, skip: tuple[str, ...] = ()) -> Columns:
-    """Numeric data sets of an HDF5 file; groups named in ``skip`` are left out. Links out of the file are not followed."""
+    """Numeric data sets of an HDF5 file, without groups named in ``skip``. Links out of the file are not followed."""
     import h5py
 
     columns = Columns({})
@@ -44,7 +44,9 @@ def read_hdf(path: Path, skip: tuple[str, ...] = ()) -> Columns:
         with h5py.File(path, "r") as file:
             file.visititems(take)
     except OSError as error:
-        raise InputError(f"not a readable HDF5 file ({error})", file=path, hint="was the file closed when written?") from None
+        raise InputError(
+            f"not a readable HDF5 file ({error})", file=path, hint="was the file closed when written?"
+        ) from None
     return need_columns(columns, path)
 
 

@@ -15,7 +15,7 @@ class MatReader:
     """MATLAB .mat of every version."""
 
     name = "mat"
-    suffixes = (".mat",)
+    suffixes: tuple[str, ...] = (".mat",)
     description = "MATLAB .mat (4, 5, 6, 7 and 7.3)"
 
     def sniff(self, path: Path, head: bytes) -> bool:
@@ -32,7 +32,9 @@ class MatReader:
             content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
         except Exception as error:  # scipy raises many kinds on a damaged file
             raise InputError(
-                f"not a readable MATLAB file ({type(error).__name__}: {error})", file=path, hint="save it again with -v7"
+                f"not a readable MATLAB file ({type(error).__name__}: {error})",
+                file=path,
+                hint="save it again with -v7",
             ) from None
         columns = Columns({})
         for name, value in content.items():

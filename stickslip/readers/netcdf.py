@@ -12,7 +12,7 @@ class NetcdfReader:
     """NetCDF 3 and 4."""
 
     name = "netcdf"
-    suffixes = (".nc", ".cdf", ".nc4")
+    suffixes: tuple[str, ...] = (".nc", ".cdf", ".nc4")
     description = "NetCDF (3 and 4)"
 
     def sniff(self, path: Path, head: bytes) -> bool:

@@ -14,7 +14,7 @@ class NpyReader:
     """NumPy arrays."""
 
     name = "numpy"
-    suffixes = (".npy", ".npz")
+    suffixes: tuple[str, ...] = (".npy", ".npz")
     description = "NumPy .npy and .npz"
 
     def sniff(self, path: Path, head: bytes) -> bool:

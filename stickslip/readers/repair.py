@@ -37,8 +37,8 @@ def unwrap(values: Array, period: float, channel: str, resolution: float | None 
     doubtful = np.flatnonzero(rest > 0.4 * period)
     if doubtful.size:
         raise InputError(
-            f"{channel}: at sample {int(valid[doubtful[0] + 1])} the counter jumps by nearly half its range, so the wrap "
-            f"could be of either sign ({doubtful.size} such places)",
+            f"{channel}: at sample {int(valid[doubtful[0] + 1])} the counter jumps by nearly half its range, so the "
+            f"wrap could be of either sign ({doubtful.size} such places)",
             allowed="less than half the counter's range between two samples",
             hint="correct 'wrap', or record faster",
         )
@@ -187,8 +187,8 @@ def drop_duplicates(time: Array) -> tuple[Mask | None, list[Repair]]:
 def find_gaps(time: Array) -> tuple[Array, list[Repair]]:
     """Times (s) of the last sample before each gap, and how many samples are missing. Nothing is filled in.
 
-    A gap is a step of more than 1.5 times the usual one. Where such steps are not rare (a twentieth of them or more) the
-    sampling rate changes within the record, and only steps longer than those on both sides are gaps.
+    A gap is a step of more than 1.5 times the usual one. Where such steps are not rare (a twentieth of them or more)
+    the sampling rate changes within the record, and only steps longer than those on both sides are gaps.
     """
     steps = np.diff(time)
     usual = float(np.median(steps))

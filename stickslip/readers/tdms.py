@@ -12,7 +12,7 @@ class TdmsReader:
     """LabVIEW TDMS."""
 
     name = "tdms"
-    suffixes = (".tdms",)
+    suffixes: tuple[str, ...] = (".tdms",)
     description = "TDMS of LabVIEW (needs the extra 'tdms')"
 
     def sniff(self, path: Path, head: bytes) -> bool:

@@ -38,7 +38,7 @@ class UffReader:
     """Universal file format."""
 
     name = "uff"
-    suffixes = (".uff", ".unv", ".uf", ".ufb", ".bunv", ".ufa")
+    suffixes: tuple[str, ...] = (".uff", ".unv", ".uf", ".ufb", ".bunv", ".ufa")
     description = "universal file (data set 58, text and binary)"
 
     def sniff(self, path: Path, head: bytes) -> bool:

@@ -111,7 +111,7 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
         still = Motion(t0 + zero, zero + 1e-12, y0.x, y0.v, zero, zero, lead)
         _, forces = model.advance(y0, bank, model.contact(y0, bank, t0), still)
         rate = jax.tree.map(jnp.zeros_like, y0)
-        return eqx.tree_at(lambda y: (y.x, y.v), rate, (y0.v, forces.net / model.block.mass))
+        return eqx.tree_at(lambda y: (y.x, y.v), rate, (y0.v, forces.net / model.mass()))
 
     def step(
         self, terms: Any, t0: Any, t1: Any, y0: State, args: tuple[Model, Bank], solver_state: Step, made_jump: Any
@@ -189,7 +189,7 @@ def _increment(
     """Residual of a stage's equation for the end velocity ``v``, and what the increment then leads to."""
     motion = _path(t, dt, y0.x, y0.v, v, known_dx + dh * v, lead)
     state, forces = model.advance(y0, bank, contact, motion)
-    return v - known_v - dh * forces.net / model.block.mass, state, forces, motion
+    return v - known_v - dh * forces.net / model.mass(), state, forces, motion
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(3,))

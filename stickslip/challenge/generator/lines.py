@@ -105,7 +105,8 @@ def press(surface: Surface, heights: Array, load: float) -> Array:
     c_n = surface.normal_spring
     depth = indentation_depth(gap, c_n, load)
     if surface.softening > 0:
-        limit = (1 - surface.softening) * c_n * depth
+        hardest, kept = c_n * depth, 1 - surface.softening
+        limit = kept * hardest if surface.softening_form == "cap" else hardest / np.sqrt(kept**-2 - 1)
         depth = _soft_depth(gap, c_n, load, limit, surface.softening_form)
         force = _soft_force(c_n * np.maximum(depth - gap, 0.0), limit, surface.softening_form)
     else:

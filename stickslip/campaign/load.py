@@ -1,0 +1,149 @@
+"""Loading a campaign file: checked, in SI, and with every file in its place."""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from ..errors import InputError, nearest
+from .models import CampaignFile, Rig, RigKeys, TraceEntry
+from .place import readable
+
+_MOST_BYTES = 10_000_000
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A validated campaign.
+
+    Args:
+        path: of the file; traces are looked for beside it.
+        sha256: of the file.
+        title, note: free text.
+        rig: what is known of the apparatus, SI.
+        entries: one for each trace.
+    """
+
+    path: Path
+    sha256: str
+    title: str
+    note: str
+    rig: Rig
+    entries: tuple[TraceEntry, ...]
+
+    @property
+    def folder(self) -> Path:
+        """Where the campaign file lies."""
+        return self.path.parent
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the traces, in order."""
+        return [entry.label for entry in self.entries]
+
+    def entry(self, name: str) -> TraceEntry:
+        """The entry of a trace; `InputError` naming the nearest where there is none."""
+        for entry in self.entries:
+            if entry.label == name:
+                return entry
+        raise InputError(f"there is no trace '{name}'", file=self.path, hint=nearest(name, self.names))
+
+    def rig_of(self, name: str) -> Rig:
+        """The rig as it was in one trace: the campaign's, with what the trace gives anew."""
+        entry = self.entry(name)
+        own = {key: getattr(entry, key) for key in RigKeys.model_fields if getattr(entry, key) not in (None, "")}
+        return self.rig.model_copy(update=own)
+
+
+def load_campaign(path: str | Path) -> Campaign:
+    """Read and check a campaign file (TOML; see `campaign_template`).
+
+    Raises:
+        InputError: the file is not there or not TOML; unknown keys, missing units, values out of range, two traces
+            of one name, a trace's file that is not there or lies outside the campaign's folder without ``outside``.
+    """
+    path = Path(path)
+    text, digest = _text(path)
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(
+            f"not valid TOML: {error}", file=path, hint="correct the line; text stands in quotes"
+        ) from None
+    try:
+        file = CampaignFile.model_validate(content)
+    except ValidationError as error:
+        raise readable(error, CampaignFile, text, path) from None
+    entries = tuple(file.trace)
+    repeated = [name for name, count in Counter(entry.label for entry in entries).items() if count > 1]
+    if repeated:
+        numbers = [i for i, entry in enumerate(entries, start=1) if entry.label == repeated[0]]
+        raise InputError(
+            f"traces {', '.join(map(str, numbers))} have the same name '{repeated[0]}'",
+            file=path,
+            key=f"trace[{numbers[1]}].name",
+            hint='give one of them another name = "..."',
+        )
+    for number, entry in enumerate(entries, start=1):
+        for key, name in (("file", entry.file), *_further(entry)):
+            trace_file(path, name, outside=entry.outside, key=f"trace[{number}].{key}")
+    return Campaign(path, digest, file.title, file.note, file.rig, entries)
+
+
+def trace_file(campaign: Path, name: str, *, outside: bool, key: str) -> tuple[Path, bool]:
+    """Where a trace's file lies, and whether that is outside the campaign's folder (links followed).
+
+    Raises:
+        InputError: not there, not a file, or outside without leave.
+    """
+    where = campaign.parent / name
+    try:
+        real, home = where.resolve(), campaign.parent.resolve()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise InputError(f"the file's name cannot be used ({error})", file=campaign, key=key, value=name) from None
+    beyond = not real.is_relative_to(home)
+    if beyond and not outside:
+        raise InputError(
+            "the file lies outside the campaign's folder",
+            file=campaign,
+            key=key,
+            value=name,
+            hint="move it beside the campaign, or write  outside = true  in this trace",
+        )
+    if not real.exists():
+        beside = [p.name for p in where.parent.iterdir() if p.is_file()] if where.parent.is_dir() else []
+        hint = nearest(where.name, beside) if beside else "names are relative to the campaign file's folder"
+        raise InputError("the file is not there", file=campaign, key=key, value=name, hint=hint)
+    if not real.is_file():
+        raise InputError("not a file", file=campaign, key=key, value=name)
+    return where, beyond
+
+
+def _further(entry: TraceEntry) -> list[tuple[str, str]]:
+    channels = ("displacement", "velocity", "spring_force", "normal_load", "drive_position")
+    return [(f"{c}.file", getattr(entry, c).file) for c in channels if getattr(entry, c) and getattr(entry, c).file]
+
+
+def _text(path: Path) -> tuple[str, str]:
+    try:
+        if path.is_dir():
+            raise InputError("not a campaign file but a folder", file=path, hint="name the .toml file in it")
+        if path.stat().st_size > _MOST_BYTES:
+            raise InputError("too large for a campaign file", file=path, hint="is it a file of measurements?")
+        raw = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError("the campaign file is not there", file=path, hint="check the path") from None
+    except OSError as error:
+        raise InputError(f"the campaign file cannot be opened ({error.strerror})", file=path) from None
+    try:
+        return raw.decode("utf-8-sig"), hashlib.sha256(raw).hexdigest()
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise InputError(
+            "not a text file in UTF-8", file=path, key=f"line {line}", hint="save it as UTF-8; is it the .toml file?"
+        ) from None

@@ -1,0 +1,173 @@
+"""Campaigns of five runs as a user would bring them: CSV counts and a campaign file; the truth is kept apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+
+from .bank import Bank, make_bank
+from .dynamics import Drive, Result, simulate
+from .forms import Setup, hide
+from .rigs import draw_setup
+from .sensor import counts, spot
+from .write import write_campaign
+
+OVERSAMPLING = 4
+LONGEST = 16.0  # s
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run to be made: a steady ``velocity`` (m/s) until ``events`` slips, or ``pieces`` of (until s, m/s)."""
+
+    name: str
+    velocity: float
+    events: int = 7
+    pieces: tuple[tuple[float, float], ...] = ()
+
+
+DEFAULT_RUNS = (
+    Run("v050", 5e-5),
+    Run("v100", 1e-4),
+    Run("v200", 2e-4),
+    Run("v400", 4e-4),
+    Run("holds", 1e-4, pieces=((4.3, 1e-4), (5.3, 0.0), (7.6, 1e-4), (12.6, 0.0), (15.2, 1e-4))),
+)
+
+
+def make_campaign(
+    folder: str | Path,
+    seed: int,
+    effects: Iterable[tuple[Any, ...]] = (),
+    *,
+    new_lines: bool = False,
+    runs: Iterable[Run] = DEFAULT_RUNS,
+    virgin: bool = True,
+    spring_known: bool | None = None,
+    dt: float = 1e-5,
+    rate: float = 1e4,
+    quiet: bool = True,
+    setup: Setup | None = None,
+    title: str = "Steel block on V-grooves",
+) -> dict[str, Any]:
+    """Simulate a campaign with hidden effects and write ``campaign.toml`` and one CSV of counts per run.
+
+    Args:
+        folder: created if need be; must not hold a campaign yet.
+        seed: fixes everything.
+        effects: (tag, amplitude or None[, form]) each; see ``forms.hide``.
+        new_lines: new rough lines after every slip, as a real track has.
+        virgin: whether runs start from a contact never loaded; else the record starts after two slips.
+        spring_known: whether the file gives the spring's stiffness; None: in every other case.
+        setup: the apparatus; None draws one.
+
+    Returns:
+        The truth, ready for JSON: rig, surface, sensor, effects with their inner parameters, events of every run.
+
+    Raises:
+        InputError: unknown effect; a campaign is there already; a run shows fewer than three slips.
+    """
+    folder = Path(folder)
+    if (folder / "campaign.toml").exists():
+        raise InputError("a campaign is there already", file=folder / "campaign.toml", hint="choose another folder")
+    rng = np.random.default_rng(seed)
+    setup = draw_setup(rng) if setup is None else setup
+    if spring_known is None:
+        spring_known = bool(rng.random() < 0.5)
+    guess = 10 ** rng.uniform(-0.15, 0.15)
+    base_stiffness = setup.rig.spring_stiffness
+    base_mass = setup.rig.mass
+    hidden = [hide(setup, tag, amplitude, rng, *form) for tag, amplitude, *form in effects]
+    seeds = rng.integers(2**31, size=3)
+    bank = _bank(setup, int(seeds[0]), new_lines)
+    noise = np.random.default_rng(seeds[1])
+    traces, record = [], []
+    for number, run in enumerate(runs):
+        result, start, drive = _run(setup, bank, run, new_lines, virgin, dt, rate, quiet, int(seeds[2]) + number)
+        read, events = _read(setup, result, start, rate, noise)
+        if events["onset"].size < 3:
+            raise InputError(
+                f"run '{run.name}' shows {events['onset'].size} slips", key="effects", hint="a smaller amplitude, or another seed"
+            )
+        traces.append((run, read, drive))
+        record.append({"name": run.name, "start": start, **{key: [float(x) for x in col] for key, col in events.items()}})
+    folder.mkdir(parents=True, exist_ok=True)
+    shown_spring: float | tuple[float, float, float] = base_stiffness
+    if not spring_known:
+        shown_spring = (base_stiffness * guess, base_stiffness * guess / 3, base_stiffness * guess * 3)
+    shown = {"mass": base_mass, "spring": shown_spring}
+    write_campaign(folder, title, setup, shown, traces, rate, virgin)
+    return {
+        "seed": seed,
+        "effects": hidden,
+        "new_lines": new_lines,
+        "virgin": virgin,
+        "spring_known": spring_known,
+        "rig": asdict(setup.rig),
+        "surface": asdict(setup.surface),
+        "sensor": asdict(setup.sensor),
+        "runs": record,
+    }
+
+
+def _bank(setup: Setup, seed: int, new_lines: bool) -> Bank:
+    return make_bank(
+        setup.surface, np.asarray(setup.rig.loads), seed,
+        pool=12 if new_lines else 1, groups=setup.groups, roughness_spread=setup.roughness_spread,
+    )  # fmt: skip
+
+
+def _run(
+    setup: Setup, bank: Bank, run: Run, new_lines: bool, virgin: bool, dt: float, rate: float, quiet: bool, seed: int
+) -> tuple[Result, float, list[tuple[float, float]]]:
+    """The run, the time at which its record starts, and its drive as the file gives it."""
+    if new_lines:
+        turn = seed % bank.normal.shape[0]
+        bank = Bank(np.roll(bank.normal, turn, 0), np.roll(bank.stiffness, turn, 0), bank.start, np.roll(bank.count, turn, 0))
+
+    def go(drive: Drive, duration: float, sampling: float) -> Result:
+        return simulate(
+            setup.rig, drive, bank, setup.effects, duration=duration, dt=dt, rate=sampling, quiet=quiet,
+            new_lines=new_lines, relaxation=setup.relaxation, seed=seed,
+        )  # fmt: skip
+
+    fine = OVERSAMPLING * rate
+    before = 0.0
+    wanted = run.events
+    if not virgin or not run.pieces:
+        # how long it takes is seen from a first pass
+        load = setup.rig.capacity / (setup.rig.spring_stiffness * run.velocity)
+        scout = go(Drive.constant(run.velocity), min(LONGEST, 4.0 * load), 1000.0)
+        arrests, onsets = scout.event_columns["arrest"], scout.event_columns["onset"]
+        if not virgin and onsets.size > 2:
+            before = round(float(arrests[1] + 0.3 * (onsets[2] - arrests[1])), 3)
+            wanted += 2
+        if not run.pieces:
+            last = arrests[min(wanted, arrests.size) - 1] if arrests.size else LONGEST
+            tail = 0.4 * float(np.diff(onsets)[-1]) if onsets.size > 1 else 0.0
+            end = min(before + LONGEST, round(float(last) + tail, 3))
+            return go(Drive.constant(run.velocity), end, fine), before, []
+    pieces = [(before + until, velocity) for until, velocity in run.pieces]
+    if before:
+        pieces[0] = (pieces[0][0], run.velocity)
+    return go(Drive.pieces(pieces), pieces[-1][0], fine), before, list(run.pieces)
+
+
+def _read(
+    setup: Setup, result: Result, start: float, rate: float, rng: np.random.Generator
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    fine = OVERSAMPLING * rate
+    seen = spot(setup.sensor, result.displacement, result.contact_force, result.yaw)
+    first = round(start * fine)
+    seen = seen[first:] - seen[first]
+    read = counts(setup.sensor, seen, fine, rate, rng)
+    keep = result.event_columns["onset"] >= start
+    return read, {
+        key: col[keep] - (start if key in ("onset", "arrest") else 0.0) for key, col in result.event_columns.items()
+    }

@@ -1,0 +1,458 @@
+"""The compiled time loop: leapfrog with the return map; implicit steps while nothing but creep happens."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from . import slots as S
+from .laws import (
+    advance,
+    body_force,
+    damping,
+    friction,
+    load_point,
+    rate_factor,
+    rated,
+    spring_force,
+)
+from .springs import plain, rich, stored
+
+QUIET_BELOW = 0.7e-6  # m/s: creep slower than this ...
+QUIET_AFTER = 8e-3  # s: ... for this long is followed with implicit steps
+QUIET_UNTIL = 1e-6  # m/s: left above this; at 3 um/s every event came 0.1 ms late
+FORCE_MISS = 1e-12  # N: the balance of forces of an implicit step
+KICK_MISS = 1e-10  # N
+
+
+@njit(cache=True)
+def contacts(old, new, k, normal, tau, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff):
+    """All contacts moved by ``du`` (and the yaw ``dq``): (force, force of the yaw moment, sticking stiffness)."""
+    total = 0.0
+    moment = 0.0
+    stiff = 0.0
+    n = start.size - 1
+    for j in range(n):
+        side = 1.0 if 2 * j < n else -1.0
+        step = (du + side * dq) * soft
+        a = tilt
+        if eff[S.TILT_FORM] == 1.0:  # the front contacts lose three times what the rear ones gain
+            a = 3.0 * tilt if side > 0.0 else -tilt
+        p = plus * (1.0 - a)
+        m = minus * (1.0 - a)
+        if is_rich:
+            f, s = rich(old, new, k, normal, tau, start[j], start[j + 1], step, h, p, m, eff)
+        else:
+            f, s = plain(old[0], new[0], k, normal, start[j], start[j + 1], step, p, m)
+        total += f
+        moment += side * f
+        stiff += s * soft
+    return total, moment, stiff
+
+
+@njit(cache=True)
+def needs_rich(eff):
+    return eff[S.SLIPW_EPS] != 0.0 or eff[S.CREEP_V] != 0.0 or eff[S.VISCO_G] != 0.0 or eff[S.RENEW_RATE] != 0.0
+
+
+@njit(cache=True)
+def fresh_lines(f, normal_old, normal, k, count_old, count, start):
+    """Move the forces to new lines by rank: every spring keeps its share of the cap, every contact its force."""
+    out = np.zeros_like(f)
+    for j in range(start.size - 1):
+        lo = start[j]
+        was = 0.0
+        now = 0.0
+        for i in range(count_old[j]):
+            was += f[0, lo + i] + f[1, lo + i]
+        for i in range(count[j]):
+            src = min(int((i + 0.5) / count[j] * count_old[j]), count_old[j] - 1)
+            share = normal[lo + i] / normal_old[lo + src]
+            out[0, lo + i] = f[0, lo + src] * share
+            out[1, lo + i] = f[1, lo + src] * share
+            out[2, lo + i] = f[2, lo + src]
+            out[3, lo + i] = f[3, lo + src]
+            now += out[0, lo + i] + out[1, lo + i]
+        if now != 0.0:
+            for i in range(count[j]):
+                out[0, lo + i] *= was / now
+                out[1, lo + i] *= was / now
+    return out
+
+
+@njit(cache=True)
+def seed_generator(seed):
+    np.random.seed(seed)
+
+
+@njit(cache=True)
+def new_life(eff):
+    """Distance a junction lasts: exponentially distributed, or the same for all."""
+    if eff[S.RENEW_FORM] == 0.0:
+        return -math.log(1.0 - np.random.random()) / eff[S.RENEW_RATE]
+    return 1.0 / eff[S.RENEW_RATE]
+
+
+@njit(cache=True)
+def run(
+    rig, eff, normal_pool, k_pool, count_pool, start, tau, times, positions, duration, dt, record_dt,
+    quiet_allowed, quiet_dt, renew, onset_velocity, seed, record, events,
+):  # fmt: skip
+    """Integrate to ``duration``, filling ``record`` (samples, RECORD_SIZE) and ``events`` (max, 7).
+
+    Returns the number of events, of steps and of implicit steps.
+    """
+    seed_generator(seed)
+    size = normal_pool.shape[1]
+    k = k_pool[0]
+    normal = normal_pool[0]
+    row = 0
+    f = np.zeros((4, size))
+    g = np.zeros((4, size))
+    is_rich = needs_rich(eff)
+    is_rated = rated(eff)
+    if eff[S.RENEW_RATE] != 0.0:
+        for i in range(size):
+            life = new_life(eff)
+            f[3, i] = life if eff[S.RENEW_FORM] == 0.0 else life * np.random.random()
+    state = np.zeros(S.STATE_SIZE)
+    state[S.PSI] = 1.0
+    state[S.AGE] = eff[S.AGE_START]
+    state[S.REST] = 0.0
+    trial = state.copy()
+
+    mass = rig[S.MASS]
+    capacity = rig[S.MU_S] * normal_pool[0].sum()
+    yaw_on = eff[S.YAW_EPS] != 0.0
+    yaw_mass = 0.4 * mass
+    yaw_w = 2.0 * math.pi * eff[S.YAW_F]
+    k_m = 1.0 / eff[S.COMPLIANCE] if eff[S.COMPLIANCE] != 0.0 else 0.0
+    quiet_allowed = quiet_allowed and not yaw_on
+
+    t = 0.0
+    x = 0.0
+    u = 0.0  # displacement of the contact; x unless the fixture gives
+    vh = 0.0
+    v = 0.0
+    q = 0.0
+    qh = 0.0
+    z = load_point(0.0, times, positions, eff)
+    y = z - x
+    soft = 1.0
+    fs, branch = spring_force(y, y, 0.0, 0.0, dt, rig, eff)
+    fc = 0.0
+    moment = 0.0
+    stiff = k.sum()
+    c_now = rig[S.DAMPING]
+    fb = body_force(0.0, 0.0, 0.0, rig, eff)
+
+    work_drive = 0.0
+    work_spring = 0.0
+    work_contact = 0.0
+    work_viscous = 0.0
+    work_body = 0.0
+    yaw_energy = 0.0
+
+    calm = 0.0
+    quiet = False
+    sliding = False
+    n_events = 0
+    n_steps = 0
+    n_quiet = 0
+    n_samples = record.shape[0]
+    sample = 0
+    lost = 0.0  # elastic energy that left the books when springs were replaced
+
+    while sample < n_samples:
+        # the record, by interpolation over the last step, is written at the end of the loop; sample 0 is the start
+        if sample == 0:
+            record[0, :] = 0.0
+            record[0, 2] = z
+            record[0, 3] = fs
+            record[0, 5] = 1.0
+            sample = 1
+            continue
+        t0, x0, v0, z0, y0, fs0, fc0, psi0, u0, q0 = t, x, v, z, y, fs, fc, state[S.PSI], u, q
+        wd0, ws0, wc0, wv0, wb0 = work_drive, work_spring, work_contact, work_viscous, work_body
+        c0, fb0 = c_now, fb
+        power = abs(fc0 * v0)
+        n_steps += 1
+
+        done = False
+        if quiet:
+            h = quiet_dt
+            for i in range(times.size):  # land on the corners of the drive
+                if times[i] > t0 + 1e-3 * dt and times[i] < t0 + h:
+                    h = times[i] - t0
+            t1 = t0 + h
+            z1 = load_point(t1, times, positions, eff)
+            lo = 0.0
+            hi = 0.0
+            r_lo = 0.0
+            r_hi = 0.0
+            du = 0.0
+            guess = v0 * h
+            bracketed = 0
+            for it in range(200):
+                advance(state, trial, du / h, h, rig, eff, power)
+                mu = friction(trial, t1, x0 + du, rig, eff)
+                plus = mu
+                minus = mu
+                if is_rated:
+                    plus = mu * rate_factor(max(du / h, 0.0), trial, eff)
+                    minus = mu * rate_factor(max(-du / h, 0.0), trial, eff)
+                tilt = 0.0
+                if eff[S.TILT_K] != 0.0:
+                    tilt = eff[S.TILT_K] * fs0 / capacity
+                fc, moment, stiff = contacts(
+                    f, g, k, normal, tau, start, du, 0.0, h, plus, minus, soft, tilt, is_rich, eff
+                )
+                x = u0 + du + (fc / k_m if k_m != 0.0 else 0.0)
+                v = (x - x0) / h
+                y = z1 - x
+                fs, br = spring_force(y, y0, branch, t1, h, rig, eff)
+                c_now = damping(v, stiff, fc / capacity, rig, eff)
+                fb = body_force(t1, x, v, rig, eff)
+                miss = fs - fc - c_now * v + fb - mass * (v - v0) / h
+                if abs(miss) < FORCE_MISS:
+                    done = True
+                    break
+                if it == 0:
+                    lo = hi = 0.0
+                    r_lo = r_hi = miss
+                    du = guess if guess * miss > 0.0 else (1e-12 if miss > 0.0 else -1e-12)
+                    continue
+                if bracketed == 0:
+                    if miss * r_lo > 0.0:  # same side as the start: go on
+                        lo = du
+                        r_lo = miss
+                        du *= 3.0
+                        if abs(du) > 2.0 * QUIET_UNTIL * h:
+                            break
+                        continue
+                    hi = du
+                    r_hi = miss
+                    bracketed = 1
+                else:
+                    if miss * r_lo > 0.0:
+                        lo = du
+                        r_lo = miss
+                        if bracketed == 2:
+                            r_hi *= 0.5
+                        bracketed = 2
+                    else:
+                        hi = du
+                        r_hi = miss
+                        if bracketed == 3:
+                            r_lo *= 0.5
+                        bracketed = 3
+                if abs(hi - lo) < 1e-14 * abs(hi) + 1e-21:
+                    done = True
+                    break
+                du = lo + (hi - lo) * r_lo / (r_lo - r_hi)
+            if done and abs(v) > QUIET_UNTIL:
+                done = False
+            if done:
+                n_quiet += 1
+                t = t1
+                z = z1
+                branch = br
+                u = u0 + du
+                vh = v
+                dx = x - x0
+                work_viscous += 0.5 * (c0 * v0 + c_now * v) * dx
+                work_body += 0.5 * (fb0 + fb) * dx
+            else:  # too fast: take the step again with small ones
+                quiet = False
+                calm = 0.0
+                t, x, v, y, fs, fc, c_now, fb = t0, x0, v0, y0, fs0, fc0, c0, fb0
+        if not done:
+            h = dt
+            t = t0 + h
+            x = x0 + h * vh
+            z = load_point(t, times, positions, eff)
+            y = z - x
+            fs, branch = spring_force(y, y0, branch, t, h, rig, eff)
+            du = h * vh
+            if k_m != 0.0:
+                du = (k_m * (x - u0) - fc0) / (k_m + stiff)
+            u = u0 + du
+            dq = h * qh
+            q = q0 + dq
+            advance(state, trial, du / h, h, rig, eff, power)
+            mu = friction(trial, t, x, rig, eff)
+            tilt = 0.0
+            if eff[S.TILT_K] != 0.0:
+                tilt = eff[S.TILT_K] * fs / capacity
+            c_now = damping(vh, stiff, fc0 / capacity, rig, eff)
+            fb = body_force(t, x, vh, rig, eff)
+            if not is_rated:
+                fc, moment, stiff = contacts(
+                    f, g, k, normal, tau, start, du, dq, h, mu, mu, soft, tilt, is_rich, eff
+                )
+                before = vh
+                vh = ((mass / h - 0.5 * c_now) * vh + fs - fc + fb) / (mass / h + 0.5 * c_now)
+                v = 0.5 * (before + vh)
+            else:
+                # the caps depend on the velocity of this node: solve the kick for it
+                inertia = 2.0 * mass / h
+                lo = hi = 0.0
+                r_lo = r_hi = 0.0
+                bracketed = 0
+                v = v0
+                stretch = 1.0
+                for it in range(200):
+                    plus = mu * rate_factor(max(v, 0.0), trial, eff)
+                    minus = mu * rate_factor(max(-v, 0.0), trial, eff)
+                    fc, moment, stiff = contacts(
+                        f, g, k, normal, tau, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff
+                    )
+                    miss = fs - fc + fb - c_now * v - inertia * (v - vh)
+                    if abs(miss) < KICK_MISS:
+                        break
+                    if it == 0:
+                        lo = v
+                        r_lo = miss
+                        v += miss / (inertia + c_now)
+                        continue
+                    if bracketed == 0:
+                        if miss * r_lo > 0.0:
+                            step = miss / (inertia + c_now)
+                            if abs(r_lo - miss) > 0.0 and abs(miss) > 0.5 * abs(r_lo):
+                                stretch *= 2.0
+                            lo = v
+                            r_lo = miss
+                            v += step * stretch
+                            continue
+                        hi = v
+                        r_hi = miss
+                        bracketed = 1
+                    elif miss * r_lo > 0.0:
+                        lo = v
+                        r_lo = miss
+                        if bracketed == 2:
+                            r_hi *= 0.5
+                        bracketed = 2
+                    else:
+                        hi = v
+                        r_hi = miss
+                        if bracketed == 3:
+                            r_lo *= 0.5
+                        bracketed = 3
+                    if abs(hi - lo) < 1e-13 * abs(hi) + 1e-17:
+                        break
+                    v = lo + (hi - lo) * r_lo / (r_lo - r_hi)
+                vh = 2.0 * v - vh
+            work_viscous += 0.5 * h * (c0 * v0 * v0 + c_now * v * v)
+            work_body += 0.5 * h * (fb0 * v0 + fb * v)
+            if yaw_on:
+                c_y = 2.0 * eff[S.YAW_ZETA] * yaw_mass * yaw_w
+                pull = eff[S.YAW_EPS] * fs - moment - yaw_mass * yaw_w * yaw_w * q
+                before = qh
+                qh = ((yaw_mass / h - 0.5 * c_y) * qh + pull) / (yaw_mass / h + 0.5 * c_y)
+                rate = 0.5 * (before + qh)
+                work_viscous += c_y * rate * rate * h
+                work_contact += moment * rate * h
+                work_body += eff[S.YAW_EPS] * fs * rate * h
+                yaw_energy = 0.5 * yaw_mass * (rate * rate + yaw_w * yaw_w * q * q)
+
+        # commit
+        f, g = g, f
+        for i in range(S.STATE_SIZE):
+            state[i] = trial[i]
+        if eff[S.RENEW_RATE] != 0.0:
+            for i in range(size):
+                if f[3, i] <= 0.0:
+                    f[3, i] = new_life(eff)
+        mean_s = 0.5 * (fs0 + fs)
+        work_drive += mean_s * (z - z0)
+        work_spring += mean_s * (y - y0)
+        work_contact += 0.5 * (fc0 + fc) * (x - x0)
+        if not (abs(v) < 1e3):
+            return -1, n_steps, n_quiet
+
+        # record
+        energy_known = False
+        in_contact = 0.0
+        while sample < n_samples and sample * record_dt <= t + 1e-3 * dt:
+            w = (sample * record_dt - t0) / (t - t0)
+            w = min(1.0, max(0.0, w))
+            if not energy_known:
+                in_contact = stored(f, k, size, soft, eff)
+                if k_m != 0.0:
+                    in_contact += 0.5 * fc * fc / k_m
+                energy_known = True
+            vs = v0 + w * (v - v0)
+            record[sample, 0] = x0 + w * (x - x0)
+            record[sample, 1] = vs
+            record[sample, 2] = z0 + w * (z - z0)
+            record[sample, 3] = fs0 + w * (fs - fs0)
+            record[sample, 4] = fc0 + w * (fc - fc0)
+            record[sample, 5] = psi0 + w * (state[S.PSI] - psi0)
+            record[sample, 6] = 0.5 * mass * vs * vs + yaw_energy
+            record[sample, 7] = ws0 + w * (work_spring - ws0)
+            record[sample, 8] = in_contact - lost
+            record[sample, 9] = wc0 + w * (work_contact - wc0)
+            record[sample, 10] = wv0 + w * (work_viscous - wv0)
+            record[sample, 11] = wd0 + w * (work_drive - wd0)
+            record[sample, 12] = wb0 + w * (work_body - wb0)
+            record[sample, 13] = q0 + w * (q - q0)
+            sample += 1
+
+        # events
+        if not sliding and v > onset_velocity:
+            sliding = True
+            if n_events < events.shape[0]:
+                w = (onset_velocity - v0) / (v - v0) if v > v0 else 1.0
+                w = min(1.0, max(0.0, w))
+                events[n_events, 0] = t0 + w * (t - t0)
+                events[n_events, 2] = x0 + w * (x - x0)
+                events[n_events, 4] = v
+                events[n_events, 5] = fs
+        elif sliding:
+            if n_events < events.shape[0] and v > events[n_events, 4]:
+                events[n_events, 4] = v
+            if v <= 0.0:
+                sliding = False
+                if n_events < events.shape[0]:
+                    w = v0 / (v0 - v) if v0 > v else 1.0
+                    events[n_events, 1] = t0 + w * (t - t0)
+                    events[n_events, 3] = x0 + w * (x - x0)
+                    events[n_events, 6] = fs
+                n_events += 1
+                before = stored(f, k, size, soft, eff)
+                changed = False
+                if renew:
+                    nxt = n_events % normal_pool.shape[0]
+                    f = fresh_lines(
+                        f, normal, normal_pool[nxt], k_pool[nxt], count_pool[row], count_pool[nxt], start
+                    )
+                    row = nxt
+                    normal = normal_pool[row]
+                    k = k_pool[row]
+                    changed = True
+                for i in range(size):
+                    f[2, i] = 0.0
+                if eff[S.RESIDUAL_EPS] != 0.0:
+                    for i in range(size):
+                        keep = 1.0 - eff[S.RESIDUAL_EPS]
+                        if eff[S.RESIDUAL_FORM] == 1.0:
+                            keep = 0.0 if np.random.random() < eff[S.RESIDUAL_EPS] else 1.0
+                        f[0, i] *= keep
+                        f[1, i] *= keep
+                    fc = 0.0
+                    for i in range(size):
+                        fc += f[0, i] + f[1, i]
+                    changed = True
+                if eff[S.WEAR_EPS] != 0.0 and eff[S.WEAR_FORM] == 3.0:
+                    soft = 1.0 / (1.0 + eff[S.WEAR_EPS] * n_events)
+                    changed = True
+                if changed:
+                    lost += stored(f, k, size, soft, eff) - before
+        # quiet?
+        calm = calm + (t - t0) if abs(v) < QUIET_BELOW else 0.0
+        if quiet_allowed and not sliding and calm > QUIET_AFTER:
+            quiet = True
+    return n_events, n_steps, n_quiet

@@ -1,0 +1,115 @@
+"""The return map over the springs of one contact (compiled): plain, and with memory of slip, time and life."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from . import slots as S
+
+REORDER = {"reassoc", "contract", "nsz"}  # lets the sums vectorise; nan and infinity keep their meaning
+
+
+@njit(cache=True, fastmath=REORDER)
+def plain(old, new, k, normal, lo, hi, du, plus, minus):
+    """Springs lo..hi moved by ``du`` between caps +plus f_n and -minus f_n: (force, stiffness still sticking)."""
+    force = 0.0
+    stuck = 0.0
+    for i in range(lo, hi):
+        trial = old[i] + k[i] * du
+        up = plus * normal[i]
+        down = -minus * normal[i]
+        held = min(max(trial, down), up)
+        new[i] = held
+        force += held
+        stuck += k[i] if held == trial else 0.0
+    return force, stuck
+
+
+@njit(cache=True)
+def creep_rate(ratio, eff):
+    """Slip rate of a stuck spring at force over cap ``ratio``: Eyring's law, or a power law with the same slope."""
+    alpha = eff[S.CREEP_ALPHA]
+    r = min(1.0, abs(ratio))
+    if eff[S.CREEP_FORM] == 0.0:
+        rate = 2.0 * math.sinh(r / alpha) * math.exp(-1.0 / alpha)
+    else:
+        rate = r ** (1.0 / alpha)
+    return eff[S.CREEP_V] * (rate if ratio >= 0.0 else -rate)
+
+
+@njit(cache=True)
+def rich(old, new, k, normal, tau, lo, hi, du, h, plus, minus, eff):
+    """As ``plain`` for springs with a relaxing branch, slip weakening, thermal creep and a finite life.
+
+    Rows of ``old`` and ``new``: elastic force, force of the branch, slip since arrest, life left.
+    """
+    force = 0.0
+    stuck = 0.0
+    g = eff[S.VISCO_G]
+    for i in range(lo, hi):
+        if normal[i] == 0.0:
+            continue
+        up = plus * normal[i]
+        down = minus * normal[i]
+        slip = old[2, i]
+        if eff[S.SLIPW_EPS] != 0.0:
+            s = slip / eff[S.SLIPW_D]
+            if eff[S.SLIPW_FORM] == 0.0:
+                w = 1.0 - math.exp(-s)
+            elif eff[S.SLIPW_FORM] == 1.0:
+                w = min(1.0, s)
+            else:
+                w = s / (1.0 + s)
+            up *= 1.0 - eff[S.SLIPW_EPS] * w
+            down *= 1.0 - eff[S.SLIPW_EPS] * w
+        elastic = old[0, i]
+        branch = old[1, i]
+        life = old[3, i]
+        if eff[S.RENEW_RATE] != 0.0:
+            life -= abs(du)
+            if life <= 0.0:
+                elastic = 0.0
+                branch = 0.0
+        before = elastic + branch
+        if eff[S.CREEP_V] != 0.0:
+            cap = up if before >= 0.0 else down
+            elastic -= k[i] * h * creep_rate(before / cap, eff)
+        elastic += (1.0 - g) * k[i] * du
+        if g != 0.0:
+            branch = (branch + g * k[i] * du) * math.exp(-h / tau[i])
+        trial = elastic + branch
+        held = min(max(trial, -down), up)
+        if held != trial:
+            excess = trial - held
+            elastic -= excess
+            ds = abs(excess) / k[i]
+            slip += ds
+            if g != 0.0 and eff[S.VISCO_RENEW] != 0.0:
+                # a junction that slides is replaced by a fresh one, whose branch has not relaxed yet
+                fresh = 1.0 - math.exp(-ds * k[i] / (eff[S.VISCO_RENEW] * abs(held) + 1e-30))
+                shift = (g * held - branch) * fresh
+                branch += shift
+                elastic -= shift
+        else:
+            stuck += k[i]
+        new[0, i] = elastic
+        new[1, i] = branch
+        new[2, i] = slip
+        new[3, i] = life
+        force += held
+    return force, stuck
+
+
+@njit(cache=True)
+def stored(f, k, size, soft, eff):
+    """Elastic energy in the springs, J."""
+    total = 0.0
+    g = eff[S.VISCO_G]
+    for i in range(size):
+        if k[i] > 0.0:
+            total += 0.5 * f[0, i] * f[0, i] / (k[i] * soft * (1.0 - g))
+            if g != 0.0:
+                total += 0.5 * f[1, i] * f[1, i] / (k[i] * soft * g)
+    return total

@@ -1,0 +1,66 @@
+"""The files of a campaign: one CSV of integer counts per run and the TOML that says what they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .campaigns import Run
+    from .forms import Setup
+
+
+def write_campaign(
+    folder: Path,
+    title: str,
+    setup: Setup,
+    shown: dict[str, Any],
+    traces: list[tuple[Run, np.ndarray, list[tuple[float, float]]]],
+    rate: float,
+    virgin: bool,
+) -> None:
+    """Write ``campaign.toml`` and the traces; ``shown`` holds the mass and the spring as the user knows them."""
+    rig = setup.rig
+    surface = setup.surface
+    lines = [
+        "schema = 1",
+        f'title = "{title}"',
+        "",
+        "[rig]",
+        f'mass = "{shown["mass"]:.6g} kg"',
+        f"spring_stiffness = {_spring(shown['spring'])}",
+        f"contacts = {len(rig.loads)}",
+        f'normal_force = "{sum(rig.loads) / len(rig.loads):.6g} N"',
+        "friction_coefficient = { guess = 0.21, lower = 0.15, upper = 0.3 }",
+        f'youngs_modulus = "{surface.youngs_modulus / 1e9:.6g} GPa"',
+        f"poisson_ratio = {surface.poisson_ratio:.6g}",
+        f'line_length = "{surface.length * 1e6:.6g} um"',
+    ]
+    count = f"{setup.sensor.count * 1e9:.6g} nm"
+    for run, read, pieces in traces:
+        np.savetxt(folder / f"{run.name}.csv", read, fmt="%d", header="counts", comments="")
+        wrap = f', wrap = "{setup.sensor.wrap * setup.sensor.count * 1e9:.8g} nm"' if setup.sensor.wrap else ""
+        lines += [
+            "",
+            "[[trace]]",
+            f'file = "{run.name}.csv"',
+            f'sampling_rate = "{rate / 1e3:g} kHz"',
+            f'displacement = {{ column = "counts", unit = "{count}", resolution = "{count}"{wrap} }}',
+        ]
+        if pieces:
+            told = ", ".join(f'{{ until = "{until:g} s", velocity = "{velocity * 1e6:g} um/s" }}' for until, velocity in pieces)
+            lines.append(f"drive = [{told}]")
+        else:
+            lines.append(f'drive_velocity = "{run.velocity * 1e6:g} um/s"')
+        if virgin:
+            lines.append("virgin = true")
+    (folder / "campaign.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _spring(value: float | tuple[float, float, float]) -> str:
+    if isinstance(value, float):
+        return f'"{value:.6g} N/m"'
+    guess, lower, upper = value
+    return f'{{ guess = "{guess:.4g} N/m", lower = "{lower:.4g} N/m", upper = "{upper:.4g} N/m" }}'

@@ -1,0 +1,47 @@
+"""Damping inside the contact: a dashpot beside the spring of every stuck element."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+from jax import Array
+
+from ..params import parameter
+from .base import BodyForce, Contact, Motion
+from .catalogue import register
+from .sliding import caps, element_forces, filled
+
+
+@register
+class ContactDamping(BodyForce):
+    """A Kelvin element that fades as its force nears the cap, so that sliding elements do not drag."""
+
+    tag = "contact-damping"
+    summary = "stuck contacts damp motion like dashpots"
+    equation = r"F = -\eta\,\dot x \sum_i k_i \left[1 - (f_i/c_i)^2\right]"
+    signature = "ringing decays exponentially instead of hyperbolically; nothing in creep"
+    confused_with = {
+        "viscous-drag": "free vibration of the block on its spring without contact; slip against ring-down",
+        "plasticity": "decay of the ringing at several amplitudes",
+        "viscoelastic-contact": "ring-down with an added mass: another frequency",
+        "curvature": "decay of the ringing at several amplitudes",
+    }
+    source = "Kelvin-Voigt contact: Johnson, Contact Mechanics (1985), sec. 6.5"
+    amplitude = "time"
+    family = "contact"
+
+    time: Array = parameter(
+        0.0,
+        unit="s",
+        lower=0.0,
+        upper=1e-3,
+        null=0.0,
+        symbol=r"\eta",
+        doc="damping of a stuck element over its stiffness",
+    )
+
+    def force(self, state: Any, motion: Motion, contact: Contact) -> Array:
+        cap = filled(caps(contact))
+        load = jnp.clip(element_forces(contact, motion, cap) / cap, -1.0, 1.0)
+        return -self.time * motion.v * jnp.sum(contact.stiffness * (1.0 - load**2))

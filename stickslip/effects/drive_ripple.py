@@ -1,0 +1,51 @@
+"""Periodic error of the drive: lead screw, gear, motor step."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from ..params import parameter
+from .base import Drive
+from .catalogue import register
+
+
+@register
+class DriveRipple(Drive):
+    """The load point runs ahead and behind once a pitch; it starts where the drive says it starts."""
+
+    tag = "drive-ripple"
+    summary = "periodic error of the drive along its travel"
+    equation = r"x_0(t) = s + \varepsilon\,[\sin(2\pi s/\ell + \varphi) - \sin\varphi],\quad s = \int v_0\,dt"
+    signature = "recurrence and slip times scatter in step with the absolute position of the drive, at every velocity"
+    confused_with = {
+        "load-modulation": "change the drive velocity: a ripple is fixed to the travel, a modulation to the clock",
+        "base-vibration": "change the drive velocity: a ripple is fixed to the travel, a vibration to the clock",
+        "position-dependent-friction": "start the drive elsewhere with the block at the same place",
+        "nonlinear-spring": "go on for several pitches: a ripple repeats",
+    }
+    source = "ISO 3408-3: travel deviation of ball screws"
+    amplitude = "ripple"
+    family = "drive"
+
+    ripple: Array = parameter(
+        0.0, unit="m", lower=-5e-6, upper=5e-6, null=0.0, symbol=r"\varepsilon", doc="amplitude of the position error"
+    )
+    pitch: Array = parameter(
+        1e-3,
+        unit="m",
+        lower=1e-6,
+        upper=1e-2,
+        log=True,
+        grid=(0.5e-3, 1e-3, 2e-3),
+        symbol=r"\ell",
+        doc="travel of one period",
+    )
+    phase: Array = parameter(
+        0.0, unit="rad", lower=-np.pi, upper=np.pi, grid=(0.0, np.pi / 2), symbol=r"\varphi", doc="phase at travel 0"
+    )
+
+    def lead(self, t: Array, load_point: Array) -> Array:
+        turn = 2.0 * np.pi * load_point / self.pitch
+        return self.ripple * (jnp.sin(turn + self.phase) - jnp.sin(self.phase))

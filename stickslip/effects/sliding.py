@@ -1,0 +1,39 @@
+"""What an effect may want to know of the elements within an increment: their caps, their forces, who slides how far."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from jax import Array
+
+from .base import Contact, Motion
+
+
+def caps(contact: Contact, own: Array | float = 1.0) -> Array:
+    """Cap of every element (N) at the start of the increment.
+
+    Args:
+        contact: the bank.
+        own: factor of the asking effect, for a contact that only knows its full strength.
+    """
+    known = getattr(contact, "cap", None)
+    return contact.strength * own if known is None else known
+
+
+def filled(value: Array) -> Array:
+    """``value`` with ones where it is zero: a divisor for elements that hold no spring."""
+    return jnp.where(value > 0.0, value, 1.0)
+
+
+def element_forces(contact: Contact, motion: Motion, cap: Array) -> Array:
+    """Force of every element (N) at the end of the increment if its cap stayed as it is, shape (n,)."""
+    force = jnp.clip(contact.force + contact.stiffness * motion.turn, -cap, cap)
+    return jnp.clip(force + contact.stiffness * (motion.dx - motion.turn), -cap, cap)
+
+
+def slid(contact: Contact, motion: Motion, cap: Array) -> Array:
+    """Way (m) that the block makes within the increment while the element is at its cap, shape (n,), 0 ... path."""
+    out = contact.force + contact.stiffness * motion.turn
+    back = jnp.clip(out, -cap, cap) + contact.stiffness * (motion.dx - motion.turn)
+    over = jnp.maximum(abs(out) - cap, 0.0) + jnp.maximum(abs(back) - cap, 0.0)
+    way = over / filled(contact.stiffness)
+    return jnp.where(contact.stiffness > 0.0, jnp.minimum(way, motion.path), 0.0)

@@ -1,0 +1,187 @@
+"""The model through the events of a measured run: multiple shooting with the clock and position of the data.
+
+A run is a chain of cycles, each from one arrest to the next. Within a cycle the model is on its own; at each arrest its
+clock and position are set to what was measured, so drive phase and holds stay where the data have them and no event
+can be paired wrongly. The contact's state (forces, weakening, memory of every effect) is the model's own throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from .effects.base import Motion
+from .model import Model, State
+from .solve.integrate import _TERM, step_control
+from .solve.stepper import ContactStepper, Tolerance
+
+MOST_STEPS = 1536  # of one cycle; a cycle of ordinary stick-slip takes 300 to 600
+
+
+class Cycles(NamedTuple):
+    """What the data say of one run's cycles; arrays of shape (n,) but for the load point's nodes (m,).
+
+    Attributes:
+        start: time of the arrest (or of the trace's start) the cycle begins with (s).
+        position: reading there (m).
+        limit: time at which an unfinished cycle is given up (s).
+        least_slip: displacement after which standing still is an arrest (m).
+        ends: whether the cycle ends with an arrest in the data.
+        used: false for padding.
+        load_times, load_positions: nodes of the load point (s, m).
+        stiffness: of the driving spring where this run has another than the rig (N/m), else nan.
+        virgin: whether the run starts from a force-free contact at rest.
+    """
+
+    start: Array
+    position: Array
+    limit: Array
+    least_slip: Array
+    ends: Array
+    used: Array
+    load_times: Array
+    load_positions: Array
+    stiffness: Array
+    virgin: Array
+
+
+class Track(NamedTuple):
+    """Accepted steps of one cycle, shape (MOST_STEPS,), padded with the last one.
+
+    Attributes:
+        t, x, v, reading: time (s), displacement (m), velocity (m/s), reading (m).
+        arrest: time of the arrest, in the cycle's clock (s); the end of the track where there was none.
+        arrested: whether there was one.
+        steps: number of steps.
+    """
+
+    t: Array
+    x: Array
+    v: Array
+    reading: Array
+    arrest: Array
+    arrested: Array
+    steps: Array
+
+
+def _observe(t: Any, y: State, args: Any) -> tuple[Array, Array, Array, Array]:
+    model, *_ = args
+    lead = model.lead(t)
+    still = Motion(t + 0.0 * y.x, 1e-12 + 0.0 * y.x, y.x, y.v, 0.0 * y.x, 0.0 * y.x, lead)
+    return t + 0.0 * y.x, y.x, y.v, model.read(y, still, jnp.sum(y.force))
+
+
+class _CycleStepper(ContactStepper):
+    """The same solver; ``args`` also hold where the cycle began."""
+
+    def init(self, terms: Any, t0: Any, t1: Any, y0: State, args: Any) -> Any:
+        return super().init(terms, t0, t1, y0, args[:2])
+
+    def func(self, terms: Any, t0: Any, y0: State, args: Any) -> Any:
+        return super().func(terms, t0, y0, args[:2])
+
+    def step(self, terms: Any, t0: Any, t1: Any, y0: State, args: Any, solver_state: Any, made_jump: Any) -> Any:
+        return super().step(terms, t0, t1, y0, args[:2], solver_state, made_jump)
+
+
+def _arrested(t: Any, y: State, args: Any, **kwargs: Any) -> Array:
+    _, _, x0, least_slip = args
+    return (y.v <= 0.0) & (y.x - x0 > least_slip)
+
+
+def run_cycle(
+    model: Model, y: State, t0: Array, limit: Array, least_slip: Array, tolerance: Tolerance, most_steps: int
+) -> tuple[Track, State, Array]:
+    """Integrate one cycle until the block stands still after a slip, or until ``limit`` (s).
+
+    Returns:
+        The track, the state at its end, and the time of that end (s).
+    """
+    args = (model, model.shaped(), y.x, least_slip)
+    solution = diffrax.diffeqsolve(
+        _TERM,
+        _CycleStepper(tolerance=tolerance),
+        t0,
+        limit,
+        jnp.minimum(2e-5, 0.5 * (limit - t0)),
+        y,
+        args=args,
+        saveat=diffrax.SaveAt(
+            subs=[
+                diffrax.SubSaveAt(steps=True, fn=_observe),
+                diffrax.SubSaveAt(t1=True, fn=lambda t, y, a: jax.tree.leaves(y)),
+            ]
+        ),
+        stepsize_controller=step_control(0.05),
+        adjoint=diffrax.ForwardMode(),
+        max_steps=most_steps,
+        throw=False,
+        event=diffrax.Event(_arrested),
+    )
+    n = solution.stats["num_accepted_steps"]
+    (t, x, v, reading), leaves = solution.ys
+    end = jax.tree.unflatten(jax.tree.structure(y), [leaf[0] for leaf in leaves])
+    last = jnp.maximum(n - 1, 0)
+    padded = jnp.arange(most_steps) < n
+    t, x, v, reading = (jnp.where(padded, a, a[last]) for a in (t, x, v, reading))
+    arrested = (end.v <= 0.0) & (end.x - y.x > least_slip)
+    before = jnp.maximum(n - 2, 0)
+    fall = jnp.where(arrested, v[before] - v[last], 1.0)
+    # velocity is nearly linear in time around its zero: two steps share the crossing
+    arrest = jnp.where(arrested, t[last] + (t[last] - t[before]) * v[last] / fall, t[last])
+    return Track(t, x, v, reading, arrest, arrested, n), end, t[last]
+
+
+def run_cycles(
+    build: Callable[[Any, Array], Model], events: Any, cycles: Cycles, tolerance: Tolerance, most_steps: int = MOST_STEPS
+) -> Track:
+    """All cycles of one run.
+
+    Args:
+        build: the model of a cycle, from that cycle's entry of ``events`` and the load point's nodes.
+        events: a pytree of arrays (n, ...): what varies from event to event.
+        cycles: what the data say.
+        tolerance: of the solver.
+        most_steps: of one cycle.
+
+    Returns:
+        Tracks with a leading axis of cycles.
+    """
+    nodes = (cycles.load_times, cycles.load_positions)
+    first = build(jax.tree.map(lambda a: a[0], events), nodes)
+    start = first.rest(cycles.start[0], cycles.position[0])
+    # a run that does not start virgin starts as after an arrest: every element at its weakened cap
+    worn = first.bank.strength * first.weakening.ratio
+    virgin = cycles.virgin
+    start = eqx.tree_at(
+        lambda s: (s.force, s.psi), start, (jnp.where(virgin, start.force, worn), jnp.where(virgin, start.psi, 0.0))
+    )
+
+    def cycle(carry: tuple, item: tuple) -> tuple:
+        y, late, offset, strength = carry
+        event, t0, position, limit, least_slip, used = item
+        model = build(event, nodes)
+        # new lines keep the share of its cap that every element carries: at arrest all of them are at their caps
+        y = eqx.tree_at(
+            lambda s: (s.x, s.force),
+            y,
+            (position + offset, y.force * jnp.where(strength > 0, model.bank.strength / jnp.maximum(strength, 1e-300), 1.0)),
+        )
+        zero = jax.tree.map(jnp.zeros_like, y.work)
+        y = eqx.tree_at(lambda s: s.work, y, zero)
+        track, end, now = run_cycle(
+            model, y, t0 + late, jnp.where(used, limit, t0 + late + 1e-6), least_slip, tolerance, most_steps
+        )
+        at = jnp.interp(track.arrest, track.t, track.reading)
+        return (end, now - track.arrest, end.x - at, model.bank.strength), track
+
+    zero = jnp.zeros(())
+    items = (events, cycles.start, cycles.position, cycles.limit, cycles.least_slip, cycles.used)
+    _, tracks = jax.lax.scan(cycle, (start, zero, zero, first.bank.strength), items)
+    return tracks

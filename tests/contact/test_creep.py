@@ -1,0 +1,163 @@
+"""Creep curves: averages, virtual time, sweeps equal to loops, derivatives, speed of the end."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from stickslip.contact import (
+    creep_curve,
+    creep_displacements,
+    default_loads,
+    equal_bodies,
+    from_heights,
+    indentation,
+    rough_lines,
+    sphere,
+    static_contact,
+    virtual_time,
+)
+from stickslip.errors import InputError
+
+L = 20e-6
+SMALL = {"lines": 6, "n_springs": 512}
+
+
+def test_curve_of_the_paper():
+    curve = creep_curve()
+    assert float(curve.force[-1]) == pytest.approx(4 * 0.21 * 0.31)
+    assert 0.9e-6 < float(curve.u_max) < 1.0e-6
+    assert 0.13 < float(curve.u_max_spread / curve.u_max) < 0.18
+    assert float(curve.stiffness) == pytest.approx(2.5e5, rel=0.03)
+    assert float(curve.contact_share) == pytest.approx(0.13, abs=0.01)
+    assert curve.n_springs == 4096
+    assert float(curve.u[-1]) == pytest.approx(float(curve.u_max), rel=1e-12)
+    assert (np.diff(curve.u) > 0).all()
+    assert (np.diff(curve.t) > 0).all()
+
+
+def test_virtual_time():
+    force, u = np.array([0.0, 0.1, 0.26]), np.array([0.0, 1e-7, 1e-6])
+    assert np.allclose(virtual_time(force, u, 1000, 5e-5, "paper"), force / 0.05)
+    exact = np.asarray(virtual_time(force, u, 1000, 5e-5))
+    assert np.allclose(1000 * (5e-5 * exact - u), force, rtol=1e-12, atol=1e-18)
+    assert np.allclose(creep_curve(**SMALL, time="paper").t, creep_curve(**SMALL).force / 0.05)
+
+
+def test_speed_is_shared_between_spring_and_contact():
+    """c_s v0/(k_t + c_s), from the virgin stiffness down to that of the last spring that sticks in each contact."""
+    curve = creep_curve(tau=np.array([0.0, 1e-3, 1.0]), velocity=5e-5)
+    start = float(curve.u[1] / curve.t[1])
+    assert start == pytest.approx(1000 * 5e-5 / (4 * float(curve.stiffness) + 1000), rel=0.02)
+    one = creep_curve(lines=1)
+    speeds = np.diff(one.u) / np.diff(one.t)
+    last_spring = 4 * equal_bodies().tangential * 20e-6 / 4096
+    assert speeds[-1] == pytest.approx(1000 * 5e-5 / (last_spring + 1000), rel=1e-6)
+    assert (np.diff(speeds) > -1e-9 * speeds[-1]).all()
+
+
+def test_both_averages_by_hand():
+    tau = default_loads(30)
+    z = 2.46e-6 * np.asarray(rough_lines(0.3, 6, 512))
+    contact = static_contact(indentation(from_heights(z, L / 512)), 0.31, 0.21)
+    curve = creep_curve(**SMALL, tau=tau)
+    assert np.allclose(curve.u, contact.displacement(tau[:, None]).mean(axis=1), rtol=1e-12)
+    assert np.array_equal(curve.tau, tau)
+    other = creep_curve(**SMALL, tau=tau, average="force")
+    assert np.allclose(other.tau, contact.force(other.u[:, None]).mean(axis=1) / (0.21 * 0.31), rtol=1e-12)
+    assert float(other.u[-1]) == pytest.approx(float(contact.u_max.max()))
+    assert float(other.u[-1]) > 1.1 * float(curve.u[-1])
+
+
+def test_default_loads_lie_evenly_in_displacement():
+    steps = np.diff(creep_curve(tau=default_loads(50)).u)
+    assert steps.max() < 2 * steps.mean()
+    assert np.diff(creep_curve(tau=np.linspace(0, 1, 50)).u).max() > 8 * steps.mean()
+
+
+def test_sweep_equals_the_loop():
+    rng = np.random.default_rng(2)
+    H, h, f, mu = (
+        rng.choice([0.2, 0.5], 30),
+        rng.uniform(1e-6, 4e-6, 30),
+        rng.uniform(0.1, 0.5, 30),
+        rng.uniform(0.1, 1, 30),
+    )
+    tau = default_loads(7)
+    sweep = creep_displacements(H, h, f, mu, tau, **SMALL, memory=80 * 6 * 7 * 4)
+    loop = np.stack([creep_curve(*p, tau=tau, **SMALL).u for p in zip(H, h, f, mu, strict=True)])
+    assert sweep.shape == (30, 7)
+    assert np.allclose(sweep, loop, rtol=1e-12, atol=1e-20)
+
+
+def test_scalars_broadcast_in_a_sweep():
+    sweep = creep_displacements(0.3, [1e-6, 2e-6, 3e-6], 0.31, 0.21, [0.5, 1.0], **SMALL)
+    assert (np.diff(sweep, axis=0) > 0).all()
+
+
+def test_vmap_over_H_equals_the_loop():
+    H = jnp.array([0.2, 0.4, 0.8])
+    together = jax.vmap(lambda h: creep_curve(H=h, **SMALL).u)(H)
+    assert np.allclose(together, np.stack([creep_curve(H=float(h), **SMALL).u for h in H]), rtol=1e-12, atol=1e-22)
+
+
+@pytest.mark.parametrize("which", range(4), ids=["H", "h_rms", "normal_force", "friction"])
+def test_derivatives_against_a_ladder_of_steps(which):
+    """Steps that pass no spring's first touch agree to rounding; larger ones to the size of the kinks they pass."""
+    point = np.array([0.3, 2.46e-6, 0.31, 0.21])
+    tau = np.array([0.2, 0.5, 0.9, 1.0])
+    curve = jax.jit(lambda q: creep_curve(*q, tau=tau, lines=20, n_springs=2048).u)
+    direction = np.eye(4)[which] * point[which]
+    exact = np.asarray(jax.jvp(curve, (jnp.asarray(point),), (jnp.asarray(direction),))[1])
+    assert (np.abs(exact) > 1e-9).all()
+    assert np.allclose(exact, jax.jacrev(curve)(point) @ direction, rtol=1e-9)
+    for step, tolerance in ((1e-1, 5e-2), (1e-2, 3e-2), (1e-3, 2e-2), (1e-4, 5e-3), (1e-5, 1e-6), (1e-6, 1e-6)):
+        difference = np.asarray(curve(point + step * direction) - curve(point - step * direction)) / (2 * step)
+        assert np.abs(difference / exact - 1).max() < tolerance, step
+
+
+def test_derivatives_pass_through_the_whole_curve():
+    gradient = jax.jacfwd(lambda q: creep_curve(*q[:4], spring_stiffness=q[4], velocity=q[5], **SMALL).t[-1])(
+        jnp.array([0.3, 2.46e-6, 0.31, 0.21, 1000.0, 5e-5])
+    )
+    assert np.isfinite(gradient).all()
+    assert float(gradient[5]) == pytest.approx(-float(creep_curve(**SMALL).t[-1]) / 5e-5, rel=1e-12)
+
+
+def test_creep_accelerates_with_the_power_of_the_remaining_time():
+    """v ~ (t_end - t)^-(1 - 1/p): a sphere, p = 1.5, in the form of time without the block's own motion."""
+    curve = creep_curve(profile=sphere(30e-6, 100_000, 1e-3), tau=1 - np.geomspace(1, 1e-4, 60), time="paper")
+    end = float(curve.force[-1]) / 0.05
+    v = np.diff(curve.u) / np.diff(curve.t)
+    left = end - 0.5 * np.asarray(curve.t[1:] + curve.t[:-1])
+    slope = np.polyfit(np.log(left[20:]), np.log(v[20:]), 1)[0]
+    assert slope == pytest.approx(-(1 - 1 / 1.5), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"H": 1.2},
+        {"h_rms": 0.0},
+        {"normal_force": -1.0},
+        {"friction": 0.0},
+        {"velocity": 0.0},
+        {"spring_stiffness": -5.0},
+        {"length": 0.0},
+        {"n_springs": 3},
+        {"lines": 0},
+        {"contacts": 0},
+        {"tau": [0.5, 1.5]},
+        {"average": "displacment"},
+        {"time": "papr"},
+    ],
+    ids=str,
+)
+def test_bad_input_is_refused(change):
+    with pytest.raises(InputError):
+        creep_curve(**{**SMALL, **change})
+
+
+def test_bad_sweep_is_refused():
+    with pytest.raises(InputError, match=r"got 0\.0"):
+        creep_displacements([0.3, 0.3], [1e-6, 0.0], 0.31, 0.21, [1.0], **SMALL)

@@ -1,0 +1,77 @@
+import numpy as np
+import pytest
+
+from stickslip.errors import InputError
+from stickslip.trace import Drive, Trace
+
+
+def test_trace_cannot_be_changed_from_outside():
+    t, x = np.arange(5.0), np.arange(5.0)
+    trace = Trace("a", t, displacement=x)
+    x[0] = 99.0
+    assert trace.displacement[0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        trace.displacement[0] = 1.0
+    with pytest.raises(AttributeError):
+        trace.name = "b"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        ({"time": [0.0, 1.0, 1.0], "displacement": [0.0, 1.0, 2.0]}, "does not increase at sample 2"),
+        ({"time": [0.0, np.nan, 1.0], "displacement": [0.0, 1.0, 2.0]}, "does not increase"),
+        ({"time": [0.0, 1.0], "displacement": [0.0, 1.0, 2.0]}, "has 3 samples, time has 2"),
+        ({"time": [0.0, 1.0], "displacement": [0.0, np.inf]}, "not finite"),
+        ({"time": [0.0, 1.0]}, "no signal"),
+        ({"time": [0.0], "displacement": [0.0]}, "has 1 samples"),
+    ],
+)
+def test_trace_refuses(arguments, word):
+    with pytest.raises(InputError, match=word):
+        Trace("a", **{key: np.array(value) for key, value in arguments.items()})
+
+
+def test_drive_of_pieces_has_the_integral_of_its_velocities():
+    drive = Drive.from_pieces([2.0, 5.0, 6.0], [1e-3, 0.0, -2e-3], start=1.0)
+    t = np.linspace(1, 6, 1001)
+    v = drive.velocity(t[:-1])
+    assert np.allclose(np.concatenate([[0], np.cumsum(v * np.diff(t))]), drive.position(t), atol=2e-5)
+    assert drive.position([1, 2, 5, 6]) == pytest.approx([0, 1e-3, 1e-3, -1e-3])
+    assert list(drive.breakpoints) == [2.0, 5.0]
+    assert drive.holds(0, 10) == [(2.0, 5.0)]
+    # beyond its ends it goes on
+    assert drive.position([0.0, 7.0]) == pytest.approx([-1e-3, -3e-3])
+
+
+def test_velocity_at_a_breakpoint_is_that_of_the_next_piece():
+    drive = Drive.from_pieces([2.0, 5.0], [1e-3, 0.0])
+    assert drive.velocity([2.0 - 1e-9, 2.0]) == pytest.approx([1e-3, 0.0])
+
+
+def test_sampled_drive_stays_within_its_tolerance_and_is_short():
+    t = np.arange(0, 20, 1e-3)
+    ripple = 1e-6 * np.sin(2 * np.pi * t / 0.15)
+    steady = 42e-6 * np.clip(t, 0, 8) + 42e-6 * np.clip(t - 10, 0, None)
+    noise = np.random.default_rng(1).normal(0, 1e-8, t.size)
+    short = Drive.from_samples(t, steady + noise, 6e-8)
+    assert short.times.size < 40
+    assert np.abs(short.position(t) - steady).max() < 2 * 6e-8
+    assert short.speed == pytest.approx(42e-6, rel=1e-2)
+    (hold,) = [h for h in short.holds(0, 20) if h[1] - h[0] > 0.1]
+    assert hold == pytest.approx((8, 10), abs=0.02)
+    rippled = Drive.from_samples(t, steady + ripple, 6e-8)
+    assert np.abs(rippled.position(t) - steady - ripple).max() <= 2 * 6e-8
+    assert rippled.times.size > 20 / 0.15
+
+
+def test_usual_speed_leaves_holds_out():
+    assert Drive.from_pieces([1.0, 100.0], [3e-6, 0.0]).speed == pytest.approx(3e-6)
+    assert Drive.constant(-2e-6).speed == pytest.approx(2e-6)
+    assert Drive.constant(0.0).holds(0.0, 4.0) == [(0.0, 4.0)]
+
+
+@pytest.mark.parametrize("times", [[0.0, 0.0], [1.0, 0.0], [0.0, np.nan]])
+def test_drive_refuses_times_that_do_not_increase(times):
+    with pytest.raises(InputError, match="increase"):
+        Drive(np.array(times), np.array([0.0, 1.0]))
