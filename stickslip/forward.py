@@ -118,7 +118,7 @@ def run_cycle(
                 diffrax.SubSaveAt(t1=True, fn=lambda t, y, a: jax.tree.leaves(y)),
             ]
         ),
-        stepsize_controller=step_control(0.05),
+        stepsize_controller=step_control(0.01),
         adjoint=diffrax.ForwardMode(),
         max_steps=most_steps,
         throw=False,

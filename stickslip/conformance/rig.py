@@ -14,7 +14,7 @@ from jax import Array
 
 from ..contact import power_law_bank
 from ..effects.base import Effect, Motion
-from ..model import Block, LoadPoint, Model, Weakening
+from ..model import Block, LoadPoint, Model, State, Weakening
 from ..params import specs
 from ..solve import ContactStepper, Steps, Tolerance
 from ..solve.integrate import observe, step_control
@@ -27,22 +27,21 @@ CREEP = np.array([0.05, 0.12, 0.29, 0.38])  # s
 END = 0.55  # s; after the first slip
 SLIP = 5e-6  # m; a displacement reached only in the slip
 MOST_STEPS = 8192
-LOOSE, TIGHT = 1e-2, 1e-3  # relative tolerances of a step
+LOOSE, TIGHT = 1e-2, 4e-3  # relative tolerances of a step
+LONGEST = 4e-3  # s; a step must resolve an oscillation that is absent where its derivative is taken
 AT_ONCE = 6  # derivatives taken together
 
 _TERM = diffrax.ODETerm(lambda t, y, args: y)
 
 
 class Outcome(NamedTuple):
-    """What is looked at of a run.
+    """A run as the solver made it.
 
     Attributes:
-        features: reading at the CREEP times and at END (m), then the time at which the reading passes SLIP (s).
         steps: everything at every step; the unused rest of the buffer holds infinities.
         count: number of accepted steps.
     """
 
-    features: Array
     steps: Steps
     count: Array
 
@@ -75,7 +74,8 @@ class Rig:
         self.traces = 0
         self._model = base_model(effects)
         self.run = jax.jit(self._run)
-        self.run_derivatives = _derivatives(lambda p, drive, tol: self._run(p, drive, tol).features)
+        self.replay = jax.jit(jax.vmap(self._replay, in_axes=(0, None, None, None)))
+        self.replay_derivatives = _derivatives(self._replay)
         self.march = jax.jit(self._march)
         self.march_derivatives = _derivatives(self._march)
 
@@ -102,17 +102,36 @@ class Rig:
             1e-5,
             model.rest(),
             args=(model, model.shaped()),
-            saveat=diffrax.SaveAt(
-                subs=[diffrax.SubSaveAt(ts=jnp.append(CREEP, END), fn=observe), diffrax.SubSaveAt(steps=True, fn=observe)]
-            ),
-            stepsize_controller=step_control(0.02),
+            saveat=diffrax.SaveAt(steps=True, fn=observe),
+            stepsize_controller=step_control(LONGEST),
             adjoint=diffrax.ForwardMode(),
             max_steps=MOST_STEPS,
             throw=False,
         )
-        at_times, steps = solution.ys
-        features = jnp.append(at_times.reading, _passes(steps, SLIP))
-        return Outcome(features, steps, solution.stats["num_accepted_steps"])
+        return Outcome(solution.ys, solution.stats["num_accepted_steps"])
+
+    def _replay(self, p: Array, times: Array, count: Array, tolerance: Array) -> Array:
+        """Features of a run over given ``times`` (s), of which the first ``count`` + 1 are used.
+
+        Readings at the steps nearest to the CREEP times and at the last (m), and the time at which the reading first
+        passes SLIP (s). With the steps held, the features are as smooth in the parameters as the laws are; the
+        derivative is the one that diffrax gives, which takes no derivative of the step sizes.
+        """
+        model = self.model(p)
+        args = model, model.shaped()
+        solver = ContactStepper(tolerance=Tolerance(tolerance, 1e-9 * tolerance, 1e-5 * tolerance))
+        start = model.rest()
+
+        def body(k: Array, carry: Any) -> Any:
+            y, solver_state, seen = carry
+            y, _, _, solver_state, _ = solver.step(_TERM, times[k], times[k + 1], y, args, solver_state, False)
+            return y, solver_state, seen.at[:, k].set(jnp.stack(_seen(model, times[k + 1], y)))
+
+        blank = jnp.full((2, times.size - 1), jnp.inf)
+        carry = start, solver.init(_TERM, times[0], times[1], start, args), blank
+        _, _, (reading, v) = jax.lax.fori_loop(0, count, body, carry)
+        at = jnp.searchsorted(times[1:], CREEP)
+        return jnp.append(reading[jnp.append(at, count - 1)], _passes(times[1:], reading, v, SLIP))
 
     def _march(self, p: Array, motions: Motion) -> tuple[Any, ...]:
         model = self.model(p)
@@ -152,14 +171,21 @@ def prescribed() -> Motion:
     return Motion(*(jnp.asarray(f) for f in fields))
 
 
-def _passes(steps: Steps, level: float) -> Array:
-    """Time (s) at which the reading first passes a level, by inverse cubic interpolation; infinite if it never does."""
-    after = jnp.argmax(steps.reading > level)
+def _seen(model: Model, t: Array, y: State) -> tuple[Array, Array]:
+    """Reading (m) and velocity (m/s)."""
+    zero = jnp.zeros(())
+    motion = Motion(t, zero + 1e-12, y.x, y.v, zero, zero, model.lead(t))
+    return model.read(y, motion, jnp.sum(y.force)), y.v
+
+
+def _passes(t: Array, reading: Array, v: Array, level: float) -> Array:
+    """Time (s) at which the reading first passes a level, by inverse cubic interpolation; not finite if it never does."""
+    after = jnp.argmax(reading > level)
     before = jnp.maximum(after - 1, 0)
-    way, dt = steps.reading[after] - steps.reading[before], steps.t[after] - steps.t[before]
-    s = (level - steps.reading[before]) / way
-    slow0, slow1 = way / steps.v[before], way / steps.v[after]
-    return steps.t[before] + s * s * (3 - 2 * s) * dt + s * (1 - s) * ((1 - s) * slow0 - s * slow1)
+    way, dt = reading[after] - reading[before], t[after] - t[before]
+    s = (level - reading[before]) / way
+    slow0, slow1 = way / v[before], way / v[after]
+    return t[before] + s * s * (3 - 2 * s) * dt + s * (1 - s) * ((1 - s) * slow0 - s * slow1)
 
 
 def _derivatives(function: Callable) -> Callable:

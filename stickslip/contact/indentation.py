@@ -94,7 +94,7 @@ def _last_below(table: Array, gaps: Array, sums: Array, queries: Array) -> tuple
 
 def indentation(profile: Profile) -> Indentation:
     """Sort the gaps (..., N) of a profile into the table that answers F_n(d) and d(F_n)."""
-    gaps = sort_gaps(jnp.asarray(profile.gaps))
+    gaps = sort_gaps(jnp.asarray(profile.gaps, dtype=float))
     rises = jnp.diff(gaps, axis=-1) * jnp.arange(1, gaps.shape[-1])
     # a sum of terms that are all positive: increasing to the last bit, and without cancellation
     sums = jnp.pad(jnp.cumsum(rises, axis=-1), [(0, 0)] * (gaps.ndim - 1) + [(1, 0)])

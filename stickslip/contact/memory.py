@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
@@ -70,6 +71,7 @@ def reload_displacement(bank: Bank, element_force: ArrayLike, load: ArrayLike) -
     return loading_displacement(bank.stiffness, bank.strength - held, jnp.asarray(load) - jnp.sum(held))
 
 
+@jax.jit
 def loading_displacement(stiffness: Array, room: Array, target: ArrayLike) -> Array:
     """Displacement x (m) at which sum(min(stiffness x, room)) reaches ``target`` (N, any shape); exact, by one sort.
 

@@ -46,9 +46,10 @@ class StaticContact(eqx.Module):
     def u_max(self) -> Array:
         """Displacement mu (E*/G*) d at which the last spring slides, m (Grzemba 2014, eq. 4).
 
-        The depth counts from first touch, where a profile's highest spring lies beside its apex.
+        Where the highest spring of an analytic profile lies beside its apex (gap above zero), sliding is complete a
+        little earlier, at ``displacement(1.0)``.
         """
-        return self.displacement(1.0)
+        return self.depth * self._reach
 
     @property
     def stiffness(self) -> Array:

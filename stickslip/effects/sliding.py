@@ -32,8 +32,9 @@ def element_forces(contact: Contact, motion: Motion, cap: Array) -> Array:
 
 def slid(contact: Contact, motion: Motion, cap: Array) -> Array:
     """Way (m) that the block makes within the increment while the element is at its cap, shape (n,), 0 ... path."""
-    out = contact.force + contact.stiffness * motion.turn
-    back = jnp.clip(out, -cap, cap) + contact.stiffness * (motion.dx - motion.turn)
-    over = jnp.maximum(abs(out) - cap, 0.0) + jnp.maximum(abs(back) - cap, 0.0)
-    way = over / filled(contact.stiffness)
+    stiffness = filled(contact.stiffness)
+    reach = cap / stiffness
+    out = contact.force / stiffness + motion.turn
+    back = jnp.clip(out, -reach, reach) + (motion.dx - motion.turn)
+    way = jnp.maximum(abs(out) - reach, 0.0) + jnp.maximum(abs(back) - reach, 0.0)
     return jnp.where(contact.stiffness > 0.0, jnp.minimum(way, motion.path), 0.0)

@@ -37,9 +37,9 @@ class ViscoelasticContact(Memory, Flow):
     """Spring and Maxwell branch side by side, their sum limited by the cap.
 
     ``share`` of the instantaneous stiffness lies in the branch. An element at its cap keeps its deflection, so its
-    branch relaxes while it slides (``kept``); where sliding replaces the contacts, the fresh ones are loaded quickly and
-    their branch carries its ``share`` again (``renewed``, over a slip distance). Deflection and branch are found from
-    the force that the cap has left, so no order of relaxing and sliding has to be assumed.
+    branch relaxes while it slides (``kept``); where sliding replaces the contacts, the fresh ones are loaded quickly
+    and their branch carries its ``share`` again (``renewed``, over a slip distance). Deflection and branch are found
+    from the force that the cap has left, so no order of relaxing and sliding has to be assumed.
     """
 
     tag = "viscoelastic-contact"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -43,7 +44,7 @@ class StepCurve(NamedTuple):
 
     def value(self, t: Any) -> Any:
         k = self.track
-        i = jnp.clip(jnp.searchsorted(k.t, t, side="right", method="scan_unrolled") - 1, 0, k.t.size - 2)
+        i = jnp.clip(jnp.searchsorted(k.t, t, side="right") - 1, 0, k.t.size - 2)
         h = k.t[i + 1] - k.t[i]
         s = jnp.clip(jnp.where(h > 0, (t - k.t[i]) / jnp.where(h > 0, h, 1.0), 0.0), 0.0, 1.0)
         return self._at(i, s)
@@ -58,11 +59,14 @@ class StepCurve(NamedTuple):
         j = jnp.clip(jnp.argmax(above, axis=1), 1, k.t.size - 1)
         j = jnp.where(jnp.any(above, axis=1), j, k.t.size - 1)
         i = j - 1
-        low, high = jnp.zeros(levels.shape), jnp.ones(levels.shape)
-        for _ in range(24):  # bisection: the cubic is monotone enough, and no derivative is asked of it
+
+        def halve(_: int, bracket: tuple) -> tuple:
+            low, high = bracket
             mid = 0.5 * (low + high)
             below = self._at(i, mid) < levels
-            low, high = jnp.where(below, mid, low), jnp.where(below, high, mid)
+            return jnp.where(below, mid, low), jnp.where(below, high, mid)
+
+        low, high = jax.lax.fori_loop(0, 24, halve, (jnp.zeros(levels.shape), jnp.ones(levels.shape)))
         return k.t[i] + 0.5 * (low + high) * (k.t[j] - k.t[i])
 
     @property

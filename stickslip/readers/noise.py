@@ -24,14 +24,15 @@ def estimate_resolution(values: Array, samples: int = 200_000) -> float | None:
     # one count is the commonest of the smallest steps; rounding in a file's decimals smears it
     smallest = float(np.min(steps))
     count = float(np.median(steps[steps < 1.5 * smallest]))
-    multiples = steps / count
-    tolerance = 0.02 * np.maximum(1.0, multiples / 50)
-    on_grid = np.abs(multiples - np.round(multiples)) < tolerance
-    few = multiples < 25  # far multiples fall on the grid of any count by chance
-    if few.sum() < 10 or on_grid[few].mean() < 0.98 or np.unique(np.round(multiples[few])).size > 0.5 * few.sum():
+    for most in (3, 8, 25):  # far multiples tell the count better, once it is known well enough to number them
+        near = steps < (most + 0.5) * count
+        numbers = np.round(steps[near] / count)
+        count = float(np.sum(steps[near] * numbers) / np.sum(numbers**2))
+    numbers = np.round(steps[near] / count)
+    on_grid = np.abs(steps[near] / count - numbers) < 0.03
+    if near.sum() < 10 or on_grid.mean() < 0.98 or np.unique(numbers).size > 0.5 * near.sum():
         return None
-    near = few & on_grid
-    return float(np.sum(steps[near] * np.round(multiples[near])) / np.sum(np.round(multiples[near]) ** 2))
+    return count
 
 
 def noise_level(values: Array, resolution: float | None = None, windows: int = 400, length: int = 64) -> float:

@@ -102,14 +102,14 @@ def despike(values: Array, channel: str, time: Array, noise: float, passes: int 
     """Replace single samples that stand out from both neighbours by the neighbours' mean.
 
     A sample is a spike if it lies at least 8 standard deviations of the noise outside both neighbours, by more than the
-    neighbours differ, and by 6 times the curvature usual within 5 samples (so that noisier stretches, and the crests of
-    a ring-down sampled only a few times a period, are left alone).
+    neighbours differ, and by 8 times the steps usual within 9 samples (so that noisier stretches, tips of a sawtooth,
+    and the crests of a ring-down sampled only a few times a period are left alone).
 
     Args:
         values: finite, shape (n,).
         noise: standard deviation of one sample.
     """
-    if values.size < 11 or noise <= 0:
+    if values.size < 20 or noise <= 0:
         return values, []
     result, marked = values, np.zeros(values.size, bool)
     for _ in range(passes):
@@ -137,12 +137,11 @@ def _spikes(x: Array, noise: float) -> Mask:
     places = np.flatnonzero(candidates)
     if places.size == 0:
         return candidates
-    # curvature nearby, the largest left out (it may be one more spike): what noise or a ringing block does here
-    offsets = np.array([-5, -4, -3, -2, 2, 3, 4, 5])
-    around = np.clip(places[:, None] + offsets, 0, size.size - 1)
-    curvature = np.abs(x[around + 1] - 0.5 * (x[around] + x[around + 2]))
-    local = np.sort(curvature, axis=1)[:, :-1].mean(axis=1)
-    candidates[places] = size[places] > 6 * local
+    # steps nearby, the largest left out (they may belong to further spikes): what noise, motion or ringing do here
+    offsets = np.r_[-9:-2, 2:9]
+    around = np.clip(places[:, None] + 1 + offsets, 0, x.size - 2)
+    steps = np.sort(np.abs(x[around + 1] - x[around]), axis=1)[:, :-4]
+    candidates[places] = size[places] > 8 * steps.mean(axis=1)
     return candidates
 
 

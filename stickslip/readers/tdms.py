@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import InputError
 from .base import Columns, add_array, need_columns
 
@@ -33,6 +35,8 @@ class TdmsReader:
                 for group in file.groups():
                     for channel in group.channels():
                         _add(columns, group.name, channel)
+                if file.file_status.incomplete_final_segment:
+                    columns.notes.append("the file is cut short; what is there was read")
         except InputError:
             raise
         except Exception as error:  # nptdms raises many kinds on a damaged file
@@ -48,6 +52,7 @@ def _add(columns: Columns, group: str, channel: object) -> None:
     add_array(columns, name, values, unit if isinstance(unit, str) else None)
     if "wf_increment" in properties and name in columns.data:
         own = f"{name} time"
-        add_array(columns, own, channel.time_track(), "s")  # type: ignore[attr-defined]
+        first, step = float(properties.get("wf_start_offset", 0.0)), float(properties["wf_increment"])
+        add_array(columns, own, first + step * np.arange(columns.data[name].size), "s")
         columns.data.setdefault("time", columns.data[own])
         columns.units.setdefault("time", "s")

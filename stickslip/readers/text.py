@@ -120,10 +120,13 @@ def _separators(sample: list[str]) -> tuple[str | None, str]:
             if delimiter and sum(delimiter in line for line in sample) < 0.5 * len(sample):
                 continue
             rows = [_split(line, delimiter) for line in sample[-50:]]
+            rows = [row for row in rows if any(_number(f, decimal) for f in row)]
             fields = sum(map(len, rows))
             good = sum(_number(f, decimal) for row in rows for f in row)
             blank = sum(_empty(f) for row in rows for f in row)
             share = good / max(fields - blank, 1)
+            if delimiter is None and decimal == "," and fields == len(rows):
+                share *= 0.5  # "1,5" alone in its line is rather two columns
             if (share, good) > best[:2]:
                 best = (share, good, delimiter, decimal)
     return best[2], best[3]

@@ -3,8 +3,8 @@
 from .build import Setup, build
 from .load import Scenario, load_scenario, make_scenario
 from .simulate import Progress, simulate
-from .static import StaticCreep, static_creep
 from .stability import Sliding, steady_sliding
+from .static import StaticCreep, static_creep
 
 __all__ = [
     "Progress",

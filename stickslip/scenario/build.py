@@ -50,16 +50,15 @@ def build(scenario: Scenario) -> Setup:
     file = scenario.file
     built = build_contact(file.contact, scenario.folder)
     motion = load_point(file.drive, scenario.folder)
-    block = Block(file.block.mass, file.block.spring_stiffness, file.block.damping)
+    block = Block(*map(jnp.asarray, (file.block.mass, file.block.spring_stiffness, file.block.damping)))
     law = file.weakening
     residual, force = file.contact.residual, None
     if residual > 0.0:
         force = arrest(built.bank, max(law.ratio, 1e-6), kept=residual)
     offset = 0.0 if force is None else float(force.force) / file.block.spring_stiffness
     points = LoadPoint(jnp.asarray(motion.times), jnp.asarray(motion.positions + offset))
-    model = Model(
-        block, built.bank, Weakening(law.ratio, law.slip_distance, law.healing_time), points, make_effects(file)
-    )
+    weakening = Weakening(*map(jnp.asarray, (law.ratio, law.slip_distance, law.healing_time)))
+    model = Model(block, built.bank, weakening, points, make_effects(file))
     start = model.rest()
     if force is not None:
         start = eqx.tree_at(lambda s: s.force, start, force.element_force)
@@ -68,5 +67,10 @@ def build(scenario: Scenario) -> Setup:
         start = eqx.tree_at(lambda s: s.v, start, jnp.asarray(k * motion.first_velocity / (k + built.stiffness)))
     solver = file.solver
     return Setup(
-        model, start, motion, built, Tolerance(solver.relative, solver.displacement, solver.velocity), offset
+        model,
+        start,
+        motion,
+        built,
+        Tolerance(*map(jnp.asarray, (solver.relative, solver.displacement, solver.velocity))),
+        offset,
     )

@@ -19,8 +19,8 @@ class Table(BaseModel):
 class Each(Table):
     """One contact that differs from the others."""
 
-    normal_force: quantity("N", above=0) | None = None  # type: ignore[valid-type]
-    friction_coefficient: quantity("1", above=0, most=10) | None = None  # type: ignore[valid-type]
+    normal_force: Annotated[float | None, quantity("N", above=0)] = None
+    friction_coefficient: Annotated[float | None, quantity("1", above=0, most=10)] = None
 
 
 class ContactTable(Table):
@@ -32,10 +32,10 @@ class ContactTable(Table):
 
     kind: str
     contacts: Annotated[int, Field(ge=1, le=10_000)] = 1
-    normal_force: quantity("N", above=0)  # type: ignore[valid-type]
-    friction_coefficient: quantity("1", above=0, most=10)  # type: ignore[valid-type]
+    normal_force: Annotated[float, quantity("N", above=0)]
+    friction_coefficient: Annotated[float, quantity("1", above=0, most=10)]
     bins: Annotated[int, Field(ge=8, le=100_000)] = 128
-    residual: quantity("1", least=0, most=1) = 0.0  # type: ignore[valid-type]
+    residual: Annotated[float, quantity("1", least=0, most=1)] = 0.0
 
     @model_validator(mode="before")
     @classmethod
@@ -65,80 +65,80 @@ class ContactTable(Table):
 class ElasticTable(ContactTable):
     """Kinds made of an elastic profile."""
 
-    youngs_modulus: quantity("Pa", above=0) = 210e9  # type: ignore[valid-type]
-    poisson_ratio: quantity("1", above=-1, most=0.5) = 0.3  # type: ignore[valid-type]
+    youngs_modulus: Annotated[float, quantity("Pa", above=0)] = 210e9
+    poisson_ratio: Annotated[float, quantity("1", above=-1, most=0.5)] = 0.3
 
 
 class EachRoughLine(Each):
     """A rough line of its own."""
 
-    H: quantity("1", above=0, below=1) | None = None  # type: ignore[valid-type]
-    h_rms: quantity("m", above=0) | None = None  # type: ignore[valid-type]
+    H: Annotated[float | None, quantity("1", above=0, below=1)] = None
+    h_rms: Annotated[float | None, quantity("m", above=0)] = None
 
 
 class RoughLineTable(ElasticTable):
     """Self-affine rough lines; every contact its own line (``realisation = "each"``) or the mean of many."""
 
     kind: Literal["rough-line"]
-    H: quantity("1", above=0, below=1)  # type: ignore[valid-type]
-    h_rms: quantity("m", above=0)  # type: ignore[valid-type]
-    line_length: quantity("m", above=0) = 20e-6  # type: ignore[valid-type]
+    H: Annotated[float, quantity("1", above=0, below=1)]
+    h_rms: Annotated[float, quantity("m", above=0)]
+    line_length: Annotated[float, quantity("m", above=0)] = 20e-6
     springs: Annotated[int, Field(ge=16, le=10_000_000, multiple_of=2)] = 4096
     realisation: Literal["each", "mean"] = "each"
     lines: Annotated[int, Field(ge=1, le=100_000)] = 100
     seed: Annotated[int, Field(ge=0)] = 0
-    roll_off: quantity("m", above=0) | None = None  # type: ignore[valid-type]
-    cut_off: quantity("m", above=0) | None = None  # type: ignore[valid-type]
-    curvature: quantity("1/m", least=0) = 0.0  # type: ignore[valid-type]
+    roll_off: Annotated[float | None, quantity("m", above=0)] = None
+    cut_off: Annotated[float | None, quantity("m", above=0)] = None
+    curvature: Annotated[float, quantity("1/m", least=0)] = 0.0
     each: list[EachRoughLine] | None = None
 
 
 class EachPowerLaw(Each):
     """A power law of its own."""
 
-    u_max: quantity("m", above=0) | None = None  # type: ignore[valid-type]
-    p: quantity("1", above=1, most=100) | None = None  # type: ignore[valid-type]
+    u_max: Annotated[float | None, quantity("m", above=0)] = None
+    p: Annotated[float | None, quantity("1", above=1, most=100)] = None
 
 
 class PowerLawTable(ContactTable):
     """The backbone 1 - (1 - u/u_max)^p; ``spread`` is the rms of ln(u_max) over equally loaded contacts."""
 
     kind: Literal["power-law"]
-    u_max: quantity("m", above=0)  # type: ignore[valid-type]
-    p: quantity("1", above=1, most=100)  # type: ignore[valid-type]
-    spread: quantity("1", least=0, most=3) = 0.0  # type: ignore[valid-type]
+    u_max: Annotated[float, quantity("m", above=0)]
+    p: Annotated[float, quantity("1", above=1, most=100)]
+    spread: Annotated[float, quantity("1", least=0, most=3)] = 0.0
     each: list[EachPowerLaw] | None = None
 
 
 class EachSphere(Each):
     """A sphere of its own."""
 
-    radius: quantity("m", above=0) | None = None  # type: ignore[valid-type]
+    radius: Annotated[float | None, quantity("m", above=0)] = None
 
 
 class SphereTable(ElasticTable):
     """Spheres on flats; the springs cover ``reach`` times the contact radius of Hertz."""
 
     kind: Literal["sphere"]
-    radius: quantity("m", above=0)  # type: ignore[valid-type]
+    radius: Annotated[float, quantity("m", above=0)]
     springs: Annotated[int, Field(ge=16, le=10_000_000)] = 4096
-    reach: quantity("1", above=1, most=1000) = 1.5  # type: ignore[valid-type]
+    reach: Annotated[float, quantity("1", above=1, most=1000)] = 2.5
     each: list[EachSphere] | None = None
 
 
 class EachCone(Each):
     """A cone of its own."""
 
-    slope: quantity("1", above=0) | None = None  # type: ignore[valid-type]
+    slope: Annotated[float | None, quantity("1", above=0)] = None
 
 
 class ConeTable(ElasticTable):
     """Cones on flats; ``slope`` is the tangent of the angle between flank and flat."""
 
     kind: Literal["cone"]
-    slope: quantity("1", above=0)  # type: ignore[valid-type]
+    slope: Annotated[float, quantity("1", above=0)]
     springs: Annotated[int, Field(ge=16, le=10_000_000)] = 4096
-    reach: quantity("1", above=1, most=1000) = 1.5  # type: ignore[valid-type]
+    reach: Annotated[float, quantity("1", above=1, most=1000)] = 2.5
     each: list[EachCone] | None = None
 
 
@@ -146,7 +146,7 @@ class FlatPunchTable(ElasticTable):
     """Flat punches: no creep, all springs slide at once."""
 
     kind: Literal["flat-punch"]
-    half_width: quantity("m", above=0)  # type: ignore[valid-type]
+    half_width: Annotated[float, quantity("m", above=0)]
     each: list[Each] | None = None
 
 
@@ -164,9 +164,9 @@ class HeightsTable(ElasticTable):
     file: str = Field(min_length=1)
     height: HeightColumn
     position: HeightColumn | None = None
-    spacing: quantity("m", above=0) | None = None  # type: ignore[valid-type]
+    spacing: Annotated[float | None, quantity("m", above=0)] = None
     springs: Annotated[int, Field(ge=16, le=10_000_000)] | None = None
-    scale: quantity("1", above=0) = 1.0  # type: ignore[valid-type]
+    scale: Annotated[float, quantity("1", above=0)] = 1.0
     each: list[Each] | None = None
 
     @model_validator(mode="after")

@@ -252,7 +252,7 @@ def _profiles(table: ElasticTable, folder: Path) -> list[tuple[int, int, Profile
 
 def profile_of(table: ElasticTable, i: int = 0, folder: Path = Path()) -> Profile:
     """The profile of the i-th contact of a kind that is not a rough line."""
-    normal = float(moduli(table).normal)
+    normal = float(np.asarray(moduli(table).normal))
     load = table.of(i, "normal_force")
     match table:
         case SphereTable():

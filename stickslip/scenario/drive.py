@@ -75,10 +75,7 @@ def _sampled(table: DriveTable, folder: Path) -> Drive:
     columns = read_columns(path)
     time_name = columns.find(table.time.column, file=path, key="drive.time")
     name = columns.find(table.position.column, file=path, key="drive.position")
-    units = [
-        part.unit or columns.units.get(found)
-        for part, found in ((table.time, time_name), (table.position, name))
-    ]
+    units = [part.unit or columns.units.get(found) for part, found in ((table.time, time_name), (table.position, name))]
     if units[1] is None:
         raise InputError("the unit of the drive's position is not given", file=path, key="drive.position.unit")
     time = columns.data[time_name] * factor_to_si(units[0] or "s", "s", key="drive.time.unit")

@@ -43,8 +43,30 @@ class Events(NamedTuple):
 UNITS = {"onset": "s", "arrest": "s", "slip": "m", "peak_velocity": "m/s", "recurrence": "s", "creep_before_slip": "m"}
 
 
+class Slip(NamedTuple):
+    """Onset and arrest (s), largest velocity in the direction of the pull (m/s), and that direction (+1 or -1)."""
+
+    onset: float
+    arrest: float
+    peak: float
+    sign: float
+
+
 def find_events(trajectory: Trajectory, motion: Motion, strength: float) -> Events:
-    """Slip events that are complete within the trajectory.
+    """The table of all slips that are complete within the trajectory; arguments as of `find_slips`."""
+    slips = find_slips(trajectory, motion, strength)
+    if not slips:
+        return Events(*(np.zeros(0) for _ in Events._fields))
+    onset, arrest, peak, sign = np.array(slips).T
+    from_, to = trajectory.at(onset).x, trajectory.at(arrest).x
+    begin = np.concatenate([[trajectory.steps.t[0]], arrest[:-1]])
+    rest = np.array([_settled(trajectory, a, b, i > 0) for i, (a, b) in enumerate(zip(begin, onset, strict=True))])
+    recurrence = np.concatenate([[np.nan], np.diff(onset)])
+    return Events(onset, arrest, (to - from_) * sign, peak, recurrence, (from_ - rest) * sign)
+
+
+def find_slips(trajectory: Trajectory, motion: Motion, strength: float) -> list[Slip]:
+    """Slips that are complete within the trajectory.
 
     Args:
         trajectory: of the solver.
@@ -58,21 +80,17 @@ def find_events(trajectory: Trajectory, motion: Motion, strength: float) -> Even
     ahead = np.concatenate([[False], lead > 0.0, [False]])
     edges = np.flatnonzero(ahead[1:] != ahead[:-1]).reshape(-1, 2)
     edges = edges[(edges[:, 0] > 0) & (edges[:, 1] < s.t.size)]  # neither cut off at the start nor at the end
-    keep = []
+    # ringing brings thousands of stretches; what their own samples already rule out is not looked at closely
+    force = np.abs(s.spring_force)
+    edges = edges[force[edges[:, 0] - 1] - force[edges[:, 1]] > 0.5 * LEAST_DROP * strength]
+    found = []
     for first, after in edges:
         onset, arrest = (_zero(s.t, lead, i) for i in (first, after))
         peak = float(np.max(s.v[first:after] * pull[first:after]))
-        force = np.interp([onset, arrest], s.t, s.spring_force)
-        if abs(force[0]) - abs(force[1]) > LEAST_DROP * strength and peak > LEAST_PEAK * speed[first]:
-            keep.append((onset, arrest, peak, pull[first]))
-    if not keep:
-        return Events(*(np.zeros(0) for _ in Events._fields))
-    onset, arrest, peak, sign = np.array(keep).T
-    from_, to = trajectory.at(onset).x, trajectory.at(arrest).x
-    begin = np.concatenate([[s.t[0]], arrest[:-1]])
-    rest = np.array([_settled(trajectory, a, b, i > 0) for i, (a, b) in enumerate(zip(begin, onset, strict=True))])
-    recurrence = np.concatenate([[np.nan], np.diff(onset)])
-    return Events(onset, arrest, (to - from_) * sign, peak, recurrence, (from_ - rest) * sign)
+        begin, end = np.interp([onset, arrest], s.t, force)
+        if begin - end > LEAST_DROP * strength and peak > LEAST_PEAK * speed[first]:
+            found.append(Slip(onset, arrest, peak, float(pull[first])))
+    return found
 
 
 def _zero(t: np.ndarray, lead: np.ndarray, i: int) -> float:

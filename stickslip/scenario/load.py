@@ -72,7 +72,9 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not valid TOML: {error}", file=path, hint="correct the line; text stands in quotes") from None
+        raise InputError(
+            f"not valid TOML: {error}", file=path, hint="correct the line; text stands in quotes"
+        ) from None
     return _checked(content, path, digest, tuple(changes), changes, text)
 
 

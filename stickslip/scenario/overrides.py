@@ -60,7 +60,9 @@ def _step(place: Any, part: str, following: str, key: str) -> Any:
 def _entry(entries: list[Any], part: str, key: str) -> Any:
     if part.isdigit():
         if not 1 <= int(part) <= len(entries):
-            raise InputError("there is no such entry", file="--set", key=key, value=part, allowed=f"1 to {len(entries)}")
+            raise InputError(
+                "there is no such entry", file="--set", key=key, value=part, allowed=f"1 to {len(entries)}"
+            )
         return entries[int(part) - 1]
     for entry in entries:
         if isinstance(entry, dict) and entry.get("type") == part:
@@ -108,8 +110,8 @@ def si_value(value: float | int | str, key: str) -> float:
     from ..units import unit_registry
 
     try:
-        quantity = unit_registry().Quantity(value)
-        return float(quantity.to_base_units().magnitude)
+        found: Any = unit_registry().Quantity(value)
+        return float(found.to_base_units().magnitude)
     except Exception:  # pint's parser raises whatever its tokenizer raises on garbage
         raise InputError("cannot read the quantity", file="--sweep", key=key, value=value) from None
 

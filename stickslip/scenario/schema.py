@@ -20,16 +20,16 @@ class Table(BaseModel):
 class BlockTable(Table):
     """The moving body and its spring."""
 
-    mass: quantity("kg", above=0, most=1e6)  # type: ignore[valid-type]
-    spring_stiffness: quantity("N/m", above=0, most=1e9)  # type: ignore[valid-type]
-    damping: quantity("N s/m", least=0, most=1e6) = 10.0  # type: ignore[valid-type]
+    mass: Annotated[float, quantity("kg", above=0, most=1e6)]
+    spring_stiffness: Annotated[float, quantity("N/m", above=0, most=1e9)]
+    damping: Annotated[float, quantity("N s/m", least=0, most=1e6)] = 10.0
 
 
 class Piece(Table):
     """The drive at one velocity for a while; zero is a hold."""
 
-    velocity: quantity("m/s", least=-10, most=10)  # type: ignore[valid-type]
-    duration: quantity("s", above=0)  # type: ignore[valid-type]
+    velocity: Annotated[float, quantity("m/s", least=-10, most=10)]
+    duration: Annotated[float, quantity("s", above=0)]
 
 
 class Column(Table):
@@ -42,14 +42,14 @@ class Column(Table):
 class DriveTable(Table):
     """How the load point moves: one velocity, pieces, or sampled positions from a file."""
 
-    velocity: quantity("m/s", least=-10, most=10) | None = None  # type: ignore[valid-type]
-    duration: quantity("s", above=0) | None = None  # type: ignore[valid-type]
+    velocity: Annotated[float | None, quantity("m/s", least=-10, most=10)] = None
+    duration: Annotated[float | None, quantity("s", above=0)] = None
     events: Annotated[int, Field(ge=1, le=100_000)] | None = None
     piece: Annotated[list[Piece], Field(min_length=1)] | None = None
     file: str | None = None
     time: Column = Column(column="time", unit="s")
     position: Column | None = None
-    tolerance: quantity("m", above=0) = 1e-9  # type: ignore[valid-type]
+    tolerance: Annotated[float, quantity("m", above=0)] = 1e-9
     start: Literal["rest", "steady"] = "rest"
 
     @model_validator(mode="after")
@@ -75,33 +75,33 @@ class DriveTable(Table):
 class WeakeningTable(Table):
     """The base law of friction."""
 
-    ratio: quantity("1", least=0, most=1) = 0.85  # type: ignore[valid-type]
-    slip_distance: quantity("m", least=1e-10, most=1e-2) = 1e-6  # type: ignore[valid-type]
-    healing_time: quantity("s", least=1e-6, most=1e4) = 0.02  # type: ignore[valid-type]
+    ratio: Annotated[float, quantity("1", least=0, most=1)] = 0.85
+    slip_distance: Annotated[float, quantity("m", least=1e-10, most=1e-2)] = 1e-6
+    healing_time: Annotated[float, quantity("s", least=1e-6, most=1e4)] = 0.02
 
 
 class SensorTable(Table):
     """The vibrometer; keys as of `stickslip.sensor.Vibrometer`. Whatever is not given is off, but for the counts."""
 
-    resolution: quantity("m", least=0, most=1e-3) = 7.91e-9  # type: ignore[valid-type]
+    resolution: Annotated[float, quantity("m", least=0, most=1e-3)] = 7.91e-9
     counter_steps: Annotated[int, Field(ge=0, le=2**40)] = 0
     clear_at_arrest: bool = False
-    gain: quantity("1", above=-1, most=1) = 0.0  # type: ignore[valid-type]
-    interpolation_error: quantity("m", least=0, most=1e-6) = 0.0  # type: ignore[valid-type]
-    delay: quantity("s", least=0, most=1) = 0.0  # type: ignore[valid-type]
-    low_pass: quantity("s", least=0, most=10) = 0.0  # type: ignore[valid-type]
-    high_pass: quantity("Hz", least=0, most=1e6) = 0.0  # type: ignore[valid-type]
-    drift: quantity("m/s", least=-1e-3, most=1e-3) = 0.0  # type: ignore[valid-type]
-    random_walk: quantity("m/s**0.5", least=0, most=1e-3) = 0.0  # type: ignore[valid-type]
-    white: quantity("m/Hz**0.5", least=0, most=1e-3) = 0.0  # type: ignore[valid-type]
-    flicker: quantity("m", least=0, most=1e-3) = 0.0  # type: ignore[valid-type]
-    mains: quantity("m", least=0, most=1e-3) = 0.0  # type: ignore[valid-type]
-    mains_frequency: quantity("Hz", above=0, most=1e6) = 50.0  # type: ignore[valid-type]
-    speckle_rate: quantity("1/m", least=0, most=1e9) = 0.0  # type: ignore[valid-type]
-    speckle_jump: quantity("m", least=0, most=1e-3) = 3e-8  # type: ignore[valid-type]
-    dropout_rate: quantity("1/m", least=0, most=1e9) = 0.0  # type: ignore[valid-type]
-    dropout_time: quantity("s", above=0, most=10) = 1e-3  # type: ignore[valid-type]
-    clock_error: quantity("1", above=-0.01, below=0.01) = 0.0  # type: ignore[valid-type]
+    gain: Annotated[float, quantity("1", above=-1, most=1)] = 0.0
+    interpolation_error: Annotated[float, quantity("m", least=0, most=1e-6)] = 0.0
+    delay: Annotated[float, quantity("s", least=0, most=1)] = 0.0
+    low_pass: Annotated[float, quantity("s", least=0, most=10)] = 0.0
+    high_pass: Annotated[float, quantity("Hz", least=0, most=1e6)] = 0.0
+    drift: Annotated[float, quantity("m/s", least=-1e-3, most=1e-3)] = 0.0
+    random_walk: Annotated[float, quantity("m/s**0.5", least=0, most=1e-3)] = 0.0
+    white: Annotated[float, quantity("m/Hz**0.5", least=0, most=1e-3)] = 0.0
+    flicker: Annotated[float, quantity("m", least=0, most=1e-3)] = 0.0
+    mains: Annotated[float, quantity("m", least=0, most=1e-3)] = 0.0
+    mains_frequency: Annotated[float, quantity("Hz", above=0, most=1e6)] = 50.0
+    speckle_rate: Annotated[float, quantity("1/m", least=0, most=1e9)] = 0.0
+    speckle_jump: Annotated[float, quantity("m", least=0, most=1e-3)] = 3e-8
+    dropout_rate: Annotated[float, quantity("1/m", least=0, most=1e9)] = 0.0
+    dropout_time: Annotated[float, quantity("s", above=0, most=10)] = 1e-3
+    clock_error: Annotated[float, quantity("1", above=-0.01, below=0.01)] = 0.0
     dither: bool = False
     seed: Annotated[int, Field(ge=0)] = 0
 
@@ -109,10 +109,10 @@ class SensorTable(Table):
 class SolverTable(Table):
     """Error allowed in a step (see `stickslip.solve.Tolerance`) and the longest step."""
 
-    relative: quantity("1", above=0, most=1) = 1e-2  # type: ignore[valid-type]
-    displacement: quantity("m", above=0, most=1e-6) = 1e-11  # type: ignore[valid-type]
-    velocity: quantity("m/s", above=0, most=1e-3) = 1e-7  # type: ignore[valid-type]
-    largest_step: quantity("s", above=0, most=100) = 0.05  # type: ignore[valid-type]
+    relative: Annotated[float, quantity("1", above=0, most=1)] = 1e-2
+    displacement: Annotated[float, quantity("m", above=0, most=1e-6)] = 1e-11
+    velocity: Annotated[float, quantity("m/s", above=0, most=1e-3)] = 1e-7
+    largest_step: Annotated[float, quantity("s", above=0, most=100)] = 0.05
 
 
 Channel = Literal["displacement", "velocity", "spring_force", "drive_position"]
@@ -122,7 +122,7 @@ ENDINGS = (".csv", ".nc", ".mat", ".uff")
 class OutputTable(Table):
     """What is written besides pictures and numbers."""
 
-    sampling_rate: quantity("Hz", above=0, most=1e8) = 10_000.0  # type: ignore[valid-type]
+    sampling_rate: Annotated[float, quantity("Hz", above=0, most=1e8)] = 10_000.0
     trace: str | None = None
     channels: Annotated[list[Channel], Field(min_length=1)] = ["displacement"]
 
@@ -155,7 +155,9 @@ class SweepTable(Table):
         span = [self.start is not None, self.stop is not None, self.points is not None]
         if (self.values is None) == (not all(span)) or (self.values is not None and any(span)):
             raise fault(
-                InputError("a series needs start, stop and points, or values", hint='start = "20 um/s"; stop = "1 mm/s"')
+                InputError(
+                    "a series needs start, stop and points, or values", hint='start = "20 um/s"; stop = "1 mm/s"'
+                )
             )
         return self
 
@@ -191,7 +193,7 @@ class ScenarioFile(Table):
 
 
 FILES: dict[str, type[ScenarioFile]] = {
-    kind: create_model(f"ScenarioFile_{kind}", __base__=ScenarioFile, contact=(table, ...))  # type: ignore[call-overload]
+    kind: create_model(f"ScenarioFile_{kind}", __base__=ScenarioFile, contact=(table, ...))
     for kind, table in CONTACTS.items()
 }
 

@@ -1,9 +1,10 @@
-"""The static curve of a scenario's contacts: force against displacement, and the time at which a slow drive gets there."""
+"""The static curve of a scenario's contacts: displacement against force, and the time a slow drive takes to it."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from .. import contact as physics
@@ -13,6 +14,8 @@ from .build import Setup
 from .contact_tables import ElasticTable, RoughLineTable
 from .contacts import build_contact, moduli, profile_of
 from .load import Scenario
+
+_loading = jax.jit(physics.loading_displacement)
 
 
 class StaticCreep(NamedTuple):
@@ -47,10 +50,16 @@ def static_creep(
     file, table = scenario.file, scenario.file.contact
     velocity = _drive_velocity(scenario)
     tau = physics.default_loads(points)
-    drive = {"spring_stiffness": file.block.spring_stiffness, "velocity": velocity}
+    drive: dict[str, Any] = {"spring_stiffness": file.block.spring_stiffness, "velocity": velocity}
     equal = getattr(table, "each", None) is None
     if isinstance(table, ElasticTable) and equal:
-        common = {"tau": tau, "average": average, "time": time, "moduli": moduli(table), "contacts": table.contacts}
+        common: dict[str, Any] = {
+            "tau": tau,
+            "average": average,
+            "time": time,
+            "moduli": moduli(table),
+            "contacts": table.contacts,
+        }
         if isinstance(table, RoughLineTable) and not table.curvature:
             curve = physics.creep_curve(
                 table.H,
@@ -74,7 +83,7 @@ def static_creep(
             )
             return StaticCreep(*(np.asarray(a) for a in (curve.tau, curve.u, curve.t)))
     built = build_contact(table.model_copy(update={"bins": max(table.bins, 4096)}), scenario.folder)
-    u = np.asarray(physics.loading_displacement(built.bank.stiffness, built.bank.strength, tau * built.strength))
+    u = np.asarray(_loading(built.bank.stiffness, built.bank.strength, tau * built.strength))
     t = physics.virtual_time(tau * built.strength, u, form=time, **drive)
     return StaticCreep(tau, u, np.asarray(t))
 
@@ -92,7 +101,7 @@ def first_stick(setup: Setup, points: int = 400) -> tuple[np.ndarray, np.ndarray
     room = np.asarray(bank.strength) - held
     left = float(room.sum())
     loads = physics.default_loads(points) * left
-    u = np.asarray(physics.loading_displacement(bank.stiffness, room, loads))
+    u = np.asarray(_loading(bank.stiffness, room, loads))
     t = (loads / float(setup.model.block.spring_stiffness) + u) / abs(velocity)
     return u * sign, t
 

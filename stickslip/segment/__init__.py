@@ -34,8 +34,10 @@ __all__ = [
     "velocity",
 ]
 
+_COMPLETE = 0.5  # share of the way that slips should make up for the threshold to have found them all
 _STOPLESS = 0.2  # share of slips without a zero of velocity beyond which none is asked for
-_ACCIDENTAL = 0.1  # slips that make up less than this share of the way are no stick-slip
+# slips that make up less than this share of the way and are smaller than so many noise levels are no stick-slip
+_ACCIDENTAL = ((0.3, 30.0), (0.1, 100.0))
 
 
 def segment(
@@ -54,31 +56,44 @@ def segment(
     """
     gain = settings.gain if settings is not None else None
     position, drive, gain, unit = block_motion(trace, spring_stiffness, gain)
-    chosen = settings is not None
-    smallest = minimum_slip if minimum_slip is not None else trace.minimum_slip
-    if settings is None:
-        noise, count = trace.noise, trace.resolution
-        if gain is not None and trace.leading == "spring_force":
-            noise, count = (None if v is None else v / gain for v in (noise, count))
-        elif trace.leading != "displacement":
-            noise = count = None
-        if noise is None:
-            noise = noise_level(position, count)
-        settings = choose_settings(
-            trace.time, position, drive, noise, count, minimum_slip=smallest, gain=gain, unit=unit
-        )
-    result = segment_motion(
-        trace.time, position, drive, settings, name=trace.name, virgin=trace.virgin, missing=trace.missing
-    )
-    stopless = sum(event.arrest == "drive" for event in result.events)
-    if not chosen and stopless > _STOPLESS * len(result.events):
-        # one kind of arrest for the whole trace: slips that end in two ways cannot be compared
-        settings = replace(settings, arrest="drive")
-        result = segment_motion(
+
+    def run(settings: Settings) -> Segmentation:
+        return segment_motion(
             trace.time, position, drive, settings, name=trace.name, virgin=trace.virgin, missing=trace.missing
         )
+
+    if settings is not None:
+        return run(settings)
+    noise, count = trace.noise, trace.resolution
+    if gain is not None and trace.leading == "spring_force":
+        noise, count = (None if v is None else v / gain for v in (noise, count))
+    elif trace.leading != "displacement":
+        noise = count = None
+    if noise is None:
+        noise = noise_level(position, count)
+    smallest = minimum_slip if minimum_slip is not None else trace.minimum_slip
+
+    def choose(slow: bool) -> Settings:
+        return choose_settings(
+            trace.time, position, drive, noise, count, minimum_slip=smallest, gain=gain, unit=unit, slow=slow
+        )
+
+    result = run(choose(False))
+    moved = _path(position, result.settings.noise)
+    if drive is not None and _slipped(result) < _COMPLETE * moved:
+        other = run(choose(True))  # the threshold for fast slips finds only part of the motion, if any
+        if _slipped(other) > _slipped(result) + 0.1 * moved:
+            result = other
+    stopless = sum(event.arrest == "drive" for event in result.events)
+    if stopless > _STOPLESS * len(result.events):
+        # one kind of arrest for the whole trace: slips that end in two ways cannot be compared
+        result = run(replace(result.settings, arrest="drive"))
     # the limit found on this trace holds for the model's trace too
-    return replace(result, settings=replace(settings, minimum_slip=result.settings.minimum_slip, relative=0.0))
+    return replace(result, settings=replace(result.settings, relative=0.0))
+
+
+def _slipped(segmentation: Segmentation) -> float:
+    return sum(event.slip for event in segmentation.events)
 
 
 def segment_motion(
@@ -121,9 +136,11 @@ def _regime(
     """What kind of motion it is, and the numbers that say so."""
     moved = _path(position, settings.noise)
     slipped = sum(event.slip for event in events)
-    if events and slipped > _ACCIDENTAL * moved:
+    middle = float(np.median([event.slip for event in events])) if events else 0.0
+    if events and not any(
+        slipped < share * moved and middle < levels * settings.noise for share, levels in _ACCIDENTAL
+    ):
         rests = [event.stick_time / max(event.duration, 1e-300) for event in events[1:]]
-        middle = float(np.median([event.slip for event in events]))
         text = f"{len(events)} slip{'s' if len(events) > 1 else ''}, median {middle:.3g} {settings.unit}"
         if rests and float(np.median(rests)) < 1.0:
             return "oscillation", text + ", but the block rests for less time than it slips"

@@ -23,18 +23,21 @@ def choose_settings(
     minimum_slip: float | None = None,
     gain: float | None = None,
     unit: str = "m",
+    slow: bool = False,
 ) -> Settings:
     """Settings for `pick`, so that noise cannot cross the threshold.
 
     The threshold is 4 v0 + 0.1 mm/s where slips are at least twice as fast; on slower or other scales (a laboratory
     fault, lengths in seconds of loading) it is 1.5 v0, raised above the noise. The window is the shortest for which
-    the velocity's noise is a fifth of the threshold (a quarter of the drive's speed on other scales).
+    the velocity's noise is a fifth of the threshold (a quarter of the drive's speed on other scales), widened to a
+    twentieth as far as that leaves the fastest slip's velocity as it is.
 
     Args:
         time, position: s, m, shape (n,).
         drive: the load point, or None (then ten times the block's usual speed is the threshold).
         noise, resolution: of one sample of position, m.
         minimum_slip: m; default 10 noise levels (and `pick` leaves out what is below a tenth of the large slips).
+        slow: choose for slow slips even where some are twice as fast as the rig's threshold.
     """
     step = float(np.median(np.diff(time[:200_001])))
     speed = _speed(time, drive)
@@ -45,15 +48,32 @@ def choose_settings(
     most = max(1, min(time.size // 20, 20_000))
     if drive is None:
         return _undriven(time, position, step, spread, smallest, most, relative, gain, unit)
-    if unit == "m":
+    if unit == "m" and not slow:
         threshold = _RIG_FACTOR * speed + _RIG_FLOOR
         half = half_window(spread, step, threshold / 5, most)
         fastest = float(np.max(np.abs(velocity(time, position, half))))
         if fastest > 2 * threshold and velocity_noise(spread, half, step) <= threshold / 4:
+            allowance = 4 * velocity_noise(spread, half, step)
+            half = _widen(time, position, half, half_window(spread, step, threshold / 20, most), allowance)
             return Settings(half * step, threshold, speed, smallest, spread, gain=gain, unit=unit, relative=relative)
     half = half_window(spread, step, speed / 4 if speed > 0 else np.inf, most)
     threshold = max(1.5 * speed, speed + 5 * velocity_noise(spread, half, step))
     return Settings(half * step, threshold, speed, smallest, spread, gain=gain, unit=unit, relative=relative)
+
+
+def _widen(time: Array, position: Array, half: int, wanted: int, noise: float) -> int:
+    """A wider window, up to ``wanted``, that lowers the greatest velocity by no more than a hundredth and its noise."""
+    if wanted <= half:
+        return half
+    top = int(np.argmax(np.abs(velocity(time, position, half))))
+    part = slice(max(top - 20 * wanted, 0), top + 20 * wanted)
+    fastest = float(np.abs(velocity(time[part], position[part], half)).max()) - noise
+    while half < wanted:
+        wider = min(half + max(1, half // 4), wanted)
+        if float(np.abs(velocity(time[part], position[part], wider)).max()) < 0.99 * fastest:
+            break
+        half = wider
+    return half
 
 
 def _undriven(
@@ -73,7 +93,7 @@ def _undriven(
     usual, greatest = float(np.median(speeds)), float(speeds.max())
     lowest = usual + 5 * velocity_noise(noise, half, step)
     threshold = max(lowest, min(10 * usual, 0.5 * greatest))
-    return Settings(half * step, threshold, usual, smallest, noise, gain=gain, unit=unit, relative=relative)
+    return Settings(half * step, threshold, 0.5 * threshold, smallest, noise, gain=gain, unit=unit, relative=relative)
 
 
 def _speed(time: Array, drive: Drive | None) -> float:

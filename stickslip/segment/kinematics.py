@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..trace import Drive, Trace
 
 Array = NDArray[np.float64]
-_CHUNK = 1 << 18
+_CHUNK = 1 << 14
 
 
 def velocity(time: Array, position: Array, half: int) -> Array:
@@ -126,8 +126,9 @@ def block_motion(
 def loading_rate(time: Array, force: Array, noise: float, drive: Drive | None = None) -> float:
     """How fast the force builds up while the block sticks: N for each metre of drive, or N/s without a drive.
 
-    The upper decile of the slopes of the commoner sign. Slopes are between means over blocks long enough for their
-    noise to be an eighth of the usual slope.
+    The upper quartile of the slopes of the commoner sign. Slopes are between means over blocks long enough for their
+    noise to be an eighth of the usual slope. Where these slopes scatter too much to speak of a build-up (steady
+    sliding, velocity steps, loops) it is the steepest, so that fluctuations of the force are not taken for motion.
     """
     size = 4
     along = time if drive is None else drive.position(time)
@@ -147,4 +148,8 @@ def loading_rate(time: Array, force: Array, noise: float, drive: Drive | None = 
         size *= 2
     sign = 1.0 if drive is not None or np.count_nonzero(slopes > 0) >= np.count_nonzero(slopes < 0) else -1.0
     same = np.abs(slopes[sign * slopes > 0])
-    return sign * float(np.quantile(same, 0.9)) if same.size else 0.0
+    if same.size == 0:
+        return 0.0
+    quartiles = np.quantile(same, [0.25, 0.5, 0.75])
+    steady = quartiles[2] - quartiles[0] < 0.9 * quartiles[1]
+    return sign * float(quartiles[2] if steady else same.max())

@@ -68,7 +68,7 @@ def pick(
     events: list[Event] = []
     if above[0]:
         drop("the block is already slipping when the record begins", float(time[0]))
-        resume = _first(speed, 1, lambda v: v <= 0)[0]
+        resume = _first(speed, 1, lambda v: v <= stop_level)[0]
     gaps = np.asarray(missing)
     for up in ups.tolist():
         if up < resume:
@@ -137,7 +137,9 @@ def _drop_small(
     """Leave out what is small beside the large slips: tremors of the ring-down and of the drive."""
     if not events:
         return [], settings
-    limit = settings.relative * float(np.quantile([event.slip for event in events], 0.9))
+    # half of all slipped length is in slips of at least this size: many tremors cannot pull it down
+    sizes = np.sort([event.slip for event in events])[::-1]
+    limit = settings.relative * float(sizes[np.searchsorted(np.cumsum(sizes), 0.5 * sizes.sum())])
     for event in events:
         if event.slip < limit:
             drop(_too_small(limit, settings.unit) + f" ({settings.relative:g} of the large ones)", event.t_onset)

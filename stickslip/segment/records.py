@@ -18,7 +18,7 @@ class Settings:
         minimum_slip: m; anything smaller is not an event.
         noise: m, standard deviation of one sample of position (quantisation included).
         arrest: ``"zero"``: a slip ends at the first zero of velocity; ``"drive"``: where it falls behind the drive.
-        relative: slips below this share of the large ones (ninth decile) are left out too.
+        relative: slips below this share of the large ones (which make half of all slipped length) are left out too.
         gain: for traces of spring force, N per m (or per s of loading) between force and spring elongation.
         unit: ``"m"``, or ``"s of loading"`` where neither stiffness nor drive is known.
     """

@@ -155,8 +155,8 @@ def _dropouts(rng: np.random.Generator, x: Array, y: Array, rate: float, samples
         return y
     y = y.copy()
     starts = np.flatnonzero(rng.random(x.size) < -np.expm1(-rate * _travel(x)))
-    free = 0
-    for start in starts:
+    free: int = 0
+    for start in starts.tolist():
         if start < free:
             continue
         free = min(start + samples, x.size - 1)

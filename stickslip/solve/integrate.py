@@ -106,7 +106,7 @@ def integrate(
     state: State | None = None,
     tolerance: Tolerance | None = None,
     stops: Sequence[float] = (),
-    largest_step: float = 0.05,
+    largest_step: float = 0.02,
     most_steps: int = 50_000_000,
     progress: Callable[[float, Steps], None] | None = None,
 ) -> tuple[Trajectory, State]:

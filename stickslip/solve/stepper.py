@@ -68,9 +68,9 @@ class Tolerance(eqx.Module):
         velocity: absolute part (m/s).
     """
 
-    relative: Array = eqx.field(default=1e-2, converter=jnp.asarray)
-    displacement: Array = eqx.field(default=1e-11, converter=jnp.asarray)
-    velocity: Array = eqx.field(default=1e-7, converter=jnp.asarray)
+    relative: Array = eqx.field(default=3e-3, converter=jnp.asarray)
+    displacement: Array = eqx.field(default=3e-12, converter=jnp.asarray)
+    velocity: Array = eqx.field(default=3e-8, converter=jnp.asarray)
 
 
 class Step(eqx.Module):
@@ -122,7 +122,7 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
         contact = model.contact(y0, bank, t0)
         tol = self.tolerance
         dh = D * h
-        exact = 1e-3 * tol.velocity
+        exact = 1e-2 * tol.velocity + 1e-3 * tol.relative * jnp.abs(v0)
 
         def stage(t: Array, dt: Array, known_dx: Array, known_v: Array, guess: Array) -> tuple:
             """Solve v = known_v + D h a(v), dx = known_dx + D h v; the path runs from the start of the step."""
@@ -145,7 +145,10 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
         ok = ok1 & ok2
         error = jax.tree.map(jnp.zeros_like, y0)
         error = eqx.tree_at(
-            lambda y: (y.x, y.v), error, (jnp.where(ok, ex / sx, jnp.inf), jnp.where(ok, ev / sv, jnp.inf))
+            lambda y: (y.x, y.v), error, (
+                jnp.where(ok, ex / sx, jnp.inf),
+                jnp.where(ok, ev / sv, jnp.inf),
+            ),
         )
         y1 = eqx.tree_at(lambda y: y.work, y1, _work(y0, contact, (v0, v1, v2), (f1, f2), h, model))
         return y1, error, {"y0": y0, "y1": y1}, Step(a2, ~ok), diffrax.RESULTS.successful

@@ -93,7 +93,7 @@ def campaign(tmp_path):
         if rows is not None:
             np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=header, comments="", fmt="%.12g")
         path = tmp_path / name
-        path.write_text(f"schema = 1\n[rig]\n{rig}\n[[trace]]\nfile = \"a.csv\"\n{trace}\n", encoding="utf-8")
+        path.write_text(f'schema = 1\n[rig]\n{rig}\n[[trace]]\nfile = "a.csv"\n{trace}\n', encoding="utf-8")
         return path
 
     return write

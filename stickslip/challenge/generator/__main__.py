@@ -17,12 +17,14 @@ def main(arguments: list[str] | None = None) -> int:
     """Write one campaign; the truth goes to standard output, or to ``--truth``."""
     parser = argparse.ArgumentParser(prog="python -m stickslip.challenge.generator", description=main.__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--effect", action="append", default=[], metavar="TAG[=AMPLITUDE][:FORM]", help=f"one of: {', '.join(EFFECTS)}")
+    parser.add_argument(
+        "--effect", action="append", default=[], metavar="TAG[=AMPLITUDE][:FORM]", help=f"one of: {', '.join(EFFECTS)}"
+    )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--new-lines", action="store_true", help="new rough lines after every slip")
     parser.add_argument("--not-virgin", action="store_true", help="records start after two slips")
     parser.add_argument("--spring", choices=("known", "unknown"), help="default: drawn")
-    parser.add_argument("--dt", type=float, default=1e-5, help="small step, s")
+    parser.add_argument("--dt", type=float, default=2e-5, help="small step, s")
     parser.add_argument("--truth", type=Path, help="where to write the truth (kept apart from the campaign)")
     given = parser.parse_args(arguments)
     try:

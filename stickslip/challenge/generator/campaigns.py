@@ -20,6 +20,7 @@ from .write import write_campaign
 
 OVERSAMPLING = 4
 LONGEST = 16.0  # s
+OTHER_CASE = "a smaller amplitude, or another seed"
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ def make_campaign(
     runs: Iterable[Run] = DEFAULT_RUNS,
     virgin: bool = True,
     spring_known: bool | None = None,
-    dt: float = 1e-5,
+    dt: float = 2e-5,
     rate: float = 1e4,
     quiet: bool = True,
     setup: Setup | None = None,
@@ -83,8 +84,8 @@ def make_campaign(
     guess = 10 ** rng.uniform(-0.15, 0.15)
     base_stiffness = setup.rig.spring_stiffness
     base_mass = setup.rig.mass
+    seeds = rng.integers(2**31, size=3)  # lines and noise do not change with what is hidden
     hidden = [hide(setup, tag, amplitude, rng, *form) for tag, amplitude, *form in effects]
-    seeds = rng.integers(2**31, size=3)
     bank = _bank(setup, int(seeds[0]), new_lines)
     noise = np.random.default_rng(seeds[1])
     traces, record = [], []
@@ -92,11 +93,11 @@ def make_campaign(
         result, start, drive = _run(setup, bank, run, new_lines, virgin, dt, rate, quiet, int(seeds[2]) + number)
         read, events = _read(setup, result, start, rate, noise)
         if events["onset"].size < 3:
-            raise InputError(
-                f"run '{run.name}' shows {events['onset'].size} slips", key="effects", hint="a smaller amplitude, or another seed"
-            )
+            raise InputError(f"run '{run.name}' shows {events['onset'].size} slips", key="effects", hint=OTHER_CASE)
         traces.append((run, read, drive))
-        record.append({"name": run.name, "start": start, **{key: [float(x) for x in col] for key, col in events.items()}})
+        record.append(
+            {"name": run.name, "start": start, **{key: [float(x) for x in col] for key, col in events.items()}}
+        )
     folder.mkdir(parents=True, exist_ok=True)
     shown_spring: float | tuple[float, float, float] = base_stiffness
     if not spring_known:
@@ -129,34 +130,28 @@ def _run(
     """The run, the time at which its record starts, and its drive as the file gives it."""
     if new_lines:
         turn = seed % bank.normal.shape[0]
-        bank = Bank(np.roll(bank.normal, turn, 0), np.roll(bank.stiffness, turn, 0), bank.start, np.roll(bank.count, turn, 0))
+        bank = Bank(
+            np.roll(bank.normal, turn, 0), np.roll(bank.stiffness, turn, 0), bank.start, np.roll(bank.count, turn, 0)
+        )
 
-    def go(drive: Drive, duration: float, sampling: float) -> Result:
+    def go(pieces: list[tuple[float, float]], duration: float, sampling: float, stop: tuple[int, float]) -> Result:
         return simulate(
-            setup.rig, drive, bank, setup.effects, duration=duration, dt=dt, rate=sampling, quiet=quiet,
-            new_lines=new_lines, relaxation=setup.relaxation, seed=seed,
+            setup.rig, Drive.pieces(pieces), bank, setup.effects, duration=duration, dt=dt, rate=sampling, quiet=quiet,
+            new_lines=new_lines, relaxation=setup.relaxation, seed=seed, stop=stop,
         )  # fmt: skip
 
     fine = OVERSAMPLING * rate
+    steady = [(1.0, run.velocity)]
     before = 0.0
-    wanted = run.events
-    if not virgin or not run.pieces:
-        # how long it takes is seen from a first pass
-        load = setup.rig.capacity / (setup.rig.spring_stiffness * run.velocity)
-        scout = go(Drive.constant(run.velocity), min(LONGEST, 4.0 * load), 1000.0)
-        arrests, onsets = scout.event_columns["arrest"], scout.event_columns["onset"]
-        if not virgin and onsets.size > 2:
-            before = round(float(arrests[1] + 0.3 * (onsets[2] - arrests[1])), 3)
-            wanted += 2
-        if not run.pieces:
-            last = arrests[min(wanted, arrests.size) - 1] if arrests.size else LONGEST
-            tail = 0.4 * float(np.diff(onsets)[-1]) if onsets.size > 1 else 0.0
-            end = min(before + LONGEST, round(float(last) + tail, 3))
-            return go(Drive.constant(run.velocity), end, fine), before, []
+    if not virgin:
+        arrests = go(steady, LONGEST, 1000.0, (2, 0.0)).event_columns["arrest"]
+        if arrests.size < 2:
+            raise InputError(f"run '{run.name}' does not stick and slip", key="effects", hint=OTHER_CASE)
+        before = round(float(arrests[1] + 0.3 * (arrests[1] - arrests[0])), 3)
+    if not run.pieces:
+        return go(steady, before + LONGEST, fine, (run.events + (0 if virgin else 2), 0.4)), before, []
     pieces = [(before + until, velocity) for until, velocity in run.pieces]
-    if before:
-        pieces[0] = (pieces[0][0], run.velocity)
-    return go(Drive.pieces(pieces), pieces[-1][0], fine), before, list(run.pieces)
+    return go(pieces, pieces[-1][0], fine, (0, 0.0)), before, list(run.pieces)
 
 
 def _read(

@@ -13,6 +13,8 @@ from .bank import Bank
 from .kernel import run
 from .lines import Array
 
+MOST_EVENTS = 1000
+
 
 @dataclass(frozen=True)
 class Rig:
@@ -115,7 +117,7 @@ def simulate(
     new_lines: bool = False,
     relaxation: tuple[float, float] = (0.05, 0.0),
     seed: int = 0,
-    max_events: int = 1000,
+    stop: tuple[int, float] = (0, 0.0),
 ) -> Result:
     """Integrate the equation of motion from rest with force-free springs.
 
@@ -126,6 +128,7 @@ def simulate(
         bank: the contact springs; row 0 at the start, the next row after every slip if ``new_lines``.
         effects: amplitudes and inner parameters, shape (slots.EFFECT_SIZE,); None or zeros for none.
         rate: samples per second of the result.
+        stop: (n, share): end after n slips and that share of the last interval, if that comes before ``duration``.
         relaxation: (time, log-normal spread) of the relaxing branches of the springs, s.
 
     Raises:
@@ -140,19 +143,19 @@ def simulate(
             quiet_dt = min(quiet_dt, 1 / (60 * eff[frequency]))
     samples = round(duration * rate) + 1
     record = np.zeros((samples, S.RECORD_SIZE))
-    events = np.zeros((max_events, len(S.EVENT_COLUMNS)))
+    events = np.zeros((MOST_EVENTS, len(S.EVENT_COLUMNS)))
     onset = 2e-4 + 1.5 * drive.fastest
-    count, steps, quiet_steps = run(
+    count, steps, quiet_steps, samples = run(
         rig.vector(), eff, bank.normal, bank.stiffness, bank.count, bank.start, tau,
         np.asarray(drive.times), np.asarray(drive.positions), duration, dt, 1 / rate,
-        quiet, quiet_dt, new_lines, onset, seed, record, events,
+        quiet, quiet_dt, new_lines, onset, rng, stop[0], stop[1], record, events,
     )  # fmt: skip
     if count < 0:
         raise SolveError(f"the motion diverged with the step {dt:g} s; take a smaller one")
-    count = min(count, max_events)
+    count = min(count, MOST_EVENTS)
     return Result(
         np.arange(samples) / rate,
-        {name: record[:, i] for i, name in enumerate(S.COLUMNS)},
+        {name: record[:samples, i] for i, name in enumerate(S.COLUMNS)},
         {name: events[:count, i] for i, name in enumerate(S.EVENT_COLUMNS)},
         steps,
         quiet_steps,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from . import slots as S
+from .compiled import jit
 from .laws import (
     advance,
     body_force,
@@ -23,12 +23,14 @@ from .springs import plain, rich, stored
 QUIET_BELOW = 0.7e-6  # m/s: creep slower than this ...
 QUIET_AFTER = 8e-3  # s: ... for this long is followed with implicit steps
 QUIET_UNTIL = 1e-6  # m/s: left above this; at 3 um/s every event came 0.1 ms late
+QUIET_STIFFNESS = 8.0  # sticking stiffness over the rate of weakening: nearer to one, creep begins to oscillate
+SMALLEST_SLIP = 3e-6  # m: less is a lurch of the springs, not a slip
 FORCE_MISS = 1e-12  # N: the balance of forces of an implicit step
 KICK_MISS = 1e-10  # N
 
 
-@njit(cache=True)
-def contacts(old, new, k, normal, tau, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff):
+@jit
+def contacts(old, new, k, normal, fade, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff):
     """All contacts moved by ``du`` (and the yaw ``dq``): (force, force of the yaw moment, sticking stiffness)."""
     total = 0.0
     moment = 0.0
@@ -43,7 +45,7 @@ def contacts(old, new, k, normal, tau, start, du, dq, h, plus, minus, soft, tilt
         p = plus * (1.0 - a)
         m = minus * (1.0 - a)
         if is_rich:
-            f, s = rich(old, new, k, normal, tau, start[j], start[j + 1], step, h, p, m, eff)
+            f, s = rich(old, new, k, normal, fade, start[j], start[j + 1], step, h, p, m, eff)
         else:
             f, s = plain(old[0], new[0], k, normal, start[j], start[j + 1], step, p, m)
         total += f
@@ -52,12 +54,12 @@ def contacts(old, new, k, normal, tau, start, du, dq, h, plus, minus, soft, tilt
     return total, moment, stiff
 
 
-@njit(cache=True)
+@jit
 def needs_rich(eff):
     return eff[S.SLIPW_EPS] != 0.0 or eff[S.CREEP_V] != 0.0 or eff[S.VISCO_G] != 0.0 or eff[S.RENEW_RATE] != 0.0
 
 
-@njit(cache=True)
+@jit
 def fresh_lines(f, normal_old, normal, k, count_old, count, start):
     """Move the forces to new lines by rank: every spring keeps its share of the cap, every contact its force."""
     out = np.zeros_like(f)
@@ -82,41 +84,47 @@ def fresh_lines(f, normal_old, normal, k, count_old, count, start):
     return out
 
 
-@njit(cache=True)
-def seed_generator(seed):
-    np.random.seed(seed)
-
-
-@njit(cache=True)
-def new_life(eff):
+@jit
+def new_life(eff, rng):
     """Distance a junction lasts: exponentially distributed, or the same for all."""
     if eff[S.RENEW_FORM] == 0.0:
-        return -math.log(1.0 - np.random.random()) / eff[S.RENEW_RATE]
+        return -math.log(1.0 - rng.random()) / eff[S.RENEW_RATE]
     return 1.0 / eff[S.RENEW_RATE]
 
 
-@njit(cache=True)
+@jit
+def relax(fade, tau, h, eff):
+    """Fill ``fade`` with the relaxation of each branch in ``h``; returns ``h``."""
+    if eff[S.VISCO_G] != 0.0:
+        for i in range(tau.size):
+            fade[i] = math.exp(-h / tau[i])
+    return h
+
+
+@jit
 def run(
     rig, eff, normal_pool, k_pool, count_pool, start, tau, times, positions, duration, dt, record_dt,
-    quiet_allowed, quiet_dt, renew, onset_velocity, seed, record, events,
+    quiet_allowed, quiet_dt, renew, onset_velocity, rng, stop_events, stop_tail, record, events,
 ):  # fmt: skip
     """Integrate to ``duration``, filling ``record`` (samples, RECORD_SIZE) and ``events`` (max, 7).
 
-    Returns the number of events, of steps and of implicit steps.
+    After ``stop_events`` slips it goes on for ``stop_tail`` of the last interval and ends.
+    Returns the number of events, of steps, of implicit steps and of samples.
     """
-    seed_generator(seed)
     size = normal_pool.shape[1]
     k = k_pool[0]
     normal = normal_pool[0]
     row = 0
     f = np.zeros((4, size))
     g = np.zeros((4, size))
+    fade = np.ones(size)
+    fade_step = 0.0
     is_rich = needs_rich(eff)
     is_rated = rated(eff)
     if eff[S.RENEW_RATE] != 0.0:
         for i in range(size):
-            life = new_life(eff)
-            f[3, i] = life if eff[S.RENEW_FORM] == 0.0 else life * np.random.random()
+            life = new_life(eff, rng)
+            f[3, i] = life if eff[S.RENEW_FORM] == 0.0 else life * rng.random()
     state = np.zeros(S.STATE_SIZE)
     state[S.PSI] = 1.0
     state[S.AGE] = eff[S.AGE_START]
@@ -155,6 +163,7 @@ def run(
     work_body = 0.0
     yaw_energy = 0.0
 
+    quiet_stiffness = QUIET_STIFFNESS * (rig[S.MU_S] - rig[S.MU_K]) / rig[S.MU_S] * capacity / rig[S.SLIP_LENGTH]
     calm = 0.0
     quiet = False
     sliding = False
@@ -188,6 +197,8 @@ def run(
                     h = times[i] - t0
             t1 = t0 + h
             z1 = load_point(t1, times, positions, eff)
+            if is_rich and h != fade_step:
+                fade_step = relax(fade, tau, h, eff)
             lo = 0.0
             hi = 0.0
             r_lo = 0.0
@@ -207,7 +218,7 @@ def run(
                 if eff[S.TILT_K] != 0.0:
                     tilt = eff[S.TILT_K] * fs0 / capacity
                 fc, moment, stiff = contacts(
-                    f, g, k, normal, tau, start, du, 0.0, h, plus, minus, soft, tilt, is_rich, eff
+                    f, g, k, normal, fade, start, du, 0.0, h, plus, minus, soft, tilt, is_rich, eff
                 )
                 x = u0 + du + (fc / k_m if k_m != 0.0 else 0.0)
                 v = (x - x0) / h
@@ -252,7 +263,7 @@ def run(
                     done = True
                     break
                 du = lo + (hi - lo) * r_lo / (r_lo - r_hi)
-            if done and abs(v) > QUIET_UNTIL:
+            if done and (abs(v) > QUIET_UNTIL or stiff < quiet_stiffness):
                 done = False
             if done:
                 n_quiet += 1
@@ -271,6 +282,8 @@ def run(
         if not done:
             h = dt
             t = t0 + h
+            if is_rich and h != fade_step:
+                fade_step = relax(fade, tau, h, eff)
             x = x0 + h * vh
             z = load_point(t, times, positions, eff)
             y = z - x
@@ -289,9 +302,7 @@ def run(
             c_now = damping(vh, stiff, fc0 / capacity, rig, eff)
             fb = body_force(t, x, vh, rig, eff)
             if not is_rated:
-                fc, moment, stiff = contacts(
-                    f, g, k, normal, tau, start, du, dq, h, mu, mu, soft, tilt, is_rich, eff
-                )
+                fc, moment, stiff = contacts(f, g, k, normal, fade, start, du, dq, h, mu, mu, soft, tilt, is_rich, eff)
                 before = vh
                 vh = ((mass / h - 0.5 * c_now) * vh + fs - fc + fb) / (mass / h + 0.5 * c_now)
                 v = 0.5 * (before + vh)
@@ -307,7 +318,7 @@ def run(
                     plus = mu * rate_factor(max(v, 0.0), trial, eff)
                     minus = mu * rate_factor(max(-v, 0.0), trial, eff)
                     fc, moment, stiff = contacts(
-                        f, g, k, normal, tau, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff
+                        f, g, k, normal, fade, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff
                     )
                     miss = fs - fc + fb - c_now * v - inertia * (v - vh)
                     if abs(miss) < KICK_MISS:
@@ -365,13 +376,13 @@ def run(
         if eff[S.RENEW_RATE] != 0.0:
             for i in range(size):
                 if f[3, i] <= 0.0:
-                    f[3, i] = new_life(eff)
+                    f[3, i] = new_life(eff, rng)
         mean_s = 0.5 * (fs0 + fs)
         work_drive += mean_s * (z - z0)
         work_spring += mean_s * (y - y0)
         work_contact += 0.5 * (fc0 + fc) * (x - x0)
         if not (abs(v) < 1e3):
-            return -1, n_steps, n_quiet
+            return -1, n_steps, n_quiet, sample
 
         # record
         energy_known = False
@@ -404,31 +415,34 @@ def run(
         # events
         if not sliding and v > onset_velocity:
             sliding = True
-            if n_events < events.shape[0]:
-                w = (onset_velocity - v0) / (v - v0) if v > v0 else 1.0
-                w = min(1.0, max(0.0, w))
-                events[n_events, 0] = t0 + w * (t - t0)
-                events[n_events, 2] = x0 + w * (x - x0)
-                events[n_events, 4] = v
-                events[n_events, 5] = fs
+            at = min(n_events, events.shape[0] - 1)
+            w = (onset_velocity - v0) / (v - v0) if v > v0 else 1.0
+            w = min(1.0, max(0.0, w))
+            events[at, 0] = t0 + w * (t - t0)
+            events[at, 2] = x0 + w * (x - x0)
+            events[at, 4] = v
+            events[at, 5] = fs
         elif sliding:
-            if n_events < events.shape[0] and v > events[n_events, 4]:
-                events[n_events, 4] = v
+            at = min(n_events, events.shape[0] - 1)
+            events[at, 4] = max(v, events[at, 4])
             if v <= 0.0:
                 sliding = False
-                if n_events < events.shape[0]:
-                    w = v0 / (v0 - v) if v0 > v else 1.0
-                    events[n_events, 1] = t0 + w * (t - t0)
-                    events[n_events, 3] = x0 + w * (x - x0)
-                    events[n_events, 6] = fs
+                w = v0 / (v0 - v) if v0 > v else 1.0
+                at = min(n_events, events.shape[0] - 1)
+                events[at, 1] = t0 + w * (t - t0)
+                events[at, 3] = x0 + w * (x - x0)
+                events[at, 6] = fs
+                if events[at, 3] - events[at, 2] < SMALLEST_SLIP:
+                    continue
                 n_events += 1
+                if n_events == stop_events:
+                    last = events[n_events - 2, 1] if n_events > 1 else 0.0
+                    n_samples = min(n_samples, int((t + stop_tail * (t - last)) / record_dt) + 1)
                 before = stored(f, k, size, soft, eff)
                 changed = False
                 if renew:
                     nxt = n_events % normal_pool.shape[0]
-                    f = fresh_lines(
-                        f, normal, normal_pool[nxt], k_pool[nxt], count_pool[row], count_pool[nxt], start
-                    )
+                    f = fresh_lines(f, normal, normal_pool[nxt], k_pool[nxt], count_pool[row], count_pool[nxt], start)
                     row = nxt
                     normal = normal_pool[row]
                     k = k_pool[row]
@@ -439,7 +453,7 @@ def run(
                     for i in range(size):
                         keep = 1.0 - eff[S.RESIDUAL_EPS]
                         if eff[S.RESIDUAL_FORM] == 1.0:
-                            keep = 0.0 if np.random.random() < eff[S.RESIDUAL_EPS] else 1.0
+                            keep = 0.0 if rng.random() < eff[S.RESIDUAL_EPS] else 1.0
                         f[0, i] *= keep
                         f[1, i] *= keep
                     fc = 0.0
@@ -454,5 +468,5 @@ def run(
         # quiet?
         calm = calm + (t - t0) if abs(v) < QUIET_BELOW else 0.0
         if quiet_allowed and not sliding and calm > QUIET_AFTER:
-            quiet = True
-    return n_events, n_steps, n_quiet
+            quiet = stiff > quiet_stiffness
+    return n_events, n_steps, n_quiet, sample

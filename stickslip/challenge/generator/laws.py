@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from . import slots as S
+from .compiled import jit
 
 
-@njit(cache=True)
+@jit
 def decay(theta: float, speed: float, length: float, h: float) -> float:
     """Age after ``h`` seconds of theta' = 1 - speed theta / length, exact for constant speed."""
     a = speed * h / length
@@ -18,7 +17,7 @@ def decay(theta: float, speed: float, length: float, h: float) -> float:
     return theta * e + grown
 
 
-@njit(cache=True)
+@jit
 def advance(old, new, v, h, rig, eff, power):
     """Slow states after a step of ``h`` at velocity ``v``; ``power`` is the frictional heating, W."""
     speed = abs(v)
@@ -45,7 +44,7 @@ def advance(old, new, v, h, rig, eff, power):
         new[S.REST] = decay(old[S.REST], speed, eff[S.RAMP_LENGTH], h)
 
 
-@njit(cache=True)
+@jit
 def friction(new, t, x, rig, eff):
     """Friction coefficient common to all contacts, without its dependence on the momentary velocity."""
     mu = rig[S.MU_K] + (rig[S.MU_S] - rig[S.MU_K]) * new[S.PSI]
@@ -72,7 +71,7 @@ def friction(new, t, x, rig, eff):
     return mu
 
 
-@njit(cache=True)
+@jit
 def wave(cycles, form):
     """A periodic signal of unit size: 0 sine, 1 triangle, 2 three incommensurate sines, 3 smoothed saw."""
     a = 2.0 * math.pi * cycles
@@ -85,13 +84,13 @@ def wave(cycles, form):
     return math.atan2(0.8 * math.sin(a), 1.0 + 0.8 * math.cos(a)) / 0.927
 
 
-@njit(cache=True)
+@jit
 def rated(eff):
     """Whether the caps depend on the momentary velocity (then the kick is solved implicitly)."""
     return eff[S.STRIBECK_EPS] != 0.0 or eff[S.DIRECT_A] != 0.0 or eff[S.RS_B] != 0.0
 
 
-@njit(cache=True)
+@jit
 def rate_factor(v, new, eff):
     """Factor on the caps of springs that slide at velocity ``v`` >= 0."""
     g = 1.0
@@ -107,7 +106,7 @@ def rate_factor(v, new, eff):
     return g
 
 
-@njit(cache=True)
+@jit
 def load_point(t, times, positions, eff):
     """Position of the load point at time ``t``: the commanded piecewise line and its ripple, locked to position."""
     n = times.size
@@ -127,7 +126,7 @@ def load_point(t, times, positions, eff):
     return z
 
 
-@njit(cache=True)
+@jit
 def stiffness_now(t, rig, eff):
     """Stiffness of the drive spring at time ``t`` (a clamp that works loose)."""
     c = rig[S.SPRING]
@@ -137,7 +136,7 @@ def stiffness_now(t, rig, eff):
     return c
 
 
-@njit(cache=True)
+@jit
 def spring_force(y, y_old, branch_old, t, h, rig, eff):
     """Force of the drive spring at extension ``y`` and its relaxing branch (anelastic spring)."""
     c = stiffness_now(t, rig, eff)
@@ -153,7 +152,7 @@ def spring_force(y, y_old, branch_old, t, h, rig, eff):
     return force, branch
 
 
-@njit(cache=True)
+@jit
 def body_force(t, x, v, rig, eff):
     """Force on the block that is neither spring nor contact nor damping, N."""
     force = 0.0
@@ -172,7 +171,7 @@ def body_force(t, x, v, rig, eff):
     return force
 
 
-@njit(cache=True)
+@jit
 def damping(v, stuck, share, rig, eff):
     """Coefficient of the force opposing the velocity, N s/m; ``share`` is contact force over capacity."""
     c = rig[S.DAMPING]

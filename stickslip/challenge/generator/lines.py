@@ -114,7 +114,10 @@ def press(surface: Surface, heights: Array, load: float) -> Array:
     touching = int(np.searchsorted(gap, depth, side="left"))
     if touching > 0.9 * gap.size:
         raise InputError(
-            "the rough line saturates under its load", key="h_rms", value=surface.h_rms, hint="raise h_rms or lower the load"
+            "the rough line saturates under its load",
+            key="h_rms",
+            value=surface.h_rms,
+            hint="raise h_rms or lower the load",
         )
     if surface.adhesion > 0:
         reach = touching

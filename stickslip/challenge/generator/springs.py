@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from . import slots as S
+from .compiled import jit
 
 REORDER = {"reassoc", "contract", "nsz"}  # lets the sums vectorise; nan and infinity keep their meaning
 
 
-@njit(cache=True, fastmath=REORDER)
+@jit(fastmath=REORDER)
 def plain(old, new, k, normal, lo, hi, du, plus, minus):
     """Springs lo..hi moved by ``du`` between caps +plus f_n and -minus f_n: (force, stiffness still sticking)."""
     force = 0.0
@@ -27,23 +26,26 @@ def plain(old, new, k, normal, lo, hi, du, plus, minus):
     return force, stuck
 
 
-@njit(cache=True)
+@jit
 def creep_rate(ratio, eff):
     """Slip rate of a stuck spring at force over cap ``ratio``: Eyring's law, or a power law with the same slope."""
     alpha = eff[S.CREEP_ALPHA]
     r = min(1.0, abs(ratio))
+    if 1.0 - r > 30.0 * alpha:  # both laws are below 1e-13 there, and most springs are there
+        return 0.0
     if eff[S.CREEP_FORM] == 0.0:
-        rate = 2.0 * math.sinh(r / alpha) * math.exp(-1.0 / alpha)
+        rate = math.exp((r - 1.0) / alpha) - math.exp(-(r + 1.0) / alpha)
     else:
         rate = r ** (1.0 / alpha)
     return eff[S.CREEP_V] * (rate if ratio >= 0.0 else -rate)
 
 
-@njit(cache=True)
-def rich(old, new, k, normal, tau, lo, hi, du, h, plus, minus, eff):
+@jit
+def rich(old, new, k, normal, fade, lo, hi, du, h, plus, minus, eff):
     """As ``plain`` for springs with a relaxing branch, slip weakening, thermal creep and a finite life.
 
     Rows of ``old`` and ``new``: elastic force, force of the branch, slip since arrest, life left.
+    ``fade`` is the factor by which each branch relaxes in ``h``.
     """
     force = 0.0
     stuck = 0.0
@@ -57,7 +59,7 @@ def rich(old, new, k, normal, tau, lo, hi, du, h, plus, minus, eff):
         if eff[S.SLIPW_EPS] != 0.0:
             s = slip / eff[S.SLIPW_D]
             if eff[S.SLIPW_FORM] == 0.0:
-                w = 1.0 - math.exp(-s)
+                w = 1.0 - math.exp(-s) if s < 40.0 else 1.0
             elif eff[S.SLIPW_FORM] == 1.0:
                 w = min(1.0, s)
             else:
@@ -78,13 +80,16 @@ def rich(old, new, k, normal, tau, lo, hi, du, h, plus, minus, eff):
             elastic -= k[i] * h * creep_rate(before / cap, eff)
         elastic += (1.0 - g) * k[i] * du
         if g != 0.0:
-            branch = (branch + g * k[i] * du) * math.exp(-h / tau[i])
+            branch = (branch + g * k[i] * du) * fade[i]
         trial = elastic + branch
         held = min(max(trial, -down), up)
         if held != trial:
-            excess = trial - held
-            elastic -= excess
-            ds = abs(excess) / k[i]
+            # the slider is in series with spring and branch: both lose the same strain
+            soft = k[i] * (1.0 - g + g * fade[i])
+            ds = (trial - held) / soft
+            elastic -= (1.0 - g) * k[i] * ds
+            branch -= g * k[i] * fade[i] * ds
+            ds = abs(ds)
             slip += ds
             if g != 0.0 and eff[S.VISCO_RENEW] != 0.0:
                 # a junction that slides is replaced by a fresh one, whose branch has not relaxed yet
@@ -102,7 +107,7 @@ def rich(old, new, k, normal, tau, lo, hi, du, h, plus, minus, eff):
     return force, stuck
 
 
-@njit(cache=True)
+@jit
 def stored(f, k, size, soft, eff):
     """Elastic energy in the springs, J."""
     total = 0.0

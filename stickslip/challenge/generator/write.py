@@ -50,7 +50,9 @@ def write_campaign(
             f'displacement = {{ column = "counts", unit = "{count}", resolution = "{count}"{wrap} }}',
         ]
         if pieces:
-            told = ", ".join(f'{{ until = "{until:g} s", velocity = "{velocity * 1e6:g} um/s" }}' for until, velocity in pieces)
+            told = ", ".join(
+                f'{{ until = "{until:g} s", velocity = "{velocity * 1e6:g} um/s" }}' for until, velocity in pieces
+            )
             lines.append(f"drive = [{told}]")
         else:
             lines.append(f'drive_velocity = "{run.velocity * 1e6:g} um/s"')

@@ -76,7 +76,7 @@ EFFECTS = (
         detect=8e-10,
     ),
     Effect(
-        "viscoelastic-contact", "1", 0.005, 0.1,
+        "viscoelastic-contact", "1", 0.005, 0.06,
         (
             Form("single", False, partial(_visco, renew=0.0, spread=0.0)),
             Form("renewed", False, partial(_visco, renew=1.0, spread=0.0)),
@@ -96,7 +96,10 @@ EFFECTS = (
     ),
     Effect(
         "adhesion", "1", 0.005, 0.1,
-        (Form("contact", False, partial(_adhesion, form="contact")), Form("range", True, partial(_adhesion, form="range"))),
+        (
+            Form("contact", False, partial(_adhesion, form="contact")),
+            Form("range", True, partial(_adhesion, form="range")),
+        ),
         detect=5e-3,
     ),
     Effect(
@@ -110,12 +113,18 @@ EFFECTS = (
     ),
     Effect(
         "unequal-contacts", "1", 0.1, 0.5,
-        (Form("load", False, partial(_unequal, what="load")), Form("roughness", True, partial(_unequal, what="roughness"))),
+        (
+            Form("load", False, partial(_unequal, what="load")),
+            Form("roughness", True, partial(_unequal, what="roughness")),
+        ),
         detect=2e-2,
     ),
     Effect(
         "curvature", "1/m", 2e3, 2e4,
-        (Form("parabola", False, partial(_curvature, form="parabola")), Form("quartic", True, partial(_curvature, form="quartic"))),
+        (
+            Form("parabola", False, partial(_curvature, form="parabola")),
+            Form("quartic", True, partial(_curvature, form="quartic")),
+        ),
     ),
     Effect(
         "roll-off", "1", 0.5, 6.0,

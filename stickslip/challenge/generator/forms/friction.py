@@ -75,12 +75,15 @@ EFFECTS = (
         detect=2e-4,
     ),
     Effect(
-        "rate-and-state", "1", 0.002, 0.012,
-        (Form("ageing law", False, partial(_rate_state, form=0.0)), Form("slip law", True, partial(_rate_state, form=1.0))),
+        "rate-and-state", "1", 0.001, 0.006,
+        (
+            Form("ageing law", False, partial(_rate_state, form=0.0)),
+            Form("slip law", True, partial(_rate_state, form=1.0)),
+        ),
         detect=2e-4,
     ),
     Effect(
-        "direct-effect", "1", 5e-4, 0.006,
+        "direct-effect", "1", 3e-4, 0.003,
         (Form("logarithm", False, partial(_direct, form=0.0)), Form("asinh", True, partial(_direct, form=1.0))),
         detect=6e-5,
     ),
@@ -103,5 +106,5 @@ EFFECTS = (
         ),
         detect=3e-4, signed=True,
     ),
-    Effect("flash-heating", "1/K", 1e-4, 3e-3, (Form("lumped", False, _flash),), decoy=True),
+    Effect("flash-heating", "1/K", 1e-5, 3e-4, (Form("lumped", False, _flash),), decoy=True),
 )  # fmt: skip

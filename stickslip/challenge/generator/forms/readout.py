@@ -36,12 +36,18 @@ def _gain(setup: Setup, a: float, rng: Rng, *, bent: bool) -> dict[str, Any]:
 EFFECTS = (
     Effect(
         "sensor-drift", "m/s", 5e-10, 3e-8,
-        (Form("linear", False, partial(_drift, settling=False)), Form("settling", True, partial(_drift, settling=True))),
+        (
+            Form("linear", False, partial(_drift, settling=False)),
+            Form("settling", True, partial(_drift, settling=True)),
+        ),
         detect=2e-10, signed=True,
     ),
     Effect(
         "sensor-high-pass", "Hz", 1e-3, 0.1,
-        (Form("first order", False, partial(_high_pass, order=1)), Form("second order", True, partial(_high_pass, order=2))),
+        (
+            Form("first order", False, partial(_high_pass, order=1)),
+            Form("second order", True, partial(_high_pass, order=2)),
+        ),
         detect=2e-7,
     ),
     Effect(

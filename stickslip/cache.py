@@ -1,0 +1,58 @@
+"""What JAX compiles is kept on disk, so that the next start does not compile again.
+
+Set through environment variables before JAX is imported, so nothing here imports it and child processes inherit it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+OFF = "STICKSLIP_NO_CACHE"
+_SETTINGS = {
+    "JAX_COMPILATION_CACHE_DIR": "",
+    "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
+    "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
+    # a checked error inside compiled code calls back into Python, and such code cannot be kept; as nan it is found by
+    # the integrator's own check of every piece
+    "EQX_ON_ERROR": "nan",
+}
+
+
+def enable() -> Path | None:
+    """Keep compiled code in the user's cache folder.
+
+    Returns:
+        The folder, or None where it is switched off (``STICKSLIP_NO_CACHE=1``), cannot be written, or JAX has its own
+        setting already.
+    """
+    if os.environ.get(OFF, "").strip() not in ("", "0") or "JAX_COMPILATION_CACHE_DIR" in os.environ:
+        return None
+    folder = _folder()
+    if folder is None:
+        return None
+    settings = {**_SETTINGS, "JAX_COMPILATION_CACHE_DIR": str(folder)}
+    for name, value in settings.items():
+        os.environ.setdefault(name, value)
+    if "jax" in sys.modules:
+        import jax
+
+        jax.config.update("jax_compilation_cache_dir", str(folder))
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+        jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    return folder
+
+
+def _folder() -> Path | None:
+    """The cache folder, made if need be; None where nothing can be written there."""
+    import platformdirs
+
+    folder = Path(platformdirs.user_cache_dir("stickslip", appauthor=False)) / "compiled"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        return None

@@ -1,0 +1,84 @@
+"""The command line. A command is one module of `stickslip.cli` with a function of the same name, and a line here.
+
+Nothing heavy is imported before a command runs, so that ``stickslip --help`` is quick.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from cyclopts import App, CycloptsError
+
+from .. import __version__, cache
+from ..errors import InputError, StickslipError, nearest
+
+# module and function in it -> what it does, in one line
+COMMANDS = {
+    "simulate": "Simulate a scenario: trace, slip events, pictures.",
+    "creep": "The static creep curve of a scenario's contacts, without inertia.",
+    "new": "Write a commented scenario or campaign file to start from.",
+    "effects": "List the catalogue of effects, explain one, or print a model's equations.",
+}
+
+INTERRUPTED = 130
+
+
+def make_app() -> App:
+    """The command line's application; commands are imported when they are called."""
+    app = App(
+        name="stickslip",
+        help="Creep and stick-slip of a rough contact: simulate it, measure it, find what is missing.",
+        version=__version__,
+        help_format="plaintext",
+    )
+    for name, text in COMMANDS.items():
+        app.command(f"stickslip.cli.{name}:{name}", name=name, help=text)
+    return app
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line and exit.
+
+    Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted.
+    """
+    code = run(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None:
+        sys.exit(code)
+    return code
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run a command line and return its exit code; every error is one message on stderr."""
+    try:
+        cache.enable()
+        result = make_app()(list(arguments), exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
+        return result if isinstance(result, int) else 0
+    except CycloptsError as error:
+        return _fail(_usage(error))
+    except StickslipError as error:
+        return _fail(error)
+    except KeyboardInterrupt as error:
+        kept = str(error) or "nothing was written"
+        print(f"\nstickslip: interrupted; {kept}", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # such as  stickslip effects | head
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _fail(error: StickslipError) -> int:
+    print(f"stickslip: {error}", file=sys.stderr)
+    return error.exit_code
+
+
+def _usage(error: CycloptsError) -> InputError:
+    """A wrong command line in the form all messages have."""
+    unused = list(getattr(error, "unused_tokens", None) or [])
+    command = list(getattr(error, "command_chain", None) or [])
+    hint = f"stickslip {' '.join([*command, '--help'])}"
+    if not command and unused:
+        return InputError(f"there is no command '{unused[0]}'", hint=f"{nearest(unused[0], COMMANDS)} See {hint}")
+    return InputError(" ".join(str(error).split()), hint=f"see {hint}")

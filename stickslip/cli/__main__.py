@@ -1,0 +1,5 @@
+"""``python -m stickslip.cli``."""
+
+from . import main
+
+main()

@@ -1,0 +1,95 @@
+"""``stickslip creep``: the static curve of a scenario's contacts."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from ..errors import InputError
+from ..runstore import file_record, open_run, refuse_existing, versions
+from . import show
+
+
+def creep(
+    scenario: str,
+    *more: str,
+    out: Path | None = None,
+    set: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    points: int = 400,
+    average: Literal["displacement", "force"] = "displacement",
+    time: Literal["exact", "paper"] = "exact",
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """The static creep curve of a scenario's contacts, without inertia.
+
+    Prints CSV with the columns tau (share of full friction), u (m), t (s).
+
+    Parameters
+    ----------
+    scenario:
+        TOML file that describes the rig and its drive.
+    more:
+        Further changes such as contact.H=0.5.
+    out:
+        Folder for creep.csv, creep.png and result.json instead.
+    set:
+        Change a key of the scenario: --set contact.H=0.5. May be given several times.
+    points:
+        Loads from zero to full friction.
+    average:
+        Mean over rough lines of the displacement at the same load, or of the force at the same displacement.
+    time:
+        Virtual time with the block's own motion (exact) or without it (paper).
+    force:
+        Replace an existing run folder.
+    """
+    from .simulate import scenario_arguments
+
+    path, changes = scenario_arguments(scenario, more, set)
+    if not 2 <= points <= 1_000_000:
+        raise InputError("the number of loads is out of range", key="--points", value=points, allowed="2 to 1000000")
+    if out is not None:
+        refuse_existing(out, force)
+    import warnings
+
+    from ..scenario import load_scenario, static_creep
+
+    loaded = load_scenario(path, changes)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        curve = static_creep(loaded, points, average, time)
+    notes = [str(w.message) for w in caught if issubclass(w.category, UserWarning)]
+    for text in notes:
+        show.warn(text)
+    rows = zip(*(column.tolist() for column in curve), strict=True)
+    text = "\n".join(["tau,u,t", *(",".join(repr(cell) for cell in row) for row in rows)]) + "\n"
+    if out is None:
+        sys.stdout.write(text)
+        return 0
+    table = loaded.file.contact
+    result: dict[str, Any] = {
+        "schema": 1,
+        "kind": "creep",
+        "title": loaded.title,
+        "scenario": loaded.file.model_dump(by_alias=True, exclude_none=True),
+        "changes": [f"{key}={value}" for key, value in loaded.changes],
+        "inputs": [file_record(path)],
+        "versions": versions(),
+        "seeds": {"lines": getattr(table, "seed", None)},
+        "N": getattr(table, "springs", None),
+        "L": getattr(table, "line_length", None),
+        "average": average,
+        "time": time,
+        "warnings": notes,
+    }
+    with open_run(out, force=force) as run:
+        from ..plots import creep_figure, save
+
+        run.text(text, "creep.csv")
+        save(creep_figure(*curve, loaded.title), run.path("creep.png"))
+        run.json(result)
+    print(f"written to {out}: creep.csv, creep.png, result.json")
+    return 0

@@ -1,0 +1,59 @@
+"""``stickslip new``: a commented file to start from."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from ..errors import RunFolderError
+
+
+def new(
+    what: Literal["scenario", "campaign"],
+    file: Annotated[Path | None, Parameter(allow_leading_hyphen=True)] = None,
+    *,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Write a commented scenario or campaign file to start from.
+
+    Parameters
+    ----------
+    what:
+        scenario (a rig to simulate) or campaign (measurements of a rig).
+    file:
+        Where to write it; default scenario.toml or campaign.toml. A dash prints it.
+    force:
+        Replace an existing file.
+    """
+    if what == "scenario":
+        from ..scenario.template import scenario_template
+
+        text = scenario_template()
+    else:
+        from ..campaign import campaign_template
+
+        text = campaign_template()
+    path = file or Path(f"{what}.toml")
+    if str(path) == "-":
+        print(text, end="")
+        return 0
+    _write(path, text, force)
+    then = f"stickslip simulate {path}" if what == "scenario" else f"stickslip inspect {path}"
+    print(f"written to {path}; next: {then}")
+    return 0
+
+
+def _write(path: Path, text: str, force: bool) -> None:
+    if path.exists() and (not force or not path.is_file()):
+        hint = "choose another name, or replace it with --force" if path.is_file() else "choose another name"
+        raise RunFolderError("the file exists already", file=path, hint=hint)
+    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        aside.write_text(text, encoding="utf-8")
+        aside.replace(path)
+    except OSError as error:
+        aside.unlink(missing_ok=True)
+        raise RunFolderError(f"the file cannot be written ({error.strerror})", file=path) from None

@@ -1,0 +1,249 @@
+"""``stickslip simulate``: a scenario in; slip events, pictures and a trace out."""
+
+from __future__ import annotations
+
+import sys
+import time
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from ..errors import InputError
+from ..runstore import Run, file_record, json_text, open_run, refuse_existing, versions
+from . import show
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..scenario import Scenario
+    from ..scenario.schema import SweepTable
+
+
+def simulate(
+    scenario: str,
+    *more: str,
+    out: Path | None = None,
+    set: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    sweep: str | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Simulate a scenario: trace, slip events, pictures.
+
+    Parameters
+    ----------
+    scenario:
+        TOML file that describes the rig and its drive.
+    more:
+        Further changes such as contact.H=0.5.
+    out:
+        Folder for result.json, arrays.nc, the pictures and the synthetic measurement.
+    set:
+        Change a key of the scenario: --set contact.H=0.5. May be given several times.
+    sweep:
+        Run a series: --sweep drive.velocity=20um/s:1mm/s:8 (start, stop, number), or values with commas.
+    json:
+        Print the result as JSON instead of a table.
+    force:
+        Replace an existing run folder.
+    """
+    path, changes = scenario_arguments(scenario, more, set)
+    if out is not None:
+        refuse_existing(out, force)
+    began = time.perf_counter()
+    from ..scenario import load_scenario
+    from ..scenario.overrides import parse_sweep
+
+    loaded = load_scenario(path, changes)
+    if sweep is not None:
+        loaded = loaded.with_changes([("sweep", parse_sweep(sweep))])
+    series = loaded.file.sweep
+    with open_run(out, force=force) if out is not None else nullcontext() as run:
+        work = _single(loaded, run) if series is None else _series(loaded, series, run)
+        result = {**_head(loaded), **work, "seconds": round(time.perf_counter() - began, 3)}
+        if run is not None:
+            run.json(result)
+    for text in result["warnings"]:
+        show.warn(text)
+    print(json_text(result) if json else _report(result, out))
+    return 130 if result.get("interrupted") else 0
+
+
+def scenario_arguments(scenario: str, more: tuple[str, ...], changes: tuple[str, ...]) -> tuple[str, list[str]]:
+    """The scenario's path and all changes; both may stand in any order."""
+    words = [scenario, *more]
+    paths = [word for word in words if "=" not in word or Path(word).is_file()]
+    if len(paths) != 1:
+        what = "no scenario is given" if not paths else f"more than one scenario is given: {', '.join(paths)}"
+        raise InputError(what, allowed="one TOML file", hint="stickslip simulate SCENARIO --set contact.H=0.5")
+    return paths[0], [*changes, *(word for word in words if word not in paths)]
+
+
+def _head(scenario: Scenario) -> dict[str, Any]:
+    file = scenario.file
+    inputs = [file_record(scenario.path)] if scenario.path else []
+    for part in (file.drive.file, getattr(file.contact, "file", None)):
+        if part:
+            inputs.append(file_record(scenario.folder / part))
+    return {
+        "schema": 1,
+        "kind": "simulate",
+        "title": scenario.title,
+        "scenario": file.model_dump(by_alias=True, exclude_none=True),
+        "changes": [f"{key}={value}" for key, value in scenario.changes],
+        "inputs": inputs,
+        "versions": versions(),
+        "seeds": {
+            "lines": getattr(file.contact, "seed", None),
+            "sensor": file.sensor.seed if file.sensor else None,
+        },
+    }
+
+
+def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
+    from ..scenario import simulate as integrate
+
+    with show.progress_bar() as watch:
+        data = integrate(scenario, watch)
+    if run is not None:
+        from ..plots import save, static_against_inertial, trace_figure
+
+        run.arrays(data)
+        save(trace_figure(data), run.path("trace.png"))
+        save(static_against_inertial([data], [scenario.title]), run.path("static_vs_inertial.png"))
+        if scenario.file.output.trace:
+            from ..scenario.writers import write_campaign
+
+            write_campaign(run.folder, [scenario], [data])
+    return _numbers(data)
+
+
+def _numbers(data: xarray.Dataset) -> dict[str, Any]:
+    """What `result.json` says of one run."""
+    names = [str(name) for name in data if data[name].dims == ("event",)]
+    columns = {name: data[name].values.tolist() for name in names}
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    units = {name: data[name].attrs["units"] for name in names}
+    facts = {key: value for key, value in data.attrs.items() if key not in ("title", "versions", "warnings")}
+    return {
+        "events": rows,
+        "units": units,
+        "facts": facts,
+        "verdict": data.attrs["verdict"],
+        "warnings": [text for text in str(data.attrs["warnings"]).split("\n") if text],
+    }
+
+
+def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str, Any]:
+    from ..scenario.series import scenarios_of, simulate_series, summary
+
+    members = scenarios_of(scenario, sweep)
+    done: list[xarray.Dataset] = []
+    interrupted = False
+    with show.progress_bar() as watch:
+        try:
+            for data in simulate_series(members, lambda number, p: watch(p)):
+                done.append(data)
+                if sys.stderr.isatty():
+                    value = f"{sweep.key} = {members[len(done) - 1][0]:.4g}"
+                    print(f"{len(done)} of {len(members)}: {value}: {data.attrs['verdict']}", file=sys.stderr)
+        except KeyboardInterrupt:
+            if run is None or not done:
+                raise
+            interrupted = True
+    values = [value for value, _ in members]
+    table = summary(scenario, sweep.key, values, done)
+    if run is not None:
+        _write_series(run, scenario, members, table, done)
+    warnings = {text: None for data in done for text in str(data.attrs["warnings"]).split("\n") if text}
+    result: dict[str, Any] = {
+        "kind": "series",
+        "key": sweep.key,
+        "runs": [{"value": value, **_numbers(data)} for value, data in zip(values[: len(done)], done, strict=True)],
+        "table": {str(name): table[name].values.tolist() for name in table},
+        "units": {str(name): table[name].attrs["units"] for name in table},
+        "verdict": f"{sum(1 for d in done if d.sizes['event'])} of {len(done)} runs show slip events",
+        "warnings": list(warnings),
+    }
+    if interrupted:
+        result["interrupted"] = f"{len(done)} of {len(members)} runs were finished and are kept"
+    return result
+
+
+def _write_series(
+    run: Run,
+    scenario: Scenario,
+    members: list[tuple[float, Scenario]],
+    table: xarray.Dataset,
+    done: list[xarray.Dataset],
+) -> None:
+    from ..plots import save, series_figure, static_against_inertial
+
+    run.arrays(table)
+    run.text(_csv(table), "series.csv")
+    save(series_figure(table), run.path("series.png"))
+    unit = table["value"].attrs["units"]
+    labels = [show.quantity(float(value), unit, 3) for value in table["value"].values]
+    save(static_against_inertial(done, labels), run.path("static_vs_inertial.png"))
+    if scenario.file.output.trace:
+        from ..scenario.writers import write_campaign
+
+        write_campaign(run.folder, [member for _, member in members[: len(done)]], done)
+
+
+def _csv(table: xarray.Dataset) -> str:
+    names = [str(name) for name in table]
+    header = ",".join(f"{name} [{table[name].attrs['units']}]" for name in names)
+    rows = zip(*(table[name].values.tolist() for name in names), strict=True)
+    return "\n".join([header, *(",".join(repr(cell) for cell in row) for row in rows)]) + "\n"
+
+
+def _report(result: dict[str, Any], out: Path | None) -> str:
+    lines = [f"{result['title']}: {result['verdict']}"]
+    if result["kind"] == "series":
+        lines += ["", _series_table(result)]
+    elif result["events"]:
+        lines += ["", _event_table(result)]
+    if result["kind"] == "simulate":
+        lines += ["", _facts(result["facts"])]
+    if result.get("interrupted"):
+        lines.append(f"interrupted: {result['interrupted']}")
+    lines.append(f"{result['seconds']:.1f} s")
+    if out is not None:
+        pictures = sorted(p.name for p in out.glob("*.png"))
+        lines.append(f"written to {out}: {', '.join(pictures)}, result.json, arrays.nc")
+    return "\n".join(lines)
+
+
+def _event_table(result: dict[str, Any], most: int = 12) -> str:
+    units = result["units"]
+    rows = [
+        [str(number), *(show.quantity(event[name], units[name]) for name in units)]
+        for number, event in enumerate(result["events"], start=1)
+    ]
+    left = len(rows) - most
+    text = show.table(["event", *(name.replace("_", " ") for name in units)], rows[:most])
+    return text if left <= 0 else f"{text}\n... and {left} more"
+
+
+def _series_table(result: dict[str, Any]) -> str:
+    names = [name for name in result["table"] if not name.endswith("_std")]
+    units = result["units"]
+    columns = [[show.quantity(value, units[name]) for value in result["table"][name]] for name in names]
+    header = [result["key"], *(name.replace("_", " ") for name in names[1:])]
+    return show.table(header, [list(row) for row in zip(*columns, strict=True)])
+
+
+def _facts(facts: dict[str, Any]) -> str:
+    q = show.quantity
+    line = f"; N = {facts['N']} springs" if facts["N"] else ""
+    line += f", L = {q(facts['L'], 'm')}" if facts["L"] == facts["L"] else ""
+    return (
+        f"full friction {q(facts['friction_force'], 'N')}, contact stiffness {q(facts['contact_stiffness'], 'N/m')}, "
+        f"u_max {q(facts['u_max'], 'm')}, resonance {q(facts['contact_resonance'], 'Hz')}\n"
+        f"stick-slip below {q(facts['critical_velocity'], 'm/s')} and with springs softer than "
+        f"{q(facts['critical_stiffness'], 'N/m')}{line}\n"
+        f"{facts['steps']} steps, {facts['rejected']} rejected, energy balance to {facts['energy_error']:.1e}"
+    )

@@ -1,0 +1,119 @@
+"""Junctions that break and are replaced by force-free ones while the block slides."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from ..contact import Bank
+from ..params import parameter
+from .base import Contact, Flow, Memory, Motion, Threshold
+from .catalogue import register
+from .sliding import caps, filled
+
+YOUNG = 7  # classes of age below that at which a junction reaches its cap; one more holds all older ones
+
+
+class Junctions(NamedTuple):
+    """The classes of age of every element, youngest first.
+
+    Attributes:
+        spread: force (N) of each class less that of the element, shape (n, YOUNG + 1).
+        change: force (N) that renewal takes from the element within the increment (negative: gives), shape (n,).
+        deficit: share of the cap that the element cannot reach because its junctions are not all at their cap, (n,).
+    """
+
+    spread: Array
+    change: Array
+    deficit: Array
+
+
+@register
+class ContactRenewal(Memory, Threshold, Flow):
+    """Each element stands for many junctions with exponentially distributed lives in slip, sorted by age into classes.
+
+    While the block moves on, a class takes over the force of the next younger one, at a rate that gives it the mean age
+    of its junctions; before the youngest stands a force-free newborn (McKendrick's equation in quantiles of age, solved
+    class by class with exponentials). Every class has the element's cap. Steady sliding is exact: an element with
+    threshold u_y carries (l/u_y)(1 - exp(-u_y/l)) of its cap.
+    """
+
+    tag = "contact-renewal"
+    summary = "sliding junctions break and are replaced by force-free ones"
+    equation = (
+        r"\partial_t f + |\dot x|\,\partial_a f = k\dot x,\ |f| \le c,\ f|_{a=0} = 0,\quad a \sim \mathrm{Exp}(\ell)"
+    )
+    signature = "kinetic friction below static without weakening of the material, most for the deepest contacts"
+    confused_with = {
+        "velocity-weakening": "load series: the slip over which strength is lost scales with u_max",
+        "residual-load": "lift the block off before an event",
+        "slip-weakening": "load series: the slip over which strength is lost scales with u_max",
+    }
+    source = "Farkas, Dahmen & Wolf, J. Stat. Mech. (2005) P06015; Braun & Peyrard, Phys. Rev. Lett. 100 (2008) 125501"
+    amplitude = "rate"
+    family = "contact"
+
+    rate: Array = parameter(
+        0.0,
+        unit="1/m",
+        lower=0.0,
+        upper=2e6,
+        null=0.0,
+        symbol=r"1/\ell",
+        doc="share of the junctions that break per metre of slip",
+    )
+
+    def start(self, bank: Bank) -> Junctions:
+        zero = jnp.zeros_like(bank.stiffness)
+        return Junctions(jnp.zeros((bank.stiffness.size, YOUNG + 1)), zero, zero)
+
+    def advance(self, state: Junctions, motion: Motion, contact: Contact) -> Junctions:
+        own = 1.0 - state.deficit
+        cap = filled(caps(contact, own) / filled(own))
+        width = filled(contact.strength / filled(contact.stiffness)) / YOUNG  # of a young class, in age (m)
+        weights, rates = _ages(width, self.rate)
+        step = contact.stiffness * motion.dx
+        plain = contact.force + step  # with no renewal
+        capped = jnp.clip(plain, -cap, cap)
+        before, after = jnp.zeros_like(step), jnp.zeros_like(step)  # the newborn
+        offs = []
+        for j in range(YOUNG + 1):
+            force = contact.force + state.spread[:, j]
+            z = rates[j] * motion.path
+            gone, mean = -jnp.expm1(-z), _mean_decay(z)
+            # written as a difference, so that it vanishes exactly where the rate does
+            renewed = -force * gone - step * (1.0 - mean) + after * (1.0 - mean) + before * (mean - 1.0 + gone)
+            other = jnp.clip(plain + (state.spread[:, j] + renewed), -cap, cap)
+            offs.append(other - capped)
+            before, after = force, other
+        off = jnp.stack(offs, axis=1)
+        change = jnp.sum(weights * off, axis=1)
+        return Junctions(off - change[:, None], -change, -change * capped / cap**2)
+
+    def strength(self, state: Junctions, motion: Motion, contact: Contact) -> Array:
+        return 1.0 - state.deficit
+
+    def flow(self, state: Junctions, motion: Motion, force: Array, contact: Contact) -> Array:
+        return force - state.change
+
+
+def _ages(width: Array, rate: Array) -> tuple[Array, list[Array]]:
+    """Shares of the junctions in the classes (n, YOUNG + 1), and 1/(gap to the next younger class's mean age) (1/m)."""
+    x = width * rate
+    small = x < 1e-2
+    safe = jnp.where(small, 1.0, x)
+    # mean age of a class after its youngest, in widths
+    centre = jnp.where(small, 0.5 - x / 12.0 + x**3 / 720.0, 1.0 / safe - 1.0 / jnp.expm1(safe))
+    shares = [jnp.exp(-j * x) * -jnp.expm1(-x) for j in range(YOUNG)]
+    oldest = rate / (1.0 + x * (1.0 - centre))
+    rates = [1.0 / (width * centre), *[1.0 / width] * (YOUNG - 1), oldest]
+    return jnp.stack([*shares, jnp.exp(-YOUNG * x)], axis=1), rates
+
+
+def _mean_decay(z: Array) -> Array:
+    """(1 - exp(-z))/z."""
+    small = z < 1e-4
+    safe = jnp.where(small, 1.0, z)
+    return jnp.where(small, 1.0 - 0.5 * z + z**2 / 6.0, -jnp.expm1(-safe) / safe)

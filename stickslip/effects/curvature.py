@@ -1,0 +1,48 @@
+"""A contact that is curved as a whole, besides its roughness."""
+
+from __future__ import annotations
+
+from jax import Array
+
+from ..contact import Bank
+from ..params import parameter
+from .base import Geometry
+from .catalogue import register
+from .quantiles import sticking_shares, towards
+
+
+@register
+class Curvature(Geometry):
+    """The backbone is led towards Cattaneo and Mindlin's 1 - (1 - u/u_max)^1.5 of the same stiffness and strength.
+
+    There a share Q = sqrt(1 - u/u_max) of the stiffness sticks at u, so u/u_max = 1 - Q^2, with u_max = 1.5 F_s/k.
+    """
+
+    tag = "curvature"
+    summary = "macroscopic curvature of the contact"
+    equation = r"u(Q) \to (1-\varepsilon)\,u(Q) + \varepsilon\,\tfrac{3}{2}\tfrac{F_s}{k}\,(1 - Q^2)"
+    signature = "the exponent of the backbone falls towards 1.5: softer start, earlier end of creep"
+    confused_with = {
+        "machine-compliance": "load series: the exponent of a curved contact changes with load",
+        "sensor-drift": "change the drive velocity: curvature follows force, drift the clock",
+        "roll-off": "load series",
+        "contact-damping": "decay of the ringing at several amplitudes",
+    }
+    source = "Cattaneo (1938); Mindlin, J. Appl. Mech. 16 (1949) 259"
+    amplitude = "share"
+    family = "geometry"
+
+    share: Array = parameter(
+        0.0,
+        unit="1",
+        lower=0.0,
+        upper=1.0,
+        null=0.0,
+        symbol=r"\varepsilon",
+        doc="how far the distribution of thresholds is that of a smooth sphere",
+    )
+
+    def reshape(self, bank: Bank) -> Bank:
+        before, after = sticking_shares(bank)
+        squared = (before**2 + before * after + after**2) / 3.0  # mean of Q^2 over the element
+        return towards(bank, 1.5 * bank.total_strength / bank.total_stiffness * (1.0 - squared), self.share)

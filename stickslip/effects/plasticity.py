@@ -1,0 +1,51 @@
+"""Asperities that yield: the strongest elements carry no more than hardness allows."""
+
+from __future__ import annotations
+
+from jax import Array
+
+from ..contact import Bank
+from ..params import parameter
+from .base import Geometry
+from .catalogue import register
+from .quantiles import powered, scaled
+
+
+@register
+class Plasticity(Geometry):
+    """Thresholds level off as they near the hardness limit; the load they lose goes to all alike.
+
+    ``hardness_ratio`` is what the deepest element would carry elastically over what hardness allows. The bank is that
+    of a run-in contact: it has yielded in loading and is elastic from then on.
+    """
+
+    tag = "plasticity"
+    summary = "asperities yield: a hardness limit blunts the distribution of thresholds"
+    equation = r"c_i \propto c_i\,[1 + (h\,u_i/u_{max})^n]^{-1/n},\quad \sum c_i\ \mathrm{kept}"
+    signature = "blunted end of creep, many elements slide together: more sudden; changes with load"
+    confused_with = {
+        "unequal-contacts": "load series; first against repeated loading",
+        "roll-off": "load series",
+        "adhesion": "load series including light loads",
+        "contact-damping": "decay of the ringing at several amplitudes",
+    }
+    source = "Bowden & Tabor, The Friction and Lubrication of Solids (1950); Kogut & Etsion, J. Tribol. 126 (2004) 34"
+    amplitude = "hardness_ratio"
+    family = "geometry"
+
+    hardness_ratio: Array = parameter(
+        0.0,
+        unit="1",
+        lower=0.0,
+        upper=10.0,
+        null=0.0,
+        symbol="h",
+        doc="elastic over plastic load of the deepest asperity",
+    )
+    sharpness: Array = parameter(
+        1.0, unit="1", lower=1.0, upper=8.0, grid=(1.0, 4.0), symbol="n", doc="how abruptly asperities yield"
+    )
+
+    def reshape(self, bank: Bank) -> Bank:
+        load = self.hardness_ratio * bank.threshold / bank.threshold.max()
+        return scaled(bank, powered(1.0 + powered(load, self.sharpness), -1.0 / self.sharpness))

@@ -1,0 +1,126 @@
+"""Rate-and-state friction: a jump with the logarithm of velocity, then a slow answer of the contacts' state."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from ..contact import Bank
+from ..params import parameter, variant
+from .base import Contact, Memory, Motion, Threshold
+from .catalogue import register
+
+_GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 4 / 9), (0.5 + 0.15**0.5, 5 / 18))  # Gauss-Legendre on (0, 1)
+
+
+class Contacts(NamedTuple):
+    """Logarithm of the state over its largest value, ln(theta v*/D_c), and the speed that it was reached at (m/s)."""
+
+    log_state: Array
+    speed: Array
+
+
+@register
+class RateAndState(Memory, Threshold):
+    """Dieterich's ageing law or Ruina's slip law, regularised to be static far below v*.
+
+    With V = |v| + v* the state theta obeys theta' = 1 - V theta/D_c (ageing) or -(V theta/D_c) ln(V theta/D_c) (slip).
+    It cannot exceed D_c/v*, where friction has its full strength; sliding steadily at v it is weaker by the factor
+    1 - (b - a) ln(1 + v/v*).
+    """
+
+    tag = "rate-and-state"
+    summary = "rate-and-state friction (direct effect and evolving state), ageing or slip law"
+    equation = r"\mu \to \mu\,[1 + a \ln(1 + |\dot x|/v^*) + b \ln(\theta v^*/D_c)]"
+    signature = "creep velocity as 1/(time to slip); overshoot after arrest; recurrence and slip size follow ln(hold)"
+    confused_with = {
+        "contact-ageing": "velocity steps in steady sliding: a jump that decays over D_c",
+        "direct-effect": "velocity steps in steady sliding: a jump that decays over D_c",
+        "slip-weakening": "slide-hold-slide",
+        "velocity-weakening": "holds of 1 s to 1000 s",
+    }
+    source = "Ruina, J. Geophys. Res. 88 (1983) 10359; Rice & Ruina, J. Appl. Mech. 50 (1983) 343"
+    amplitude = "evolution"
+    family = "friction"
+
+    evolution: Array = parameter(
+        0.0,
+        unit="1",
+        lower=-0.02,
+        upper=0.1,
+        null=0.0,
+        symbol="b",
+        doc="relative growth of strength per e-fold of the state",
+    )
+    ratio: Array = parameter(
+        0.6,
+        unit="1",
+        lower=0.0,
+        upper=2.0,
+        grid=(0.3, 0.7),
+        symbol="a/b",
+        doc="direct effect over evolution effect; below 1 friction weakens with velocity",
+    )
+    slip_distance: Array = parameter(
+        2e-6,
+        unit="m",
+        lower=1e-8,
+        upper=1e-4,
+        log=True,
+        grid=(5e-7, 5e-6),
+        symbol="D_c",
+        doc="slip over which the state is renewed",
+    )
+    cutoff_velocity: Array = parameter(
+        1e-7,
+        unit="m/s",
+        lower=1e-10,
+        upper=1e-4,
+        log=True,
+        grid=(1e-8, 1e-6),
+        symbol="v^*",
+        doc="velocity below which friction is static",
+    )
+    first_age: Array = parameter(
+        100.0,
+        unit="s",
+        lower=1e-3,
+        upper=1e7,
+        log=True,
+        grid=(1.0, 100.0),
+        symbol=r"\theta_1",
+        doc="age of the contact at the start of the record",
+    )
+    law: str = variant("ageing", ("ageing", "slip"), "the state grows in stationary contact too, or by slip only")
+
+    def start(self, bank: Bank) -> Contacts:
+        # the state of a contact that was renewed first_age ago and has rested since
+        return Contacts(jnp.log(-jnp.expm1(-self.first_age * self._rest_rate)), jnp.zeros(()))
+
+    def advance(self, state: Contacts, motion: Motion, contact: Contact) -> Contacts:
+        if self.law == "ageing":
+            share = motion.relax(jnp.exp(state.log_state), self._rest_rate, self._rest_rate, 1.0 / self.slip_distance)
+            return Contacts(jnp.log(share), abs(motion.v))
+        return Contacts(self._slip_law(state, motion), abs(motion.v))
+
+    def strength(self, state: Contacts, motion: Motion, contact: Contact) -> Array:
+        direct = self.ratio * jnp.log1p(abs(motion.v) / self.cutoff_velocity)
+        return 1.0 + self.evolution * (direct + state.log_state)
+
+    @property
+    def _rest_rate(self) -> Array:
+        return self.cutoff_velocity / self.slip_distance
+
+    def _slip_law(self, state: Contacts, motion: Motion) -> Array:
+        """The logarithm relaxes with slip towards -ln(V/v*); V goes linearly in time, so V^2 linearly in slip."""
+        slip = (self.cutoff_velocity * motion.dt + motion.path) / self.slip_distance
+        begin = ((state.speed + self.cutoff_velocity) / self.cutoff_velocity) ** 2
+        end = ((abs(motion.v) + self.cutoff_velocity) / self.cutoff_velocity) ** 2
+        done = -jnp.expm1(-slip)
+        target = jnp.zeros(())
+        for node, weight in _GAUSS:
+            back = -jnp.log1p(-node * done) / slip  # share of the slip that lies between the node and the end
+            target = target - 0.5 * weight * jnp.log(end + (begin - end) * back)
+        return state.log_state * jnp.exp(-slip) + target * done

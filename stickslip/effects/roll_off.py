@@ -1,0 +1,56 @@
+"""Roughness without long waves: gaps with an exponential tail."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from jax import Array
+
+from ..contact import Bank
+from ..params import parameter
+from .base import Geometry
+from .catalogue import register
+from .quantiles import sticking_shares, towards
+
+
+@register
+class RollOff(Geometry):
+    """The backbone is led towards 1 - exp(-u/u_c), u_c = F_s/k, that of exponentially distributed gaps.
+
+    A line much longer than its longest wave has many independent summits, whose load grows as exp(depth/length).
+    """
+
+    tag = "roll-off"
+    summary = "no roughness beyond a longest wave: exponentially distributed gaps"
+    equation = r"u(Q) \to (1-\varepsilon)\,u(Q) - \varepsilon\,\tfrac{F_s}{k}\,\ln Q"
+    signature = "the backbone becomes exponential: creep velocity as 1/(time to slip), longer tail"
+    confused_with = {
+        "slip-weakening": "profilometry; the slowest drive",
+        "unequal-contacts": "turn the block in its guide",
+        "wear": "profilometry before and after",
+        "rate-and-state": "velocity steps in steady sliding",
+    }
+    source = "Greenwood & Williamson, Proc. R. Soc. A 295 (1966) 300; Persson, Phys. Rev. Lett. 99 (2007) 125502"
+    amplitude = "share"
+    family = "geometry"
+
+    share: Array = parameter(
+        0.0,
+        unit="1",
+        lower=0.0,
+        upper=1.0,
+        null=0.0,
+        symbol=r"\varepsilon",
+        doc="how far the distribution of thresholds is exponential",
+    )
+
+    def reshape(self, bank: Bank) -> Bank:
+        before, after = sticking_shares(bank)
+        width = before - after
+        # mean of -ln Q over the element
+        mean = 1.0 - (_x_log_x(before) - _x_log_x(after)) / jnp.where(width > 0.0, width, 1.0)
+        return towards(bank, bank.total_strength / bank.total_stiffness * mean, self.share)
+
+
+def _x_log_x(x: Array) -> Array:
+    positive = x > 0.0
+    return jnp.where(positive, x * jnp.log(jnp.where(positive, x, 1.0)), 0.0)

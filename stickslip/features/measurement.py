@@ -1,0 +1,243 @@
+"""A campaign turned into numbers: the cycles of every run, their features, and the sensor's share of the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..errors import InputError
+from ..forward import Cycles
+from ..segment import Segmentation
+from ..trace import Trace
+from .curve import SampledCurve
+from .evaluate import Anchors, features
+from .layout import CREEP_POINTS, HOLD, SETTLE, Layout
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a fit sees of a campaign. R runs, n cycles (the shorter runs padded), F features.
+
+    Attributes:
+        layout: which features.
+        cycles: when and where each cycle begins, shape (R, n) and nodes (R, m).
+        anchors: when the features are taken, shape (R, n, ...).
+        values: features, SI, shape (R, n, F).
+        valid: which of them the data give, shape (R, n, F).
+        sensor: standard deviation of their sensor noise, SI, shape (R, n, F).
+        names: of the runs.
+        velocities: usual speed of the drive in each run (m/s), shape (R,).
+        dropped: what was left out, and why.
+    """
+
+    layout: Layout
+    cycles: Cycles
+    anchors: Anchors
+    values: np.ndarray
+    valid: np.ndarray
+    sensor: np.ndarray
+    names: tuple[str, ...]
+    velocities: np.ndarray
+    dropped: tuple[str, ...] = ()
+
+    @property
+    def runs(self) -> int:
+        return self.values.shape[0]
+
+    def take(self, runs: Sequence[int]) -> Measurement:
+        """The measurement with these runs only."""
+        i = np.asarray(runs, int)
+        pick = lambda tree: jax.tree.map(lambda a: a[i], tree)
+        return Measurement(
+            self.layout,
+            pick(self.cycles),
+            pick(self.anchors),
+            self.values[i],
+            self.valid[i],
+            self.sensor[i],
+            tuple(self.names[k] for k in i),
+            self.velocities[i],
+            self.dropped,
+        )
+
+
+def measure(
+    traces: Sequence[Trace],
+    segmentations: Sequence[Segmentation],
+    *,
+    ring_period: float,
+    most_cycles: int = 8,
+) -> Measurement:
+    """Features of every cycle of every run.
+
+    Args:
+        traces, segmentations: of the runs, in the same order; runs without a slip are left out and named.
+        ring_period: expected period of the contact resonance (s).
+        most_cycles: at most so many cycles of a run are used, the first ones.
+
+    Raises:
+        InputError: no run has a slip.
+    """
+    pairs = [(t, s) for t, s in zip(traces, segmentations, strict=True) if len(s.events) >= 1]
+    dropped = [
+        f"{t.name}: no slip in it ({s.reason})" for t, s in zip(traces, segmentations, strict=True) if not s.events
+    ]
+    if not pairs:
+        raise InputError(
+            "no run of this campaign holds a slip",
+            hint="drive slower or with a softer spring; `stickslip inspect` shows what was found in each run",
+        )
+    durations = np.concatenate([[e.duration for e in s.events] for _, s in pairs])
+    settling = float(2.2 * np.median(durations))
+    layout = Layout(settling, float(max(0.13 * np.median(durations), 2.0 * ring_period)))
+    rows = [_run(t, s, layout, ring_period, most_cycles) for t, s in pairs]
+    width = max(len(r[1]) for r in rows)
+    nodes = max(r[0][0].size for r in rows)
+    cycles, anchors, values, valid, sensor = zip(*(_stack(r, width, nodes, layout) for r in rows), strict=True)
+    pile = lambda trees: jax.tree.map(lambda *a: np.stack(a), *trees)
+    return Measurement(
+        layout,
+        jax.tree.map(jnp.asarray, pile(cycles)),
+        jax.tree.map(jnp.asarray, pile(anchors)),
+        np.stack(values),
+        np.stack(valid),
+        np.stack(sensor),
+        tuple(t.name for t, _ in pairs),
+        np.array([s.settings.speed for _, s in pairs]),
+        tuple(dropped),
+    )
+
+
+def _run(trace: Trace, found: Segmentation, layout: Layout, ring_period: float, most: int) -> tuple:
+    """Nodes of the load point and one record for every cycle of a run."""
+    assert trace.displacement is not None
+    t, y = trace.time, trace.displacement
+    times = np.concatenate([[trace.drive.times[0]], trace.drive.times[1:]])
+    nodes = (np.asarray(times, float), trace.drive.position(times))
+    width = 0.18 * ring_period
+    events = found.events[:most]
+    tops = []
+    for e in events:
+        curve = SampledCurve(t[max(e.i_onset - 5, 0) : e.i_arrest + 60], y[max(e.i_onset - 5, 0) : e.i_arrest + 60], e.t_arrest, width)
+        tops.append(curve.top)
+    begins = [(float(t[0]), float(y[0])), *tops]
+    noise = float(trace.noise or 0.0)
+    count = float(trace.resolution or 0.0)
+    records = []
+    for n in range(len(events)):
+        start, position = begins[n]
+        stop = tops[n][0]
+        records.append(_cycle(t, y, start, position, stop, found, n, layout, ring_period, width, noise, count, trace))
+    return nodes, records, bool(trace.virgin), trace.spring_stiffness
+
+
+def _cycle(t, y, start, position, stop, found, n, layout, ring_period, width, noise, count, trace) -> dict:
+    """Anchors, features, validity and sensor noise of the cycle that ends with event ``n``."""
+    event = found.events[n]
+    a = max(int(np.searchsorted(t, start)) - 2, 0)
+    b = min(int(np.searchsorted(t, stop)) + 80, t.size)
+    curve = SampledCurve(t[a:b], y[a:b], event.t_arrest, width)
+    settling = layout.settling
+    rest = float(curve.mean(np.array([start + 1.15 * settling]), 0.3 * settling)[0])
+    _, peak = curve.top
+    first = float(curve.rise(np.array([rest + 0.05 * (peak - rest)]), start + settling)[0])
+    longest = max(first - start - 1.35 * settling, 2.0 * layout.shortest)
+    ladder = np.geomspace(layout.shortest, longest, CREEP_POINTS)
+    hold = max(event.holds, key=lambda h: h[1] - h[0], default=None)
+    usable = hold is not None and hold[0] > start + 1.4 * settling
+    span = np.array(hold if usable else (start, start + settling), float)
+    anchors = Anchors(np.float64(start), ladder, span, np.float64(ring_period))
+    values = features(curve, anchors, layout)
+    virgin = n == 0
+    valid = np.ones(layout.size, bool)
+    s = layout.slices()
+    if virgin:
+        for group in ("overshoot", "ring", "frequency"):
+            valid[s[group]] = False
+        if not trace.virgin:
+            # where the cycle began is not known: only the slip itself can be compared
+            valid[s["recurrence"]] = valid[s["creep"]] = valid[s["settle"]] = False
+    if first - start < 1.6 * settling:
+        valid[s["creep"]] = valid[s["settle"]] = False
+    late = start + np.array(SETTLE) * settling > first - 2.0 * layout.shortest
+    valid[s["settle"]] &= ~late
+    valid[s["hold"]] = usable
+    short = np.array([start + np.max(SETTLE[:2]) * settling > first])
+    if short.any():
+        valid[s["ring"]] = False
+    valid &= np.isfinite(values)
+    sensor = _sensor_noise(curve, values, anchors, layout, noise, count, 1.0 / np.median(np.diff(t)))
+    return {
+        "start": start,
+        "position": position,
+        "limit": start + 1.6 * (stop - start) + 2.0 * settling,
+        "least_slip": 0.3 * (peak - position),
+        "anchors": anchors,
+        "values": np.where(np.isfinite(values), values, 0.0),
+        "valid": valid,
+        "sensor": sensor,
+        "stop": stop,
+    }
+
+
+def _sensor_noise(curve, values, anchors, layout, noise, count, rate) -> np.ndarray:
+    """Standard deviation of every feature that comes from the sensor alone (SI)."""
+    s = layout.slices()
+    out = np.zeros(layout.size)
+    white = noise**2 + count**2 / 12.0
+
+    def window(length: float) -> float:
+        # a count is a bias of up to half its size while the reading rests on it; motion dithers it
+        return float(np.sqrt(noise**2 / max(rate * length, 1.0) + count**2 / 12.0 / 4.0))
+
+    rest = window(0.3 * layout.settling)
+    out[s["recurrence"]] = 0.5 / rate / np.sqrt(3.0)
+    out[s["size"]] = np.hypot(rest, np.sqrt(white / 4.0))
+    out[s["times"]] = 0.1 / rate
+    out[s["overshoot"]] = np.hypot(rest, np.sqrt(white / 4.0))
+    out[s["ring"]] = np.sqrt(white) / 3.0
+    ringing = max(float(values[s["ring"]][0]), 1e-12)
+    period = float(anchors.ring_period)
+    out[s["frequency"]] = np.sqrt(white) / ringing / (2 * np.pi * period) / np.sqrt(max(rate * 3 * period, 1.0))
+    widths = np.maximum(0.12 * anchors.creep, 0.25 * layout.shortest)
+    out[s["creep"]] = [np.hypot(rest, window(w)) for w in widths]
+    out[s["settle"]] = np.hypot(rest, window(0.1 * layout.settling))
+    length = float(anchors.hold[1] - anchors.hold[0])
+    out[s["hold"]] = [np.hypot(window(0.03 * length), window(0.08 * length))] * len(HOLD)
+    return out
+
+
+def _stack(run: tuple, width: int, nodes: int, layout: Layout) -> tuple:
+    """One run's records as arrays, padded to ``width`` cycles and ``nodes`` nodes of the load point."""
+    (times, positions), records, virgin, stiffness = run
+    n = len(records)
+    pad = width - n
+    last = records[-1]["stop"]
+
+    def column(key: str, fill: float) -> np.ndarray:
+        return np.array([r[key] for r in records] + [fill] * pad, float)
+
+    while times.size < nodes:  # more nodes on the last piece change nothing
+        step = max(times[-1] - times[-2], 1e-3)
+        slope = (positions[-1] - positions[-2]) / (times[-1] - times[-2])
+        times, positions = np.append(times, times[-1] + step), np.append(positions, positions[-1] + slope * step)
+    cycles = Cycles(
+        start=column("start", last),
+        position=column("position", 0.0),
+        limit=column("limit", last + 1e-6),
+        least_slip=column("least_slip", 1.0),
+        ends=np.arange(width) < n,
+        used=np.arange(width) < n,
+        load_times=times,
+        load_positions=positions,
+        stiffness=np.array(np.nan if stiffness is None else stiffness),
+        virgin=np.array(virgin),
+    )
+    filler = jax.tree.map(lambda a: np.asarray(a), records[-1]["anchors"])
+    anchors = jax.tree.map(lambda *a: np.stack(a), *[r["anchors"] for r in records], *[filler] * pad)
+    rows = lambda key: np.stack([r[key] for r in records] + [np.zeros(layout.size)] * pad)
+    return cycles, anchors, rows("values"), rows("valid") > 0, np.maximum(rows("sensor"), 1e-15)

@@ -1,0 +1,198 @@
+"""Fit of the dynamic model to all runs of a campaign together: annealed floors, Huber's loss, event-wise variation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..errors import FitError
+from .composition import EVENT_WIDTHS
+from .parameters import Free, to_si, vector
+from .problem import Problem
+
+HUBER = 3.0
+STAGES = ((30.0, 6), (7.0, 6), (2.5, 6), (1.0, 12))  # factor on the floors, most evaluations at it
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An optimum.
+
+    Attributes:
+        z: free parameters on the search scale, shape (k,).
+        events: event-wise ln factors, shape (R, n, 2).
+        cost: robust chi-square, priors included.
+        data_cost: of the data alone.
+        features: of the model at the optimum, shape (R, n, F).
+        covariance: of z, event-wise factors marginalised, shape (k, k).
+        free: what z means.
+        evaluations: Jacobians taken.
+    """
+
+    z: np.ndarray
+    events: np.ndarray
+    cost: float
+    data_cost: float
+    features: np.ndarray
+    covariance: np.ndarray
+    free: tuple[Free, ...]
+    evaluations: int
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Name -> SI value."""
+        return to_si(self.free, self.z)
+
+    def std(self) -> dict[str, float]:
+        """Name -> standard deviation (SI), from the covariance."""
+        sd = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return {f.name: float(s * f.slope(float(z))) for f, s, z in zip(self.free, sd, self.z, strict=True)}
+
+
+class _Residuals:
+    """Whitened residuals and their Jacobian for scipy, in the vector (z, event factors of the used cycles)."""
+
+    def __init__(self, problem: Problem, floor: np.ndarray, event_scale: float) -> None:
+        self.problem, self.floor = problem, floor
+        m = problem.measurement
+        self.used = np.asarray(m.cycles.used)
+        self.valid = m.valid & self.used[..., None]
+        self.widths = np.array(EVENT_WIDTHS) * event_scale
+        self.free = problem.composition.free
+        self.k = len(self.free)
+        self._at: np.ndarray | None = None
+        self._kept: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.evaluations = 0
+
+    def events(self, x: np.ndarray) -> np.ndarray:
+        out = np.zeros((*self.used.shape, 2))
+        out[self.used] = x[self.k :].reshape(-1, 2)
+        return out
+
+    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        if self._at is None or not np.array_equal(self._at, x):
+            self._kept = self.problem.jacobian(x[: self.k], self.events(x))
+            self._at = x.copy()
+            self.evaluations += 1
+        assert self._kept is not None
+        return self._kept
+
+    def data(self, x: np.ndarray, factor: float) -> np.ndarray:
+        model, *_ = self.evaluate(x)
+        r = (model - self.problem.measurement.values) / (factor * self.floor)
+        return np.nan_to_num(np.clip(r[self.valid], -1e4, 1e4), nan=1e4)
+
+    def priors(self, x: np.ndarray) -> np.ndarray:
+        z = x[: self.k]
+        p = [
+            (v - f.inward(f.prior)) / f.width for v, f in zip(z, self.free, strict=True) if np.isfinite(f.width)
+        ]
+        return np.concatenate([p, (x[self.k :].reshape(-1, 2) / self.widths).ravel()])
+
+    def residual(self, x: np.ndarray, factor: float) -> np.ndarray:
+        return np.concatenate([self.data(x, factor), self.priors(x)])
+
+    def jacobian(self, x: np.ndarray, factor: float) -> np.ndarray:
+        _, dz, de = self.evaluate(x)
+        scale = 1.0 / (factor * self.floor)[..., None]
+        dz = np.nan_to_num(dz * scale)[self.valid]
+        rows = self.valid.sum()
+        cells = np.argwhere(self.used)
+        index = np.full(self.used.shape, -1)
+        index[self.used] = np.arange(len(cells))
+        owner = np.broadcast_to(index[..., None], self.valid.shape)[self.valid]
+        event = np.zeros((rows, 2 * len(cells)))
+        de = np.nan_to_num(de * scale)[self.valid]
+        at = np.arange(rows)
+        event[at, 2 * owner] = de[:, 0]
+        event[at, 2 * owner + 1] = de[:, 1]
+        finite = [i for i, f in enumerate(self.free) if np.isfinite(f.width)]
+        prior = np.zeros((len(finite), self.k + event.shape[1]))
+        prior[np.arange(len(finite)), finite] = [1.0 / self.free[i].width for i in finite]
+        event_prior = np.hstack([np.zeros((event.shape[1], self.k)), np.diag(np.tile(1.0 / self.widths, len(cells)))])
+        return np.clip(np.vstack([np.hstack([dz, event]), prior, event_prior]), -1e7, 1e7)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        low, high = zip(*(f.bounds for f in self.free), strict=True)
+        n = 2 * int(self.used.sum())
+        reach = 4.0 * np.tile(self.widths, n // 2)
+        return np.concatenate([low, -reach]), np.concatenate([high, reach])
+
+
+def robust(r: np.ndarray) -> float:
+    """Huber's loss: chi-square with the far tails straightened."""
+    a = np.abs(r)
+    return float(np.sum(np.where(a <= HUBER, a * a, 2.0 * HUBER * a - HUBER * HUBER)))
+
+
+def fit(
+    problem: Problem,
+    floor: np.ndarray,
+    *,
+    z: np.ndarray | None = None,
+    events: np.ndarray | None = None,
+    stages: tuple[tuple[float, int], ...] = STAGES,
+    event_scale: float = 1.0,
+    progress: Callable[[str], None] | None = None,
+) -> Fit:
+    """Levenberg-Marquardt (trust region with bounds) at falling floors.
+
+    Args:
+        problem: composition and data.
+        floor: standard deviation of every feature, shape (R, n, F).
+        z, events: where to start; default the composition's starts and no variation.
+        stages: factors on the floors and how many evaluations each may take.
+        event_scale: on the prior width of the event-wise variation.
+        progress: told the error after every evaluation.
+
+    Raises:
+        FitError: the model could not be evaluated at the start.
+    """
+    res = _Residuals(problem, floor, event_scale)
+    low, high = res.bounds()
+    start = vector(problem.composition.free) if z is None else np.asarray(z, float)
+    ev = np.zeros((*res.used.shape, 2)) if events is None else events
+    x = np.clip(np.concatenate([start, ev[res.used].ravel()]), low + 1e-9, high - 1e-9)
+    scale = np.concatenate([[min(f.width, 1.0) for f in res.free], np.tile(res.widths, int(res.used.sum()))])
+    for factor, most in stages:
+
+        def residual(x: np.ndarray, factor: float = factor) -> np.ndarray:
+            r = res.residual(x, factor)
+            if progress is not None:
+                progress(f"floors x{factor:g}, evaluation {res.evaluations}, cost {robust(r):.1f}")
+            return r
+
+        if not np.all(np.isfinite(residual(x))):
+            raise FitError("the model gives no finite features at the start of the fit")
+        found = least_squares(
+            residual,
+            x,
+            jac=lambda x, factor=factor: res.jacobian(x, factor),
+            bounds=(low, high),
+            x_scale=scale,
+            loss="huber",
+            f_scale=HUBER,
+            max_nfev=most,
+            ftol=2e-3,
+            xtol=1e-4,
+            gtol=1e-6,
+        )
+        x = found.x
+    features, *_ = res.evaluate(x)
+    data, prior = res.data(x, 1.0), res.priors(x)
+    # the scipy Jacobian at the optimum carries Huber's weights already
+    hessian = found.jac.T @ found.jac
+    covariance = np.linalg.pinv(hessian)[: res.k, : res.k]
+    return Fit(
+        x[: res.k],
+        res.events(x),
+        robust(data) + float(prior @ prior),
+        robust(data),
+        features,
+        covariance,
+        problem.composition.free,
+        res.evaluations,
+    )

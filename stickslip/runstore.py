@@ -1,0 +1,255 @@
+"""Run folders: written aside and renamed, so that a folder is there as a whole or not at all.
+
+While a run writes, its files lie in ``NAME.partial`` beside the folder, held by a lock that dies with the process. A
+crash leaves the partial folder; the next run into the same name continues it (``resume=True``) or starts anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import platform
+import shutil
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+from .errors import InputError, RunFolderError
+
+if TYPE_CHECKING:
+    import xarray
+
+RESULT = "result.json"
+PACKAGES = ("stickslip", "numpy", "scipy", "jax", "diffrax", "equinox", "xarray")
+
+
+class Run:
+    """A run folder while it is written.
+
+    Attributes:
+        folder: where files go for now.
+        target: what it will be called.
+        resumed: whether files of an interrupted run were found in it.
+    """
+
+    def __init__(self, folder: Path, target: Path, resumed: bool) -> None:
+        self.folder, self.target, self.resumed = folder, target, resumed
+
+    def path(self, name: str) -> Path:
+        """Where a file of this name is written; its folder is made."""
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def json(self, content: Mapping[str, Any], name: str = RESULT) -> Path:
+        """Write a JSON file, aside and renamed; numbers that are not finite become null."""
+        return self.text(json_text(content) + "\n", name)
+
+    def text(self, content: str, name: str) -> Path:
+        """Write a text file, aside and renamed."""
+        path = self.path(name)
+        aside = path.with_name(path.name + ".part")
+        with aside.open("w", encoding="utf-8") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        return aside.replace(path)
+
+    def arrays(self, data: xarray.Dataset, name: str = "arrays.nc") -> Path:
+        """Write a data set as NetCDF."""
+        path = self.path(name)
+        aside = path.with_name(path.name + ".part")
+        data.to_netcdf(aside, engine="h5netcdf")
+        return aside.replace(path)
+
+
+@contextmanager
+def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -> Iterator[Run]:
+    """Write a run folder; it appears under its name when the block ends without an error.
+
+    Args:
+        target: the folder.
+        force: replace an existing run folder (one with a ``result.json``; nothing else is ever replaced).
+        resume: go on with what an interrupted run left behind instead of removing it, and leave it after an error.
+
+    Raises:
+        RunFolderError: it exists, another run is writing it, or the disk is read-only or full.
+    """
+    target = Path(target)
+    name = target.name or target.resolve().name
+    if name in ("", ".", ".."):
+        raise RunFolderError("not a name for a run folder", file=target)
+    target = target.resolve() if target.is_symlink() else target
+    refuse_existing(target, force)
+    partial = target.with_name(f"{name}.partial")
+    with _speaking(target), _locked(target):
+        refuse_existing(target, force)
+        resumed = resume and partial.is_dir()
+        if partial.exists() and not resumed:
+            shutil.rmtree(partial)
+        partial.mkdir(parents=True, exist_ok=True)
+        try:
+            yield Run(partial, target, resumed)
+        except BaseException:
+            if not resume:
+                shutil.rmtree(partial, ignore_errors=True)
+            raise
+        _rename(partial, target)
+
+
+def refuse_existing(target: Path, force: bool) -> None:
+    """Say early that a folder cannot be written.
+
+    Raises:
+        RunFolderError: it exists, unless it is an empty folder, or a run folder and ``force``.
+    """
+    if not target.exists() or (target.is_dir() and not any(target.iterdir())):
+        return
+    if not target.is_dir():
+        raise RunFolderError("the run folder's name is taken by a file", file=target, hint="choose another --out")
+    if not (target / RESULT).is_file():
+        raise RunFolderError(
+            "the folder exists and is no run folder (it holds no result.json), so it is left alone",
+            file=target,
+            hint="choose another --out",
+        )
+    if not force:
+        raise RunFolderError(
+            "the run folder exists already", file=target, hint="choose another --out, or replace it with --force"
+        )
+
+
+def _rename(partial: Path, target: Path) -> None:
+    old = target.with_name(f"{target.name}.old")
+    if old.exists():
+        shutil.rmtree(old)
+    if target.exists():
+        target.replace(old)
+    partial.replace(target)
+    if old.exists():
+        shutil.rmtree(old)
+
+
+@contextmanager
+def _speaking(target: Path) -> Iterator[None]:
+    """Turn the system's errors about this folder into one message."""
+    try:
+        yield
+    except OSError as error:
+        where = Path(error.filename) if isinstance(error.filename, (str, Path)) else target
+        home = target.resolve().parent
+        if error.filename is not None and not where.resolve().is_relative_to(home):
+            raise
+        reason = error.strerror or str(error)
+        raise RunFolderError(
+            f"the run folder cannot be written ({reason})", file=target, hint="choose another --out, or make room"
+        ) from error
+
+
+@contextmanager
+def _locked(target: Path) -> Iterator[None]:
+    """Hold the lock of a run folder; the system lets go of it when the process ends, however it ends."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    path = target.with_name(f".{target.name}.lock")
+    stream = path.open("a+", encoding="utf-8")
+    try:
+        if not _take(stream):
+            raise RunFolderError(
+                "another run is writing this folder", file=target, hint="wait for it, or choose another --out"
+            )
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)
+    finally:
+        stream.close()
+
+
+def _take(stream: TextIO) -> bool:
+    if sys.platform == "win32":
+        import msvcrt
+
+        try:
+            msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+    import fcntl
+
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    # whoever held it before may have removed the file, so that this lock is on nothing
+    try:
+        return os.fstat(stream.fileno()).st_ino == Path(stream.name).stat().st_ino
+    except FileNotFoundError:
+        return False
+
+
+def json_text(content: Any) -> str:
+    """JSON of plain data, arrays and numpy numbers; what is not finite becomes null, so that it is valid JSON."""
+    return json.dumps(_plain(content), indent=1, allow_nan=False, ensure_ascii=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(part) for key, part in value.items()}
+    if isinstance(value, (str, bool, int, type(None))):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if hasattr(value, "tolist"):  # arrays and numbers of numpy
+        return _plain(value.tolist())
+    if isinstance(value, Iterable):
+        return [_plain(part) for part in value]
+    return str(value)
+
+
+def file_record(path: str | Path) -> dict[str, str]:
+    """Name and SHA-256 of an input."""
+    path = Path(path)
+    digest = hashlib.sha256()
+    try:
+        with path.open("rb") as stream:
+            while block := stream.read(1 << 20):
+                digest.update(block)
+    except OSError as error:
+        raise InputError(f"the file cannot be read ({error.strerror})", file=path) from None
+    return {"file": str(path), "sha256": digest.hexdigest()}
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a result depends on."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def read_result(folder: str | Path) -> dict[str, Any]:
+    """The ``result.json`` of a run folder.
+
+    Raises:
+        RunFolderError: the folder is not there, is not a run folder, or its result is damaged.
+    """
+    folder = Path(folder)
+    path = folder / RESULT
+    if not path.is_file():
+        what = "there is no such folder" if not folder.is_dir() else "not a run folder: it holds no result.json"
+        raise RunFolderError(what, file=folder)
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise RunFolderError(f"the result cannot be read ({error})", file=path) from None
+    if not isinstance(found, dict):
+        raise RunFolderError("the result is not a table", file=path)
+    return found

@@ -1,0 +1,125 @@
+"""Universal files as pyuff writes them and as other writers do."""
+
+import struct
+
+import numpy as np
+import pytest
+import pyuff
+
+from stickslip.readers import read_columns
+
+T = np.arange(40) * 2.5e-4
+X = np.cos(T * 300) * 1e-6
+
+
+def data_set(**changes):
+    base = {
+        "type": 58, "func_type": 1, "id1": "Vib Displacement", "rsp_node": 1, "rsp_dir": 1, "ref_node": 1, "ref_dir": 1,
+        "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s", "abscissa_spacing": 1,
+        "ordinate_spec_data_type": 8, "ordinate_axis_units_lab": "um", "orddenom_spec_data_type": 0, "x": T, "data": X,
+    }  # fmt: skip
+    return base | changes
+
+
+def header(order, kind, spacing, count, *, total, start=0.0, step=2.5e-4, fmt=2):
+    """A 58b header as the published format has it, not by pyuff."""
+    return [
+        f"{'-1':>6}",
+        f"{'58':>6}b{order:6d}{fmt:6d}{11:12d}{total:12d}{0:6d}{0:6d}{0:12d}{0:12d}",
+        "Vib Displacement", "NONE", "NONE", "NONE", "NONE",
+        f"{1:5d}{0:10d}{0:5d}{0:10d} {'NONE':>10}{1:10d}{1:4d} {'NONE':>10}{1:10d}{1:4d}",
+        f"{kind:10d}{count:10d}{spacing:10d}{start:13.5e}{step:13.5e}{0.0:13.5e}",
+        f"{17:10d}{0:5d}{0:5d}{0:5d} {'Time':<20} {'s':<20}",
+        f"{8:10d}{0:5d}{0:5d}{0:5d} {'Displacement':<20} {'um':<20}",
+        f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
+        f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
+    ]  # fmt: skip
+
+
+def write(path, lines, payload, end=b"    -1\n", newline="\n"):
+    path.write_bytes((newline.join(lines) + newline).encode() + payload + end)
+    return path
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("spacing", [0, 1])
+def test_as_pyuff_writes(tmp_path, binary, spacing):
+    path = tmp_path / "a.uff"
+    pyuff.UFF(str(path)).write_sets(data_set(binary=binary, abscissa_spacing=spacing))
+    columns = read_columns(path)
+    assert columns.reader == "uff"
+    assert columns.units == {"time": "s", "Vib Displacement": "um"}
+    assert columns.data["time"] == pytest.approx(T, rel=1e-5, abs=1e-12)
+    assert columns.data["Vib Displacement"] == pytest.approx(X, rel=1e-11, abs=1e-18)
+
+
+def test_doubles_under_a_header_that_says_single(tmp_path):
+    path = tmp_path / "a.uff"
+    pyuff.UFF(str(path)).write_sets(data_set(binary=1, ord_data_type=2), force_double=False)
+    columns = read_columns(path)
+    assert np.array_equal(columns.data["Vib Displacement"], X)
+    assert any("not what the header states" in note for note in columns.notes)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(
+    "end", [b"    -1\n", b"\n    -1\n", b"\r\n    -1\r\n", b"    -1", b"\n    -1" + b" " * 74 + b"\r\n"]
+)
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize("kind", [2, 4])
+@pytest.mark.parametrize("spacing", [0, 1])
+def test_binary_as_other_writers_have_it(tmp_path, kind, spacing, newline, end, order):
+    mark, letter = ("<" if order == 1 else ">"), ("f" if kind == 2 else "d")
+    if spacing:
+        payload = struct.pack(f"{mark}{X.size}{letter}", *X)
+    else:  # abscissas are single precision whatever the ordinates are
+        payload = b"".join(struct.pack(f"{mark}f{letter}", t, x) for t, x in zip(T, X, strict=True))
+    path = write(tmp_path / "a.uff", header(order, kind, spacing, X.size, total=len(payload)), payload, end, newline)
+    columns = read_columns(path)
+    exact = X.astype(np.float32) if kind == 2 else X
+    assert np.array_equal(columns.data["Vib Displacement"], exact.astype(float))
+    assert columns.data["time"] == pytest.approx(T, rel=1e-6, abs=1e-9)
+
+
+def test_closing_mark_inside_the_data(tmp_path):
+    payload = bytearray(struct.pack(f"<{X.size}d", *X))
+    payload[80:88] = b"\n    -1\n"
+    values = np.frombuffer(bytes(payload), "<f8")
+    path = write(tmp_path / "a.uff", header(1, 4, 1, X.size, total=len(payload)), bytes(payload))
+    assert np.array_equal(read_columns(path).data["Vib Displacement"], values)
+
+
+def test_wrong_byte_order_in_the_header(tmp_path):
+    path = write(tmp_path / "a.uff", header(2, 4, 1, X.size, total=320), struct.pack(f"<{X.size}d", *X))
+    columns = read_columns(path)
+    assert np.array_equal(columns.data["Vib Displacement"], X)
+    assert any("byte order" in note for note in columns.notes)
+
+
+def test_several_sets_and_other_kinds_between(tmp_path):
+    path = tmp_path / "a.uff"
+    file = pyuff.UFF(str(path))
+    file.write_sets({"type": 151, "model_name": "m", "description": "d", "db_app": "a", "program": "p"}, "overwrite")
+    file.write_sets(data_set(binary=1), "add")
+    file.write_sets(data_set(binary=0, data=2 * X), "add")
+    file.write_sets(data_set(binary=1, x=T[:20], data=X[:20], id1="short"), "add")
+    file.write_sets(data_set(binary=1, func_type=4, abscissa_spec_data_type=18, id1="spectrum"), "add")
+    columns = read_columns(path)
+    assert np.array_equal(columns.data["Vib Displacement"], X)
+    assert columns.data["Vib Displacement (2)"] == pytest.approx(2 * X, rel=1e-11)
+    assert columns.data["short time"].size == columns.data["short"].size == 20
+    assert "spectrum" in columns.ignored
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+def test_cut_short(tmp_path, refuses, binary):
+    path = tmp_path / "a.uff"
+    pyuff.UFF(str(path)).write_sets(data_set(binary=binary))
+    path.write_bytes(path.read_bytes()[:-60])
+    refuses(lambda: read_columns(path), "a.uff", "data set 1", "40" if binary else "promises")
+
+
+def test_vax_format_is_refused(tmp_path, refuses):
+    payload = struct.pack(f"<{X.size}d", *X)
+    path = write(tmp_path / "a.uff", header(1, 4, 1, X.size, total=320, fmt=1), payload)
+    refuses(lambda: read_columns(path), "VAX or IBM", "IEEE")

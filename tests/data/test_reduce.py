@@ -1,0 +1,110 @@
+"""A reduced record keeps its events, and a long one is handled in seconds and bounded memory."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from stickslip.segment import reduce_trace, segment
+from stickslip.trace import Drive, Trace
+
+LSB = 7.91e-9
+
+
+@pytest.fixture
+def trace(stick_slip):
+    model = stick_slip(ring=150e-9)
+    t = np.arange(0, model.stop, 5e-5)
+    x = np.floor((model.position(t) + np.random.default_rng(1).normal(0, 3e-9, t.size)) / LSB) * LSB
+    drive = Drive.constant(model.v0, 0.0, model.stop)
+    return Trace("a", t, displacement=x, normal_load=1 + 0 * t, drive=drive, resolution=LSB, noise=3e-9)
+
+
+def test_slips_stay_at_full_rate_and_creep_is_shortened(trace):
+    found = segment(trace)
+    short = reduce_trace(trace, found)
+    assert short.time.size < 0.25 * trace.time.size
+    for event in found.events:
+        inside = (trace.time > event.t_onset - 0.05) & (trace.time < event.t_arrest + 0.05)
+        kept = (short.time > event.t_onset - 0.05) & (short.time < event.t_arrest + 0.05)
+        assert np.array_equal(short.displacement[kept], trace.displacement[inside])
+    (note,) = short.repairs
+    assert note.kind == "reduced"
+    assert note.count == trace.time.size - short.time.size
+    assert short.normal_load == pytest.approx(1.0)
+
+
+def test_segmentation_of_the_reduced_record_is_the_same(trace):
+    found = segment(trace)
+    again = segment(reduce_trace(trace, found), settings=found.settings)
+    assert len(again.events) == len(found.events)
+    for a, b in zip(again.events, found.events, strict=True):
+        assert a.t_onset == pytest.approx(b.t_onset, abs=1e-5)
+        assert a.slip == pytest.approx(b.slip, abs=LSB)
+
+
+def test_means_of_creep_are_finer_than_a_count(trace, stick_slip):
+    """Averages over the windows of creep follow the true position much closer than one count."""
+    model = stick_slip(ring=150e-9)
+    short = reduce_trace(trace, segment(trace))
+    middle = (np.abs(np.mod(short.time, 1.0) - 0.5) < 0.25) & (short.time < 6)
+    error = short.displacement[middle] + LSB / 2 - model.position(short.time[middle])
+    assert middle.sum() > 100
+    assert np.sqrt(np.mean(error**2)) < LSB / 8
+
+
+def test_a_record_without_events_is_shortened_too():
+    t = np.arange(0, 100, 1e-3)
+    trace = Trace("s", t, displacement=1e-9 * t, drive=Drive.constant(50e-6, 0, 100))
+    short = reduce_trace(trace, segment(trace), points=200)
+    assert 100 < short.time.size <= 200
+    assert short.displacement == pytest.approx(1e-9 * short.time, abs=1e-20)
+    assert np.all(np.diff(short.time) > 0)
+
+
+LONG = """
+import resource, sys, time
+from stickslip.campaign import load_campaign, load_traces
+from stickslip.segment import reduce_trace, segment
+start = time.process_time()
+(trace,) = load_traces(load_campaign(sys.argv[1]))
+found = segment(trace)
+short = reduce_trace(trace, found)
+print(trace.time.size, len(found.events), short.time.size, time.process_time() - start,
+      resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("ending", "seconds"), [("npy", 15), ("csv", 45)])
+def test_ten_million_samples(tmp_path, stick_slip, ending, seconds):
+    """Read, segmented and reduced in seconds of processor time and less than 1 GB."""
+    n, model = 10_000_000, stick_slip(period=1.5, events=130)
+    t = np.arange(n) / 50e3
+    one = np.arange(0, 1.5, 2e-5)
+    cycle = model.position(one)
+    x = (
+        np.floor(1e6 * (cycle[np.arange(n) % one.size] + model.v0 * 1.5 * (np.arange(n) // one.size)) / 7.91e-3)
+        * 7.91e-3
+    )
+    if ending == "npy":
+        np.save(tmp_path / "a.npy", np.column_stack([t, x]))
+    else:
+        with (tmp_path / "a.csv").open("w") as stream:
+            stream.write("time [s],x [um]\n")
+            for i in range(0, n, 200_000):
+                np.savetxt(stream, np.column_stack([t[i : i + 200_000], x[i : i + 200_000]]), fmt="%.5f,%.5f")
+    (tmp_path / "c.toml").write_text(
+        f'schema = 1\n[[trace]]\nfile = "a.{ending}"\ntime = {{ column = 1, unit = "s" }}\n'
+        'displacement = { column = 2, unit = "um" }\ndrive_velocity = "50 um/s"\n'
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", LONG, str(tmp_path / "c.toml")], capture_output=True, text=True, check=True
+    )
+    size, events, short, spent, memory = done.stdout.split()
+    assert int(size) == n
+    assert int(events) == 133
+    assert int(short) < n / 5
+    assert float(memory) < 1e9
+    assert float(spent) < seconds
