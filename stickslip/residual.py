@@ -24,12 +24,14 @@ class Scatter:
     times: float = 0.0015
     overshoot: float = 0.05
     ring: float = 0.05
-    frequency: float = 0.0045
+    frequency: float = 0.03
     creep: float = 0.006
     creep_largest: float = 0.004
     creep_clock: float = 4e-5  # s
     hold: float = 0.025
     resolution: float = 0.4e-9  # m
+    overshoot_resolution: float = 1.5e-9  # m
+    virgin: float = 3.0  # factor on all of these in a virgin cycle, which sees the whole shape of the lines
 
 
 def floors(measurement: Measurement, scatter: Scatter | None = None, factor: float = 1.0) -> np.ndarray:
@@ -50,7 +52,7 @@ def floors(measurement: Measurement, scatter: Scatter | None = None, factor: flo
     times = v[..., s["times"]]
     duration = (times[..., -1] - times[..., 0])[..., None]
     real[..., s["times"]] = np.hypot(k.times * duration, 0.0)
-    real[..., s["overshoot"]] = np.hypot(k.overshoot * v[..., s["overshoot"]], k.resolution)
+    real[..., s["overshoot"]] = np.hypot(k.overshoot * v[..., s["overshoot"]], k.overshoot_resolution)
     loudest = np.max(np.abs(v[..., s["ring"]]), axis=-1, keepdims=True)
     real[..., s["ring"]] = np.hypot(k.ring * v[..., s["ring"]], 0.02 * loudest)
     real[..., s["frequency"]] = k.frequency * v[..., s["frequency"]]
@@ -61,6 +63,7 @@ def floors(measurement: Measurement, scatter: Scatter | None = None, factor: flo
     real[..., s["creep"]] = _root_sum(k.creep * creep, k.creep_largest * largest, k.creep_clock * slope, k.resolution)
     real[..., s["settle"]] = _root_sum(k.creep * v[..., s["settle"]], k.creep_largest * largest, k.resolution)
     real[..., s["hold"]] = np.hypot(k.hold * v[..., s["hold"]], k.resolution)
+    real[:, 0] *= k.virgin
     return np.hypot(m.sensor, factor * real)
 
 

@@ -32,6 +32,7 @@ def make_app() -> App:
         help="Creep and stick-slip of a rough contact: simulate it, measure it, find what is missing.",
         version=__version__,
         help_format="plaintext",
+        suppress_keyboard_interrupt=False,
     )
     for name, text in COMMANDS.items():
         app.command(f"stickslip.cli.{name}:{name}", name=name, help=text)

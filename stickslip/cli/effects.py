@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +20,7 @@ def effects(
     tag: str | None = None,
     *,
     model: str | None = None,
+    latex: Annotated[bool, Parameter(negative="")] = False,
     effect: Annotated[tuple[Path, ...], Parameter(negative="")] = (),
     picture: Path | None = None,
     force: Annotated[bool, Parameter(negative="")] = False,
@@ -31,6 +33,8 @@ def effects(
         The effect to explain.
     model:
         Print the equations of this model: --model static,inertia,contact-ageing.
+    latex:
+        Print the equations as LaTeX.
     effect:
         A Python file with an effect of your own. Its code is run.
     picture:
@@ -45,9 +49,7 @@ def effects(
     for path in effect:
         catalogue.load_file(path)
     if model is not None:
-        from ..scenario.equations import as_text, model_parts
-
-        print(as_text(model_parts([name.strip() for name in model.split(",") if name.strip()])))
+        print(_equations([name.strip() for name in model.split(",") if name.strip()], latex), end="")
         return 0
     if tag is None:
         print(_catalogue(catalogue.all()))
@@ -58,6 +60,14 @@ def effects(
         _draw(cls, picture, force)
         print(f"\nwritten to {picture}")
     return 0
+
+
+def _equations(tags: list[str], latex: bool) -> str:
+    from ..effects.equations import of_tags
+    from ..model import Block, Weakening
+
+    found = of_tags(tags, block=Block(), weakening=Weakening())
+    return found.latex() if latex else found.text()
 
 
 def _catalogue(known: dict[str, type[Effect]]) -> str:
@@ -74,13 +84,11 @@ def _catalogue(known: dict[str, type[Effect]]) -> str:
 
 def _explained(cls: type[Effect]) -> str:
     from ..effects.catalogue import roles
-    from ..params import specs, variants
-    from ..scenario.equations import parameter_lines
+    from ..effects.plain import plain
+    from ..params import variants
 
-    default = cls()
-    values = [(name, spec, float(getattr(default, name))) for name, spec in specs(cls).items()]
-    lines = [f"{cls.tag} ({cls.family}): {cls.summary}", "", f"  {cls.equation}", "", "parameters:"]
-    lines += [f"  {line}" for line in parameter_lines(values)]
+    lines = [f"{cls.tag} ({cls.family}): {cls.summary}", "", f"  {plain(cls.equation)}", f"  LaTeX: {cls.equation}", ""]
+    lines += ["parameters:", *(f"  {line}" for line in _parameters(cls))]
     lines += [f"  {name}: one of {', '.join(choices)}" for name, choices in variants(cls).items()]
     lines += ["", f"acts as: {', '.join(roles(cls))}", *_wrapped("signature", cls.signature)]
     if cls.confused_with:
@@ -88,6 +96,18 @@ def _explained(cls: type[Effect]) -> str:
         for other, experiment in cls.confused_with.items():
             lines += _wrapped(f"  {other}", experiment)
     return "\n".join([*lines, *_wrapped("source", cls.source)])
+
+
+def _parameters(cls: type[Effect]) -> Iterator[str]:
+    from ..effects.plain import plain
+    from ..params import specs
+
+    for name, spec in specs(cls).items():
+        unit = "" if spec.unit == "1" else f" {spec.unit}"
+        symbol = f" ({plain(spec.symbol)})" if spec.symbol else ""
+        null = "" if spec.null is None else f", absent at {spec.null:g}"
+        default = float(getattr(cls(), name))
+        yield f"{name}{symbol} = {default:.6g}{unit} [{spec.lower:g} ... {spec.upper:g}{unit}]: {spec.doc}{null}"
 
 
 def _wrapped(head: str, text: str) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -103,11 +104,12 @@ def _head(scenario: Scenario) -> dict[str, Any]:
 
 
 def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
-    from ..scenario import simulate as integrate
+    from ..scenario import record
 
     with show.progress_bar() as watch:
-        data = integrate(scenario, watch)
+        recording = record(scenario, watch)
     if run is not None:
+        data = recording.dataset()
         from ..plots import save, static_against_inertial, trace_figure
 
         run.arrays(data)
@@ -117,22 +119,27 @@ def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
             from ..scenario.writers import write_campaign
 
             write_campaign(run.folder, [scenario], [data])
-    return _numbers(data)
+    events = {name: part for name, part in recording.variables.items() if part[0] == "event"}
+    columns = {name: (values.tolist(), attributes["units"]) for name, (_, values, attributes) in events.items()}
+    return _numbers(columns, recording.attributes)
 
 
-def _numbers(data: xarray.Dataset) -> dict[str, Any]:
-    """What `result.json` says of one run."""
+def _of_dataset(data: xarray.Dataset) -> dict[str, Any]:
     names = [str(name) for name in data if data[name].dims == ("event",)]
-    columns = {name: data[name].values.tolist() for name in names}
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    units = {name: data[name].attrs["units"] for name in names}
-    facts = {key: value for key, value in data.attrs.items() if key not in ("title", "versions", "warnings")}
+    return _numbers({name: (data[name].values.tolist(), data[name].attrs["units"]) for name in names}, data.attrs)
+
+
+def _numbers(columns: dict[str, tuple[list[float], str]], attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """What `result.json` says of one run, from the columns of its event table and their units."""
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*(c for c, _ in columns.values()), strict=True)]
+    units = {name: unit for name, (_, unit) in columns.items()}
+    facts = {key: value for key, value in attributes.items() if key not in ("title", "versions", "warnings")}
     return {
         "events": rows,
         "units": units,
         "facts": facts,
-        "verdict": data.attrs["verdict"],
-        "warnings": [text for text in str(data.attrs["warnings"]).split("\n") if text],
+        "verdict": attributes["verdict"],
+        "warnings": [text for text in str(attributes["warnings"]).split("\n") if text],
     }
 
 
@@ -161,7 +168,7 @@ def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str,
     result: dict[str, Any] = {
         "kind": "series",
         "key": sweep.key,
-        "runs": [{"value": value, **_numbers(data)} for value, data in zip(values[: len(done)], done, strict=True)],
+        "runs": [{"value": value, **_of_dataset(data)} for value, data in zip(values[: len(done)], done, strict=True)],
         "table": {str(name): table[name].values.tolist() for name in table},
         "units": {str(name): table[name].attrs["units"] for name in table},
         "verdict": f"{sum(1 for d in done if d.sizes['event'])} of {len(done)} runs show slip events",

@@ -31,6 +31,8 @@ class Finding:
         return f"{self.tag}: {self.check}: {self.text}"
 
 
+TOGETHER = 10  # effects in one compilation: more take longer to run than they save in compiling
+
 RIG_CHECKS: tuple[tuple[str, Callable], ...] = (
     ("finite", dynamics.check_finite),
     ("energy", dynamics.check_energy),
@@ -85,6 +87,10 @@ def _together(effects: tuple[Effect, ...]) -> list[Finding]:
     if not effects:
         return []
     findings: list[Finding] = []
+
+    def alone() -> list[Finding]:
+        return [f for effect in effects for f in _together((effect,))]
+
     rig = Rig(effects)
     for name, check in RIG_CHECKS:
 
@@ -95,12 +101,12 @@ def _together(effects: tuple[Effect, ...]) -> list[Finding]:
             check(rig, report)
         except Exception as error:  # whatever a foreign law raises when it is traced
             if len(effects) > 1:
-                return [f for effect in effects for f in _together((effect,))]
+                return alone()
             return [Finding(effects[0].tag, "compilation", f"the law cannot be compiled: {_first_line(error)}")]
-        broken = {f.tag for f in findings}
-        if name == "finite" and broken and len(effects) > 1:
-            # numbers that are not finite would spoil the runs of all the others
-            return findings + _together(tuple(e for e in effects if e.tag not in broken))
+        if name == "finite" and findings and len(effects) > 1:
+            return alone()  # a number that is not finite spoils the others' runs and derivatives
+        if name == "finite" and findings:
+            break
     if rig.traces > 1:
         findings.append(Finding(effects[0].tag, "compilation", f"{rig.traces} compilations of one run"))
     return findings

@@ -11,13 +11,12 @@ from ..params import Spec, specs
 from .rig import AT_ONCE, DRIVE, LOOSE, TIGHT, Rig, feature_scales
 
 LADDER = 10.0 ** np.arange(-7.0, -1.0)  # steps as shares of a parameter's range
-# on a plateau, share of the largest change of a feature over the range; the solver's Newton iteration ends at a
-# velocity in proportion to the tolerance, which a law with a kink in velocity feels in its derivative
-AGREEMENT = {LOOSE: 0.1, TIGHT: 0.02}
+AGREEMENT = 0.02  # on a plateau, of the largest change of a feature over the range
 SECANT = 0.25  # at the step WIDE; elements that begin to slide in between bend the true curve by some per cent
 NOISE = 1e-5  # change of a feature over the range, as a share of its scale, that is as good as none
+JUMP = 0.01  # of a scale: the least difference that a switch hidden between two steps of the ladder must make
 BETWEEN = 0.5  # difference between the tolerances, as a share of the largest change, plus
-COARSE = 0.02  # what the looser tolerance leaves of a feature, as a share of its scale
+COARSE = 0.5  # of a scale: just before a slip elements let go one by one, and the derivative jumps with the steps
 CENTRAL = ([-1, 0, 1], [-0.5, 0.0, 0.5])
 WIDE = 1e-3  # a step so large must roughly agree too: a small one alone sees only its own branch of a switch
 
@@ -88,8 +87,9 @@ def _check_point(
         gaps = np.abs(_differences(rig, p, place, spec, reach, steps) - exact)
         size = np.max(np.abs(exact))
         worst = np.max(np.nan_to_num(gaps, nan=np.inf), axis=1)
-        good = worst <= AGREEMENT[steps[2]] * size + NOISE
-        if not np.any(good[:-1] & good[1:]) or worst[LADDER >= WIDE].min() > SECANT * size + NOISE:
+        good = worst <= AGREEMENT * size + NOISE
+        jumps = worst[-1] > SECANT * size + JUMP and worst[-2] < 1e-3 * worst[-1]  # curvature alone: a tenth or less
+        if not np.any(good[:-1] & good[1:]) or worst[LADDER >= WIDE].min() > SECANT * size + NOISE or jumps:
             report(
                 index,
                 f"derivative in {name} {where} (tolerance {steps[2]:g}) agrees with no finite difference: per range "

@@ -119,7 +119,9 @@ class Rig:
         """
         model = self.model(p)
         args = model, model.shaped()
-        solver = ContactStepper(tolerance=Tolerance(tolerance, 1e-9 * tolerance, 1e-5 * tolerance))
+        # the velocity tolerance only ends Newton's iteration here; so low, because a derivative taken off the root is
+        # wrong by the distance over the law's own scale of velocity
+        solver = ContactStepper(tolerance=Tolerance(tolerance, 1e-9 * tolerance, 1e-9 * tolerance))
         start = model.rest()
 
         def body(k: Array, carry: Any) -> Any:

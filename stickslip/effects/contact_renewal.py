@@ -37,7 +37,8 @@ class ContactRenewal(Memory, Threshold, Flow):
     While the block moves on, a class takes over the force of the next younger one, at a rate that gives it the mean age
     of its junctions; before the youngest stands a force-free newborn (McKendrick's equation in quantiles of age, solved
     class by class with exponentials). Every class has the element's cap. Steady sliding is exact: an element with
-    threshold u_y carries (l/u_y)(1 - exp(-u_y/l)) of its cap.
+    threshold u_y carries (l/u_y)(1 - exp(-u_y/l)) of its cap. Junctions older than u_y are one class: a reversal
+    by more than the threshold, longer than any rebound, mixes their forces.
     """
 
     tag = "contact-renewal"

@@ -139,10 +139,10 @@ def of_tags(tags: Sequence[str], *, block: Any = None, weakening: Any = None) ->
 def _base(effects: Sequence[Effect], inertial: bool) -> Iterator[Line]:
     bodies = "".join(rf" + F_{{\mathrm{{{e.tag}}}}}" for e in effects if isinstance(e, BodyForce))
     if inertial:
-        yield Line("balance of the block", rf"m \ddot x = F_s - c\,\dot x - \sum_i f_i{bodies}")
+        yield Line("balance of the block", r"m \ddot x = F_{\mathrm{spring}} - c\,\dot x - \sum_i f_i" + bodies)
     else:
-        yield Line("balance of the block, without inertia", rf"0 = F_s - \sum_i f_i{bodies}")
-    yield Line("driving spring", r"F_s = c_s\,(x_0(t) - x)")
+        yield Line("balance of the block, without inertia", r"0 = F_{\mathrm{spring}} - \sum_i f_i" + bodies)
+    yield Line("driving spring", r"F_{\mathrm{spring}} = c_s\,(x_0(t) - x)")
     yield Line("Jenkins elements, while stuck", r"\dot f_i = k_i\,\dot x")
     if inertial:
         yield Line("and never beyond their caps", r"|f_i| \le c_i\,\mu(\psi)/\mu_s")
@@ -150,6 +150,7 @@ def _base(effects: Sequence[Effect], inertial: bool) -> Iterator[Line]:
         yield Line("its state", r"\dot\psi = (1 - \psi)/t_h - |\dot x|\,\psi/D_c")
     else:
         yield Line("and never beyond their caps (constant friction)", r"|f_i| \le c_i")
+    yield Line("full friction force", r"F_s = \sum_i c_i")
 
 
 def _own(effect: Effect) -> Iterator[Line]:

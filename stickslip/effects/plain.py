@@ -17,8 +17,6 @@ _WORDS = {
     r"\cdot": "·",
     r"\pm": "±",
     r"\partial": "∂",
-    r"\quad": "   ",
-    r"\qquad": "     ",
     r"\varepsilon": "ε",
     r"\varphi": "φ",
     r"\ell": "l",
@@ -43,11 +41,12 @@ _ARGUMENT = r"(\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z0-9])"
 
 def plain(latex: str) -> str:
     """Text of a formula: fractions as (a)/(b), derivatives in time as primes, sub- and superscripts as _ and ^."""
-    text = re.sub(r"\\[,;:! ]", " ", latex)
+    text = re.sub(r"\\(qquad|quad)(?![A-Za-z])", "   ", latex)
+    text = re.sub(r"\\[,;:! ]", " ", text)
     text = re.sub(r"\\(" + _BARE + ")", "", text)
     for _ in range(6):  # innermost braces first
         before = text
-        text = re.sub(r"\\[dt]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}", r"(\1)/(\2)", text)
+        text = re.sub(r"\\[dt]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}", _fraction, text)
         text = re.sub(r"\\sqrt\s*\{([^{}]*)\}", r"sqrt(\1)", text)
         text = re.sub(r"\\(d?dot)\s*" + _ARGUMENT, lambda m: m[2].strip("{}") + _PRIMES["\\" + m[1]], text)
         text = re.sub(r"([_^])\{([^{}]*)\}", lambda m: m[1] + (m[2] if len(m[2]) == 1 else f"({m[2]})"), text)
@@ -56,8 +55,19 @@ def plain(latex: str) -> str:
             break
     text = re.sub(r"\\[A-Za-z]+", lambda m: _word(m[0]), text)
     text = text.replace("\\{", "{").replace("\\}", "}").replace("\\|", "|").replace("\\", "")
-    text = re.sub(r"_\(([^()]*)\)", lambda m: "_" + re.sub(r"[\s,]+", ",", m[1].strip()), text)
+    text = re.sub(r"_\(([^()]*)\)", lambda m: "_" + _short(m[1]), text)
     return re.sub(r" {2,}(?! {2})", lambda m: m[0] if len(m[0]) > 2 else " ", text).strip()
+
+
+def _fraction(match: re.Match) -> str:
+    text = "/".join(part if re.fullmatch(r"[\w\\]+'*", part) else f"({part})" for part in match.groups())
+    return text + (" " if re.match(r"[\w\\(]", match.string[match.end() :]) else "")
+
+
+def _short(subscript: str) -> str:
+    """A subscript of several characters; parentheses only where it is a sum."""
+    subscript = re.sub(r"[\s,]+", ",", subscript.strip())
+    return f"({subscript})" if re.search(r"[+\-]", subscript) else subscript
 
 
 def _word(command: str) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import jax.numpy as jnp
 from jax import Array
 
@@ -13,13 +11,6 @@ from .base import Contact, Memory, Motion, Threshold
 from .catalogue import register
 
 _GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 4 / 9), (0.5 + 0.15**0.5, 5 / 18))  # Gauss-Legendre on (0, 1)
-
-
-class Contacts(NamedTuple):
-    """Logarithm of the state over its largest value, ln(theta v*/D_c), and the speed that it was reached at (m/s)."""
-
-    log_state: Array
-    speed: Array
 
 
 @register
@@ -95,32 +86,32 @@ class RateAndState(Memory, Threshold):
     )
     law: str = variant("ageing", ("ageing", "slip"), "the state grows in stationary contact too, or by slip only")
 
-    def start(self, bank: Bank) -> Contacts:
-        # the state of a contact that was renewed first_age ago and has rested since
-        return Contacts(jnp.log(-jnp.expm1(-self.first_age * self._rest_rate)), jnp.zeros(()))
+    def start(self, bank: Bank) -> Array:
+        # ln(theta v*/D_c) of a contact that was renewed first_age ago and has rested since
+        return jnp.log(-jnp.expm1(-self.first_age * self._rest_rate))
 
-    def advance(self, state: Contacts, motion: Motion, contact: Contact) -> Contacts:
-        if self.law == "ageing":
-            share = motion.relax(jnp.exp(state.log_state), self._rest_rate, self._rest_rate, 1.0 / self.slip_distance)
-            return Contacts(jnp.log(share), abs(motion.v))
-        return Contacts(self._slip_law(state, motion), abs(motion.v))
+    def advance(self, state: Array, motion: Motion, contact: Contact) -> Array:
+        if self.law == "slip":
+            return self._slip_law(state, motion)
+        share = motion.relax(jnp.exp(state), self._rest_rate, self._rest_rate, 1.0 / self.slip_distance)
+        return jnp.log(share)
 
-    def strength(self, state: Contacts, motion: Motion, contact: Contact) -> Array:
+    def strength(self, state: Array, motion: Motion, contact: Contact) -> Array:
         direct = self.ratio * jnp.log1p(abs(motion.v) / self.cutoff_velocity)
-        return 1.0 + self.evolution * (direct + state.log_state)
+        return 1.0 + self.evolution * (direct + state)
 
     @property
     def _rest_rate(self) -> Array:
         return self.cutoff_velocity / self.slip_distance
 
-    def _slip_law(self, state: Contacts, motion: Motion) -> Array:
+    def _slip_law(self, state: Array, motion: Motion) -> Array:
         """The logarithm relaxes with slip towards -ln(V/v*); V goes linearly in time, so V^2 linearly in slip."""
         slip = (self.cutoff_velocity * motion.dt + motion.path) / self.slip_distance
-        begin = ((state.speed + self.cutoff_velocity) / self.cutoff_velocity) ** 2
-        end = ((abs(motion.v) + self.cutoff_velocity) / self.cutoff_velocity) ** 2
+        first = jnp.maximum(2.0 * motion.path / motion.dt - abs(motion.v), 0.0)
+        begin, end = ((1.0 + v / self.cutoff_velocity) ** 2 for v in (first, abs(motion.v)))
         done = -jnp.expm1(-slip)
         target = jnp.zeros(())
         for node, weight in _GAUSS:
             back = -jnp.log1p(-node * done) / slip  # share of the slip that lies between the node and the end
             target = target - 0.5 * weight * jnp.log(end + (begin - end) * back)
-        return state.log_state * jnp.exp(-slip) + target * done
+        return state * jnp.exp(-slip) + target * done

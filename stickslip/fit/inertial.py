@@ -14,6 +14,7 @@ from .parameters import Free, to_si, vector
 from .problem import Problem
 
 HUBER = 3.0
+TRUST = 0.3  # share of a step's change that Broyden's update may have missed
 STAGES = ((30.0, 6), (7.0, 6), (2.5, 6), (1.0, 12))  # factor on the floors, most evaluations at it
 
 
@@ -29,7 +30,9 @@ class Fit:
         features: of the model at the optimum, shape (R, n, F).
         covariance: of z, event-wise factors marginalised, shape (k, k).
         free: what z means.
-        evaluations: Jacobians taken.
+        columns: derivatives of the features in z, the last ones used, shape (R, n, F, k).
+        use: cycles the fit has seen, shape (R, n).
+        evaluations, jacobians: features and Jacobians taken.
     """
 
     z: np.ndarray
@@ -39,7 +42,10 @@ class Fit:
     features: np.ndarray
     covariance: np.ndarray
     free: tuple[Free, ...]
+    columns: np.ndarray
+    use: np.ndarray
     evaluations: int
+    jacobians: int
 
     @property
     def values(self) -> dict[str, float]:
@@ -55,51 +61,78 @@ class Fit:
 class _Residuals:
     """Whitened residuals and their Jacobian for scipy, in the vector (z, event factors of the used cycles)."""
 
-    def __init__(self, problem: Problem, floor: np.ndarray, event_scale: float) -> None:
+    def __init__(self, problem: Problem, floor: np.ndarray, event_scale: float, use: np.ndarray | None) -> None:
         self.problem, self.floor = problem, floor
         m = problem.measurement
-        self.used = np.asarray(m.cycles.used)
+        self.used = np.asarray(m.cycles.used) & (True if use is None else use)
         self.valid = m.valid & self.used[..., None]
         self.widths = np.array(EVENT_WIDTHS) * event_scale
         self.free = problem.composition.free
         self.k = len(self.free)
         self._at: np.ndarray | None = None
-        self._kept: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-        self.evaluations = 0
+        self._features: np.ndarray | None = None
+        self._columns: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.evaluations = self.jacobians = 0
 
     def events(self, x: np.ndarray) -> np.ndarray:
         out = np.zeros((*self.used.shape, 2))
         out[self.used] = x[self.k :].reshape(-1, 2)
         return out
 
-    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def evaluate(self, x: np.ndarray) -> np.ndarray:
+        """Features at ``x``, kept for the Jacobian that may follow."""
         if self._at is None or not np.array_equal(self._at, x):
-            self._kept = self.problem.jacobian(x[: self.k], self.events(x))
+            self._features = self.problem.features(x[: self.k], self.events(x))
             self._at = x.copy()
             self.evaluations += 1
-        assert self._kept is not None
-        return self._kept
+        assert self._features is not None
+        return self._features
+
+    def columns(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives in z: taken anew, or carried on by Broyden's update while that predicts the change well."""
+        f = self.evaluate(x)
+        if self._columns is not None:
+            at, old, columns = self._columns
+            if np.array_equal(at, x):
+                return columns
+            dz = x[: self.k] - at[: self.k]
+            de = self.events(x) - self.events(at)
+            event = self.problem.event_columns(columns, at[: self.k], self.events(at))
+            miss = f - old - columns @ dz - np.einsum("rnfe,rne->rnf", event, de)
+            weight = self.valid / self.floor
+            size = np.linalg.norm((f - old) * weight)
+            if dz @ dz > 0 and np.linalg.norm(miss * weight) < TRUST * size:
+                columns = columns + miss[..., None] * dz / (dz @ dz)
+                self._columns = (x.copy(), f, columns)
+                return columns
+        columns = self.problem.columns(x[: self.k], self.events(x), range(self.k), f)
+        self.jacobians += 1
+        self._columns = (x.copy(), f, columns)
+        return columns
+
+    def start(self, x: np.ndarray, columns: np.ndarray) -> None:
+        """Take ``columns`` for the derivatives at ``x``."""
+        self._columns = (x.copy(), self.evaluate(x), columns)
 
     def data(self, x: np.ndarray, factor: float) -> np.ndarray:
-        model, *_ = self.evaluate(x)
+        model = self.evaluate(x)
         r = (model - self.problem.measurement.values) / (factor * self.floor)
         return np.nan_to_num(np.clip(r[self.valid], -1e4, 1e4), nan=1e4)
 
     def priors(self, x: np.ndarray) -> np.ndarray:
         z = x[: self.k]
-        p = [
-            (v - f.inward(f.prior)) / f.width for v, f in zip(z, self.free, strict=True) if np.isfinite(f.width)
-        ]
+        p = [(v - f.inward(f.prior)) / f.width for v, f in zip(z, self.free, strict=True) if np.isfinite(f.width)]
         return np.concatenate([p, (x[self.k :].reshape(-1, 2) / self.widths).ravel()])
 
     def residual(self, x: np.ndarray, factor: float) -> np.ndarray:
         return np.concatenate([self.data(x, factor), self.priors(x)])
 
     def jacobian(self, x: np.ndarray, factor: float) -> np.ndarray:
-        _, dz, de = self.evaluate(x)
+        columns = self.columns(x)
+        de = self.problem.event_columns(columns, x[: self.k], self.events(x))
         scale = 1.0 / (factor * self.floor)[..., None]
-        dz = np.nan_to_num(dz * scale)[self.valid]
-        rows = self.valid.sum()
+        dz = np.nan_to_num(columns * scale)[self.valid]
+        rows = int(self.valid.sum())
         cells = np.argwhere(self.used)
         index = np.full(self.used.shape, -1)
         index[self.used] = np.arange(len(cells))
@@ -136,6 +169,8 @@ def fit(
     events: np.ndarray | None = None,
     stages: tuple[tuple[float, int], ...] = STAGES,
     event_scale: float = 1.0,
+    use: np.ndarray | None = None,
+    columns: np.ndarray | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Fit:
     """Levenberg-Marquardt (trust region with bounds) at falling floors.
@@ -146,23 +181,27 @@ def fit(
         z, events: where to start; default the composition's starts and no variation.
         stages: factors on the floors and how many evaluations each may take.
         event_scale: on the prior width of the event-wise variation.
+        use: cycles to fit, shape (R, n); default all.
+        columns: derivatives at the start if they are known, shape (R, n, F, k).
         progress: told the error after every evaluation.
 
     Raises:
         FitError: the model could not be evaluated at the start.
     """
-    res = _Residuals(problem, floor, event_scale)
+    res = _Residuals(problem, floor, event_scale, use)
     low, high = res.bounds()
     start = vector(problem.composition.free) if z is None else np.asarray(z, float)
     ev = np.zeros((*res.used.shape, 2)) if events is None else events
     x = np.clip(np.concatenate([start, ev[res.used].ravel()]), low + 1e-9, high - 1e-9)
+    if columns is not None:
+        res.start(x, columns)
     scale = np.concatenate([[min(f.width, 1.0) for f in res.free], np.tile(res.widths, int(res.used.sum()))])
     for factor, most in stages:
 
         def residual(x: np.ndarray, factor: float = factor) -> np.ndarray:
             r = res.residual(x, factor)
             if progress is not None:
-                progress(f"floors x{factor:g}, evaluation {res.evaluations}, cost {robust(r):.1f}")
+                progress(f"floors x{factor:g}, evaluation {res.evaluations} ({res.jacobians} Jacobians), cost {robust(r):.1f}")
             return r
 
         if not np.all(np.isfinite(residual(x))):
@@ -181,7 +220,7 @@ def fit(
             gtol=1e-6,
         )
         x = found.x
-    features, *_ = res.evaluate(x)
+    features = res.evaluate(x)
     data, prior = res.data(x, 1.0), res.priors(x)
     # the scipy Jacobian at the optimum carries Huber's weights already
     hessian = found.jac.T @ found.jac
@@ -194,5 +233,8 @@ def fit(
         features,
         covariance,
         problem.composition.free,
+        res.columns(x),
+        res.used,
         res.evaluations,
+        res.jacobians,
     )

@@ -2,12 +2,13 @@
 
 from .build import Setup, build
 from .load import Scenario, load_scenario, make_scenario
-from .simulate import Progress, simulate
+from .simulation import Progress, Recording, record, simulate
 from .stability import Sliding, steady_sliding
 from .static import StaticCreep, static_creep
 
 __all__ = [
     "Progress",
+    "Recording",
     "Scenario",
     "Setup",
     "Sliding",
@@ -15,6 +16,7 @@ __all__ = [
     "build",
     "load_scenario",
     "make_scenario",
+    "record",
     "simulate",
     "static_creep",
     "steady_sliding",

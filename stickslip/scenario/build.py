@@ -37,6 +37,9 @@ class Setup:
     offset: float
 
 
+_rest = eqx.filter_jit(Model.rest)
+
+
 def build(scenario: Scenario) -> Setup:
     """Make model and initial state.
 
@@ -59,7 +62,7 @@ def build(scenario: Scenario) -> Setup:
     points = LoadPoint(jnp.asarray(motion.times), jnp.asarray(motion.positions + offset))
     weakening = Weakening(*map(jnp.asarray, (law.ratio, law.slip_distance, law.healing_time)))
     model = Model(block, built.bank, weakening, points, make_effects(file))
-    start = model.rest()
+    start = _rest(model)
     if force is not None:
         start = eqx.tree_at(lambda s: s.force, start, force.element_force)
     if file.drive.start == "steady":

@@ -122,36 +122,33 @@ def build_contact(table: ContactTable, folder: Path = Path()) -> Built:
         InputError: a line in contact over its whole length, or a file that cannot be used.
     """
     parts = tuple(_parts(table, folder))
-    shares = np.concatenate(
-        [np.ravel(p.contact.contact_share) for p in parts if isinstance(p, Elastic)] or [np.array([])]
-    )
+    bank, facts, found = _make_bank(parts, table.bins)
+    shares = np.asarray(found)
     notes: list[str] = []
     if shares.size and not isinstance(table, FlatPunchTable):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             physics.check_saturation(shares, key="contact")
         notes += [str(w.message) for w in caught]
-    bank, u_max, error = _make_bank(parts, table.bins)
-    return Built(
-        bank,
-        float(bank.total_strength),
-        float(bank.total_stiffness),
-        float(u_max),
-        float(error),
-        float(shares.mean()) if shares.size else float("nan"),
-        tuple(notes),
-    )
+    strength, stiffness, u_max, error = np.asarray(facts).tolist()
+    touching = float(shares.mean()) if shares.size else float("nan")
+    return Built(bank, strength, stiffness, u_max, error, touching, tuple(notes))
 
 
 @partial(jax.jit, static_argnames="n")
 def _make_bank(parts: tuple[Part, ...], n: int) -> tuple[Bank, Array, Array]:
+    """The bank; its strength, stiffness, mean u_max and binning error; shares of the lines in contact."""
+
     def backbone(u: Array) -> Array:
         return sum((part.backbone(u) for part in parts), jnp.zeros_like(u))
 
     reaches = jnp.concatenate([part.u_max for part in parts])
     edges = physics.default_edges(n)
     bank = physics.bank_from_backbone(backbone, jnp.max(reaches), edges)
-    return bank, jnp.mean(reaches), physics.binning_error(backbone, jnp.max(reaches), edges)
+    error = physics.binning_error(backbone, jnp.max(reaches), edges)
+    facts = jnp.stack([bank.total_strength, bank.total_stiffness, jnp.mean(reaches), error])
+    shares = [jnp.ravel(part.contact.contact_share) for part in parts if isinstance(part, Elastic)]
+    return bank, facts, jnp.concatenate([jnp.zeros(0), *shares])
 
 
 def _parts(table: ContactTable, folder: Path) -> list[Part]:
@@ -195,8 +192,8 @@ def rough_indentation(
     }
     if not table.curvature:
         made = physics.rough_table(H, table.line_length, table.springs, lines, table.seed, **waves)
-        keep = slice(None) if rows is None or rows.size == lines else rows
-        made = physics.Indentation(made.gaps[keep], made.sums[keep], made.dx, made.height)
+        if rows is not None and rows.size < lines:
+            made = physics.Indentation(made.gaps[rows], made.sums[rows], made.dx, made.height)
         return made.scaled(heights)
     # curvature does not scale with the rms height, so these lines are sorted at their real height
     unit = physics.rough_lines(H, lines, table.springs, table.seed, **waves)[slice(None) if rows is None else rows]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..effects.base import Effect
 from ..params import specs
 from .load import make_scenario
-from .simulate import Progress, simulate
+from .simulation import Progress, simulate
 
 if TYPE_CHECKING:
     import xarray

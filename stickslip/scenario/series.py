@@ -12,7 +12,7 @@ from .events import UNITS
 from .load import Scenario
 from .overrides import sweep_values
 from .schema import SweepTable
-from .simulate import Progress, simulate
+from .simulation import Progress, simulate
 
 if TYPE_CHECKING:
     import xarray

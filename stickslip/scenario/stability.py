@@ -41,19 +41,27 @@ def steady_sliding(block: BlockTable, law: WeakeningTable, strength: float, velo
         reason = "friction does not weaken (weakening.ratio = 1), so nothing can make the block slip"
     elif speed == 0.0:
         reason = "the drive stands still"
-    elif stable and limit > 0.0 and speed < fastest:
-        reason = (
-            f"the spring of {block.spring_stiffness:.4g} N/m is stiffer than the critical {limit:.4g} N/m "
-            f"at {speed:.3g} m/s"
-        )
     elif stable:
-        soft = f" and any spring above {limit:.4g} N/m is too stiff" if limit > 0.0 else ""
-        reason = f"the drive velocity of {speed:.3g} m/s is above the critical {fastest:.3g} m/s{soft}"
+        reason = _why_stable(block, speed, fastest, limit)
     else:
         top = "at any velocity" if math.isinf(fastest) else f"below {fastest:.3g} m/s"
         stiff = "with any spring" if math.isinf(limit) else f"with a spring softer than {limit:.4g} N/m"
         reason = f"steady sliding is unstable: stick-slip is expected {top}, {stiff}"
     return Sliding(stable, fastest, limit, reason)
+
+
+def _why_stable(block: BlockTable, speed: float, fastest: float, limit: float) -> str:
+    slow = (
+        f"with this spring the critical velocity is {fastest:.3g} m/s (the drive has {speed:.3g} m/s)"
+        if fastest > 0.0
+        else "with this spring it is so at every velocity"
+    )
+    stiff = (
+        f"at this velocity the critical stiffness is {limit:.4g} N/m (the spring has {block.spring_stiffness:.4g} N/m)"
+        if limit > 0.0
+        else "at this velocity no spring is soft enough"
+    )
+    return f"steady sliding is stable; {slow}, {stiff}"
 
 
 def _critical_stiffness(block: BlockTable, law: WeakeningTable, drop: float, speed: float) -> float:

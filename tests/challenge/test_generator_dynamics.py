@@ -10,7 +10,7 @@ import pytest
 from stickslip.challenge.generator import Bank, Drive, Rig, Surface, make_bank, simulate
 from stickslip.challenge.generator import slots as S
 from stickslip.challenge.generator.bank import join
-from stickslip.challenge.generator.kernel import fresh_lines
+from stickslip.challenge.generator.contacts import fresh_lines
 from stickslip.challenge.generator.lines import slide_curve
 from stickslip.errors import InputError, SolveError
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -104,7 +105,7 @@ def make_campaign(
         shown_spring = (base_stiffness * guess, base_stiffness * guess / 3, base_stiffness * guess * 3)
     shown = {"mass": base_mass, "spring": shown_spring}
     write_campaign(folder, title, setup, shown, traces, rate, virgin)
-    return {
+    truth = {
         "seed": seed,
         "effects": hidden,
         "new_lines": new_lines,
@@ -115,6 +116,8 @@ def make_campaign(
         "sensor": asdict(setup.sensor),
         "runs": record,
     }
+    plain: dict[str, Any] = json.loads(json.dumps(truth))  # as it will be read again
+    return plain
 
 
 def _bank(setup: Setup, seed: int, new_lines: bool) -> Bank:

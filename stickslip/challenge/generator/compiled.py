@@ -11,10 +11,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numba
+from stickslip.errors import InputError
+
+try:
+    import numba
+except ImportError:
+    raise InputError("the challenge's simulator needs numba", hint="pip install 'stickslip[challenge]'") from None
 
 config: Any = numba.config
-_SOURCES = ("slots.py", "laws.py", "springs.py", "kernel.py")
+_SOURCES = ("slots.py", "laws.py", "springs.py", "contacts.py", "implicit.py", "kernel.py")
 
 
 @cache

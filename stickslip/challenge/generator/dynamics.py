@@ -147,8 +147,8 @@ def simulate(
     onset = 2e-4 + 1.5 * drive.fastest
     count, steps, quiet_steps, samples = run(
         rig.vector(), eff, bank.normal, bank.stiffness, bank.count, bank.start, tau,
-        np.asarray(drive.times), np.asarray(drive.positions), duration, dt, 1 / rate,
-        quiet, quiet_dt, new_lines, onset, rng, stop[0], stop[1], record, events,
+        np.asarray(drive.times, dtype=float), np.asarray(drive.positions, dtype=float), float(dt), 1 / rate,
+        quiet, quiet_dt, new_lines, onset, rng, stop[0], float(stop[1]), record, events,
     )  # fmt: skip
     if count < 0:
         raise SolveError(f"the motion diverged with the step {dt:g} s; take a smaller one")

@@ -8,105 +8,24 @@ import numpy as np
 
 from . import slots as S
 from .compiled import jit
-from .laws import (
-    advance,
-    body_force,
-    damping,
-    friction,
-    load_point,
-    rate_factor,
-    rated,
-    spring_force,
-)
-from .springs import plain, rich, stored
+from .contacts import contacts, forget, fresh_lines, needs_rich, new_life, relax
+from .implicit import creep_step, kick
+from .laws import advance, body_force, damping, friction, load_point, rated, spring_force
+from .springs import stored
 
 QUIET_BELOW = 0.7e-6  # m/s: creep slower than this ...
 QUIET_AFTER = 8e-3  # s: ... for this long is followed with implicit steps
 QUIET_UNTIL = 1e-6  # m/s: left above this; at 3 um/s every event came 0.1 ms late
 QUIET_STIFFNESS = 8.0  # sticking stiffness over the rate of weakening: nearer to one, creep begins to oscillate
 SMALLEST_SLIP = 3e-6  # m: less is a lurch of the springs, not a slip
-FORCE_MISS = 1e-12  # N: the balance of forces of an implicit step
-KICK_MISS = 1e-10  # N
-
-
-@jit
-def contacts(old, new, k, normal, fade, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff):
-    """All contacts moved by ``du`` (and the yaw ``dq``): (force, force of the yaw moment, sticking stiffness)."""
-    total = 0.0
-    moment = 0.0
-    stiff = 0.0
-    n = start.size - 1
-    for j in range(n):
-        side = 1.0 if 2 * j < n else -1.0
-        step = (du + side * dq) * soft
-        a = tilt
-        if eff[S.TILT_FORM] == 1.0:  # the front contacts lose three times what the rear ones gain
-            a = 3.0 * tilt if side > 0.0 else -tilt
-        p = plus * (1.0 - a)
-        m = minus * (1.0 - a)
-        if is_rich:
-            f, s = rich(old, new, k, normal, fade, start[j], start[j + 1], step, h, p, m, eff)
-        else:
-            f, s = plain(old[0], new[0], k, normal, start[j], start[j + 1], step, p, m)
-        total += f
-        moment += side * f
-        stiff += s * soft
-    return total, moment, stiff
-
-
-@jit
-def needs_rich(eff):
-    return eff[S.SLIPW_EPS] != 0.0 or eff[S.CREEP_V] != 0.0 or eff[S.VISCO_G] != 0.0 or eff[S.RENEW_RATE] != 0.0
-
-
-@jit
-def fresh_lines(f, normal_old, normal, k, count_old, count, start):
-    """Move the forces to new lines by rank: every spring keeps its share of the cap, every contact its force."""
-    out = np.zeros_like(f)
-    for j in range(start.size - 1):
-        lo = start[j]
-        was = 0.0
-        now = 0.0
-        for i in range(count_old[j]):
-            was += f[0, lo + i] + f[1, lo + i]
-        for i in range(count[j]):
-            src = min(int((i + 0.5) / count[j] * count_old[j]), count_old[j] - 1)
-            share = normal[lo + i] / normal_old[lo + src]
-            out[0, lo + i] = f[0, lo + src] * share
-            out[1, lo + i] = f[1, lo + src] * share
-            out[2, lo + i] = f[2, lo + src]
-            out[3, lo + i] = f[3, lo + src]
-            now += out[0, lo + i] + out[1, lo + i]
-        if now != 0.0:
-            for i in range(count[j]):
-                out[0, lo + i] *= was / now
-                out[1, lo + i] *= was / now
-    return out
-
-
-@jit
-def new_life(eff, rng):
-    """Distance a junction lasts: exponentially distributed, or the same for all."""
-    if eff[S.RENEW_FORM] == 0.0:
-        return -math.log(1.0 - rng.random()) / eff[S.RENEW_RATE]
-    return 1.0 / eff[S.RENEW_RATE]
-
-
-@jit
-def relax(fade, tau, h, eff):
-    """Fill ``fade`` with the relaxation of each branch in ``h``; returns ``h``."""
-    if eff[S.VISCO_G] != 0.0:
-        for i in range(tau.size):
-            fade[i] = math.exp(-h / tau[i])
-    return h
 
 
 @jit
 def run(
-    rig, eff, normal_pool, k_pool, count_pool, start, tau, times, positions, duration, dt, record_dt,
+    rig, eff, normal_pool, k_pool, count_pool, start, tau, times, positions, dt, record_dt,
     quiet_allowed, quiet_dt, renew, onset_velocity, rng, stop_events, stop_tail, record, events,
 ):  # fmt: skip
-    """Integrate to ``duration``, filling ``record`` (samples, RECORD_SIZE) and ``events`` (max, 7).
+    """Integrate until ``record`` is full, and fill it (samples, RECORD_SIZE) and ``events`` (max, 7).
 
     After ``stop_events`` slips it goes on for ``stop_tail`` of the last interval and ends.
     Returns the number of events, of steps, of implicit steps and of samples.
@@ -185,7 +104,7 @@ def run(
             continue
         t0, x0, v0, z0, y0, fs0, fc0, psi0, u0, q0 = t, x, v, z, y, fs, fc, state[S.PSI], u, q
         wd0, ws0, wc0, wv0, wb0 = work_drive, work_spring, work_contact, work_viscous, work_body
-        c0, fb0 = c_now, fb
+        c0, fb0, stiff0 = c_now, fb, stiff
         power = abs(fc0 * v0)
         n_steps += 1
 
@@ -199,72 +118,11 @@ def run(
             z1 = load_point(t1, times, positions, eff)
             if is_rich and h != fade_step:
                 fade_step = relax(fade, tau, h, eff)
-            lo = 0.0
-            hi = 0.0
-            r_lo = 0.0
-            r_hi = 0.0
-            du = 0.0
-            guess = v0 * h
-            bracketed = 0
-            for it in range(200):
-                advance(state, trial, du / h, h, rig, eff, power)
-                mu = friction(trial, t1, x0 + du, rig, eff)
-                plus = mu
-                minus = mu
-                if is_rated:
-                    plus = mu * rate_factor(max(du / h, 0.0), trial, eff)
-                    minus = mu * rate_factor(max(-du / h, 0.0), trial, eff)
-                tilt = 0.0
-                if eff[S.TILT_K] != 0.0:
-                    tilt = eff[S.TILT_K] * fs0 / capacity
-                fc, moment, stiff = contacts(
-                    f, g, k, normal, fade, start, du, 0.0, h, plus, minus, soft, tilt, is_rich, eff
-                )
-                x = u0 + du + (fc / k_m if k_m != 0.0 else 0.0)
-                v = (x - x0) / h
-                y = z1 - x
-                fs, br = spring_force(y, y0, branch, t1, h, rig, eff)
-                c_now = damping(v, stiff, fc / capacity, rig, eff)
-                fb = body_force(t1, x, v, rig, eff)
-                miss = fs - fc - c_now * v + fb - mass * (v - v0) / h
-                if abs(miss) < FORCE_MISS:
-                    done = True
-                    break
-                if it == 0:
-                    lo = hi = 0.0
-                    r_lo = r_hi = miss
-                    du = guess if guess * miss > 0.0 else (1e-12 if miss > 0.0 else -1e-12)
-                    continue
-                if bracketed == 0:
-                    if miss * r_lo > 0.0:  # same side as the start: go on
-                        lo = du
-                        r_lo = miss
-                        du *= 3.0
-                        if abs(du) > 2.0 * QUIET_UNTIL * h:
-                            break
-                        continue
-                    hi = du
-                    r_hi = miss
-                    bracketed = 1
-                else:
-                    if miss * r_lo > 0.0:
-                        lo = du
-                        r_lo = miss
-                        if bracketed == 2:
-                            r_hi *= 0.5
-                        bracketed = 2
-                    else:
-                        hi = du
-                        r_hi = miss
-                        if bracketed == 3:
-                            r_lo *= 0.5
-                        bracketed = 3
-                if abs(hi - lo) < 1e-14 * abs(hi) + 1e-21:
-                    done = True
-                    break
-                du = lo + (hi - lo) * r_lo / (r_lo - r_hi)
-            if done and (abs(v) > QUIET_UNTIL or stiff < quiet_stiffness):
-                done = False
+            done, du, x, v, y, fs, br, fc, moment, stiff, c_now, fb = creep_step(
+                f, g, k, normal, fade, start, soft, is_rich, state, trial, rig, eff,
+                t1, h, z1, x0, u0, v0, y0, fs0, branch, power, capacity, k_m, QUIET_UNTIL,
+            )  # fmt: skip
+            done = done and stiff >= quiet_stiffness
             if done:
                 n_quiet += 1
                 t = t1
@@ -278,7 +136,7 @@ def run(
             else:  # too fast: take the step again with small ones
                 quiet = False
                 calm = 0.0
-                t, x, v, y, fs, fc, c_now, fb = t0, x0, v0, y0, fs0, fc0, c0, fb0
+                t, x, v, y, fs, fc, c_now, fb, stiff = t0, x0, v0, y0, fs0, fc0, c0, fb0, stiff0
         if not done:
             h = dt
             t = t0 + h
@@ -307,54 +165,10 @@ def run(
                 vh = ((mass / h - 0.5 * c_now) * vh + fs - fc + fb) / (mass / h + 0.5 * c_now)
                 v = 0.5 * (before + vh)
             else:
-                # the caps depend on the velocity of this node: solve the kick for it
-                inertia = 2.0 * mass / h
-                lo = hi = 0.0
-                r_lo = r_hi = 0.0
-                bracketed = 0
-                v = v0
-                stretch = 1.0
-                for it in range(200):
-                    plus = mu * rate_factor(max(v, 0.0), trial, eff)
-                    minus = mu * rate_factor(max(-v, 0.0), trial, eff)
-                    fc, moment, stiff = contacts(
-                        f, g, k, normal, fade, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff
-                    )
-                    miss = fs - fc + fb - c_now * v - inertia * (v - vh)
-                    if abs(miss) < KICK_MISS:
-                        break
-                    if it == 0:
-                        lo = v
-                        r_lo = miss
-                        v += miss / (inertia + c_now)
-                        continue
-                    if bracketed == 0:
-                        if miss * r_lo > 0.0:
-                            step = miss / (inertia + c_now)
-                            if abs(r_lo - miss) > 0.0 and abs(miss) > 0.5 * abs(r_lo):
-                                stretch *= 2.0
-                            lo = v
-                            r_lo = miss
-                            v += step * stretch
-                            continue
-                        hi = v
-                        r_hi = miss
-                        bracketed = 1
-                    elif miss * r_lo > 0.0:
-                        lo = v
-                        r_lo = miss
-                        if bracketed == 2:
-                            r_hi *= 0.5
-                        bracketed = 2
-                    else:
-                        hi = v
-                        r_hi = miss
-                        if bracketed == 3:
-                            r_lo *= 0.5
-                        bracketed = 3
-                    if abs(hi - lo) < 1e-13 * abs(hi) + 1e-17:
-                        break
-                    v = lo + (hi - lo) * r_lo / (r_lo - r_hi)
+                v, fc, moment, stiff = kick(
+                    f, g, k, normal, fade, start, soft, is_rich, trial, rig, eff,
+                    du, dq, h, mu, tilt, fs, fb, c_now, v0, vh,
+                )  # fmt: skip
                 vh = 2.0 * v - vh
             work_viscous += 0.5 * h * (c0 * v0 * v0 + c_now * v * v)
             work_body += 0.5 * h * (fb0 * v0 + fb * v)
@@ -450,15 +264,7 @@ def run(
                 for i in range(size):
                     f[2, i] = 0.0
                 if eff[S.RESIDUAL_EPS] != 0.0:
-                    for i in range(size):
-                        keep = 1.0 - eff[S.RESIDUAL_EPS]
-                        if eff[S.RESIDUAL_FORM] == 1.0:
-                            keep = 0.0 if rng.random() < eff[S.RESIDUAL_EPS] else 1.0
-                        f[0, i] *= keep
-                        f[1, i] *= keep
-                    fc = 0.0
-                    for i in range(size):
-                        fc += f[0, i] + f[1, i]
+                    fc = forget(f, eff, rng)
                     changed = True
                 if eff[S.WEAR_EPS] != 0.0 and eff[S.WEAR_FORM] == 3.0:
                     soft = 1.0 / (1.0 + eff[S.WEAR_EPS] * n_events)

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
+from ..effects.base import Drive, Spring
 from ..errors import InputError
+from ..model import Model
 from ..sensor import Vibrometer, measure
 from ..solve import Stats, Steps, Trajectory, integrate
 from ..solve.trajectory import energy_error
@@ -43,6 +49,26 @@ class Progress:
     events: int
 
 
+@dataclass(frozen=True)
+class Recording:
+    """A simulated run as plain arrays; `dataset` makes the data set of it (importing xarray takes half a second).
+
+    Attributes:
+        variables: name -> dimension, values (n,), attributes with ``units``.
+        attributes: facts of the whole run.
+    """
+
+    variables: Mapping[str, tuple[str, np.ndarray, dict[str, str]]]
+    attributes: Mapping[str, Any]
+
+    def dataset(self) -> xarray.Dataset:
+        """As `simulate` gives it."""
+        import xarray
+
+        data = dict(self.variables)
+        return xarray.Dataset(data, coords={"time": data.pop("time")}, attrs=dict(self.attributes))
+
+
 def simulate(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> xarray.Dataset:
     """Simulate a scenario.
 
@@ -66,6 +92,11 @@ def simulate(scenario: Scenario, progress: Callable[[Progress], None] | None = N
         SolveError: the integration failed; says when and what to change.
         InputError: the output would not fit into memory.
     """
+    return record(scenario, progress).dataset()
+
+
+def record(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> Recording:
+    """`simulate` without making a data set of it; arguments and errors as there."""
     setup = build(scenario)
     file = scenario.file
     sliding = steady_sliding(file.block, file.weakening, setup.contact.strength, setup.motion.speed)
@@ -80,7 +111,7 @@ def simulate(scenario: Scenario, progress: Callable[[Progress], None] | None = N
             allowed=f"at most {_MOST_SAMPLES}",
         )
     t = np.arange(samples) / file.output.sampling_rate
-    return _dataset(scenario, setup, trajectory, events, sliding, t)
+    return _recording(scenario, setup, trajectory, events, sliding, t)
 
 
 def _run(
@@ -150,16 +181,15 @@ def _joined(parts: list[Trajectory]) -> Trajectory:
     )
 
 
-def _dataset(
+def _recording(
     scenario: Scenario, setup: Setup, trajectory: Trajectory, events: Events, sliding: Sliding, t: np.ndarray
-) -> xarray.Dataset:
-    import xarray
-
+) -> Recording:
     at = trajectory.at(t)
-    variables = {
+    sampled = {
+        "time": (t, "s", "time"),
         "displacement": (at.x, "m", "displacement of the block"),
         "velocity": (_velocity(trajectory, t), "m/s", "velocity of the block"),
-        "spring_force": (at.spring_force, "N", "pull of the driving spring"),
+        "spring_force": (_spring_force(setup, t, at.x), "N", "pull of the driving spring"),
         "contact_force": (at.contact_force, "N", "tangential force of all contacts"),
         "psi": (at.psi, "1", "weakening state, 1 rested, 0 fully weakened"),
         "sliding_share": (at.sliding, "1", "share of the contact's strength that slides"),
@@ -168,16 +198,27 @@ def _dataset(
     }
     data = {
         name: ("time", np.asarray(values), {"units": unit, "long_name": text})
-        for name, (values, unit, text) in variables.items()
+        for name, (values, unit, text) in sampled.items()
     }
     for name, column in events._asdict().items():
         data[name] = ("event", column, {"units": UNITS[name]})
     u, moment = first_stick(setup)
     data["static_displacement"] = ("static", u, {"units": "m", "long_name": "static curve of the first stick"})
     data["static_time"] = ("static", moment, {"units": "s", "long_name": "its virtual time"})
-    found = xarray.Dataset(data, coords={"time": ("time", t, {"units": "s"})})
-    found.attrs.update(_attributes(scenario, setup, trajectory, events, sliding))
-    return found
+    return Recording(data, _attributes(scenario, setup, trajectory, events, sliding))
+
+
+def _spring_force(setup: Setup, t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Pull of the spring (N) from the displacement; a straight line between long steps would not belong to it."""
+    model = setup.model
+    if not any(isinstance(effect, (Drive, Spring)) for effect in model.effects):
+        return float(model.block.spring_stiffness) * (setup.motion.position(t) + setup.offset - x)
+    return np.asarray(_pulls(model, jnp.asarray(t), jnp.asarray(x)))
+
+
+@eqx.filter_jit
+def _pulls(model: Model, t: Array, x: Array) -> Array:
+    return jax.vmap(lambda t, x: model.pull(model.lead(t) - x))(t, x)
 
 
 def _velocity(trajectory: Trajectory, t: np.ndarray) -> np.ndarray:
@@ -238,13 +279,13 @@ def _verdict(scenario: Scenario, setup: Setup, trajectory: Trajectory, events: E
         counted = f"{n} slip event{'s' if n > 1 else ''}"
         usual = float(np.median(np.diff(events.onset))) if n > 1 else 0.0
         if sliding.stable and setup.motion.first_velocity != 0.0 and end - events.arrest[-1] > 2.0 * usual:
-            return f"{counted} at the start, then the block slides{beyond}, for {sliding.reason}"
+            return f"{counted} at the start, then the block slides{beyond}: {sliding.reason}"
         text = f"stick-slip: {counted} in {end:.4g} s"
         return (
             f"{text}, though steady sliding is stable{beyond}: {sliding.reason}" if sliding.stable and n > 1 else text
         )
     if sliding.stable:
-        return f"no slip event: the block slides{beyond}, for {sliding.reason}"
+        return f"no slip event, the block slides{beyond}: {sliding.reason}"
     speed = setup.motion.speed
     if speed > 0:
         loading = (setup.contact.strength / scenario.file.block.spring_stiffness + setup.contact.u_max) / speed

@@ -1,0 +1,49 @@
+"""Which cycles no fit may see: one whole velocity and the later part of the run with holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError, nearest
+from ..features.measurement import Measurement
+
+
+def training_cycles(measurement: Measurement, holdout: Sequence[str] = ()) -> np.ndarray:
+    """Cycles a fit may use, shape (R, n).
+
+    By default the run of the middle velocity is held out if three or more velocities remain known without it, and the
+    later half of every run with holds. With a single run its last third is held out.
+
+    Args:
+        measurement: the data.
+        holdout: names of runs to hold out instead.
+    """
+    m = measurement
+    used = np.asarray(m.cycles.used)
+    train = used.copy()
+    if holdout:
+        for name in holdout:
+            short = [n for n in m.names if n == name or n == name.rsplit(".", 1)[0]]
+            if not short:
+                raise InputError("no run of this name to hold out", key="--holdout", value=name, hint=nearest(name, m.names))
+            train[m.names.index(short[0])] = False
+        if not train.any():
+            raise InputError("every run is held out", key="--holdout", hint="leave runs to fit")
+        return train
+    holds = m.valid[..., m.layout.slices()["hold"]].any(axis=(1, 2))
+    steady = np.flatnonzero(~holds)
+    speeds = np.unique(np.round(m.velocities[steady], 12))
+    if speeds.size >= 3:
+        middle = steady[np.argsort(m.velocities[steady])[steady.size // 2]]
+        train[middle] = False
+    for r in np.flatnonzero(holds):
+        at = np.flatnonzero(m.valid[r][:, m.layout.slices()["hold"]].any(axis=1))
+        cut = (at[0] + at[-1] + 1) // 2 if at.size > 1 else max(int(used[r].sum() * 0.6), 1)
+        train[r, max(cut, 1) :] = False
+    if (train == used).all():
+        for r in range(m.runs):
+            n = int(used[r].sum())
+            train[r, max(n - max(n // 3, 1), 1) :] = False
+    return train

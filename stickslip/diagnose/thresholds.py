@@ -1,0 +1,34 @@
+"""The numbers a verdict rests on: one place, the same for every campaign.
+
+Set on simulated development campaigns (see docs/diagnosis); not to be changed for a single case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """When is nothing missing, and when is an effect named.
+
+    Attributes:
+        complete: largest error of any phase (floors), training and held-out, at which the model is complete.
+        gain: an effect must take off at least this share of the training cost, and of the held-out score.
+        adequate: largest error of any phase (floors) with the named effect; above it something else is missing.
+        significant: least amplitude over its standard deviation.
+        rival: the runner-up must cost at least this factor more; otherwise the data cannot tell them apart.
+        failed: a base fit with a larger error (floors) is not ranked.
+        standard_errors: least gain on held-out cycles over its standard error.
+    """
+
+    complete: float = 1.5
+    gain: float = 0.4
+    adequate: float = 2.0
+    significant: float = 3.0
+    rival: float = 1.15
+    failed: float = 50.0
+    standard_errors: float = 2.0
+
+
+THRESHOLDS = Thresholds()

@@ -1,0 +1,143 @@
+"""Single creep processes cut out of a trace: from the end of the ring-down to where the block reaches a given speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..segment import Dropped, Event, Segmentation, block_motion, position_at, velocity
+from ..segment.kinematics import half_window
+from ..trace import Trace
+
+Array = NDArray[np.float64]
+V_LIM = 1e-6  # m/s, where the paper ends the comparison
+RINGING = 0.25  # s after an arrest that are left out, or this share of a stick that is shorter
+SHARE = 0.3
+LEAST_NOISE = 12.0  # creep smaller than this many noise levels of a mean is not fitted
+POINTS = 160
+
+
+@dataclass(frozen=True)
+class CreepProcess:
+    """Creep before one slip.
+
+    Args:
+        trace, event: where it comes from.
+        time: s before the moment at which the block reaches ``v_lim`` (negative), increasing, shape (n,).
+        displacement: m, relative to the position at that moment, shape (n,).
+        velocity: of the drive, m/s.
+        v_lim: m/s, speed of the block at the end.
+        noise: standard deviation of the displacements, m, shape (n,).
+        virgin: whether the contact was fresh.
+    """
+
+    trace: str
+    event: int
+    time: Array
+    displacement: Array
+    velocity: float
+    v_lim: float
+    noise: Array
+    virgin: bool
+
+    @property
+    def amplitude(self) -> float:
+        """Displacement over the process, m."""
+        return float(np.ptp(self.displacement))
+
+
+def creep_processes(
+    trace: Trace, segmentation: Segmentation, *, v_lim: float = V_LIM, points: int = POINTS
+) -> tuple[list[CreepProcess], list[Dropped]]:
+    """Every stick that ends in a slip, as the static model is compared with it.
+
+    Means over windows that lie evenly in the logarithm of the time left, so that the end, where most of the creep
+    happens, has as many points as the beginning.
+
+    Args:
+        v_lim: speed of the block at which a process ends, m/s.
+        points: most points of a process.
+
+    Returns:
+        The processes, and those left out with the reason.
+    """
+    position, _, _, unit = block_motion(trace, gain=segmentation.settings.gain)
+    if unit != "m":
+        why = "neither the spring's stiffness nor the drive is known, so the force gives no displacement"
+        return [], [Dropped("creep processes", len(segmentation.events), trace.name, why)]
+    noise = segmentation.settings.noise
+    step = 1.0 / trace.sampling_rate
+    half = half_window(noise, step, v_lim / 10.0, max(trace.time.size // 50, 1))
+    kept, dropped = [], []
+    for event in segmentation.events:
+        outcome = _process(trace, segmentation, event, position, noise, half, v_lim, points)
+        if isinstance(outcome, str):
+            dropped.append(Dropped("creep process", 1, f"{trace.name}, event {event.index + 1}", outcome))
+        else:
+            kept.append(outcome)
+    return kept, dropped
+
+
+def _process(
+    trace: Trace,
+    found: Segmentation,
+    event: Event,
+    position: Array,
+    noise: float,
+    half: int,
+    v_lim: float,
+    points: int,
+) -> CreepProcess | str:
+    """One process, or why there is none."""
+    time = trace.time
+    first, start = _begin(trace, found, event)
+    if event.holds:
+        return "the drive stood still before this slip: virtual time needs a steady pull"
+    if first is None:
+        return "the record begins within this stick"
+    drive = trace.drive
+    speed = abs(float(drive.velocity(max(event.t_onset - 1e-9, time[0])))) if drive is not None else 0.0
+    if speed <= v_lim:
+        return f"the drive ({speed:.3g} m/s) is not faster than v_lim ({v_lim:.3g} m/s)"
+    low, high = int(np.searchsorted(time, start)), event.i_onset
+    if high - low < 4 * half + 8:
+        return "too few samples between ring-down and onset"
+    part = slice(low, high)
+    speeds = event.direction * velocity(time[part], position[part], half)
+    slow = np.flatnonzero(speeds <= v_lim)
+    if slow.size < 8 or slow[-1] + 1 >= speeds.size:
+        return f"the block never creeps through v_lim = {v_lim:.3g} m/s (sampled or sensed too coarsely)"
+    i = int(slow[-1])
+    share = (v_lim - speeds[i]) / max(speeds[i + 1] - speeds[i], 1e-300)
+    moment = float(time[low + i] + np.clip(share, 0.0, 1.0) * (time[low + i + 1] - time[low + i]))
+    there = position_at(time, position, moment, max(half, 2))
+    t, u, n = _windows(time[low : low + i + 1] - moment, event.direction * (position[low : low + i + 1] - there), points)
+    spread = noise / np.sqrt(n)
+    amplitude = float(np.ptp(u))
+    if amplitude < LEAST_NOISE * float(np.median(spread)):
+        return f"its creep ({amplitude:.2g} m) does not stand out of the noise ({noise:.2g} m a sample)"
+    virgin = trace.virgin and event.index == 0
+    return CreepProcess(trace.name, event.index, t, u, speed, v_lim, spread, virgin)
+
+
+def _begin(trace: Trace, found: Segmentation, event: Event) -> tuple[float | None, float]:
+    """When the stick before an event began (None: unknown), and from when on it is compared (s)."""
+    if event.index == 0:
+        begin = float(trace.time[0])
+        return (begin if trace.virgin else None), begin
+    before = found.events[event.index - 1]
+    calm = max((p.stop for p in found.during("ring-down") if p.event == before.index), default=before.t_arrest)
+    stick = event.t_onset - before.t_arrest
+    return before.t_arrest, max(calm, before.t_arrest + min(RINGING, SHARE * stick))
+
+
+def _windows(t: Array, u: Array, points: int) -> tuple[Array, Array, Array]:
+    """Means over windows even in ln(time left); times, displacements and samples in each."""
+    left = -t + max(float(np.median(np.diff(t))), 1e-12)
+    edges = np.geomspace(left[-1], left[0] * (1 + 1e-12), points + 1)
+    bucket = np.searchsorted(edges, left, side="right")
+    starts = np.flatnonzero(np.diff(np.concatenate([[-1], bucket])))
+    n = np.diff(np.append(starts, t.size)).astype(float)
+    return np.add.reduceat(t, starts) / n, np.add.reduceat(u, starts) / n, n

@@ -1,0 +1,131 @@
+"""Where a fit of the dynamic model starts: what the campaign file says, and what a glance at the events tells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.signal import periodogram
+
+from ..campaign import Campaign, Unmeasured
+from ..errors import InputError
+from ..features.measurement import Measurement
+from ..segment import Segmentation
+from ..trace import Trace
+from .composition import Composition
+from .parameters import Free
+
+SHAPE = 3.3  # exponent of the backbone of a self-affine line with H about 0.3
+BINS = 96
+FALLBACK_FREQUENCY = 500.0  # Hz, contact resonance of the paper's rig
+
+
+def ring_period(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float:
+    """Period (s) of the ringing after the arrests: the highest peak of their mean spectrum above 60 Hz.
+
+    Falls back on 2 ms where the sampling is too slow or nothing rings.
+    """
+    found = []
+    for trace, segments in zip(traces, segmentations, strict=True):
+        if trace.displacement is None or not segments.events:
+            continue
+        rate = trace.sampling_rate
+        for event in segments.events:
+            a = event.i_arrest + max(int(1e-3 * rate), 1)
+            b = a + int(0.03 * rate)
+            if b >= trace.time.size or b - a < 64:
+                continue
+            y = trace.displacement[a:b]
+            s = np.linspace(-1, 1, y.size)
+            y = y - np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyfit(s, y, 3))
+            found.append((rate, periodogram(y, rate, window="hann", nfft=8 * y.size)))
+    if not found:
+        return 1.0 / FALLBACK_FREQUENCY
+    rates = {round(r) for r, _ in found}
+    if len(rates) > 1:
+        found = [f for f in found if round(f[0]) == max(rates)]
+    frequency = found[0][1][0]
+    size = min(f[1][1].size for f in found)
+    power = np.mean([f[1][1][:size] for f in found], axis=0)
+    band = (frequency[:size] > 60.0) & (frequency[:size] < found[0][0] / 5.0)
+    if not band.any():
+        return 1.0 / FALLBACK_FREQUENCY
+    return float(1.0 / frequency[:size][band][np.argmax(power[band])])
+
+
+def _known(value: Any, default: float, width: float) -> tuple[float, float, float | None, float | None, bool]:
+    """Guess, width of its logarithm, bounds, and whether it was measured."""
+    if isinstance(value, Unmeasured):
+        spread = np.log(value.upper / value.lower) / 4.0
+        return value.guess, float(max(spread, 0.02)), value.lower, value.upper, False
+    if value is None:
+        return default, width, None, None, False
+    return float(value), 0.0, None, None, True
+
+
+def base_composition(
+    campaign: Campaign, measurement: Measurement, *, bins: int = BINS, ring: float | None = None
+) -> Composition:
+    """The base model of a campaign, with starts from its data and priors from its file.
+
+    Args:
+        campaign: the rig; what is not measured there is free within its bounds.
+        measurement: features of the runs.
+        bins: Jenkins elements.
+        ring: period of the contact resonance (s); default the one the features were taken with.
+
+    Raises:
+        InputError: the mass is not given.
+    """
+    rig, m, s = campaign.rig, measurement, measurement.layout.slices()
+    mass, _, _, _, _ = _known(rig.mass, np.nan, 0.0)
+    if not np.isfinite(mass):
+        raise InputError(
+            "the dynamic model needs the mass of the block", key="rig.mass", hint='write mass = "0.0894 kg", or weigh it'
+        )
+    contacts = int(rig.contacts or 1)
+    period = float(np.asarray(m.anchors.ring_period).flat[0]) if ring is None else ring
+    later = np.asarray(m.cycles.used) & (np.arange(m.values.shape[1]) > 0)
+    if not later.any():
+        later = np.asarray(m.cycles.used)
+    size = float(np.median(m.values[later][:, s["size"]]))
+    own = np.asarray(m.cycles.stiffness)
+    stiffness, stiffness_width, low, high, measured = _known(rig.spring_stiffness, 1000.0, 0.8)
+    times = m.values[later][:, s["times"]]
+    duration = float(np.median(times[:, -1] - times[:, 0])) / 0.66
+    if not measured and not np.isfinite(own).all():
+        stiffness = float(np.clip(mass * (np.pi / duration) ** 2, low or 1e-3, high or 1e9))
+    load = _known(rig.normal_force, np.nan, 0.0)[0]
+    friction, friction_width, _, _, _ = _known(rig.friction_coefficient, np.nan, 0.15)
+    first = np.asarray(m.cycles.virgin)
+    seen = m.values[:, 0, 0][first] * m.velocities[first] * stiffness if first.any() else np.array([])
+    nominal = friction * load * contacts
+    if not np.isfinite(nominal):
+        nominal = float(np.median(seen)) if seen.size else 3.0 * stiffness * size
+    strength = float(np.median(seen)) if seen.size else nominal
+    drop = float(np.clip(0.55 * stiffness * size / strength, 0.02, 0.8))
+    u_max = SHAPE * strength / (mass * (2 * np.pi / period) ** 2)
+
+    def log(name: str, unit: str, start: float, width: float, lower: float, upper: float, doc: str, prior: float | None = None) -> Free:
+        start = float(np.clip(start, lower * 1.001, upper * 0.999))
+        return Free(name, unit, "log", start, start if prior is None else prior, width, lower, upper, doc)
+
+    free = [
+        log("contact.strength", "N", strength, max(friction_width, 0.1), nominal / 4, nominal * 4, "friction force of all contacts at full strength", nominal),
+        log("weakening.drop", "1", drop, 0.7, 0.003, 0.95, "1 - kinetic over static friction"),
+        log("weakening.slip_distance", "m", 1e-6, 1.0, 1e-8, 1e-4, "slip over which strength is lost"),
+        log("weakening.healing_time", "s", 0.01, 1.2, 1e-4, 10.0, "time over which strength returns"),
+        log("rig.damping", "N s/m", 0.017 * 2 * mass * 2 * np.pi / period, 1.0, 0.005, 500.0, "viscous damping of the block"),
+        log("contact.u_max", "m", u_max, 0.5, u_max / 30, u_max * 30, "displacement at which the last element slides"),
+        log("contact.p", "1", SHAPE, 0.2, 1.2, 9.0, "exponent of the backbone"),
+        log("contact.spread", "1", 0.15, 0.6, 0.01, 0.8, "rms of ln(u_max) over the contacts"),
+    ]  # fmt: skip
+    fixed = {"rig.spring_stiffness": stiffness}
+    if not measured and not np.isfinite(own).all():
+        fixed = {}
+        prior = rig.spring_stiffness.guess if isinstance(rig.spring_stiffness, Unmeasured) else stiffness
+        free.append(
+            log("rig.spring_stiffness", "N/m", stiffness, stiffness_width, low or stiffness / 10, high or stiffness * 10, "driving spring", prior)
+        )  # fmt: skip
+    return Composition(mass, contacts, bins, tuple(free), fixed)

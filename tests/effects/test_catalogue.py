@@ -1,0 +1,172 @@
+"""Finding, making and loading effects; a user's own effect in a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from stickslip.conformance import check_effect
+from stickslip.contact import power_law_bank
+from stickslip.effects import catalogue
+from stickslip.effects.equations import of_model, of_tags
+from stickslip.errors import InputError
+from stickslip.model import Block, LoadPoint, Model, Weakening
+from stickslip.solve import integrate
+
+MY_EFFECT = """
+from jax import Array
+import jax.numpy as jnp
+from stickslip.effects import Threshold
+from stickslip.params import parameter
+
+class Humming(Threshold):
+    tag = "humming"
+    summary = "friction follows the sine of the displacement"
+    equation = r"\\mu \\to \\mu\\,[1 + \\varepsilon \\sin(x/\\ell)]"
+    amplitude = "size"
+    size: Array = parameter(0.0, unit="1", lower=-0.1, upper=0.1, null=0.0, doc="relative change of friction")
+    length: Array = parameter(20e-6, unit="m", lower=5e-6, upper=1e-3, log=True, doc="length over which it changes")
+
+    def strength(self, state, motion, contact):
+        return 1.0 + self.size * jnp.sin(motion.x / self.length)
+"""
+
+
+@pytest.fixture
+def no_user_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(catalogue, "_user", {})
+
+
+def write(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def test_a_users_effect_takes_part(tmp_path: Path, no_user_effects: None) -> None:
+    assert len(MY_EFFECT.strip().splitlines()) < 20
+    (cls,) = catalogue.load_file(write(tmp_path / "my_effect.py", MY_EFFECT))
+    assert "humming" in catalogue.tags() and catalogue.get("humming") is cls
+    effect = catalogue.make("humming", size=0.05, length="30 um")
+    assert float(effect.length) == pytest.approx(30e-6)
+    assert check_effect(cls, full_metadata=False) == []
+
+    def slip_time(effects: tuple) -> float:
+        drive = LoadPoint(jnp.array([0.0, 1.0]), jnp.array([0.0, 1e-3]))
+        bank = power_law_bank(0.2604, 0.95e-6, 3.6, n=24)
+        steps = integrate(Model(Block(damping=20.0), bank, Weakening(), drive, effects), 0.4)[0].steps
+        return float(np.interp(20e-6, steps.x, steps.t))
+
+    shift = slip_time((catalogue.make("humming", size=0.1, length=5e-6),)) - slip_time(())
+    assert 1e-3 < shift < 0.1  # caps rise by 2 % over the 1 um of creep, 0.26 N/(1 N/s) long
+    assert "humming" in of_tags(["static", "inertia", "humming"]).text()
+
+
+def test_loading_again_replaces(tmp_path: Path, no_user_effects: None) -> None:
+    path = write(tmp_path / "my_effect.py", MY_EFFECT)
+    catalogue.load_file(path)
+    (second,) = catalogue.load_file(write(path, MY_EFFECT.replace("upper=0.1,", "upper=0.2,")))
+    assert float(catalogue.make("humming", size=0.15).size) == 0.15
+    assert catalogue.get("humming") is second
+    with pytest.raises(InputError, match="line 3"):
+        catalogue.load_file(write(path, "import os\n\nos.no_such_thing()\n"))
+    assert catalogue.get("humming") is second  # a faulty edit leaves the last good one
+    assert list(tmp_path.iterdir()) == [path]  # no byte code beside the user's file
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("amplitude = ", "amplitud = "), "needs an amplitude"),
+        (('tag = "humming"', 'tag = "sensor-drift"'), "taken"),
+        (('tag = "humming"', 'tag = "Humming"'), "needs a tag"),
+        (("(Threshold)", "(Treshold)"), "line 7.*Treshold"),
+        (("from stickslip.effects import Threshold", "from stickslip.effects import Treshold"), "line 4.*Treshold"),
+        (("def strength", "def strengt"), "method is not written"),
+        (("(self, state", "(self state"), "not valid Python"),
+        (("null=0.0, ", ""), "needs an amplitude"),
+        (("parameter(0.0,", "parameter(0.5,"), "outside its range"),
+        (("lower=-0.1", "lower=0.3"), "bounds"),
+        (("(Threshold)", ""), "no effect"),
+    ],
+)
+def test_errors_teach(tmp_path: Path, no_user_effects: None, change: tuple[str, str], message: str) -> None:
+    text = MY_EFFECT.replace(*change)
+    assert text != MY_EFFECT
+    with pytest.raises(InputError, match=f"(?s)my_effect.py.*{message}"):
+        catalogue.load_file(write(tmp_path / "my_effect.py", text))
+    assert "humming" not in catalogue.tags()
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        catalogue.load_file(tmp_path / "missing.py")
+    with pytest.raises(InputError, match="not a Python file"):
+        catalogue.load_file(write(tmp_path / "effect.txt", MY_EFFECT))
+
+
+def test_names_and_values_are_checked() -> None:
+    with pytest.raises(InputError, match="did you mean 'sensor-drift'"):
+        catalogue.get("sensor-drif")
+    with pytest.raises(InputError, match="did you mean 'ripple'"):
+        catalogue.make("drive-ripple", riple=1e-7)
+    with pytest.raises(InputError, match=r"drive-ripple\.ripple.*allowed: -5e-06 \.\.\. 5e-06 m"):
+        catalogue.make("drive-ripple", ripple="6 um")
+    with pytest.raises(InputError, match=r"drive-ripple\.ripple.*not one of m"):
+        catalogue.make("drive-ripple", ripple="6 s")
+    with pytest.raises(InputError, match="spring, contact"):
+        catalogue.make("tilt", by="weight")
+
+
+def test_forms_start_with_the_default() -> None:
+    assert list(catalogue.forms(catalogue.get("tilt"))) == [{"by": "spring"}, {"by": "contact"}]
+    assert list(catalogue.forms(catalogue.get("inertia"))) == [{}]
+
+
+def test_equations_hold_the_values() -> None:
+    drive = LoadPoint(jnp.array([0.0, 1.0]), jnp.array([0.0, 1e-3]))
+    effects = (catalogue.make("inertia", share=0.03), catalogue.make("sensor-drift", rate="5 nm/s"))
+    model = Model(Block(mass=0.05), power_law_bank(0.2604, 0.95e-6, 3.6, n=24), Weakening(), drive, effects)
+    shown = of_model(model)
+    assert shown.model == ("static", "inertia", "sensor-drift")
+    text = shown.text()
+    for part in (
+        "m x'' = F_spring - c x' - Σ_i f_i",
+        "y = x + ε t",
+        "sensor-drift.rate",
+        "5e-09",
+        "block.mass",
+        "0.05",
+    ):
+        assert part in text
+    latex = shown.latex()
+    assert r"m \ddot x" in latex and r"$5 \times 10^{-9}$" in latex and r"\begin{tabular}" in latex
+    for group in ("align*", "tabular"):
+        assert latex.count(rf"\begin{{{group}}}") == latex.count(rf"\end{{{group}}}") == 1
+
+
+def test_equations_of_the_static_model_have_no_inertia() -> None:
+    text = of_tags(["static"], block=Block(), weakening=Weakening()).text()
+    assert "0 = F_spring" in text and "x''" not in text and "block.mass" not in text and "ψ" not in text
+    assert "block.spring_stiffness" in text
+    assert "0 = F_spring" in of_tags(["static", "contact-ageing"]).text()
+    with pytest.raises(InputError, match="did you mean 'static'"):
+        of_tags(["statc"])
+
+
+def test_every_equation_can_be_shown_as_text() -> None:
+    from matplotlib.mathtext import MathTextParser
+
+    from stickslip.effects.plain import plain
+
+    for tag, cls in catalogue.all().items():
+        shown = plain(cls.equation)
+        assert "\\" not in shown and shown.count("(") == shown.count(")"), tag
+        assert shown.count("{") == shown.count("}") == 0, tag
+        MathTextParser("path").parse(f"${cls.equation}$".replace(r"\tfrac", r"\frac").replace(r"\le ", r"\leq "))
+
+
+def test_inertia_alone_is_not_the_static_model() -> None:
+    assert "m x''" in of_tags(["static", "inertia"]).text()

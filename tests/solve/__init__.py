@@ -1,0 +1,1 @@
+"""Proofs about the dynamic model and its solver."""

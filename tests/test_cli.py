@@ -1,0 +1,367 @@
+"""The command line as a user meets it: quick, one message for bad input, exit codes, nothing half-written."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip.cli import COMMANDS, run
+
+SCENARIO = """
+schema = 1
+title = "small"
+[block]
+mass = "89.4 g"
+spring_stiffness = "1000 N/m"
+[drive]
+velocity = "200 um/s"
+events = 2
+[contact]
+kind = "power-law"
+normal_force = "1.24 N"
+friction_coefficient = 0.21
+u_max = "0.95 um"
+p = 3.3
+bins = 32
+[output]
+sampling_rate = "2 kHz"
+"""
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    """Tests leave the user's cache alone."""
+    monkeypatch.setenv("STICKSLIP_NO_CACHE", "1")
+
+
+@pytest.fixture
+def scenario(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("rig.toml").write_text(SCENARIO)
+    return "rig.toml"
+
+
+def shell(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "stickslip.cli", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, **options)
+
+
+def test_help_is_quick_and_imports_nothing_heavy():
+    code = (
+        "import sys; from stickslip.cli import run; run(['--help'])\n"
+        "heavy = {'jax', 'numpy', 'diffrax', 'matplotlib', 'xarray', 'pydantic', 'pint', 'scipy'} & set(sys.modules)\n"
+        "sys.exit(', '.join(heavy) or 0)"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert found.stderr == ""
+    assert found.returncode == 0
+    for name in COMMANDS:
+        assert name in found.stdout
+    before = os.times()
+    assert shell("--help").returncode == 0
+    after = os.times()
+    spent = after.children_user + after.children_system - before.children_user - before.children_system
+    assert spent < 0.3  # processor time: what others do on this machine does not count
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_of_a_command_imports_no_jax(name):
+    code = f"import sys; from stickslip.cli import run; run(['{name}', '--help']); sys.exit('jax' in sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert found.returncode == 0, found.stderr
+    assert COMMANDS[name].split(",")[0].split(":")[0][:20] in " ".join(found.stdout.split())
+
+
+def test_importing_the_package_imports_nothing():
+    code = "import sys, stickslip; assert 'jax' not in sys.modules and 'numpy' not in sys.modules; stickslip.InputError"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+def test_public_names_are_there():
+    import stickslip
+
+    for name in stickslip.__all__:
+        assert getattr(stickslip, name) is not None
+    assert set(stickslip.__all__) <= set(dir(stickslip))
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        stickslip.simulat  # noqa: B018
+
+
+def test_simulate_prints_a_table_and_writes_nothing_unasked(scenario, capsys):
+    assert run(["simulate", scenario]) == 0
+    out = capsys.readouterr()
+    assert "2 slip events" in out.out
+    assert "recurrence" in out.out
+    assert out.err == ""
+    assert os.listdir() == ["rig.toml"]  # noqa: PTH208
+
+
+def test_json_is_valid_and_alone_on_stdout(scenario, capsys):
+    assert run(["simulate", scenario, "--json", "--set", "contact.p=2"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert len(result["events"]) == 2
+    assert result["events"][0]["recurrence"] is None
+    assert result["scenario"]["contact"]["p"] == 2
+    assert result["changes"] == ["contact.p=2"]
+    assert result["units"]["slip"] == "m"
+
+
+def test_run_folder_rules(scenario, capsys):
+    assert run(["simulate", scenario, "--out", "out"]) == 0
+    first = Path("out/result.json").read_text()
+    assert "trace.png" in capsys.readouterr().out
+    assert run(["simulate", scenario, "--out", "out"]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert Path("out/result.json").read_text() == first
+    assert run(["simulate", scenario, "--out", "out", "--force", "--set", "drive.events=1"]) == 0
+    assert len(json.loads(Path("out/result.json").read_text())["events"]) == 1
+
+
+def test_overrides_may_follow_one_set(scenario, capsys):
+    assert run(["simulate", "--set", "contact.p=2", "drive.events=1", scenario, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["changes"] == ["contact.p=2", "drive.events=1"]
+
+
+BAD = {
+    "no such file": (["simulate", "rg.toml"], ["rg.toml", "did you mean 'rig.toml'"]),
+    "no unit": (["simulate", "rig.toml", "--set", "block.mass=3 x"], ["--set", "block.mass", "3 x"]),
+    "mass zero": (["simulate", "rig.toml", "--set", "block.mass=0"], ["block.mass", "above 0 kg"]),
+    "negative load": (
+        ["simulate", "rig.toml", "--set", "contact.normal_force=-1N"],
+        ["contact.normal_force", "above 0 N"],
+    ),
+    "unknown key": (["simulate", "rig.toml", "--set", "contact.umax=1um"], ["did you mean 'u_max'"]),
+    "no scenario": (["simulate", "--set", "a.b=1"], ["scenario"]),
+    "two scenarios": (["simulate", "rig.toml", "rig2.toml"], ["more than one"]),
+    "unknown option": (["simulate", "rig.toml", "--ot", "x"], ["--ot"]),
+    "unknown command": (["simulat"], ["did you mean 'simulate'"]),
+    "not a series": (["simulate", "rig.toml", "--sweep", "drive.velocity=1:2"], ["not a series"]),
+    "series of nothing": (
+        ["simulate", "rig.toml", "--sweep", "drive.velocty=1e-5:1e-4:3"],
+        ["did you mean 'velocity'"],
+    ),
+    "unknown effect": (["effects", "wear-and-tear"], ["wear"]),
+    "unknown model": (["effects", "--model", "static,weer"], ["did you mean 'wear'"]),
+    "no such thing": (["new", "thing"], ["thing"]),
+    "too few points": (["creep", "rig.toml", "--points", "1"], ["--points"]),
+    "folder of others": (["simulate", "rig.toml", "--out", "."], ["."]),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_message_and_exit_code_2(scenario, capsys, case):
+    arguments, words = BAD[case]
+    assert (
+        run([*arguments, *(["--out", "out"] if arguments[0] == "simulate" and "--out" not in arguments else [])]) == 2
+    )
+    out = capsys.readouterr()
+    assert out.out == ""
+    assert out.err.startswith("stickslip: ")
+    assert "Traceback" not in out.err
+    assert out.err.count("stickslip: ") == 1
+    for word in words:
+        assert word in out.err
+    assert os.listdir() == ["rig.toml"]  # noqa: PTH208
+
+
+def test_a_failing_solver_is_exit_code_1(scenario, capsys, monkeypatch):
+    from stickslip.errors import SolveError
+
+    def fail(*args, **kwargs):
+        raise SolveError("the integration stopped at t = 1 s: loosen the tolerance")
+
+    monkeypatch.setattr("stickslip.scenario.simulation.integrate", fail)
+    assert run(["simulate", scenario, "--out", "out"]) == 1
+    assert "loosen the tolerance" in capsys.readouterr().err
+    assert os.listdir() == ["rig.toml"]  # noqa: PTH208
+
+
+def test_interrupting_a_run_leaves_nothing(scenario, capsys, monkeypatch):
+    def interrupt(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("stickslip.scenario.simulation.integrate", interrupt)
+    assert run(["simulate", scenario, "--out", "out"]) == 130
+    assert "nothing was written" in capsys.readouterr().err
+    assert os.listdir() == ["rig.toml"]  # noqa: PTH208
+
+
+def test_interrupting_a_series_keeps_what_is_finished(scenario, capsys, monkeypatch):
+    import stickslip.scenario.series as series
+
+    real, calls = series.simulate, []
+
+    def second_time(*args, **kwargs):
+        calls.append(1)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return real(*args, **kwargs)
+
+    monkeypatch.setattr(series, "simulate", second_time)
+    assert run(["simulate", scenario, "--out", "out", "--sweep", "contact.p=2:4:3"]) == 130
+    result = json.loads(Path("out/result.json").read_text())
+    assert len(result["runs"]) == 1
+    assert "1 of 3" in result["interrupted"]
+    assert "1 of 3" in capsys.readouterr().out
+
+
+def test_a_signal_ends_the_program_cleanly(scenario, tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "stickslip.cli",
+        "simulate",
+        scenario,
+        "--out",
+        "out",
+        "--set",
+        "drive.events=90000",
+    ]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while not Path("out.partial").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in err
+    assert "Traceback" not in err
+    assert os.listdir() == ["rig.toml"]  # noqa: PTH208
+
+
+def test_a_series_of_runs(scenario, capsys):
+    assert run(["simulate", scenario, "--sweep", "drive.velocity=100um/s:400um/s:3", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["table"]["value"] == pytest.approx([1e-4, 2e-4, 4e-4])
+    recurrence = result["table"]["recurrence"]
+    assert recurrence[0] > recurrence[1] > recurrence[2]
+
+
+def test_creep_is_csv(scenario, capsys):
+    assert run(["creep", scenario]) == 0
+    rows = list(csv.reader(io.StringIO(capsys.readouterr().out)))
+    assert rows[0] == ["tau", "u", "t"]
+    tau, u, t = np.array(rows[1:], float).T
+    assert tau[0] == 0 and tau[-1] == 1
+    np.testing.assert_allclose(u[1:-1], 0.95e-6 * (1 - (1 - tau[1:-1]) ** (1 / 3.3)), rtol=2e-4)
+    np.testing.assert_allclose(t, (0.21 * 1.24 * tau / 1000.0 + u) / 2e-4, rtol=1e-9)
+
+
+def test_creep_into_a_folder(scenario, capsys):
+    assert run(["creep", scenario, "--out", "out", "--points", "50", "--time", "paper"]) == 0
+    lines = Path("out/creep.csv").read_text().splitlines()
+    assert lines[0] == "tau,u,t"
+    assert len(lines) == 51
+    assert float(lines[-1].split(",")[2]) == pytest.approx(0.21 * 1.24 / 1000 / 2e-4)
+    assert json.loads(Path("out/result.json").read_text())["kind"] == "creep"
+    assert Path("out/creep.png").stat().st_size > 5000
+
+
+def test_creep_of_a_standing_drive_is_refused(scenario, capsys):
+    changes = ["--set", "drive.events=1", "--set", "drive.velocity=0"]
+    assert run(["creep", scenario, *changes]) == 2
+    assert "stands still" in capsys.readouterr().err
+
+
+def test_new_files_are_not_overwritten(scenario, capsys):
+    assert run(["new", "scenario"]) == 0
+    assert run(["new", "campaign", "mine.toml"]) == 0
+    assert run(["new", "scenario"]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert run(["new", "scenario", "--force"]) == 0
+    assert run(["new", "scenario", "-"]) == 0
+    assert "[contact]" in capsys.readouterr().out
+    assert run(["new", "scenario", "nowhere/x.toml"]) == 2
+    assert sorted(os.listdir()) == ["mine.toml", "rig.toml", "scenario.toml"]  # noqa: PTH208
+
+
+def test_a_new_scenario_runs(scenario, capsys):
+    assert run(["new", "scenario"]) == 0
+    short = ["drive.events=1", "contact.bins=32", "contact.springs=256", "output.sampling_rate=2000"]
+    assert run(["simulate", "scenario.toml", *(part for text in short for part in ("--set", text))]) == 0
+    assert "1 slip event" in capsys.readouterr().out
+
+
+def test_effects_are_listed_and_explained(capsys):
+    assert run(["effects"]) == 0
+    listed = capsys.readouterr().out
+    assert run(["effects", "contact-ageing"]) == 0
+    explained = capsys.readouterr().out
+    for word in ("contact-ageing", "sensor-drift", "friction:", "sensor:"):
+        assert word in listed
+    for word in ("rate", "onset_time", "confused with", "source", "ln"):
+        assert word in explained
+
+
+def test_equations_of_a_model(capsys):
+    assert run(["effects", "--model", "static"]) == 0
+    assert "healing_time" not in capsys.readouterr().out
+    assert run(["effects", "--model", "static,inertia,contact-ageing"]) == 0
+    full = capsys.readouterr().out
+    for word in ("block.mass", "weakening.healing_time", "contact-ageing.rate", "0.0894"):
+        assert word in full
+    assert run(["effects", "--model", "static,inertia,contact-ageing", "--latex"]) == 0
+    latex = capsys.readouterr().out
+    assert r"\ddot x" in latex and r"\begin{align*}" in latex
+
+
+OWN = """
+from jax import Array
+from stickslip.effects.base import BodyForce
+from stickslip.params import parameter
+
+class Push(BodyForce):
+    tag = "my-push"
+    summary = "a constant push"
+    equation = "F = F_0"
+    amplitude = "size"
+    family = "block"
+    size: Array = parameter(0.0, unit="N", lower=-1.0, upper=1.0, null=0.0, doc="push")
+
+    def force(self, state, motion, contact):
+        return self.size
+"""
+
+
+def test_an_effect_of_ones_own_is_listed(tmp_path, capsys):
+    (tmp_path / "push.py").write_text(OWN)
+    assert run(["effects", "my-push", "--effect", str(tmp_path / "push.py")]) == 0
+    assert "a constant push" in capsys.readouterr().out
+    assert run(["effects", "--effect", str(tmp_path / "none.py")]) == 2
+
+
+def test_a_picture_of_an_effect(tmp_path, capsys):
+    picture = tmp_path / "drift.png"
+    assert run(["effects", "sensor-drift", "--picture", str(picture)]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert run(["effects", "sensor-drift", "--picture", str(picture)]) == 2
+    assert run(["effects", "--picture", str(picture)]) == 2
+
+
+def test_compiled_code_is_kept_and_can_be_switched_off(scenario, tmp_path_factory):
+    home = tmp_path_factory.mktemp("cache")
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("JAX_", "STICKSLIP_"))}
+    environment["XDG_CACHE_HOME"] = str(home)
+    found = shell("simulate", scenario, env=environment)
+    assert found.returncode == 0, found.stderr
+    kept = list((home / "stickslip" / "compiled").glob("*piece*"))
+    assert kept, "the integrator itself must be in the cache"
+    off = tmp_path_factory.mktemp("off")
+    code = "from stickslip import cache; assert cache.enable() is None"
+    environment |= {"XDG_CACHE_HOME": str(off), "STICKSLIP_NO_CACHE": "1"}
+    assert subprocess.run([sys.executable, "-c", code], env=environment, timeout=60).returncode == 0
+    assert list(off.iterdir()) == []
+    (off / "file").write_text("")
+    environment |= {"XDG_CACHE_HOME": str(off / "file"), "STICKSLIP_NO_CACHE": "0"}
+    assert subprocess.run([sys.executable, "-c", code], env=environment, timeout=60).returncode == 0
