@@ -211,6 +211,9 @@ def _report(result: dict[str, Any], out: Path | None) -> str:
     lines = [f"{result['title']}: {result['verdict']}"]
     if result["kind"] == "series":
         lines += ["", _series_table(result)]
+        unit = result["units"]["value"]
+        odd = [part for part in result["runs"] if not part["verdict"].startswith("stick-slip")]
+        lines += [f"{show.quantity(part['value'], unit)}: {part['verdict']}" for part in odd]
     elif result["events"]:
         lines += ["", _event_table(result)]
     if result["kind"] == "simulate":

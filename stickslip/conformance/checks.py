@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-
 from ..effects.base import Effect
 from ..effects.catalogue import accept, forms
 from ..errors import StickslipError
@@ -120,5 +119,3 @@ def describe(effect: Effect) -> str:
 
 def _first_line(error: Exception) -> str:
     return f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else ''}"
-
-

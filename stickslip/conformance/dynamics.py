@@ -93,7 +93,7 @@ def check_energy(rig: Rig, report: Callable[[int, str], None]) -> None:
             p = rig.defaults.copy()
             p[rig.at(index)[effect.amplitude]] = value
             outcome = rig.run(p, STOPPED, TIGHT)
-            n = int(outcome.count)
+            n = int(outcome.accepted)
             steps = jax.tree.map(lambda a, n=n: np.asarray(a[:n]), outcome.steps)
             if not np.all(np.isfinite(steps.x)):
                 report(index, f"the run is not finite at {effect.amplitude} = {value:g}")

@@ -52,14 +52,16 @@ def check_gradients(rig: Rig, report: Callable[[int, str], None]) -> None:
             apart = np.abs(exact[0] - exact[1]) - COARSE
             for row, name in enumerate(names):
                 if np.any(apart[row] > BETWEEN * np.max(np.abs(exact[1][row]))):
-                    text = f"does not settle as the tolerance is lowered: {_short(exact[0][row])}, {_short(exact[1][row])}"
+                    text = (
+                        f"does not settle as the tolerance is lowered: {_short(exact[0][row])}, {_short(exact[1][row])}"
+                    )
                     report(index, f"derivative in {name} {where} {text}")
 
 
 def _sequence(rig: Rig, p: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
     """The solver's own step times (s) at a parameter vector, padded, and their number."""
     outcome = rig.run(p, DRIVE, tolerance)
-    count = int(outcome.count)
+    count = int(outcome.accepted)
     return np.append(0.0, np.asarray(outcome.steps.t)), count
 
 

@@ -39,11 +39,11 @@ class Outcome(NamedTuple):
 
     Attributes:
         steps: everything at every step; the unused rest of the buffer holds infinities.
-        count: number of accepted steps.
+        accepted: number of accepted steps.
     """
 
     steps: Steps
-    count: Array
+    accepted: Array
 
 
 def feature_scales() -> np.ndarray:
@@ -54,7 +54,7 @@ def feature_scales() -> np.ndarray:
 def base_model(effects: tuple[Effect, ...] = ()) -> Model:
     """The rig with effects: 0.26 N of friction over 0.95 um on a spring of 1 kN/m; the ring-down dies fast."""
     bank = power_law_bank(0.2604, 0.95e-6, 3.6, n=ELEMENTS)
-    block = Block(mass=0.0894, spring_stiffness=1000.0, damping=20.0)
+    block = Block(mass=jnp.asarray(0.0894), spring_stiffness=jnp.asarray(1000.0), damping=jnp.asarray(20.0))
     return Model(block, bank, Weakening(), LoadPoint(jnp.asarray(DRIVE_TIMES), jnp.asarray(DRIVE)), effects)
 
 
@@ -88,7 +88,9 @@ class Rig:
         if not self.names:
             return self._model
         return eqx.tree_at(
-            lambda m: [getattr(m.effects[i], name) for i, name in self.names], self._model, [p[k] for k in range(len(p))]
+            lambda m: [getattr(m.effects[i], name) for i, name in self.names],
+            self._model,
+            [p[k] for k in range(len(p))],
         )
 
     def _run(self, p: Array, drive: Array, tolerance: Array) -> Outcome:
@@ -135,7 +137,7 @@ class Rig:
         at = jnp.searchsorted(times[1:], CREEP)
         return jnp.append(reading[jnp.append(at, count - 1)], _passes(times[1:], reading, v, SLIP))
 
-    def _march(self, p: Array, motions: Motion) -> tuple[Any, ...]:
+    def _march(self, p: Array, motions: Motion) -> list[Array]:
         model = self.model(p)
         bank = model.shaped()
 
@@ -181,7 +183,7 @@ def _seen(model: Model, t: Array, y: State) -> tuple[Array, Array]:
 
 
 def _passes(t: Array, reading: Array, v: Array, level: float) -> Array:
-    """Time (s) at which the reading first passes a level, by inverse cubic interpolation; not finite if it never does."""
+    """Time (s) at which the reading first passes a level, by inverse cubic interpolation; not finite if never."""
     after = jnp.argmax(reading > level)
     before = jnp.maximum(after - 1, 0)
     way, dt = reading[after] - reading[before], t[after] - t[before]

@@ -38,7 +38,7 @@ def check_metadata(cls: type[Effect], full: bool) -> Iterator[str]:
 
 def check_bounds(cls: type[Effect]) -> Iterator[str]:
     """Values beyond the bounds, and an unknown form, must be refused with a message that says what is allowed."""
-    trials = [
+    trials: list[tuple[str, float | str]] = [
         (name, value)
         for name, spec in specs(cls).items()
         for value in (_beyond(spec, -1), _beyond(spec, 1), float("nan"), float("inf"))
@@ -67,7 +67,7 @@ def check_compilation(cls: type[Effect]) -> Iterator[str]:
         return jax.tree.leaves(eqx.filter(effect, eqx.is_array))
 
     for values in corners(cls):
-        effect = cls(**{name: value for name, value in values.items()})
+        effect = cls(**values)
         if any(leaf.dtype != np.float64 or leaf.shape != () for leaf in leaves(effect)):
             yield "a parameter is not a 64-bit number"
             return

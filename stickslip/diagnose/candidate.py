@@ -20,11 +20,11 @@ from ..params import specs
 from ..residual import Misfit, misfit
 from .heldout import HeldOut, held_out
 
-STARTS = (0.03, 0.3)  # of the amplitude's range, both signs where both are allowed
-MOST_STARTS = 12
-REFIT = ((2.5, 4), (1.0, 6))  # factors on the floors and evaluations, for all candidates
-FINISH = ((1.0, 10),)  # more of them for those still in the race
-HOPELESS = 0.92  # share of the base's cost that must be undercut after the first stages to be followed further
+START = 0.05  # of the amplitude's range; the linear step finds size and sign
+MOST_STARTS = 9
+WIDE = ((7.0, 4), (2.5, 5))  # factors on the floors and evaluations, for all candidates
+REFIT = ((1.0, 8),)  # for those that explain something
+HOPELESS = 0.93  # share of the base's cost that must be undercut at wide floors to be followed further
 
 
 @dataclass(frozen=True)
@@ -61,20 +61,15 @@ class Candidate:
 
 
 def starts(effect: Effect) -> list[dict[str, float]]:
-    """Values of the effect's parameters to begin a search from: both signs, a grid of the inner ones."""
+    """Values of the effect's parameters to begin a search from: a small amplitude, a grid of the inner ones."""
     table = specs(effect)
     spec = table[effect.amplitude]
     null = spec.null or 0.0
-    ends = [end - null for end in (spec.upper, spec.lower) if abs(end - null) > 0]
-    sizes = [null + share * end for share in STARTS for end in ends]
+    reach = spec.upper - null if spec.upper > null else spec.lower - null
     inner = {k: s.grid for k, s in table.items() if k != effect.amplitude and s.grid}
     grid = [dict(zip(inner, values, strict=True)) for values in product(*inner.values())]
-    out = [{effect.amplitude: size, **g} for g in grid for size in sizes]
-    if len(out) > MOST_STARTS:  # the amplitude's size is then left to the linear step
-        out = [{effect.amplitude: null + STARTS[0] * end, **g} for g in grid for end in ends[:1]]
-    if len(out) > MOST_STARTS:
-        out = out[:: int(np.ceil(len(out) / MOST_STARTS))]
-    return out
+    grid = grid[:: int(np.ceil(len(grid) / MOST_STARTS))]
+    return [{effect.amplitude: null + START * reach, **g} for g in grid]
 
 
 def try_effect(
@@ -86,7 +81,6 @@ def try_effect(
     train: np.ndarray,
     *,
     threads: int = 1,
-    finish: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Candidate:
     """Score and refit one effect on top of the base.
@@ -97,17 +91,16 @@ def try_effect(
         measurement, floor: the data.
         train: cycles that may be fitted, shape (R, n).
         threads: runs integrated at the same time.
-        finish: whether to refine a refit that looks promising.
         progress: told what goes on.
     """
     form = {k: str(v) for k, v in vars(effect).items() if isinstance(v, str)}
     try:
-        return _try(effect, form, base, optimum, measurement, floor, train, threads, finish, progress)
+        return _try(effect, form, base, optimum, measurement, floor, train, threads, progress)
     except StickslipError as error:
         return Candidate(effect.tag, form, effect, 0.0, note=str(error))
 
 
-def _try(effect, form, base, optimum, measurement, floor, train, threads, finish, progress) -> Candidate:
+def _try(effect, form, base, optimum, measurement, floor, train, threads, progress) -> Candidate:
     free = effect_parameters(effect)
     composition = base.with_effect(effect, free)
     problem = Problem(composition, measurement, threads=threads)
@@ -147,16 +140,15 @@ def _try(effect, form, base, optimum, measurement, floor, train, threads, finish
     columns = np.concatenate(
         [optimum.columns, problem.columns(z, optimum.events, range(k, len(composition.free)), features)], axis=-1
     )
-    found = fit(
-        problem, floor, z=z, events=optimum.events, stages=REFIT, use=train, columns=columns, progress=None
-    )
-    tell(f"{effect.tag}: cost {base_cost:.0f} -> {found.cost:.0f}")
+    found = fit(problem, floor, z=z, events=optimum.events, stages=WIDE, use=train, columns=columns)
+    tell(f"{effect.tag}: cost {base_cost:.0f} -> {found.cost:.0f} at wide floors")
+    wide = WIDE[-1][0]
     note = ""
-    if found.cost > HOPELESS * base_cost:
+    if cost_at(found, measurement, floor, wide) > HOPELESS * cost_at(optimum, measurement, floor, wide):
         note = "explains little"
-    elif finish:
-        found = fit(problem, floor, z=found.z, events=found.events, stages=FINISH, use=train, columns=found.columns)
-        tell(f"{effect.tag}: refined to {found.cost:.0f}")
+    else:
+        found = fit(problem, floor, z=found.z, events=found.events, stages=REFIT, use=train, columns=found.columns)
+        tell(f"{effect.tag}: cost {base_cost:.0f} -> {found.cost:.0f}")
     unseen = np.asarray(measurement.cycles.used) & ~train
     shown = replace(measurement, valid=valid)
     return Candidate(
@@ -170,6 +162,14 @@ def _try(effect, form, base, optimum, measurement, floor, train, threads, finish
         held_out(problem, found, floor, unseen, found.features),
         note,
     )
+
+
+def cost_at(found: Fit, measurement: Measurement, floor: np.ndarray, factor: float) -> float:
+    """Robust chi-square of the fitted cycles with all floors times ``factor``, event-wise priors included."""
+    valid = measurement.valid & found.use[..., None]
+    r = (found.features - measurement.values) / (factor * floor)
+    event = found.events[found.use] / np.array(EVENT_WIDTHS)
+    return robust(np.nan_to_num(r[valid], nan=1e4)) + float(np.sum(event**2))
 
 
 class _Projection:

@@ -1,6 +1,6 @@
 """The catalogue of effects: one module and one class each; importing this package registers them all."""
 
-from . import (
+from . import (  # noqa: F401  (each module registers its effect)
     adhesion,
     base_vibration,
     contact_ageing,
@@ -48,3 +48,26 @@ from .base import (
     Threshold,
 )
 from .catalogue import forms, get, load_file, make, register, roles, tags
+
+__all__ = [
+    "BodyForce",
+    "Contact",
+    "Drive",
+    "Effect",
+    "Flow",
+    "Geometry",
+    "Inertia",
+    "Memory",
+    "Motion",
+    "Sensor",
+    "Spring",
+    "Stiffness",
+    "Threshold",
+    "forms",
+    "get",
+    "load_file",
+    "make",
+    "register",
+    "roles",
+    "tags",
+]

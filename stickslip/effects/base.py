@@ -16,7 +16,6 @@ from jax import Array
 
 from ..contact import Bank
 
-
 _GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 4 / 9), (0.5 + 0.15**0.5, 5 / 18))  # Gauss-Legendre on (0, 1)
 
 
@@ -61,9 +60,7 @@ class Motion(NamedTuple):
         end = rest_rate + slip_rate * abs(self.v) + 1e-12
         bend = 2.0 * (end * self.dt - total) / self.dt**2
         done = -jnp.expm1(-end * self.dt)
-        mean = sum(
-            w * jnp.exp(jnp.minimum(0.5 * bend * (jnp.log1p(-s * done) / end) ** 2, 50.0)) for s, w in _GAUSS
-        )
+        mean = sum(w * jnp.exp(jnp.minimum(0.5 * bend * (jnp.log1p(-s * done) / end) ** 2, 50.0)) for s, w in _GAUSS)
         return value * jnp.exp(-total) + gain * mean * done / end
 
 

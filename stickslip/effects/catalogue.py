@@ -57,7 +57,9 @@ def accept(cls: object) -> type[Effect]:
         )
     for name, spec in known.items():
         if not spec.lower < spec.upper:
-            raise InputError("the bounds of a parameter are empty", key=f"{here}.{name}", value=[spec.lower, spec.upper])
+            raise InputError(
+                "the bounds of a parameter are empty", key=f"{here}.{name}", value=[spec.lower, spec.upper]
+            )
     check(cls(), where=cls.tag)
     if float(getattr(cls(), cls.amplitude)) != known[cls.amplitude].null:
         raise InputError("the amplitude's default must be its null value", key=f"{here}.{cls.amplitude}")

@@ -164,7 +164,9 @@ def _rows(key: str, thing: Any) -> list[Row]:
     for name, spec in specs(thing).items():
         value = np.asarray(getattr(thing, name), float)
         number = float(value) if value.shape == () else None
-        rows.append(Row(spec.symbol or rf"\mathrm{{{name}}}", f"{key}.{name}", number, spec.unit, spec.doc, spec.source))
+        rows.append(
+            Row(spec.symbol or rf"\mathrm{{{name}}}", f"{key}.{name}", number, spec.unit, spec.doc, spec.source)
+        )
     return rows
 
 

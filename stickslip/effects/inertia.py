@@ -17,7 +17,7 @@ class AddedMass(Inertia):
     summary = "inertia of the block, and of what moves with it (a third of a uniform spring's mass)"
     equation = r"m \to m\,(1 + \alpha)"
     signature = (
-        "last milliseconds before a slip, slip duration (grows as the root of the mass) and frequency of the ring-down; "
+        "last milliseconds before a slip, slip duration (as the root of the mass) and frequency of the ring-down; "
         "nothing in creep"
     )
     confused_with = {

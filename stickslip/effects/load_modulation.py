@@ -22,8 +22,8 @@ class LoadModulation(Threshold):
     equation = r"F_{n,i}(t) = F_{n,i}\,[1 + \varepsilon \sin(2\pi f t + \varphi)]"
     signature = "a line at a fixed frequency in the creep velocity, scatter of the recurrence with the phase in time"
     confused_with = {
-        "base-vibration": "a second sensor on the base; with the drive stopped far below the limit the base still shakes "
-        "the block, the load does not",
+        "base-vibration": "a second sensor on the base; with the drive stopped far below the limit the base still "
+        "shakes the block, the load does not",
         "drive-ripple": "change the drive velocity: the line of a ripple moves with it, that of the load stays",
     }
     source = "Tolstoi, Wear 10 (1967) 199: normal degree of freedom in friction"

@@ -35,7 +35,9 @@ _WORDS = {
     r"\in": "∈",
 }
 _PRIMES = {r"\dot": "'", r"\ddot": "''"}
-_BARE = r"(?:left|right|mathrm|text|operatorname|mathbf|mathit|displaystyle|big|Big|bigl|bigr|bar|hat|tilde)(?![A-Za-z])"
+_BARE = (
+    r"(?:left|right|mathrm|text|operatorname|mathbf|mathit|displaystyle|big|Big|bigl|bigr|bar|hat|tilde)(?![A-Za-z])"
+)
 _ARGUMENT = r"(\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z0-9])"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax.numpy as jnp
 from jax import Array
 
 from ..contact import Bank
@@ -48,4 +49,6 @@ class Plasticity(Geometry):
 
     def reshape(self, bank: Bank) -> Bank:
         load = self.hardness_ratio * bank.threshold / bank.threshold.max()
-        return scaled(bank, powered(1.0 + powered(load, self.sharpness), -1.0 / self.sharpness))
+        # load**n with its slope at zero, which is not zero where n is one
+        bend = jnp.where(load > 0.0, powered(load, self.sharpness - 1.0), jnp.where(self.sharpness > 1.0, 0.0, 1.0))
+        return scaled(bank, powered(1.0 + load * bend, -1.0 / self.sharpness))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ RINGING = 0.25  # s after an arrest that are left out, or this share of a stick 
 SHARE = 0.3
 LEAST_NOISE = 12.0  # creep smaller than this many noise levels of a mean is not fitted
 POINTS = 160
+Sampling = Literal["log", "uniform"]
 
 
 @dataclass(frozen=True)
@@ -49,16 +51,22 @@ class CreepProcess:
 
 
 def creep_processes(
-    trace: Trace, segmentation: Segmentation, *, v_lim: float = V_LIM, points: int = POINTS
+    trace: Trace,
+    segmentation: Segmentation,
+    *,
+    v_lim: float = V_LIM,
+    points: int = POINTS,
+    sampling: Sampling = "log",
 ) -> tuple[list[CreepProcess], list[Dropped]]:
     """Every stick that ends in a slip, as the static model is compared with it.
 
-    Means over windows that lie evenly in the logarithm of the time left, so that the end, where most of the creep
-    happens, has as many points as the beginning.
+    The record is replaced by means over windows that lie evenly in the logarithm of the time left, so that the end,
+    where most of the creep happens, has as many points as the beginning; or evenly in time, as in the paper.
 
     Args:
         v_lim: speed of the block at which a process ends, m/s.
         points: most points of a process.
+        sampling: "log" or "uniform" windows.
 
     Returns:
         The processes, and those left out with the reason.
@@ -72,7 +80,7 @@ def creep_processes(
     half = half_window(noise, step, v_lim / 10.0, max(trace.time.size // 50, 1))
     kept, dropped = [], []
     for event in segmentation.events:
-        outcome = _process(trace, segmentation, event, position, noise, half, v_lim, points)
+        outcome = _process(trace, segmentation, event, position, noise, half, v_lim, points, sampling)
         if isinstance(outcome, str):
             dropped.append(Dropped("creep process", 1, f"{trace.name}, event {event.index + 1}", outcome))
         else:
@@ -89,6 +97,7 @@ def _process(
     half: int,
     v_lim: float,
     points: int,
+    sampling: Sampling,
 ) -> CreepProcess | str:
     """One process, or why there is none."""
     time = trace.time
@@ -113,7 +122,7 @@ def _process(
     share = (v_lim - speeds[i]) / max(speeds[i + 1] - speeds[i], 1e-300)
     moment = float(time[low + i] + np.clip(share, 0.0, 1.0) * (time[low + i + 1] - time[low + i]))
     there = position_at(time, position, moment, max(half, 2))
-    t, u, n = _windows(time[low : low + i + 1] - moment, event.direction * (position[low : low + i + 1] - there), points)
+    t, u, n = _windows(time[low : low + i + 1] - moment, event.direction * (position[low : low + i + 1] - there), points, sampling)
     spread = noise / np.sqrt(n)
     amplitude = float(np.ptp(u))
     if amplitude < LEAST_NOISE * float(np.median(spread)):
@@ -133,10 +142,11 @@ def _begin(trace: Trace, found: Segmentation, event: Event) -> tuple[float | Non
     return before.t_arrest, max(calm, before.t_arrest + min(RINGING, SHARE * stick))
 
 
-def _windows(t: Array, u: Array, points: int) -> tuple[Array, Array, Array]:
-    """Means over windows even in ln(time left); times, displacements and samples in each."""
+def _windows(t: Array, u: Array, points: int, sampling: Sampling) -> tuple[Array, Array, Array]:
+    """Means over windows even in ln(time left) or in time; times, displacements and samples in each."""
     left = -t + max(float(np.median(np.diff(t))), 1e-12)
-    edges = np.geomspace(left[-1], left[0] * (1 + 1e-12), points + 1)
+    spaced = np.geomspace if sampling == "log" else np.linspace
+    edges = spaced(left[-1], left[0] * (1 + 1e-12), points + 1)
     bucket = np.searchsorted(edges, left, side="right")
     starts = np.flatnonzero(np.diff(np.concatenate([[-1], bucket])))
     n = np.diff(np.append(starts, t.size)).astype(float)

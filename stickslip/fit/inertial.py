@@ -14,6 +14,7 @@ from .parameters import Free, to_si, vector
 from .problem import Problem
 
 HUBER = 3.0
+QUIET = 0.15  # floors; mean change of the features below which derivatives are kept as they are
 TRUST = 0.3  # share of a step's change that Broyden's update may have missed
 STAGES = ((30.0, 6), (7.0, 6), (2.5, 6), (1.0, 12))  # factor on the floors, most evaluations at it
 
@@ -101,6 +102,8 @@ class _Residuals:
             miss = f - old - columns @ dz - np.einsum("rnfe,rne->rnf", event, de)
             weight = self.valid / self.floor
             size = np.linalg.norm((f - old) * weight)
+            if size < QUIET * np.sqrt(weight.astype(bool).sum()):
+                return columns  # a step this small says more of the solver's noise than of a slope
             if dz @ dz > 0 and np.linalg.norm(miss * weight) < TRUST * size:
                 columns = columns + miss[..., None] * dz / (dz @ dz)
                 self._columns = (x.copy(), f, columns)
@@ -215,7 +218,7 @@ def fit(
             loss="huber",
             f_scale=HUBER,
             max_nfev=most,
-            ftol=2e-3,
+            ftol=4e-3,
             xtol=1e-4,
             gtol=1e-6,
         )

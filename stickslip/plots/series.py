@@ -58,7 +58,7 @@ def _panel(
     if np.all(mean[good] > 0) and mean[good].max() > 10 * mean[good].min():
         logarithmic(axes, "y")
     else:
-        axes.set_ylim(bottom=0.0)
+        axes.set_ylim(0.0, 1.08 * float(np.max(mean[good] + spread[good])) * k)
     for at in value[~good]:
         axes.axvline(at, color=LIGHT, ls=":", lw=1.2)
     if (~good).any():

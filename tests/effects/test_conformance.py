@@ -14,13 +14,38 @@ from stickslip.effects import catalogue
 from stickslip.effects.base import BodyForce, Contact, Memory, Motion, Threshold
 from stickslip.params import parameter
 
-TAGS = (
-    "inertia velocity-weakening slip-weakening contact-ageing rate-and-state direct-effect thermal-creep "
-    "viscoelastic-contact contact-damping viscous-drag plasticity adhesion residual-load contact-renewal "
-    "unequal-contacts curvature roll-off load-modulation tilt position-dependent-friction wear flash-heating "
-    "drive-ripple machine-compliance nonlinear-spring base-vibration sensor-drift sensor-high-pass sensor-low-pass "
-    "sensor-gain"
-).split()
+TAGS = [
+    "inertia",
+    "velocity-weakening",
+    "slip-weakening",
+    "contact-ageing",
+    "rate-and-state",
+    "direct-effect",
+    "thermal-creep",
+    "viscoelastic-contact",
+    "contact-damping",
+    "viscous-drag",
+    "plasticity",
+    "adhesion",
+    "residual-load",
+    "contact-renewal",
+    "unequal-contacts",
+    "curvature",
+    "roll-off",
+    "load-modulation",
+    "tilt",
+    "position-dependent-friction",
+    "wear",
+    "flash-heating",
+    "drive-ripple",
+    "machine-compliance",
+    "nonlinear-spring",
+    "base-vibration",
+    "sensor-drift",
+    "sensor-high-pass",
+    "sensor-low-pass",
+    "sensor-gain",
+]
 GROUPS = [TAGS[i : i + 6] for i in range(0, len(TAGS), 6)]
 
 

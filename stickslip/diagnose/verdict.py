@@ -1,0 +1,110 @@
+"""From refitted candidates to a verdict: complete, missing, ambiguous or unknown, and never more than the data say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..effects import catalogue
+from ..residual import Misfit
+from .candidate import Candidate
+from .heldout import HeldOut
+from .thresholds import THRESHOLDS, Thresholds
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the data say.
+
+    Attributes:
+        kind: ``complete``, ``missing``, ``ambiguous`` or ``unknown``.
+        effects: named, in the order added.
+        set: effects the data cannot tell apart, the best first.
+        text: for a person.
+    """
+
+    kind: str
+    effects: tuple[str, ...] = ()
+    set: tuple[str, ...] = ()
+    text: str = ""
+    reasons: tuple[str, ...] = field(default=())
+
+
+def worst_phase(train: Misfit, held: HeldOut | None) -> tuple[str, float]:
+    """The phase with the largest error, training or held out."""
+    errors = dict(train.by_phase)
+    for phase, error in (held.by_phase if held is not None else {}).items():
+        errors[phase] = max(errors.get(phase, 0.0), error)
+    if not errors:
+        return "", 0.0
+    name = max(errors, key=lambda k: errors[k])
+    return name, errors[name]
+
+
+def is_complete(train: Misfit, held: HeldOut | None, limits: Thresholds = THRESHOLDS) -> bool:
+    """Whether every phase is at its floor, also where no fit has looked."""
+    return worst_phase(train, held)[1] <= limits.complete
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A candidate and which of the conditions for a name it meets."""
+
+    candidate: Candidate
+    cost: float
+    failures: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        return not self.failures
+
+
+def judge(
+    candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Thresholds = THRESHOLDS
+) -> Judged:
+    """Check one refitted candidate against the conditions for naming it."""
+    fails = []
+    assert candidate.fit is not None
+    assert candidate.train is not None
+    assert candidate.held is not None
+    cost = candidate.fit.cost
+    if cost > (1.0 - limits.gain) * base_cost:
+        fails.append(f"takes only {100 * (1 - cost / base_cost):.0f} % off the training cost")
+    gain = base_held.per_cycle - candidate.held.per_cycle
+    if gain.size:
+        error = np.std(gain, ddof=1) / np.sqrt(gain.size) if gain.size > 1 else 0.0
+        if candidate.held.score > (1.0 - limits.gain) * base_held.score:
+            fails.append("the error on unseen cycles does not fall enough")
+        elif np.mean(gain) < limits.standard_errors * error:
+            fails.append("the gain on unseen cycles is not significant")
+    amplitude = candidate.amplitude
+    if amplitude is not None:
+        value, sd = candidate.fit.values[amplitude.name], candidate.fit.std()[amplitude.name]
+        null = catalogue.amplitude(candidate.effect).null or 0.0
+        if sd > 0 and abs(value - null) < limits.significant * sd:
+            fails.append("its amplitude is not significant")
+        for f, z in zip(candidate.fit.free, candidate.fit.z, strict=True):
+            if not f.name.startswith(f"{candidate.tag}."):
+                continue
+            low, high = f.bounds
+            if min(z - low, high - z) < 0.004 * (high - low) and abs(f.outward(float(z)) - null) > 0:
+                fails.append(f"{f.name.split('.', 1)[1]} ends at the border of its plausible range")
+    return Judged(candidate, cost, tuple(fails))
+
+
+def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[Judged | None, list[Judged]]:
+    """The best candidate that passed, and all that the data cannot tell from it (itself first)."""
+    ranked = sorted(judged, key=lambda j: j.cost)
+    passed = [j for j in ranked if j.passed]
+    if not passed:
+        return None, []
+    best = passed[0]
+    # a rival counts even where it failed a condition of its own: it explains the data as well
+    close = [j for j in ranked if j.cost < limits.rival * best.cost]
+    seen: list[Judged] = [best]
+    for j in close:
+        if all(j.candidate.tag != s.candidate.tag for s in seen):
+            seen.append(j)
+    return best, seen

@@ -1,0 +1,60 @@
+"""The rough line (H, h_rms) that a fitted contact would come from: effective numbers, not a topography."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from .static_table import HURST, StaticRig, static_table
+
+
+@dataclass(frozen=True)
+class EffectiveLine:
+    """Lines whose mean creep curve comes nearest to a backbone 1 - (1 - u/u_max)^p.
+
+    Attributes:
+        hurst, h_rms: of that line (m); they mean nothing without ``n_springs`` and ``length``.
+        power_law_hurst: 1/(p - 1), which holds for endlessly fine lines.
+        mismatch: rms difference of the two curves over u_max.
+        n_springs, length: N and L (m).
+        note: what to think of it.
+    """
+
+    hurst: float
+    h_rms: float
+    power_law_hurst: float
+    mismatch: float
+    n_springs: int
+    length: float
+    note: str
+
+
+def effective_line(u_max: float, p: float, rig: StaticRig) -> EffectiveLine:
+    """(H, h_rms) implied by a fitted (u_max, p) of one contact, with the load, friction, L and N of ``rig``.
+
+    Args:
+        u_max: displacement at full sliding, m.
+        p: exponent of the backbone, (H + 1)/H in the power-law regime of a self-affine line.
+    """
+    table = static_table(rig.n_springs, rig.lines, rig.seed)
+    part = (table.tau > 0.02) & (table.tau < 0.98)
+    wanted = u_max * (1.0 - (1.0 - table.tau[part]) ** (1.0 / p))
+    low, high = np.log(rig.rms_range())
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        return (table.displacement(rig, float(x[0]), float(np.exp(x[1])))[part] - wanted) / u_max
+
+    starts = [(h, 0.5 * (low + high)) for h in (0.15, 0.4, 0.75)]
+    runs = [least_squares(residual, s, bounds=([HURST[0], low], [HURST[1], high]), diff_step=1e-4) for s in starts]
+    best = min(runs, key=lambda r: float(r.cost))
+    hurst, height = float(best.x[0]), float(np.exp(best.x[1]))
+    mismatch = float(np.sqrt(np.mean(best.fun**2)))
+    note = "effective parameters of the distribution of gaps, not a topography"
+    if min(hurst - HURST[0], HURST[1] - hurst) < 1e-3 or min(best.x[1] - low, high - best.x[1]) < 1e-3:
+        note += "; at the edge of what such lines can do: this contact has no rough line of that kind"
+    elif mismatch > 0.02:
+        note += "; no such line has quite this curve"
+    limit = 1.0 / (p - 1.0) if p > 1.0 else float("nan")
+    return EffectiveLine(hurst, height, limit, mismatch, rig.n_springs, rig.length, note)
