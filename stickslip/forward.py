@@ -39,16 +39,16 @@ class Cycles(NamedTuple):
         virgin: whether the run starts from a force-free contact at rest.
     """
 
-    start: Array
-    position: Array
-    limit: Array
-    least_slip: Array
-    ends: Array
-    used: Array
-    load_times: Array
-    load_positions: Array
-    stiffness: Array
-    virgin: Array
+    start: Any
+    position: Any
+    limit: Any
+    least_slip: Any
+    ends: Any
+    used: Any
+    load_times: Any
+    load_positions: Any
+    stiffness: Any
+    virgin: Any
 
 
 class Track(NamedTuple):
@@ -138,8 +138,17 @@ def run_cycle(
     return Track(t, x, v, reading, arrest, arrested, n), end, t[last]
 
 
+def _share(new: Array, old: Array) -> Array:
+    """new/old, one for an element that had no strength."""
+    return jnp.where(old > 0, new / jnp.where(old > 0, old, 1.0), 1.0)
+
+
 def run_cycles(
-    build: Callable[[Any, Array], Model], events: Any, cycles: Cycles, tolerance: Tolerance, most_steps: int = MOST_STEPS
+    build: Callable[[Any, tuple[Array, Array]], Model],
+    events: Any,
+    cycles: Cycles,
+    tolerance: Tolerance,
+    most_steps: int = MOST_STEPS,
 ) -> Track:
     """All cycles of one run.
 
@@ -163,7 +172,7 @@ def run_cycles(
         lambda s: (s.force, s.psi), start, (jnp.where(virgin, start.force, worn), jnp.where(virgin, start.psi, 0.0))
     )
 
-    def cycle(carry: tuple, item: tuple) -> tuple:
+    def cycle(carry: tuple, item: tuple) -> tuple[tuple, Track]:
         y, late, offset, strength = carry
         event, t0, position, limit, least_slip, used = item
         model = build(event, nodes)
@@ -171,7 +180,7 @@ def run_cycles(
         y = eqx.tree_at(
             lambda s: (s.x, s.force),
             y,
-            (position + offset, y.force * jnp.where(strength > 0, model.bank.strength / jnp.maximum(strength, 1e-300), 1.0)),
+            (position + offset, y.force * _share(model.bank.strength, strength)),
         )
         zero = jax.tree.map(jnp.zeros_like, y.work)
         y = eqx.tree_at(lambda s: s.work, y, zero)
@@ -183,5 +192,6 @@ def run_cycles(
 
     zero = jnp.zeros(())
     items = (events, cycles.start, cycles.position, cycles.limit, cycles.least_slip, cycles.used)
+    tracks: Track
     _, tracks = jax.lax.scan(cycle, (start, zero, zero, first.bank.strength), items)
     return tracks

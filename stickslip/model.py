@@ -112,7 +112,7 @@ class State(eqx.Module):
 
 
 class Work(NamedTuple):
-    """Energies since the start (J): done by the spring, lost in friction, in viscous damping, and by effects' forces."""
+    """Energies since the start (J): done by the spring, lost in friction and viscous damping, done by effects."""
 
     spring: Array
     friction: Array
@@ -198,7 +198,8 @@ class Model(eqx.Module):
 
     def contact(self, state: State, bank: Bank, t: Array) -> Contact:
         """What effects may know of the contact at the start of an increment."""
-        return Contact(state.force, bank.stiffness, bank.strength, self.pull(self.lead(t) - state.x), self.mass())
+        pull = self.pull(self.lead(t) - state.x)
+        return Contact(state.force, bank.stiffness, bank.strength, pull, state.cap, self.mass())
 
     def advance(self, state: State, bank: Bank, contact: Contact, motion: Motion) -> tuple[State, Forces]:
         """Take contact and effects through one increment.
@@ -237,7 +238,7 @@ class Model(eqx.Module):
         for e, m in zip(self.effects, memory, strict=True):
             if isinstance(e, Flow):
                 flowed = e.flow(m, motion, trial, contact)
-                dissipated = dissipated + jnp.sum(0.5 * (trial**2 - flowed**2) * _compliance(stiffness))
+                dissipated = dissipated + jnp.sum((_held(trial, cap) - _held(flowed, cap)) * _compliance(stiffness))
                 trial = flowed
         force, lost = _return_map(trial, stiffness, cap, mean_cap)
         dissipated = dissipated + lost
@@ -273,3 +274,9 @@ def _compliance(stiffness: Array) -> Array:
     """1/k (m/N), zero for an element that holds no spring."""
     empty = stiffness <= 0.0
     return jnp.where(empty, 0.0, 1.0 / jnp.where(empty, 1.0, stiffness))
+
+
+def _held(trial: Array, cap: Array) -> Array:
+    """Energy of a trial force times stiffness (N^2): stored up to the cap, slid off against it beyond."""
+    clipped = jnp.clip(trial, -cap, cap)
+    return 0.5 * clipped**2 + cap * jnp.abs(trial - clipped)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
 
@@ -33,7 +33,8 @@ def to_si(value: float | int | str, unit: str, *, key: str | None = None, file: 
     """
     where = {"key": key, "file": str(file) if file else None}
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise InputError("not a quantity", value=value, allowed=f"a number in {unit} or text such as '1 {unit}'", **where)
+        allowed = f"a number in {unit} or text such as '1 {unit}'"
+        raise InputError("not a quantity", value=value, allowed=allowed, **where)
     if isinstance(value, str):
         number = _parse(value, unit, where)
     else:
@@ -55,7 +56,7 @@ def factor_to_si(text: str, unit: str, *, key: str | None = None, file: object =
 def _parse(text: str, unit: str, where: dict) -> float:
     import pint
 
-    registry = unit_registry()
+    registry: Any = unit_registry()
     example = f"a number in {unit}, or text such as '1 {unit}'"
     if len(text) > 100:
         raise InputError("not a quantity", value=text[:40] + "...", allowed=example, **where)
@@ -64,7 +65,8 @@ def _parse(text: str, unit: str, where: dict) -> float:
     except (pint.UndefinedUnitError, pint.DefinitionSyntaxError) as error:
         raise InputError(f"cannot read the quantity: {error}", value=text, allowed=example, **where) from None
     except Exception as error:  # pint's parser raises whatever its tokenizer raises on garbage
-        raise InputError(f"cannot read the quantity ({type(error).__name__})", value=text, allowed=example, **where) from None
+        what = f"cannot read the quantity ({type(error).__name__})"
+        raise InputError(what, value=text, allowed=example, **where) from None
     if quantity.unitless and unit not in ("1", ""):
         raise InputError("the unit is missing", value=text, allowed=example, hint=f"write '{text} {unit}'", **where)
     try:

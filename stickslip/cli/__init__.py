@@ -19,6 +19,9 @@ COMMANDS = {
     "simulate": "Simulate a scenario: trace, slip events, pictures.",
     "creep": "The static creep curve of a scenario's contacts, without inertia.",
     "new": "Write a commented scenario or campaign file to start from.",
+    "inspect": "Traces of a campaign, their events, what was mended or left out, and what they can tell.",
+    "fit": "Fit the static or the dynamic model to a campaign, and say where it fails.",
+    "diagnose": "Find the physical effect the model lacks, add it, and see the error on unseen runs fall.",
     "effects": "List the catalogue of effects, explain one, or print a model's equations.",
 }
 

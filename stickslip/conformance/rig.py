@@ -112,12 +112,15 @@ class Rig:
         )
         return Outcome(solution.ys, solution.stats["num_accepted_steps"])
 
-    def _replay(self, p: Array, times: Array, count: Array, tolerance: Array) -> Array:
+    def _replay(self, p: Array, times: Array, count: Array, tolerance: Array) -> tuple[Array, Array]:
         """Features of a run over given ``times`` (s), of which the first ``count`` + 1 are used.
 
         Readings at the steps nearest to the CREEP times and at the last (m), and the time at which the reading first
         passes SLIP (s). With the steps held, the features are as smooth in the parameters as the laws are; the
         derivative is the one that diffrax gives, which takes no derivative of the step sizes.
+
+        Also the number of steps whose Newton iteration did not end (a law with a kink at rest can do that); the
+        derivative of such a step is not that of what it computes.
         """
         model = self.model(p)
         args = model, model.shaped()
@@ -127,15 +130,17 @@ class Rig:
         start = model.rest()
 
         def body(k: Array, carry: Any) -> Any:
-            y, solver_state, seen = carry
+            y, solver_state, seen, failed = carry
             y, _, _, solver_state, _ = solver.step(_TERM, times[k], times[k + 1], y, args, solver_state, False)
-            return y, solver_state, seen.at[:, k].set(jnp.stack(_seen(model, times[k + 1], y)))
+            seen = seen.at[:, k].set(jnp.stack(_seen(model, times[k + 1], y)))
+            return y, solver_state, seen, failed + solver_state.failed
 
         blank = jnp.full((2, times.size - 1), jnp.inf)
-        carry = start, solver.init(_TERM, times[0], times[1], start, args), blank
-        _, _, (reading, v) = jax.lax.fori_loop(0, count, body, carry)
+        carry = start, solver.init(_TERM, times[0], times[1], start, args), blank, jnp.zeros(())
+        _, _, (reading, v), failed = jax.lax.fori_loop(0, count, body, carry)
         at = jnp.searchsorted(times[1:], CREEP)
-        return jnp.append(reading[jnp.append(at, count - 1)], _passes(times[1:], reading, v, SLIP))
+        features = jnp.append(reading[jnp.append(at, count - 1)], _passes(times[1:], reading, v, SLIP))
+        return features, jax.lax.stop_gradient(failed)
 
     def _march(self, p: Array, motions: Motion) -> list[Array]:
         model = self.model(p)

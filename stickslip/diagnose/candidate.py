@@ -122,7 +122,7 @@ def _try(effect, form, base, optimum, measurement, floor, train, threads, progre
         amplitude = k + next(i for i, f in enumerate(free) if f.amplitude)
         null = free[amplitude - k].inward(specs(effect)[effect.amplitude].null or 0.0)
         direction = (features - optimum.features) / (z[amplitude] - null)
-        share, cost, step = project.line(direction, optimum.features, z[amplitude] - null)
+        share, cost, step = project.line(direction)
         score = max(score, share)
         low, high = free[amplitude - k].bounds
         landing = float(np.clip(null + step, low + 1e-6, high - 1e-6))
@@ -197,14 +197,14 @@ class _Projection:
         )
         self.q, _ = np.linalg.qr(np.vstack([jac, np.diag(prior)]))
         self.pad = np.zeros(len(prior))
-        self.residual = self._clean(((r * self.weight)[valid]))
+        self.residual = self._clean((r * self.weight)[valid])
 
     def _clean(self, column: np.ndarray) -> np.ndarray:
         padded = np.concatenate([column, self.pad])
         return padded - self.q @ (self.q.T @ padded)
 
-    def line(self, direction: np.ndarray, features: np.ndarray, taken: float) -> tuple[float, float, float]:
-        """Share of the residual a direction explains, the cost left after ``taken`` of it, and the best step along it."""
+    def line(self, direction: np.ndarray) -> tuple[float, float, float]:
+        """Share of the residual a direction explains, the cost then left, and the best step along it."""
         d = self._clean(np.nan_to_num(direction * self.weight / self.floor)[self.valid])
         norm = float(d @ d)
         total = float(self.residual @ self.residual)
@@ -212,7 +212,6 @@ class _Projection:
             return 0.0, robust(self.residual), 0.0
         step = float(d @ self.residual) / norm
         share = step * step * norm / total
-        del features, taken
         return share, total * (1.0 - share), step
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -25,6 +25,7 @@ from ..trace import Trace
 from .candidate import Candidate, forms_of, try_effect
 from .heldout import HeldOut, held_out
 from .holdout import training_cycles
+from .pieces import candidate_arrays, candidate_from, fit_arrays, fit_from
 from .static_rung import static_features
 from .thresholds import THRESHOLDS, Thresholds
 from .verdict import Judged, Verdict, decide, is_complete, judge, worst_phase
@@ -35,10 +36,10 @@ MOST_CYCLES = 14
 class Store(Protocol):
     """Where finished pieces are kept, so that an interrupted diagnosis goes on."""
 
-    def load(self, key: str) -> object | None:
+    def load(self, key: str) -> Mapping[str, np.ndarray] | None:
         """A finished piece, or None."""
 
-    def save(self, key: str, piece: object) -> None:
+    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
         """Keep a finished piece."""
 
 
@@ -139,8 +140,8 @@ def diagnose(
         phase, worst = worst_phase(rung.train, rung.held)
         if not named and worst > limits.failed:
             verdict = Verdict(
-                "unknown", text=f"The base model could not be fitted ({phase} is off by {worst:.0f} floors), so no effect "
-                "was ranked. Look at `stickslip inspect` for units, missed events and the rig's values.",
+                "unknown", text=f"The base model could not be fitted ({phase} is off by {worst:.0f} floors), so no "
+                "effect was ranked. Look at `stickslip inspect` for units, missed events and the rig's values.",
             )  # fmt: skip
             break
         if len(named) >= max_effects:
@@ -199,16 +200,22 @@ def _base_fit(
     base: Composition, data: Measurement, floor: np.ndarray, train: np.ndarray, store: Store | None
 ) -> tuple[Composition, Fit]:
     kept = store.load("base") if store is not None else None
-    if isinstance(kept, Fit):
-        return base, kept
+    if kept is not None:
+        return base, fit_from(kept)
     found = fit(Problem(base, data), floor, use=train)
     if store is not None:
-        store.save("base", found)
+        store.save("base", fit_arrays(found))
     return base, found
 
 
 def _rung(
-    model: tuple[str, ...], added: str, composition: Composition, optimum: Fit, data: Measurement, floor: np.ndarray, train: np.ndarray
+    model: tuple[str, ...],
+    added: str,
+    composition: Composition,
+    optimum: Fit,
+    data: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
 ) -> Rung:
     unseen = np.asarray(data.cycles.used) & ~train
     shown = replace(data, valid=data.valid & (train & np.asarray(data.cycles.used))[..., None])
@@ -247,23 +254,21 @@ def _sweep(
     done: dict[str, Candidate] = {}
     for tag in tags:
         kept = store.load(f"round{number + 1}-{tag}") if store is not None else None
-        if isinstance(kept, Candidate):
-            done[tag] = kept
+        if kept is not None and rung.composition is not None:
+            done[tag] = candidate_from(kept, rung.composition, data, floor, train)
     open_tags = [t for t in tags if t not in done]
     pool = Parallel(n_jobs=jobs, return_as="generator_unordered") if jobs > 1 else None
     work = [(tag, forms_of(tag)[0]) for tag in open_tags]
     assert rung.composition is not None
     assert rung.fit is not None
     if pool is not None:
-        results = pool(
-            delayed(_one)(effect, rung.composition, rung.fit, data, floor, train) for _, effect in work
-        )
+        results = pool(delayed(_one)(effect, rung.composition, rung.fit, data, floor, train) for _, effect in work)
     else:
         results = (_one(effect, rung.composition, rung.fit, data, floor, train) for _, effect in work)
     for candidate in results:
         done[candidate.tag] = candidate
         if store is not None:
-            store.save(f"round{number + 1}-{candidate.tag}", candidate)
+            store.save(f"round{number + 1}-{candidate.tag}", candidate_arrays(candidate))
         tell(f"round {number + 1}: {candidate.tag} done", len(done) / max(len(tags), 1))
     return [done[t] for t in tags]
 

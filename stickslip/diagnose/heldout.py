@@ -29,7 +29,9 @@ class HeldOut:
     per_cycle: np.ndarray
 
 
-def held_out(problem: Problem, fit: Fit, floor: np.ndarray, cycles: np.ndarray, features: np.ndarray | None = None) -> HeldOut:
+def held_out(
+    problem: Problem, fit: Fit, floor: np.ndarray, cycles: np.ndarray, features: np.ndarray | None = None
+) -> HeldOut:
     """Evaluate a fit on ``cycles`` (R, n) with its event-wise factors there at their prior mean.
 
     In each cycle the two factors are then set to their most probable values, to first order.

@@ -25,10 +25,12 @@ def training_cycles(measurement: Measurement, holdout: Sequence[str] = ()) -> np
     train = used.copy()
     if holdout:
         for name in holdout:
-            short = [n for n in m.names if n == name or n == name.rsplit(".", 1)[0]]
-            if not short:
-                raise InputError("no run of this name to hold out", key="--holdout", value=name, hint=nearest(name, m.names))
-            train[m.names.index(short[0])] = False
+            found = [n for n in m.names if n == name or n == name.rsplit(".", 1)[0]]
+            if not found:
+                raise InputError(
+                    "no run of this name to hold out", key="--holdout", value=name, hint=nearest(name, m.names)
+                )
+            train[m.names.index(found[0])] = False
         if not train.any():
             raise InputError("every run is held out", key="--holdout", hint="leave runs to fit")
         return train
@@ -38,7 +40,7 @@ def training_cycles(measurement: Measurement, holdout: Sequence[str] = ()) -> np
     if speeds.size >= 3:
         middle = steady[np.argsort(m.velocities[steady])[steady.size // 2]]
         train[middle] = False
-    for r in np.flatnonzero(holds):
+    for r in np.flatnonzero(holds).tolist():
         at = np.flatnonzero(m.valid[r][:, m.layout.slices()["hold"]].any(axis=1))
         cut = (at[0] + at[-1] + 1) // 2 if at.size > 1 else max(int(used[r].sum() * 0.6), 1)
         train[r, max(cut, 1) :] = False

@@ -9,12 +9,14 @@ from ..features.measurement import Measurement
 from ..fit.inertial import HUBER, Fit
 
 
-def static_features(measurement: Measurement, floor: np.ndarray, base: Fit, stiffness: float, use: np.ndarray) -> np.ndarray:
+def static_features(
+    measurement: Measurement, floor: np.ndarray, base: Fit, stiffness: float, use: np.ndarray
+) -> np.ndarray:
     """Features of the best static model, SI, shape (R, n, F).
 
     Every creep curve is the virgin power-law backbone, aligned at its slip (Grzemba 2014): force F_s - c_s v s at the
-    time s before it. Its u_max and exponent are fitted to the creep of the cycles in ``use``; there is no slip, no ringing
-    and no relaxation in it, and each event needs the whole load anew.
+    time s before. Its u_max and exponent are fitted to the creep of the cycles in ``use``. It has no slip, no ringing
+    and no relaxation, and each event needs the whole load anew.
     """
     m, s = measurement, measurement.layout.slices()
     values = base.values

@@ -61,9 +61,7 @@ class Judged:
         return not self.failures
 
 
-def judge(
-    candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Thresholds = THRESHOLDS
-) -> Judged:
+def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Thresholds = THRESHOLDS) -> Judged:
     """Check one refitted candidate against the conditions for naming it."""
     fails = []
     assert candidate.fit is not None

@@ -72,6 +72,7 @@ class Contact(NamedTuple):
         stiffness: stiffness of every element (N/m), shape (n,).
         strength: cap of every element at full strength, psi = 1 (N), shape (n,).
         spring_force: force of the driving spring at the end of the last increment (N).
+        cap: cap of every element as it was last (N), shape (n,).
         mass: inertia of the block (kg).
     """
 
@@ -79,6 +80,7 @@ class Contact(NamedTuple):
     stiffness: Array
     strength: Array
     spring_force: Array
+    cap: Array
     mass: Array | float = 0.0
 
 

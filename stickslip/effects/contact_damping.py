@@ -10,7 +10,7 @@ from jax import Array
 from ..params import parameter
 from .base import BodyForce, Contact, Motion
 from .catalogue import register
-from .sliding import caps, element_forces, filled
+from .sliding import element_forces, filled
 
 
 @register
@@ -42,6 +42,6 @@ class ContactDamping(BodyForce):
     )
 
     def force(self, state: Any, motion: Motion, contact: Contact) -> Array:
-        cap = filled(caps(contact))
+        cap = filled(contact.cap)
         load = jnp.clip(element_forces(contact, motion, cap) / cap, -1.0, 1.0)
         return -self.time * motion.v * jnp.sum(contact.stiffness * (1.0 - load**2))

@@ -11,7 +11,7 @@ from ..contact import Bank
 from ..params import parameter
 from .base import Contact, Flow, Memory, Motion, Threshold
 from .catalogue import register
-from .sliding import caps, filled
+from .sliding import filled
 
 YOUNG = 7  # classes of age below that at which a junction reaches its cap; one more holds all older ones
 
@@ -20,7 +20,7 @@ class Junctions(NamedTuple):
     """The classes of age of every element, youngest first.
 
     Attributes:
-        spread: force (N) of each class less that of the element, shape (n, YOUNG + 1).
+        spread: force (N) of each class less that of the element, shape (YOUNG + 1, n).
         change: force (N) that renewal takes from the element within the increment (negative: gives), shape (n,).
         deficit: share of the cap that the element cannot reach because its junctions are not all at their cap, (n,).
     """
@@ -68,30 +68,29 @@ class ContactRenewal(Memory, Threshold, Flow):
 
     def start(self, bank: Bank) -> Junctions:
         zero = jnp.zeros_like(bank.stiffness)
-        return Junctions(jnp.zeros((bank.stiffness.size, YOUNG + 1)), zero, zero)
+        return Junctions(jnp.zeros((YOUNG + 1, bank.stiffness.size)), zero, zero)
 
     def advance(self, state: Junctions, motion: Motion, contact: Contact) -> Junctions:
         own = 1.0 - state.deficit
-        cap = filled(caps(contact, own) / filled(own))
+        cap = filled(contact.cap / filled(own))
         width = filled(contact.strength / filled(contact.stiffness)) / YOUNG  # of a young class, in age (m)
         weights, rates = _ages(width, self.rate)
+        first, middle, last = (_decay(rate * motion.path) for rate in rates)
         step = contact.stiffness * motion.dx
         plain = contact.force + step  # with no renewal
         capped = jnp.clip(plain, -cap, cap)
         before, after = jnp.zeros_like(step), jnp.zeros_like(step)  # the newborn
         offs = []
-        for j in range(YOUNG + 1):
-            force = contact.force + state.spread[:, j]
-            z = rates[j] * motion.path
-            gone, mean = -jnp.expm1(-z), _mean_decay(z)
+        for (gone, mean), spread in zip([first, *[middle] * (YOUNG - 1), last], state.spread, strict=True):
+            force = contact.force + spread
             # written as a difference, so that it vanishes exactly where the rate does
             renewed = -force * gone - step * (1.0 - mean) + after * (1.0 - mean) + before * (mean - 1.0 + gone)
-            other = jnp.clip(plain + (state.spread[:, j] + renewed), -cap, cap)
+            other = jnp.clip(plain + (spread + renewed), -cap, cap)
             offs.append(other - capped)
             before, after = force, other
-        off = jnp.stack(offs, axis=1)
-        change = jnp.sum(weights * off, axis=1)
-        return Junctions(off - change[:, None], -change, -change * capped / cap**2)
+        change = sum((weight * off for weight, off in zip(weights, offs, strict=True)), jnp.zeros_like(step))
+        spread = jnp.stack([off - change for off in offs])
+        return Junctions(spread, -change, -change * capped / cap**2)
 
     def strength(self, state: Junctions, motion: Motion, contact: Contact) -> Array:
         return 1.0 - state.deficit
@@ -100,21 +99,28 @@ class ContactRenewal(Memory, Threshold, Flow):
         return force - state.change
 
 
-def _ages(width: Array, rate: Array) -> tuple[Array, list[Array]]:
-    """Shares of the junctions in the classes (n, YOUNG + 1), and 1/(gap to the next younger class's mean age) (1/m)."""
+def _ages(width: Array, rate: Array) -> tuple[list[Array], tuple[Array, ...]]:
+    """Share of the junctions in each class (n,), and 1/(gap to the next younger class's mean age) (1/m).
+
+    The rates are those of the youngest, of the other young ones, and of the oldest class.
+    """
     x = width * rate
     small = x < 1e-2
     safe = jnp.where(small, 1.0, x)
     # mean age of a class after its youngest, in widths
     centre = jnp.where(small, 0.5 - x / 12.0 + x**3 / 720.0, 1.0 / safe - 1.0 / jnp.expm1(safe))
-    shares = [jnp.exp(-j * x) * -jnp.expm1(-x) for j in range(YOUNG)]
+    dies, survives = -jnp.expm1(-x), jnp.ones_like(x)
+    shares = []
+    for _ in range(YOUNG):
+        shares.append(survives * dies)
+        survives = survives * (1.0 - dies)
+    shares.append(survives)
     oldest = rate / (1.0 + x * (1.0 - centre))
-    rates = [1.0 / (width * centre), *[1.0 / width] * (YOUNG - 1), oldest]
-    return jnp.stack([*shares, jnp.exp(-YOUNG * x)], axis=1), rates
+    return shares, (1.0 / (width * centre), 1.0 / width, oldest)
 
 
-def _mean_decay(z: Array) -> Array:
-    """(1 - exp(-z))/z."""
+def _decay(z: Array) -> tuple[Array, Array]:
+    """1 - exp(-z), and the mean (1 - exp(-z))/z of exp over the increment."""
+    gone = -jnp.expm1(-z)
     small = z < 1e-4
-    safe = jnp.where(small, 1.0, z)
-    return jnp.where(small, 1.0 - 0.5 * z + z**2 / 6.0, -jnp.expm1(-safe) / safe)
+    return gone, jnp.where(small, 1.0 - 0.5 * z + z**2 / 6.0, gone / jnp.where(small, 1.0, z))

@@ -8,17 +8,6 @@ from jax import Array
 from .base import Contact, Motion
 
 
-def caps(contact: Contact, own: Array | float = 1.0) -> Array:
-    """Cap of every element (N) at the start of the increment.
-
-    Args:
-        contact: the bank.
-        own: factor of the asking effect, for a contact that only knows its full strength.
-    """
-    known = getattr(contact, "cap", None)
-    return contact.strength * own if known is None else known
-
-
 def filled(value: Array) -> Array:
     """``value`` with ones where it is zero: a divisor for elements that hold no spring."""
     return jnp.where(value > 0.0, value, 1.0)

@@ -9,7 +9,7 @@ from ..contact import Bank
 from ..params import parameter
 from .base import Contact, Memory, Motion, Threshold
 from .catalogue import register
-from .sliding import caps, slid
+from .sliding import slid
 
 
 @register
@@ -67,7 +67,7 @@ class SlipWeakening(Memory, Threshold):
         return jnp.zeros_like(bank.stiffness)
 
     def advance(self, state: Array, motion: Motion, contact: Contact) -> Array:
-        way = slid(contact, motion, caps(contact, self._factor(state)))
+        way = slid(contact, motion, contact.cap)
         return state * jnp.exp(-(motion.path - way) / self.recovery_distance) + way
 
     def strength(self, state: Array, motion: Motion, contact: Contact) -> Array:

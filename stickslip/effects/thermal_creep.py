@@ -11,7 +11,7 @@ from jax import Array
 from ..params import parameter
 from .base import Contact, Flow, Motion
 from .catalogue import register
-from .sliding import caps, filled
+from .sliding import filled
 
 
 @register
@@ -58,7 +58,7 @@ class ThermalCreep(Flow):
     )
 
     def flow(self, state: Any, motion: Motion, force: Array, contact: Contact) -> Array:
-        cap = filled(caps(contact))
+        cap = filled(contact.cap)
         scale = self.activation * cap
         y = jnp.clip(force / cap, -1.0, 1.0) / self.activation
         rate = 2.0 * self.velocity * jnp.exp(-1.0 / self.activation) * contact.stiffness / scale

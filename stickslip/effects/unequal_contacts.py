@@ -16,9 +16,9 @@ CONTACTS = 4
 
 @register
 class UnequalContacts(Geometry):
-    """The elements are dealt to four equally loaded contacts in turn, whose thresholds are stretched by exp(spread z_j).
+    """The elements are dealt in turn to four equally loaded contacts, whose thresholds are stretched by exp(spread z).
 
-    The z_j are normal scores of mean zero. The curve is even in the spread: no effect of first order at zero.
+    The z are normal scores of mean zero. The curve is even in the spread: no effect of first order at zero.
     """
 
     tag = "unequal-contacts"

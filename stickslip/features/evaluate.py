@@ -32,7 +32,7 @@ def features(curve: Curve, anchors: Anchors, layout: Layout) -> Any:
     xp = np if isinstance(anchors.start, (float, np.floating)) else jnp
     start, settling = anchors.start, layout.settling
     rest = curve.mean(xp.asarray([start + 1.15 * settling]), 0.3 * settling)[0]
-    peak_time, peak = curve.top
+    _, peak = curve.top
     size = peak - rest
     levels = xp.asarray((0.5, *LEVELS))
     times = curve.rise(rest + levels * size, start + settling)

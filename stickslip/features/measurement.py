@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -51,11 +52,10 @@ class Measurement:
     def take(self, runs: Sequence[int]) -> Measurement:
         """The measurement with these runs only."""
         i = np.asarray(runs, int)
-        pick = lambda tree: jax.tree.map(lambda a: a[i], tree)
         return Measurement(
             self.layout,
-            pick(self.cycles),
-            pick(self.anchors),
+            jax.tree.map(lambda a: a[i], self.cycles),
+            jax.tree.map(lambda a: a[i], self.anchors),
             self.values[i],
             self.valid[i],
             self.sensor[i],
@@ -98,11 +98,10 @@ def measure(
     width = max(len(r[1]) for r in rows)
     nodes = max(r[0][0].size for r in rows)
     cycles, anchors, values, valid, sensor = zip(*(_stack(r, width, nodes, layout) for r in rows), strict=True)
-    pile = lambda trees: jax.tree.map(lambda *a: np.stack(a), *trees)
     return Measurement(
         layout,
-        jax.tree.map(jnp.asarray, pile(cycles)),
-        jax.tree.map(jnp.asarray, pile(anchors)),
+        jax.tree.map(lambda *a: jnp.asarray(np.stack(a)), *cycles),
+        jax.tree.map(lambda *a: jnp.asarray(np.stack(a)), *anchors),
         np.stack(values),
         np.stack(valid),
         np.stack(sensor),
@@ -115,14 +114,15 @@ def measure(
 def _run(trace: Trace, found: Segmentation, layout: Layout, ring_period: float, most: int) -> tuple:
     """Nodes of the load point and one record for every cycle of a run."""
     assert trace.displacement is not None
+    assert trace.drive is not None
     t, y = trace.time, trace.displacement
-    times = np.concatenate([[trace.drive.times[0]], trace.drive.times[1:]])
-    nodes = (np.asarray(times, float), trace.drive.position(times))
+    nodes = (np.asarray(trace.drive.times, float), np.asarray(trace.drive.positions, float))
     width = 0.18 * ring_period
     events = found.events[:most]
     tops = []
     for e in events:
-        curve = SampledCurve(t[max(e.i_onset - 5, 0) : e.i_arrest + 60], y[max(e.i_onset - 5, 0) : e.i_arrest + 60], e.t_arrest, width)
+        near = slice(max(e.i_onset - 5, 0), e.i_arrest + 60)
+        curve = SampledCurve(t[near], y[near], e.t_arrest, width)
         tops.append(curve.top)
     begins = [(float(t[0]), float(y[0])), *tops]
     noise = float(trace.noise or 0.0)
@@ -135,7 +135,21 @@ def _run(trace: Trace, found: Segmentation, layout: Layout, ring_period: float, 
     return nodes, records, bool(trace.virgin), trace.spring_stiffness
 
 
-def _cycle(t, y, start, position, stop, found, n, layout, ring_period, width, noise, count, trace) -> dict:
+def _cycle(
+    t: np.ndarray,
+    y: np.ndarray,
+    start: float,
+    position: float,
+    stop: float,
+    found: Segmentation,
+    n: int,
+    layout: Layout,
+    ring_period: float,
+    width: float,
+    noise: float,
+    count: float,
+    trace: Trace,
+) -> dict[str, Any]:
     """Anchors, features, validity and sensor noise of the cycle that ends with event ``n``."""
     event = found.events[n]
     a = max(int(np.searchsorted(t, start)) - 2, 0)
@@ -170,7 +184,7 @@ def _cycle(t, y, start, position, stop, found, n, layout, ring_period, width, no
     if short.any():
         valid[s["ring"]] = False
     valid &= np.isfinite(values)
-    sensor = _sensor_noise(curve, values, anchors, layout, noise, count, 1.0 / np.median(np.diff(t)))
+    sensor = _sensor_noise(values, anchors, layout, noise, count, 1.0 / np.median(np.diff(t)))
     return {
         "start": start,
         "position": position,
@@ -184,7 +198,9 @@ def _cycle(t, y, start, position, stop, found, n, layout, ring_period, width, no
     }
 
 
-def _sensor_noise(curve, values, anchors, layout, noise, count, rate) -> np.ndarray:
+def _sensor_noise(
+    values: np.ndarray, anchors: Anchors, layout: Layout, noise: float, count: float, rate: float
+) -> np.ndarray:
     """Standard deviation of every feature that comes from the sensor alone (SI)."""
     s = layout.slices()
     out = np.zeros(layout.size)
@@ -239,5 +255,8 @@ def _stack(run: tuple, width: int, nodes: int, layout: Layout) -> tuple:
     )
     filler = jax.tree.map(lambda a: np.asarray(a), records[-1]["anchors"])
     anchors = jax.tree.map(lambda *a: np.stack(a), *[r["anchors"] for r in records], *[filler] * pad)
-    rows = lambda key: np.stack([r[key] for r in records] + [np.zeros(layout.size)] * pad)
+
+    def rows(key: str) -> np.ndarray:
+        return np.stack([r[key] for r in records] + [np.zeros(layout.size)] * pad)
+
     return cycles, anchors, rows("values"), rows("valid") > 0, np.maximum(rows("sensor"), 1e-15)

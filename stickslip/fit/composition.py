@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import equinox as eqx
@@ -40,11 +41,12 @@ class Composition:
 
     def outward(self, z: Array) -> dict[str, Array]:
         """Search scale -> SI, traceable."""
-        return {
-            f.name: jnp.exp(z[i]) if f.scale == "log" else z[i] * f.scale for i, f in enumerate(self.free)
-        } | {k: jnp.asarray(v) for k, v in self.fixed.items()}
+        fixed = {name: jnp.asarray(value) for name, value in self.fixed.items()}
+        return fixed | {
+            f.name: jnp.exp(v) if f.scale == "log" else v * float(f.scale) for f, v in zip(self.free, z, strict=True)
+        }
 
-    def model(self, z: Array, event: Array, nodes: tuple[Array, Array], stiffness: Array) -> Model:
+    def model(self, z: Array, event: Array, nodes: Any, stiffness: Array) -> Model:
         """The model of one cycle.
 
         Args:
@@ -77,7 +79,7 @@ class Composition:
     def _set(self, effect: Effect, values: dict[str, Array]) -> Effect:
         mine = {k.split(".", 1)[1]: v for k, v in values.items() if k.split(".", 1)[0] == effect.tag}
         for name, value in mine.items():
-            effect = eqx.tree_at(lambda e, name=name: getattr(e, name), effect, value)
+            effect = eqx.tree_at(attrgetter(name), effect, value)
         return effect
 
     def with_effect(self, effect: Effect, free: Sequence[Free]) -> Composition:
@@ -93,5 +95,7 @@ class Composition:
             self.bins,
             tuple((f.name, f.scale) for f in self.free),
             tuple(sorted(self.fixed)),
-            tuple((type(e), tuple(sorted((k, v) for k, v in vars(e).items() if isinstance(v, str)))) for e in self.effects),
+            tuple(
+                (type(e), tuple(sorted((k, v) for k, v in vars(e).items() if isinstance(v, str)))) for e in self.effects
+            ),
         )

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..segment import Dropped, Event, Segmentation, block_motion, position_at, velocity
-from ..segment.kinematics import half_window
+from ..segment.kinematics import half_window, velocity_noise
 from ..trace import Trace
 
 Array = NDArray[np.float64]
 V_LIM = 1e-6  # m/s, where the paper ends the comparison
 RINGING = 0.25  # s after an arrest that are left out, or this share of a stick that is shorter
 SHARE = 0.3
+LONGEST = 0.05  # share of a stick that the window of a velocity may take to either side
 LEAST_NOISE = 12.0  # creep smaller than this many noise levels of a mean is not fitted
 POINTS = 160
 Sampling = Literal["log", "uniform"]
@@ -77,7 +78,12 @@ def creep_processes(
         return [], [Dropped("creep processes", len(segmentation.events), trace.name, why)]
     noise = segmentation.settings.noise
     step = 1.0 / trace.sampling_rate
-    half = half_window(noise, step, v_lim / 10.0, max(trace.time.size // 50, 1))
+    sticks = [e.stick_time for e in segmentation.events if np.isfinite(e.stick_time)] or [trace.duration]
+    most = max(int(LONGEST * float(np.median(sticks)) / step), 1)
+    half = half_window(noise, step, v_lim / 10.0, most)
+    if velocity_noise(noise, half, step) > 0.5 * v_lim:
+        why = f"v_lim = {v_lim:.3g} m/s cannot be seen: {noise:.2g} m of noise at {trace.sampling_rate:.3g} Hz hide it"
+        return [], [Dropped("creep processes", len(segmentation.events), trace.name, why)]
     kept, dropped = [], []
     for event in segmentation.events:
         outcome = _process(trace, segmentation, event, position, noise, half, v_lim, points, sampling)
@@ -122,7 +128,9 @@ def _process(
     share = (v_lim - speeds[i]) / max(speeds[i + 1] - speeds[i], 1e-300)
     moment = float(time[low + i] + np.clip(share, 0.0, 1.0) * (time[low + i + 1] - time[low + i]))
     there = position_at(time, position, moment, max(half, 2))
-    t, u, n = _windows(time[low : low + i + 1] - moment, event.direction * (position[low : low + i + 1] - there), points, sampling)
+    t, u, n = _windows(
+        time[low : low + i + 1] - moment, event.direction * (position[low : low + i + 1] - there), points, sampling
+    )
     spread = noise / np.sqrt(n)
     amplitude = float(np.ptp(u))
     if amplitude < LEAST_NOISE * float(np.median(spread)):

@@ -204,7 +204,8 @@ def fit(
         def residual(x: np.ndarray, factor: float = factor) -> np.ndarray:
             r = res.residual(x, factor)
             if progress is not None:
-                progress(f"floors x{factor:g}, evaluation {res.evaluations} ({res.jacobians} Jacobians), cost {robust(r):.1f}")
+                done = f"evaluation {res.evaluations} ({res.jacobians} Jacobians)"
+                progress(f"floors x{factor:g}, {done}, cost {robust(r):.1f}")
             return r
 
         if not np.all(np.isfinite(residual(x))):

@@ -89,9 +89,7 @@ def effect_parameters(effect: Effect, amplitude: float | None = None) -> list[Fr
         if scale == "log" and default <= 0:
             start = float(np.sqrt(lower * upper))
         out.append(
-            Free(
-                f"{effect.tag}.{name}", spec.unit, scale, start, start, width, lower, upper, spec.doc, is_amplitude
-            )
+            Free(f"{effect.tag}.{name}", spec.unit, scale, start, start, width, lower, upper, spec.doc, is_amplitude)
         )
     return out
 

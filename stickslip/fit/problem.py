@@ -1,9 +1,9 @@
 """Features of all runs for a vector of parameters, and their Jacobian.
 
-The Jacobian is taken by differences over steps of two per cent. An exact forward-mode derivative of an adaptive integration is exact for the discrete
-solution, which has a fine saw-tooth where kinks of the contact cross the borders of steps: its slope is not the slope of the
-curve it follows. (Measured in docs/verification: the exact derivative of the second event's time is wrong in sign at
-the tolerance used here, and right to four digits with small fixed steps.)
+The Jacobian is taken by differences over steps of two per cent. A forward-mode derivative of an adaptive integration is
+exact for the discrete solution, which has a fine saw-tooth where kinks of the contact cross the borders of steps: its
+slope is not the slope of the curve it follows. (Measured, docs/verification: that of the second event's time is wrong
+in sign at the tolerance used here; with small fixed steps it is right to four digits.)
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class Problem:
         self.composition, self.measurement, self.threads = composition, measurement, threads
         self.tolerance = Tolerance(5e-3, 2e-11, 2e-7) if tolerance is None else tolerance
         self.runs_done = 0
-        take = lambda tree, r: jax.tree.map(lambda a: a[r], tree)
-        self._data = [(take(measurement.cycles, r), take(measurement.anchors, r)) for r in range(measurement.runs)]
+        both = (measurement.cycles, measurement.anchors)
+        self._data = [jax.tree.map(lambda a, r=r: a[r], both) for r in range(measurement.runs)]
 
     def features(self, z: np.ndarray, events: np.ndarray) -> np.ndarray:
         """Features of the model, shape (R, n, F)."""

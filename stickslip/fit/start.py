@@ -18,6 +18,7 @@ from .parameters import Free
 
 SHAPE = 3.3  # exponent of the backbone of a self-affine line with H about 0.3
 BINS = 96
+DAMPING_SHARE = 0.017  # of the critical damping of the contact resonance
 FALLBACK_FREQUENCY = 500.0  # Hz, contact resonance of the paper's rig
 
 
@@ -82,7 +83,9 @@ def base_composition(
     mass, _, _, _, _ = _known(rig.mass, np.nan, 0.0)
     if not np.isfinite(mass):
         raise InputError(
-            "the dynamic model needs the mass of the block", key="rig.mass", hint='write mass = "0.0894 kg", or weigh it'
+            "the dynamic model needs the mass of the block",
+            key="rig.mass",
+            hint='write mass = "0.0894 kg", or weigh it',
         )
     contacts = int(rig.contacts or 1)
     period = float(np.asarray(m.anchors.ring_period).flat[0]) if ring is None else ring
@@ -107,16 +110,26 @@ def base_composition(
     drop = float(np.clip(0.55 * stiffness * size / strength, 0.02, 0.8))
     u_max = SHAPE * strength / (mass * (2 * np.pi / period) ** 2)
 
-    def log(name: str, unit: str, start: float, width: float, lower: float, upper: float, doc: str, prior: float | None = None) -> Free:
+    def log(
+        name: str,
+        unit: str,
+        start: float,
+        width: float,
+        lower: float,
+        upper: float,
+        doc: str,
+        prior: float | None = None,
+    ) -> Free:
         start = float(np.clip(start, lower * 1.001, upper * 0.999))
         return Free(name, unit, "log", start, start if prior is None else prior, width, lower, upper, doc)
 
     free = [
-        log("contact.strength", "N", strength, max(friction_width, 0.1), nominal / 4, nominal * 4, "friction force of all contacts at full strength", nominal),
+        log("contact.strength", "N", strength, max(friction_width, 0.1), nominal / 4, nominal * 4,
+            "friction force of all contacts at full strength", nominal),
         log("weakening.drop", "1", drop, 0.7, 0.003, 0.95, "1 - kinetic over static friction"),
         log("weakening.slip_distance", "m", 1e-6, 1.0, 1e-8, 1e-4, "slip over which strength is lost"),
         log("weakening.healing_time", "s", 0.01, 1.2, 1e-4, 10.0, "time over which strength returns"),
-        log("rig.damping", "N s/m", 0.017 * 2 * mass * 2 * np.pi / period, 1.0, 0.005, 500.0, "viscous damping of the block"),
+        log("rig.damping", "N s/m", DAMPING_SHARE * 4 * np.pi * mass / period, 1.0, 0.005, 500.0, "viscous damping"),
         log("contact.u_max", "m", u_max, 0.5, u_max / 30, u_max * 30, "displacement at which the last element slides"),
         log("contact.p", "1", SHAPE, 0.2, 1.2, 9.0, "exponent of the backbone"),
         log("contact.spread", "1", 0.15, 0.6, 0.01, 0.8, "rms of ln(u_max) over the contacts"),
@@ -126,6 +139,7 @@ def base_composition(
         fixed = {}
         prior = rig.spring_stiffness.guess if isinstance(rig.spring_stiffness, Unmeasured) else stiffness
         free.append(
-            log("rig.spring_stiffness", "N/m", stiffness, stiffness_width, low or stiffness / 10, high or stiffness * 10, "driving spring", prior)
+            log("rig.spring_stiffness", "N/m", stiffness, stiffness_width, low or stiffness / 10,
+                high or stiffness * 10, "stiffness of the driving spring", prior)
         )  # fmt: skip
     return Composition(mass, contacts, bins, tuple(free), fixed)

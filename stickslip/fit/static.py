@@ -197,3 +197,27 @@ def _matching(
         ratio = process.amplitude / max(float(np.ptp(model)), 1e-15)
         at = float(np.clip(at + np.clip((1 + hurst) * np.log(ratio), -1.0, 1.0), bounds[0] + 0.01, bounds[1] - 0.01))
     return at
+
+
+def tied_quantities(fit: CreepFit, rig: StaticRig) -> str:
+    """Which of h_rms, L, F_n and E* a creep curve fixes, in words, from the derivatives of the curve at a fit.
+
+    The curve at given shares of full friction is differentiated in the logarithms of the four; singular values tell
+    how many numbers the curve contains of them.
+    """
+    table = static_table(rig.n_springs, rig.lines, rig.seed)
+    q, step = rig.crowding(fit.h_rms), 0.05
+
+    def log_curve(height: float, crowding: float) -> Array:
+        return np.log(height * table.shape(fit.hurst, crowding)[20:])
+
+    # L, F_n and E* act through q alone; h_rms through q and as the scale
+    dq = (log_curve(1.0, q * np.exp(step)) - log_curve(1.0, q * np.exp(-step))) / (2 * step)
+    columns = np.stack([1.0 - dq, -dq, dq, -dq], axis=1)
+    s = np.linalg.svd(columns, compute_uv=False)
+    numbers = int(np.count_nonzero(s > 0.05 * s[0]))
+    power = float(np.mean(dq))
+    law = f"u_max ~ h_rms^{1 - power:.2f} (F_n / (E* L))^{power:.2f}"
+    if numbers == 1:
+        return f"h_rms, L, F_n and E* act only together: of the four the curve holds one number, {law}"
+    return f"of h_rms, L, F_n and E* the curve holds {numbers} numbers, the first of them {law}"

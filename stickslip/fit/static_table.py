@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,44 @@ class StaticRig:
     seed: int = 0
     moduli: Moduli | None = None
     guessed: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, rig: Any, *, spring_stiffness: float | None = None) -> StaticRig:
+        """From what a campaign says of a rig (attributes as in its ``[rig]``; where nobody measured, the guess).
+
+        Args:
+            spring_stiffness: of the run, N/m, instead of the rig's.
+
+        Raises:
+            InputError: a quantity the static model needs is neither measured nor guessed.
+        """
+        guessed: list[str] = []
+
+        def known(name: str, unit: str, default: float | None = None) -> float:
+            value = getattr(rig, name, None)
+            if hasattr(value, "guess"):
+                guessed.append(name)
+                return float(value.guess)
+            if value is None and default is None:
+                raise InputError(
+                    f"the static model needs '{name}'",
+                    key=f"rig.{name}",
+                    hint=f'write  {name} = "... {unit}"  or a guess: {{ guess = "...", lower = "...", upper = "..." }}',
+                )
+            return float(default if value is None else value)
+
+        stiffness = spring_stiffness or known("spring_stiffness", "N/m")
+        steel = (known("youngs_modulus", "Pa", 210e9), known("poisson_ratio", "1", 0.3))
+        return cls(
+            known("normal_force", "N"),
+            known("friction_coefficient", ""),
+            int(rig.contacts or 1),
+            stiffness,
+            known("line_length", "m", 20e-6),
+            int(rig.springs or 4096),
+            moduli=equal_bodies(*steel),
+            guessed=tuple(guessed),
+        )
 
     @property
     def elastic(self) -> Moduli:

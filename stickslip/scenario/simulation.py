@@ -188,7 +188,7 @@ def _recording(
     sampled = {
         "time": (t, "s", "time"),
         "displacement": (at.x, "m", "displacement of the block"),
-        "velocity": (_velocity(trajectory, t), "m/s", "velocity of the block"),
+        "velocity": (at.v, "m/s", "velocity of the block"),
         "spring_force": (_spring_force(setup, t, at.x), "N", "pull of the driving spring"),
         "contact_force": (at.contact_force, "N", "tangential force of all contacts"),
         "psi": (at.psi, "1", "weakening state, 1 rested, 0 fully weakened"),
@@ -219,16 +219,6 @@ def _spring_force(setup: Setup, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 @eqx.filter_jit
 def _pulls(model: Model, t: Array, x: Array) -> Array:
     return jax.vmap(lambda t, x: model.pull(model.lead(t) - x))(t, x)
-
-
-def _velocity(trajectory: Trajectory, t: np.ndarray) -> np.ndarray:
-    """Derivative of the cubic through the steps (m/s): between the ends of long steps a straight line has edges."""
-    s = trajectory.steps
-    i = np.clip(np.searchsorted(s.t, t, side="right") - 1, 0, s.t.size - 2)
-    h = s.t[i + 1] - s.t[i]
-    w = np.clip((t - s.t[i]) / h, 0.0, 1.0)
-    mean = (s.x[i + 1] - s.x[i]) / h
-    return 6.0 * w * (1.0 - w) * mean + (1.0 - w) * (1.0 - 3.0 * w) * s.v[i] + w * (3.0 * w - 2.0) * s.v[i + 1]
 
 
 def _reading(scenario: Scenario, trajectory: Trajectory, events: Events, t: np.ndarray) -> np.ndarray:

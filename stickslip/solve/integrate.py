@@ -61,6 +61,9 @@ def observe(t: Any, y: State, args: tuple[Model, Bank]) -> Steps:
     )
 
 
+_observe_once = eqx.filter_jit(observe)
+
+
 def _leaves(t: Any, y: State, args: Any) -> list[jax.Array]:
     """The state as a flat list: diffrax cannot buffer a tree with an empty tuple in it."""
     return jax.tree.leaves(y)
@@ -133,7 +136,7 @@ def integrate(
     bank = model.shaped()
     state = model.rest(t0) if state is None else state
     kinks = sorted({float(s) for s in stops if t0 < s < t1} | {float(t1)})
-    pieces = [jax.tree.map(lambda a: np.asarray(a)[None], observe(jnp.asarray(float(t0)), state, (model, bank)))]
+    pieces = [jax.tree.map(lambda a: np.asarray(a)[None], _observe_once(jnp.asarray(float(t0)), state, (model, bank)))]
     accepted = rejected = 0
     now, dt, carried = float(t0), 1e-5, None
     for stop in kinks:

@@ -3,9 +3,9 @@
 A vector field with kinks handed to a stock solver is an invalid input: the kinks lie wherever an element starts or
 stops to slide. Here a step is an increment, as in finite elements: position and velocity follow TR-BDF2 (Bank et al.
 1985; L-stable, second order, third-order error estimate of Hosea & Shampine 1996), while contact and effects are
-taken by their own exact or implicit update from the start of the step to each of its two stages. Each stage is one scalar
-equation in the velocity, solved by Newton's method. A reversal inside the step is a turning point of the path, so
-hysteresis is kept without landing on it.
+taken by their own exact or implicit update from the start of the step to each of its two stages. Each stage is a
+scalar equation in the velocity, solved by Newton's method. A reversal inside the step is a turning point of its
+path, so hysteresis is kept without landing on it.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ E0, E1, E2 = (1.0 - W) / 3.0 - W, (3.0 * W + 1.0) / 3.0 - W, D / 3.0 - D
 class HermiteInterpolation(diffrax.AbstractLocalInterpolation):
     """Cubic in the displacement, its derivative in the velocity, linear in the rest."""
 
-    t0: Array
-    t1: Array
+    t0: Any  # type: ignore[misc]  # diffrax declares both as class variables
+    t1: Any  # type: ignore[misc]
     y0: State
     y1: State
 
@@ -60,7 +60,7 @@ def hermite(s: Array, h: Array, dx: Array, v0: Array, v1: Array) -> Array:
 class Tolerance(eqx.Module):
     """What the error of a step is measured against: the scale of the contact, not of the travel.
 
-    Creep moves picometres a step where the contact is stiff; a tolerance relative to the travelled distance sees nothing.
+    Creep moves picometres a step where the contact is stiff; a tolerance relative to the travel sees nothing.
 
     Attributes:
         relative: share of the step's own increment and of its velocity.
@@ -68,9 +68,9 @@ class Tolerance(eqx.Module):
         velocity: absolute part (m/s).
     """
 
-    relative: Array = eqx.field(default=3e-3, converter=jnp.asarray)
-    displacement: Array = eqx.field(default=3e-12, converter=jnp.asarray)
-    velocity: Array = eqx.field(default=3e-8, converter=jnp.asarray)
+    relative: Any = eqx.field(default=3e-3, converter=jnp.asarray)
+    displacement: Any = eqx.field(default=3e-12, converter=jnp.asarray)
+    velocity: Any = eqx.field(default=3e-8, converter=jnp.asarray)
 
 
 class Step(eqx.Module):
@@ -115,7 +115,7 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
 
     def step(
         self, terms: Any, t0: Any, t1: Any, y0: State, args: tuple[Model, Bank], solver_state: Step, made_jump: Any
-    ) -> tuple[State, State, dict, Step, diffrax.RESULTS]:
+    ) -> tuple[State, State, dict, Step, Any]:
         model, bank = args
         h = t1 - t0
         a0, v0 = solver_state.acceleration, y0.v
@@ -132,7 +132,7 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
             return v, (v - known_v) / dh, state, forces, motion, slope, converged
 
         tg = t0 + GAMMA * h
-        v1, a1, _, f1, m1, _, ok1 = stage(tg, GAMMA * h, dh * v0, v0 + dh * a0, v0)
+        v1, a1, _, f1, _, _, ok1 = stage(tg, GAMMA * h, dh * v0, v0 + dh * a0, v0)
         wh = W * h
         v2, a2, y1, f2, m2, slope, ok2 = stage(t1, h, wh * (v0 + v1), v0 + wh * (a0 + a1), v1)
 
@@ -145,7 +145,9 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
         ok = ok1 & ok2
         error = jax.tree.map(jnp.zeros_like, y0)
         error = eqx.tree_at(
-            lambda y: (y.x, y.v), error, (
+            lambda y: (y.x, y.v),
+            error,
+            (
                 jnp.where(ok, ex / sx, jnp.inf),
                 jnp.where(ok, ev / sv, jnp.inf),
             ),
@@ -218,6 +220,8 @@ def _root_jvp(most: int, primals: tuple, tangents: tuple) -> tuple:
     """Implicit function theorem; the slope only serves the error estimate and carries no derivative."""
     problem, guess, exact = primals
     v, slope, converged = _root(problem, guess, exact, most)
+    # Newton's own slope belongs to the point before its last step
+    _, tangent = jax.jvp(lambda v: _increment(v, *problem)[0], (v,), (jnp.ones(()),))
     _, change = jax.jvp(lambda *p: _increment(v, *p)[0], problem, tangents[0])
     zero = np.zeros((), jax.dtypes.float0)
-    return (v, slope, converged), (-change / slope, jnp.zeros_like(slope), zero)
+    return (v, slope, converged), (-change / tangent, jnp.zeros_like(slope), zero)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,19 +17,19 @@ class Steps(NamedTuple):
     damping; given by effects' forces; stored, kinetic energy included).
     """
 
-    t: np.ndarray
-    x: np.ndarray
-    v: np.ndarray
-    reading: np.ndarray
-    spring_force: np.ndarray
-    contact_force: np.ndarray
-    psi: np.ndarray
-    sliding: np.ndarray
-    spring_work: np.ndarray
-    friction_work: np.ndarray
-    viscous_work: np.ndarray
-    body_work: np.ndarray
-    stored: np.ndarray
+    t: Any
+    x: Any
+    v: Any
+    reading: Any
+    spring_force: Any
+    contact_force: Any
+    psi: Any
+    sliding: Any
+    spring_work: Any
+    friction_work: Any
+    viscous_work: Any
+    body_work: Any
+    stored: Any
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,8 @@ class Trajectory:
     stats: Stats
 
     def at(self, t: np.ndarray) -> Steps:
-        """Everything at the times ``t`` (s), shape (m,): cubic in the displacement, linear in the rest."""
+        """Everything at the times ``t`` (s), shape (m,): cubic in the displacement, its derivative in the velocity
+        (between the ends of long steps a straight line would have edges), linear in the rest."""
         s = self.steps
         t = np.clip(np.asarray(t, float), s.t[0], s.t[-1])
         i = np.clip(np.searchsorted(s.t, t, side="right") - 1, 0, max(s.t.size - 2, 0))
@@ -69,7 +70,9 @@ class Trajectory:
         w = (t - s.t[i]) / h
         linear = Steps(*(f[i] + w * (f[i + 1] - f[i]) for f in s))
         bend = s.x[i] + hermite(w, h, s.x[i + 1] - s.x[i], s.v[i], s.v[i + 1]) - linear.x
-        return linear._replace(t=t, x=linear.x + bend, reading=linear.reading + bend)
+        mean = (s.x[i + 1] - s.x[i]) / h
+        v = 6.0 * w * (1.0 - w) * mean + (1.0 - w) * (1.0 - 3.0 * w) * s.v[i] + w * (3.0 * w - 2.0) * s.v[i + 1]
+        return linear._replace(t=t, x=linear.x + bend, v=v, reading=linear.reading + bend)
 
 
 def energy_error(s: Steps) -> float:
@@ -77,5 +80,3 @@ def energy_error(s: Steps) -> float:
     gap = (s.spring_work + s.body_work) - (s.stored - s.stored[0]) - s.friction_work - s.viscous_work
     scale = np.max(np.abs(s.spring_work)) + np.max(np.abs(s.stored))
     return float(np.max(np.abs(gap)) / scale) if scale > 0 else 0.0
-
-

@@ -104,7 +104,7 @@ def test_return_map_of_a_bank_with_odd_length() -> None:
 def test_kick_takes_the_rate_of_the_cap_it_slides_at(sign: float) -> None:
     """m (v+ - v-)/h = -sign mu f_n g(|v|) with v the mean of both."""
     eff, state = effect(DIRECT_A=0.05, DIRECT_V=1e-6, DIRECT_FORM=0.0), np.zeros(S.STATE_SIZE)
-    normal, k = np.array([0.3, 0.4]), np.array([1e4, 1e4])
+    normal, k = np.array([0.3, 0.4]), np.array([1e6, 1e6])
     f, g = np.zeros((4, 2)), np.zeros((4, 2))
     f[0] = sign * 0.2 * normal
     h, v_in = 1e-5, sign * 1e-3

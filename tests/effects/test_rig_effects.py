@@ -218,7 +218,7 @@ def test_tilt_takes_the_force_at_the_end_of_a_step(by: str, n: int) -> None:
     for x in 0.8e-6 * (np.arange(1, n + 1) / n) ** 2:
         force = equilibrium(x)
         step = motion(1e-3, x, 1e-6, x - before)._replace(load_point=jnp.asarray(x + force / 1000.0))
-        contact = Contact(state.force, bank.stiffness, bank.strength, jnp.asarray(pull), jnp.asarray(0.1))
+        contact = Contact(state.force, bank.stiffness, bank.strength, jnp.asarray(pull), state.cap, jnp.asarray(0.1))
         state, forces = model.advance(state, bank, contact, step)
         assert float(forces.contact) == pytest.approx(force, rel=1e-10)
         before, pull = x, force

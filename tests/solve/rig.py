@@ -17,7 +17,7 @@ U_MAX = 0.95e-6  # m
 P = 3.2
 MASS = 0.0894  # kg
 FAR = 1e6  # s; nodes of the load point out of reach, so that all drives have the same shape and compile once
-NODES = 4
+NODES = 5
 
 DEFAULT = Tolerance()
 
@@ -119,7 +119,9 @@ def slips(t: np.ndarray, x: np.ndarray, v: np.ndarray, threshold: float = 5e-4) 
         if not under.size:
             break
         b = a + under[0]
-        found.append((_cross(t, v, a, threshold), _cross(t, v, b, 0.0), x[a], x[b], v[a:b].max()))
+        onset, arrest = _cross(t, v, a, threshold), _cross(t, v, b, 0.0)
+        begin, end = np.interp([onset, arrest], t, x)
+        found.append((onset, arrest, begin, end, v[a:b].max()))
         i = b
     return Slips(*(np.array(f) for f in zip(*found, strict=True))) if found else Slips(*(np.zeros(0),) * 5)
 

@@ -36,7 +36,7 @@ def free_ringing(model: Model, velocity: float, duration: float, tolerance: Tole
 
 def undriven(spring_stiffness: float = 1000.0, **options: float):  # type: ignore[no-untyped-def]
     return rig(
-        springs=fine_start_bank(400, 2.0), load_point=drive((FAR, 0.0)), damping=0.0, ratio=1.0,
+        springs=fine_start_bank(4000), load_point=drive((FAR, 0.0)), damping=0.0, ratio=1.0,
         spring_stiffness=spring_stiffness, **options,
     )  # fmt: skip
 

@@ -6,11 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.contact import arrest, reload_displacement
 from stickslip.model import Model
 from stickslip.solve import Tolerance, Trajectory, integrate
 
-from .rig import MASS, STRENGTH, Slips, already_creeping, bank, rig, sliding, slips, tighter
+from .rig import MASS, STRENGTH, Slips, bank, rig, sliding, slips, tighter
 
 DROP = 0.15 * STRENGTH  # N, static minus kinetic friction
 
@@ -50,7 +49,6 @@ def classical(spring_stiffness: float, damping: float) -> Classical:
 
 def growth(velocity: float, damping: float = 0.5, duration: float = 0.5) -> float:
     """Rate (1/s) at which a small oscillation about steady sliding grows."""
-    # one element: while all slide, their number is of no account
     model = rig(velocity, damping=damping)
     trajectory, _ = integrate(model, duration, state=sliding(model, velocity, 1e-3), tolerance=tighter(100.0))
     s = trajectory.steps
@@ -73,10 +71,21 @@ def critical_velocity(damping: float = 0.5, d_c: float = 1e-6, t_h: float = 0.02
     return float(high)
 
 
-def creep_after(trajectory: Trajectory, share: float, begin: float, end: float) -> float:
-    """Displacement (m) at which the spring's force comes to ``share`` of full friction between two times (s)."""
-    s = trajectory.steps
-    inside = (s.t > begin) & (s.t < end)
-    over = int(np.argmax(s.spring_force[inside] > share * STRENGTH))
-    x, f = s.x[inside], s.spring_force[inside]
-    return float(np.interp(share * STRENGTH, f[over - 1 : over + 1], x[over - 1 : over + 1]))
+def creep_to(made: Run, speed: float) -> list[float]:
+    """Creep (m) of every stick phase up to the last time before the slip at which it is as slow as ``speed`` (m/s).
+
+    It is counted from where the block comes to rest, ringing averaged out and the drive's motion since then taken off.
+    """
+    s, e = made.trajectory.steps, made.events
+    tangent = float(bank().total_stiffness)
+    found = []
+    for i, onset in enumerate(e.onset):
+        last = np.flatnonzero((s.t < onset) & (s.v < speed))[-1]
+        rest = 0.0
+        if i > 0:
+            arrest = e.arrest[i - 1]
+            stick = made.trajectory.at(arrest + np.linspace(0.3, 0.6, 3000) * (onset - arrest))
+            loaded = stick.spring_force.mean() - np.interp(arrest, s.t, s.spring_force)
+            rest = stick.x.mean() - loaded / tangent
+        found.append(float(s.x[last] - rest))
+    return found

@@ -1,0 +1,282 @@
+"""The steps of ``stickslip fit --model inertial``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..campaign import Campaign
+from ..diagnose.candidate import forms_of, try_effect
+from ..diagnose.heldout import held_out
+from ..diagnose.static_rung import static_features
+from ..effects import catalogue
+from ..effects.equations import equations
+from ..errors import FitError, InputError, nearest
+from ..features.layout import PHASES
+from ..features.measurement import Measurement, measure
+from ..fit.composition import Composition
+from ..fit.inertial import STAGES, Fit, fit
+from ..fit.problem import Problem
+from ..fit.start import base_composition, ring_period
+from ..report import describe_trace, trace_pieces
+from ..report.inertial_result import effective, identifiability, misfit_part, overlay, parameters, residual_arrays
+from ..residual import floors, misfit
+from ..segment import Segmentation, block_motion
+from ..trace import Trace
+from ..uncertainty import profile
+from .working import Tell, working
+
+REFIT = ((2.5, 4), (1.0, 8))  # of a profile's points, from the neighbouring optimum
+PIN = 1e-3  # width of the prior that holds a profiled parameter, on the search scale
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line asked for."""
+
+    add: tuple[str, ...]
+    files: tuple[Path, ...]
+    profiles: tuple[str, ...]
+    starts: int
+    scatter: float
+    most_events: int
+
+
+def fit_inertial(
+    loaded: Campaign, traces: list[Trace], found: list[Segmentation], options: Options
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Fit the dynamic model; what ``result.json`` and ``arrays.nc`` hold of it."""
+    for path in options.files:
+        catalogue.load_file(path)
+    effects = [forms_of(catalogue.get(tag).tag)[0] for tag in options.add if tag != "inertia"]
+    notes: list[str] = []
+    traces = [_with_displacement(t, s, notes) for t, s in zip(traces, found, strict=True)]
+    usable = [(t, s) for t, s in zip(traces, found, strict=True) if t.displacement is not None and t.drive is not None]
+    if not usable:
+        raise InputError(
+            "no trace has a drive and a displacement in metres",
+            file=loaded.path,
+            hint="give drive_velocity (and spring_stiffness where only the force is measured)",
+        )
+    _check_events(usable, loaded)
+    own, segments = [t for t, _ in usable], [s for _, s in usable]
+    period = ring_period(own, segments)
+    m = measure(own, segments, ring_period=period, most_cycles=options.most_events)
+    floor = floors(m, factor=options.scatter)
+    base = base_composition(loaded, m)
+    _check_names(options.profiles, base, effects)
+    train = _training(m, traces)
+    with working("fitting") as tell:
+        composition, optimum, ladder = _climb(m, base, effects, floor, train, options.starts, tell)
+        problem = Problem(composition, m)
+        profiles = [_profile(name, problem, optimum, floor, tell) for name in options.profiles]
+        tell("drawing the model through the data")
+        drawn = overlay(problem, optimum, traces, found)
+    shown = replace(m, valid=m.valid & train[..., None])
+    stiffness = composition.fixed.get("rig.spring_stiffness", optimum.values.get("rig.spring_stiffness", np.nan))
+    result: dict[str, Any] = {
+        "model_parts": ladder[-1]["model"],
+        "ladder": ladder,
+        "misfit": misfit_part(shown, optimum.features, floor, misfit(shown, optimum.features, floor)),
+        "parameters": parameters(composition, optimum),
+        "identifiability": identifiability(optimum),
+        "effective": effective(optimum, loaded.rig, composition.contacts),
+        "equations": _equations(composition, optimum),
+        "profiles": profiles,
+        "features": {"names": list(m.layout.names), "phases": list(m.layout.phases)},
+        "fit": {
+            "cost": optimum.cost,
+            "evaluations": optimum.evaluations,
+            "jacobians": optimum.jacobians,
+            "covariance": optimum.covariance,
+            "ring_period": period,
+            "scatter_factor": options.scatter,
+            "cycles": int(train.sum()),
+        },
+        "notes": notes,
+        "dropped": [*m.dropped, *(f"{t.name}: {d}" for t, s in zip(traces, found, strict=True) for d in s.dropped)],
+        "traces": [describe_trace(t, s) for t, s in zip(traces, found, strict=True)],
+    }
+    variables: dict[str, Any] = {}
+    for i, (t, s) in enumerate(zip(traces, found, strict=True)):
+        variables |= trace_pieces(t, s, i)
+    variables |= drawn
+    by_name = dict(zip((t.name for t in traces), found, strict=True))
+    variables |= residual_arrays(
+        shown, optimum.features, floor, by_name, float(stiffness), {t.name: t for t in traces}
+    )
+    variables["coordinates"] = {"phase": list(PHASES), "feature": list(m.layout.names), "run": list(m.names)}
+    return result, variables
+
+
+def _with_displacement(trace: Trace, found: Segmentation, notes: list[str]) -> Trace:
+    """A trace of velocity or spring force with the displacement it implies."""
+    if trace.displacement is not None:
+        return trace
+    position, drive, gain, unit = block_motion(trace, gain=found.settings.gain)
+    if unit != "m":
+        return trace
+    notes.append(f"{trace.name}: the displacement is {'drive - F/c_s' if gain else 'the integral of the velocity'}")
+    scale = found.settings.noise
+    count = None if trace.resolution is None or gain is None else trace.resolution / gain
+    return trace.replace(displacement=np.array(position), noise=scale, resolution=count, drive=drive)
+
+
+def _check_events(usable: list[tuple[Trace, Segmentation]], loaded: Campaign) -> None:
+    events = [len(s.events) for _, s in usable]
+    if sum(events) < 2:
+        raise InputError(
+            f"{'one slip' if sum(events) else 'no slip'} in the whole campaign: the dynamic model needs at least two, "
+            "so that a stick between slips can be compared",
+            file=loaded.path,
+            hint="record longer, drive slower or with a softer spring; --model static fits single creep processes",
+        )
+
+
+def _check_names(names: tuple[str, ...], base: Composition, effects: list[Any]) -> None:
+    from ..fit.parameters import effect_parameters
+
+    known = [f.name for f in base.free] + [f.name for e in effects for f in effect_parameters(e)]
+    for name in names:
+        if name not in known:
+            raise InputError("no free parameter of that name", key="--profile", value=name, hint=nearest(name, known))
+
+
+def _training(m: Measurement, traces: list[Trace]) -> np.ndarray:
+    """Cycles that are fitted, shape (R, n): those of all runs that are not held out."""
+    roles = {t.name: t.role for t in traces}
+    held = np.array([roles[name] == "held-out" for name in m.names])
+    if held.all():
+        raise InputError("every run is held out", key="role", hint='leave role = "held-out" to some of the runs')
+    return np.asarray(m.cycles.used) & ~held[:, None]
+
+
+def _climb(
+    m: Measurement,
+    base: Composition,
+    effects: list[Any],
+    floor: np.ndarray,
+    train: np.ndarray,
+    starts: int,
+    tell: Tell,
+) -> tuple[Composition, Fit, list[dict[str, Any]]]:
+    """The base model, then one effect after the other."""
+    problem = Problem(base, m)
+    optimum = _best_of(problem, floor, train, starts, tell)
+    ladder = [_static_step(problem, optimum, floor, train), _step(problem, optimum, floor, train, ["static", "inertia"], None)]
+    composition = base
+    for effect in effects:
+        tell(f"adding {effect.tag}")
+        found = try_effect(effect, composition, optimum, m, floor, train, threads=problem.threads, progress=tell)
+        if found.fit is None or found.composition is None:
+            raise FitError(f"{effect.tag} could not be fitted: {found.note or 'no finite model with it'}")
+        composition, optimum = found.composition, found.fit
+        step = _step(Problem(composition, m), optimum, floor, train, [*ladder[-1]["model"], effect.tag], effect.tag)
+        ladder.append(step)
+    return composition, optimum, ladder
+
+
+def _best_of(problem: Problem, floor: np.ndarray, train: np.ndarray, starts: int, tell: Tell) -> Fit:
+    """The best of several starts: the first from the data, the others spread as the priors allow."""
+    free = problem.composition.free
+    rng = np.random.default_rng(0)
+    first = np.array([f.inward(f.start) for f in free])
+    widths = np.array([min(f.width, 1.0) for f in free])
+    bounds = np.array([f.bounds for f in free])
+    most = float(sum(n for _, n in STAGES) + 2 * len(STAGES))
+    best, failures = None, []
+    for i in range(starts):
+        z = first if i == 0 else np.clip(first + 0.5 * widths * rng.standard_normal(first.size), *bounds.T)
+        done = 0
+
+        def progress(text: str, i: int = i) -> None:
+            nonlocal done
+            done += 1
+            tell(f"start {i + 1} of {starts}, {text}", min((i + done / most) / starts, 0.99))
+
+        try:
+            found = fit(problem, floor, z=z, use=train, progress=progress)
+        except FitError as error:
+            failures.append(error)
+            continue
+        if best is None or found.cost < best.cost:
+            best = found
+    if best is None:
+        raise failures[0]
+    return best
+
+
+def _step(
+    problem: Problem, optimum: Fit, floor: np.ndarray, train: np.ndarray, model: list[str], added: str | None
+) -> dict[str, Any]:
+    m = problem.measurement
+    fitted = misfit(replace(m, valid=m.valid & train[..., None]), optimum.features, floor)
+    unseen = np.asarray(m.cycles.used) & ~train
+    held = held_out(problem, optimum, floor, unseen) if unseen.any() else None
+    return {
+        "model": model,
+        "added": added,
+        "train_error": fitted.total,
+        "heldout_error": None if held is None else held.error,
+        "by_phase": fitted.by_phase,
+    }
+
+
+def _static_step(problem: Problem, optimum: Fit, floor: np.ndarray, train: np.ndarray) -> dict[str, Any]:
+    m = problem.measurement
+    stiffness = problem.composition.fixed.get("rig.spring_stiffness") or optimum.values.get("rig.spring_stiffness", np.nan)
+    model = static_features(m, floor, optimum, stiffness, train)
+    errors = [
+        misfit(replace(m, valid=m.valid & part[..., None]), model, floor)
+        for part in (train, np.asarray(m.cycles.used) & ~train)
+    ]
+    return {
+        "model": ["static"],
+        "added": None,
+        "train_error": errors[0].total,
+        "heldout_error": errors[1].total or None,
+        "by_phase": errors[0].by_phase,
+    }
+
+
+def _equations(composition: Composition, optimum: Fit) -> list[dict[str, str]]:
+    """Equations of the fitted model with its values."""
+    m = composition
+    model = m.model(optimum.z, np.zeros(2), (np.array([0.0, 1.0]), np.array([0.0, 1.0])), np.array(np.nan))
+    found = equations(model.effects, block=model.block, weakening=model.weakening)
+    return [{"text": found.text(), "latex": found.latex()}]
+
+
+def _profile(name: str, problem: Problem, optimum: Fit, floor: np.ndarray, tell: Callable[..., None]) -> dict[str, Any]:
+    free = problem.composition.free
+    k = [f.name for f in free].index(name)
+    f, z0 = free[k], optimum.z.copy()
+
+    def refit(value: float) -> float:
+        at = f.outward(value)
+        held = tuple(replace(g, prior=at, width=PIN) if i == k else g for i, g in enumerate(free))
+        pinned = Problem(replace(problem.composition, free=held), problem.measurement)
+        z = z0.copy()
+        z[k] = value
+        found = fit(pinned, floor, z=z, events=optimum.events, stages=REFIT, use=optimum.use)
+        return found.cost - ((found.z[k] - value) / PIN) ** 2
+
+    std = float(np.sqrt(max(optimum.covariance[k, k], 0.0)))
+    progress = lambda done, of: tell(f"profile of {name}: {done} of {of}", done / of)  # noqa: E731
+    found = profile(name, float(z0[k]), std, f.bounds, refit, progress=progress)
+    low, high = (f.outward(v) if np.isfinite(v) else None for v in found.interval)
+    from . import show
+
+    text = f"{found.text}; 95 % interval {show.quantity(low, f.unit, 3)} to {show.quantity(high, f.unit, 3)}"
+    return {
+        "name": name,
+        "unit": f.unit,
+        "value": [f.outward(float(v)) for v in found.z],
+        "rise": found.rise,
+        "interval": [low, high],
+        "text": text,
+    }

@@ -1,0 +1,159 @@
+"""``stickslip diagnose``: which physical effect is missing, and how far the error falls with it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from ..runstore import Run, file_record, json_text, open_run, refuse_existing, versions
+
+UNRESOLVED = 3
+
+
+class Pieces:
+    """Finished pieces in the run folder, one file each, written aside and renamed."""
+
+    def __init__(self, run: Run, inputs: str) -> None:
+        self._run, self._inputs = run, inputs
+
+    def _path(self, key: str) -> Path:
+        return self._run.path(f"pieces/{key}.npz")
+
+    def load(self, key: str) -> Mapping[str, np.ndarray] | None:
+        """A finished piece of the same inputs, or None."""
+        path = self._path(key)
+        if not path.is_file():
+            return None
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = dict(file)
+        except (OSError, ValueError, EOFError, KeyError):
+            return None
+        return arrays if str(arrays.pop("inputs", "")) == self._inputs else None
+
+    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
+        """Keep a finished piece."""
+        path = self._path(key)
+        aside = path.with_suffix(".part")
+        with aside.open("wb") as stream:
+            np.savez(stream, allow_pickle=False, inputs=np.array(self._inputs), **piece)
+        aside.replace(path)
+
+
+def diagnose(
+    campaign: str,
+    *,
+    out: Path,
+    candidates: str | None = None,
+    max_effects: int = 3,
+    holdout: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    effect: Annotated[tuple[Path, ...], Parameter(negative="")] = (),
+    jobs: int | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Find the physical effect that the model lacks, add it, and see the error on unseen runs fall.
+
+    Parameters
+    ----------
+    campaign:
+        TOML file that describes the rig and its measured runs.
+    out:
+        Folder for result.json and the finished pieces; an interrupted diagnosis into the same folder goes on.
+    candidates:
+        Try these effects only: contact-ageing,drive-ripple.
+    max_effects:
+        Add at most so many, one after the other.
+    holdout:
+        A run no fit may see; may be given several times. Default: a middle velocity and the later part of holds.
+    effect:
+        A Python file with an effect of your own, which is run and then tried with the others.
+    jobs:
+        Parallel processes; default one a core.
+    json:
+        Print result.json.
+    force:
+        Replace an existing run folder.
+    """
+    refuse_existing(out, force)
+    began = time.perf_counter()
+    from ..campaign import load_campaign, load_traces
+    from ..diagnose.engine import diagnose as run_diagnosis
+    from ..diagnose.summary import summary
+    from ..effects import catalogue
+
+    for path in effect:
+        catalogue.load_file(path)
+    loaded = load_campaign(campaign)
+    traces = load_traces(loaded)
+    chosen = None if candidates is None else [c.strip() for c in candidates.split(",") if c.strip()]
+    for tag in chosen or ():
+        catalogue.get(tag)
+    inputs = [file_record(campaign), *({"file": t.provenance.file, "sha256": t.provenance.sha256} for t in traces)]
+    with open_run(out, force=force, resume=True) as run:
+        key = json_text({"inputs": inputs, "holdout": list(holdout), "versions": versions()})
+        found = run_diagnosis(
+            loaded,
+            traces,
+            candidates=chosen,
+            max_effects=max_effects,
+            holdout=holdout,
+            jobs=jobs,
+            store=Pieces(run, key),
+            progress=_teller(began),
+        )
+        result: dict[str, Any] = {
+            **summary(found),
+            "inputs": inputs,
+            "versions": versions(),
+            "seconds": round(time.perf_counter() - began, 1),
+        }
+        run.json(result)
+    if json:
+        print(json_text(result))
+    else:
+        _print(result, out)
+    return 0 if result["verdict"]["kind"] in ("complete", "missing") else UNRESOLVED
+
+
+def _teller(began: float) -> Any:
+    """Progress on stderr: what was finished, the share of the round, the time left."""
+    import sys
+
+    def tell(text: str, share: float) -> None:
+        if not sys.stderr.isatty():
+            return
+        spent = time.perf_counter() - began
+        left = f", about {spent * (1 - share) / share:.0f} s left in this round" if share > 0.05 else ""
+        print(f"{spent:6.0f} s  {text} ({100 * share:.0f} %{left})", file=sys.stderr, flush=True)
+
+    return tell
+
+
+def _print(result: dict[str, Any], out: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    table = Table(title="Ladder of models: error in units of what the data can tell (1 is as good as they allow)")
+    table.add_column("model")
+    phases = sorted({p for rung in result["ladder"] for p in rung["by_phase"]})
+    for name in ("fitted runs", "unseen", *phases):
+        table.add_column(name, justify="right")
+    for rung in result["ladder"]:
+        label = "static" if rung["added"] is None else f"+ {rung['added']}"
+        held = rung["heldout_error"]
+        cells = [f"{rung['train_error']:.2f}", "" if held is None else f"{held:.2f}"]
+        cells += [f"{rung['by_phase'][p]:.2f}" if p in rung["by_phase"] else "" for p in phases]
+        table.add_row(label, *cells)
+    console.print(table)
+    verdict = result["verdict"]
+    console.print(f"[bold]{verdict['kind']}[/bold]: {verdict['text']}", highlight=False)
+    if result["next_experiment"]:
+        console.print(f"next experiment: {result['next_experiment']['text']}", highlight=False)
+    console.print(f"result in {out / 'result.json'}", highlight=False)

@@ -1,0 +1,201 @@
+"""``stickslip fit``: the static or the dynamic model against a campaign."""
+
+from __future__ import annotations
+
+import time as clock
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from ..errors import InputError
+from ..runstore import Run, json_text, open_run, refuse_existing
+from . import show
+from .inspect import head, load_and_segment
+from .working import working
+
+if TYPE_CHECKING:
+    from ..campaign import Campaign
+    from ..segment import Segmentation
+    from ..trace import Trace
+
+
+def fit(
+    campaign: Path,
+    *,
+    model: Literal["static", "inertial"] = "inertial",
+    out: Path | None = None,
+    add: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    effect: Annotated[tuple[Path, ...], Parameter(negative="")] = (),
+    profile: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    starts: int = 1,
+    align: Literal["consistent", "paper"] = "consistent",
+    time: Literal["exact", "paper"] = "exact",
+    v_lim: str = "1 um/s",
+    sampling: Literal["log", "uniform"] = "log",
+    new_lines: Annotated[bool, Parameter(negative="")] = False,
+    most_events: int = 8,
+    json: Annotated[bool, Parameter(negative="")] = False,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Fit the static or the dynamic model to a campaign, and say where it fails.
+
+    Parameters
+    ----------
+    campaign:
+        TOML file that names the measurements.
+    model:
+        static (creep without inertia, one process after the other) or inertial (all runs together).
+    out:
+        Folder for result.json, arrays.nc and report.html.
+    add:
+        Put an effect into the dynamic model: --add contact-ageing. May be given several times.
+    effect:
+        A Python file with an effect of your own, to be used with --add. Its code is run.
+    profile:
+        Profile likelihood of a parameter: --profile contact.u_max. May be given several times.
+    starts:
+        Starts of the dynamic fit: the first from the data, the others spread by the priors.
+    align:
+        Static: what is laid on the measured passage of v_lim, the model's passage or (paper) its end.
+    time:
+        Static: virtual time with the block's own motion (exact) or without it (paper).
+    v_lim:
+        Static: speed of the block at which a creep process ends.
+    sampling:
+        Static: windows even in the logarithm of the time left, or even in time as in the paper.
+    new_lines:
+        Dynamic: the surfaces meet anew at every event, so that features scatter twice as much.
+    most_events:
+        Dynamic: so many events of a run are used, the first ones.
+    json:
+        Print the result as JSON.
+    force:
+        Replace an existing run folder.
+    """
+    from ..units import to_si
+
+    speed = to_si(v_lim, "m/s", key="--v-lim")
+    _check(model, add, profile, starts, most_events, speed)
+    if out is not None:
+        refuse_existing(out, force)
+    began = _now()
+    loaded, traces, found = load_and_segment(campaign)
+    if model == "static":
+        result, variables = _static(loaded, traces, found, align, time, speed, sampling)
+    else:
+        from ._inertial import Options, fit_inertial
+
+        options = Options(add, effect, profile, starts, 2.0 if new_lines else 1.0, most_events)
+        result, variables = fit_inertial(loaded, traces, found, options)
+    result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
+    if out is not None:
+        with open_run(out, force=force) as run:
+            _write(run, result, variables)
+    print(json_text(result) if json else _text(result, out))
+    return 0
+
+
+def _now() -> float:
+    return clock.perf_counter()
+
+
+def _check(
+    model: str, add: tuple[str, ...], profile: tuple[str, ...], starts: int, most_events: int, speed: float
+) -> None:
+    if model == "static" and (add or profile):
+        what = "--add" if add else "--profile"
+        raise InputError(f"{what} belongs to the dynamic model", key=what, hint="leave it out, or use --model inertial")
+    for name, value, most in (("--starts", starts, 100), ("--most-events", most_events, 200)):
+        if not 1 <= value <= most:
+            raise InputError("out of range", key=name, value=value, allowed=f"1 to {most}")
+    if speed <= 0:
+        raise InputError("the speed must be positive", key="--v-lim", value=speed)
+
+
+def _static(
+    loaded: Campaign,
+    traces: list[Trace],
+    found: list[Segmentation],
+    align: Literal["consistent", "paper"],
+    form: Literal["exact", "paper"],
+    v_lim: float,
+    sampling: str,
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    from ..fit.static_table import StaticRig
+    from ..report import describe_trace, trace_pieces
+    from ..report.static_result import static_result
+
+    def rig_of(trace: Trace) -> StaticRig:
+        try:
+            return StaticRig.of(loaded.rig_of(trace.name), spring_stiffness=trace.spring_stiffness)
+        except InputError as error:
+            raise error.at(file=loaded.path) from None
+
+    with working("creep processes") as tell:
+        result, variables = static_result(
+            traces,
+            found,
+            rig_of,
+            align=align,
+            form=form,
+            v_lim=v_lim,
+            sampling=sampling,
+            springs=loaded.rig.springs,
+            progress=lambda done, of: tell(f"{done} of {of} fitted", done / of),
+        )
+    result["traces"] = [describe_trace(t, s) for t, s in zip(traces, found, strict=True)]
+    for i, (t, s) in enumerate(zip(traces, found, strict=True)):
+        variables |= trace_pieces(t, s, i)
+    return result, variables
+
+
+def _write(run: Run, result: dict[str, Any], variables: dict[str, Any]) -> None:
+    import xarray
+
+    from ..report import write_report
+
+    coordinates = variables.pop("coordinates", {})
+    run.arrays(xarray.Dataset(variables, coords=coordinates, attrs={"title": result["title"]}))
+    run.json(result)
+    write_report(run.folder)
+
+
+def _text(result: dict[str, Any], out: Path | None) -> str:
+    """What is printed."""
+    lines = [f"{result['title']}: {result['model']} model"]
+    for key in ("static", "ramps"):
+        if result.get(key):
+            lines += ["", result[key]["text"]]
+    if result.get("ladder"):
+        rows = [
+            [" + ".join(step["model"]), *(show.quantity(step[k], "1", 3) for k in ("train_error", "heldout_error"))]
+            for step in result["ladder"]
+        ]
+        lines += ["", show.table(["model", "error", "on unseen runs"], rows)]
+    if result.get("misfit"):
+        table = result["misfit"]["table"]
+        rows = [
+            [run, show.quantity(v, "m/s", 3), *(show.quantity(e, "1", 3) for e in errors)]
+            for run, v, errors in zip(table["runs"], table["velocities"], table["errors"], strict=True)
+        ]
+        lines += ["", "residual over floor, by phase and run:", show.table(["run", "drive", *table["phases"]], rows)]
+        lines += ["", result["misfit"]["sentence"]]
+    if result.get("parameters"):
+        rows = [
+            [name, show.quantity(p["value"], p["unit"]), "+-", show.quantity(p["std"], p["unit"], 2), p["note"]]
+            for name, p in result["parameters"].items()
+        ]
+        lines += ["", show.table(["parameter", "value", "", "std", ""], rows)]
+    if result.get("effective"):
+        lines += ["", result["effective"]["text"]]
+    lines += [f"- {text}" for text in result.get("identifiability", ())]
+    lines += [p["text"] for p in result.get("profiles", ())]
+    lost = result.get("dropped", ())
+    lines += ["", *(f"left out: {text}" for text in lost[:8])]
+    if len(lost) > 8:
+        lines.append(f"... and {len(lost) - 8} more")
+    lines.append(f"{result['seconds']:.1f} s")
+    if out is not None:
+        lines.append(f"written to {out}: report.html, result.json, arrays.nc")
+    return "\n".join(lines)

@@ -1,0 +1,79 @@
+"""Finished pieces of a diagnosis as plain arrays, so that they can be kept in a file that holds data only."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from ..effects import catalogue
+from ..features.measurement import Measurement
+from ..fit.composition import Composition
+from ..fit.inertial import Fit
+from ..fit.parameters import Free, effect_parameters
+from ..fit.problem import Problem
+from ..residual import misfit
+from .candidate import Candidate
+from .heldout import held_out
+
+_ARRAYS = ("z", "events", "features", "covariance", "columns", "use")
+
+
+def fit_arrays(fit: Fit) -> dict[str, np.ndarray]:
+    """A fit as named arrays; the free parameters as one JSON text."""
+    free = json.dumps([asdict(f) for f in fit.free])
+    numbers = np.array([fit.cost, fit.data_cost, fit.evaluations, fit.jacobians])
+    return {name: getattr(fit, name) for name in _ARRAYS} | {"numbers": numbers, "free": np.array(free)}
+
+
+def fit_from(arrays: Mapping[str, np.ndarray]) -> Fit:
+    """The inverse of :func:`fit_arrays`."""
+    cost, data_cost, evaluations, jacobians = arrays["numbers"].tolist()
+    free = tuple(Free(**f) for f in json.loads(str(arrays["free"])))
+    z, events, features, covariance, columns, use = (np.asarray(arrays[name]) for name in _ARRAYS)
+    return Fit(
+        z,
+        events,
+        cost,
+        data_cost,
+        features,
+        covariance,
+        free,
+        columns,
+        use.astype(bool),
+        int(evaluations),
+        int(jacobians),
+    )
+
+
+def candidate_arrays(candidate: Candidate) -> dict[str, np.ndarray]:
+    """A candidate as named arrays."""
+    head = json.dumps({"tag": candidate.tag, "form": candidate.form, "score": candidate.score, "note": candidate.note})
+    return {"head": np.array(head)} | (fit_arrays(candidate.fit) if candidate.fit is not None else {})
+
+
+def candidate_from(
+    arrays: Mapping[str, np.ndarray],
+    base: Composition,
+    measurement: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+) -> Candidate:
+    """The inverse of :func:`candidate_arrays`; errors are computed again from the features kept."""
+    head = json.loads(str(arrays["head"]))
+    effect = catalogue.get(head["tag"])(**head["form"])
+    composition = base.with_effect(effect, effect_parameters(effect))
+    candidate = Candidate(head["tag"], head["form"], effect, head["score"], composition, note=head["note"])
+    if "z" not in arrays:
+        return candidate
+    fit = fit_from(arrays)
+    used = np.asarray(measurement.cycles.used)
+    shown = replace(measurement, valid=measurement.valid & (train & used)[..., None])
+    return replace(
+        candidate,
+        fit=fit,
+        train=misfit(shown, fit.features, floor),
+        held=held_out(Problem(composition, measurement), fit, floor, used & ~train, fit.features),
+    )

@@ -1,0 +1,95 @@
+"""A diagnosis as plain numbers and words: what goes into ``result.json``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..effects import catalogue
+from .candidate import Candidate
+from .engine import Diagnosis, Rung
+
+
+def summary(diagnosis: Diagnosis) -> dict[str, Any]:
+    """The verdict, the ladder, the ranking, parameters with units, and what to measure next."""
+    d = diagnosis
+    last = next((r for r in reversed(d.ladder) if r.fit is not None), None)
+    return {
+        "schema": 1,
+        "verdict": {
+            "kind": d.verdict.kind,
+            "effects": list(d.verdict.effects),
+            "set": list(d.verdict.set),
+            "text": d.verdict.text,
+            "reasons": list(d.verdict.reasons),
+        },
+        "ladder": [_rung(r) for r in d.ladder],
+        "ranking": [_ranked(c, d) for c in _order(d)],
+        "parameters": {} if last is None else _parameters(last),
+        "next_experiment": next_experiment(d),
+        "held_out": {n: [int(k) for k in (~d.train[r]).nonzero()[0]] for r, n in enumerate(d.measurement.names)},
+        "dropped": list(d.dropped),
+    }
+
+
+def _rung(rung: Rung) -> dict[str, Any]:
+    return {
+        "model": list(rung.model),
+        "added": rung.added,
+        "train_error": rung.train.total,
+        "heldout_error": None if rung.held is None else rung.held.error,
+        "by_phase": rung.train.by_phase,
+        "heldout_by_phase": {} if rung.held is None else rung.held.by_phase,
+        "by_run": rung.train.by_run,
+    }
+
+
+def _order(d: Diagnosis) -> list[Candidate]:
+    """Candidates of the first round, the best first; those that were not refitted last."""
+    first = d.rounds[0] if d.rounds else ()
+    return sorted(first, key=lambda c: (c.fit is None, c.fit.cost if c.fit is not None else -c.score))
+
+
+def _ranked(c: Candidate, d: Diagnosis) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "effect": c.tag,
+        "form": c.form,
+        "score": c.score,
+        "refit": c.fit is not None,
+        "note": c.note,
+    }
+    if c.fit is None or c.held is None or c.train is None:
+        return out
+    base = d.ladder[1].held
+    judged = next((j for j in d.judged[0] if j.candidate is c), None)
+    out |= {
+        "cost": c.fit.cost,
+        "train_error": c.train.total,
+        "heldout_error": c.held.error,
+        "heldout_gain": None if base is None else 1.0 - c.held.score / base.score,
+        "failures": [] if judged is None else list(judged.failures),
+    }
+    if c.amplitude is not None:
+        name = c.amplitude.name
+        out["amplitude"] = {"value": c.fit.values[name], "std": c.fit.std()[name], "unit": c.amplitude.unit}
+    return out
+
+
+def _parameters(rung: Rung) -> dict[str, Any]:
+    assert rung.fit is not None
+    sd = rung.fit.std()
+    values = rung.fit.values
+    return {f.name: {"value": values[f.name], "std": sd[f.name], "unit": f.unit} for f in rung.fit.free}
+
+
+def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
+    """For effects these data cannot tell apart: the experiment the catalogue gives for separating them."""
+    if d.verdict.kind != "ambiguous":
+        return None
+    pair = [t for t in d.verdict.set if t not in d.verdict.effects][:2]
+    if len(pair) < 2:
+        return None
+    a, b = (catalogue.get(t) for t in pair)
+    text = a.confused_with.get(pair[1]) or b.confused_with.get(pair[0])
+    if text is None:
+        text = "add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s, a virgin start"
+    return {"text": text, "separates": pair}

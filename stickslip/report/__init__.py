@@ -1,0 +1,19 @@
+"""Reports for people: what a run folder holds, as one HTML file, and the tables and sentences that go into it."""
+
+from .abilities import Abilities, abilities
+from .describe import describe_trace, event_units
+from .html import REPORT, write_report
+from .pieces import trace_pieces
+from .sentences import misfit_sentence, phase_table
+
+__all__ = [
+    "REPORT",
+    "Abilities",
+    "abilities",
+    "describe_trace",
+    "event_units",
+    "misfit_sentence",
+    "phase_table",
+    "trace_pieces",
+    "write_report",
+]

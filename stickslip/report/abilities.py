@@ -1,0 +1,187 @@
+"""Which features a campaign's data can give, and which not, in words and before anything is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..fit.creep_process import V_LIM, creep_processes
+from ..fit.normalised import is_ramp
+from ..segment import Segmentation
+from ..trace import Trace
+from .describe import stick_gain
+
+_RING_RATE = 5000.0  # Hz: a contact resonance of some 500 Hz needs ten samples a period
+_SLIP_SAMPLES = 20
+_NEAR = 1.25  # drive velocities closer than this factor count as one
+
+
+@dataclass(frozen=True)
+class Abilities:
+    """Sentences."""
+
+    can: tuple[str, ...]
+    cannot: tuple[str, ...]
+
+    @property
+    def paragraph(self) -> str:
+        """All of it as running text."""
+        return " ".join([*self.can, *self.cannot])
+
+
+def abilities(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> Abilities:
+    """What the traces of a campaign can and cannot tell."""
+    pairs = list(zip(traces, segmentations, strict=True))
+    can: list[str] = []
+    cannot: list[str] = []
+    slipping = [(t, s) for t, s in pairs if s.events]
+    if not slipping:
+        cannot.append("No trace holds a slip: nothing but creep or sliding can be looked at, no dynamic model fitted.")
+    for judge in (_velocities, _events, _holds, _virgin, _signals, _slip, _ringing, _creep, _ramps, _unseen):
+        good, bad = judge(pairs, slipping)
+        can += good
+        cannot += bad
+    return Abilities(tuple(can), tuple(cannot))
+
+
+Pairs = list[tuple[Trace, Segmentation]]
+Verdict = tuple[list[str], list[str]]
+
+
+def _velocities(pairs: Pairs, slipping: Pairs) -> Verdict:
+    speeds = sorted({float(t.drive_velocity) for t, _ in pairs if t.drive_velocity})
+    groups: list[float] = []
+    for v in speeds:
+        if not groups or v > _NEAR * groups[-1]:
+            groups.append(v)
+    shown = ", ".join(f"{v * 1e6:.3g}" for v in groups)
+    if not groups:
+        if any(not is_ramp(t) for t, _ in pairs):
+            return [], ["The drive is not known: neither its velocity nor its phase can be used."]
+        return [], []
+    if len(groups) == 1:
+        return [], [
+            f"One drive velocity only ({shown} um/s): creep at one velocity identifies nothing, since roughness, "
+            "friction and weakening together imitate almost every effect. Three velocities over a factor of four do."
+        ]
+    if len(groups) == 2 or groups[-1] < 4 * groups[0]:
+        return [f"{len(groups)} drive velocities ({shown} um/s): effects that depend on velocity show."], [
+            "Fewer than three velocities over a factor of four: many effects will stay alike."
+        ]
+    return [f"{len(groups)} drive velocities ({shown} um/s) separate what depends on velocity from what does not."], []
+
+
+def _events(pairs: Pairs, slipping: Pairs) -> Verdict:
+    few = [t.name for t, s in slipping if len(s.events) < 3]
+    n = sum(len(s.events) for _, s in slipping)
+    good = [f"{n} slips in {len(slipping)} of {len(pairs)} traces."] if n else []
+    bad = []
+    if few:
+        bad.append(f"Fewer than three slips in {_some(few)}: no recurrence time and no scatter from slip to slip there.")
+    odd = [f"{t.name} ({s.regime})" for t, s in pairs if not s.events or s.regime != "stick-slip"]
+    if odd and slipping:
+        bad.append(f"No regular stick-slip in {_some(odd)}.")
+    return good, bad
+
+
+def _holds(pairs: Pairs, slipping: Pairs) -> Verdict:
+    held = [sum(e.hold_time > 0 for e in s.events) for _, s in slipping]
+    if not slipping:
+        return [], []
+    if sum(held):
+        return [f"{sum(held)} slips after a hold: strengthening with time and creep at rest show."], []
+    return [], ["No hold: strengthening with time, creep at rest and drift of the sensor cannot be told apart."]
+
+
+def _virgin(pairs: Pairs, slipping: Pairs) -> Verdict:
+    if not pairs or any(t.virgin for t, _ in pairs):
+        return ["A virgin start: the first loading of a fresh contact is there."] if pairs else [], []
+    return [], [
+        "No virgin start is stated (virgin = true): the first stick of every trace is left out, and the contact's "
+        "memory of the last slip is in every creep."
+    ]
+
+
+def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
+    force = [t.name for t, _ in pairs if t.leading == "spring_force"]
+    if not force:
+        return [], []
+    bad = [
+        f"Spring force only in {_some(force)}: the block's position is drive - F/c_s, so every error of the force's "
+        "scale, of the stiffness or of the drive is taken for motion."
+    ]
+    good = []
+    for t, s in pairs:
+        gain = stick_gain(t, s)
+        if gain is not None and abs(gain["value"] - 1.0) > max(0.02, 3 * gain["std"]):
+            share = 100 * (gain["value"] - 1.0)
+            bad.append(
+                f"{t.name}: while the block sticks the force rises {gain['value']:.3f} (+-{gain['std']:.3f}) times as "
+                f"fast as stiffness times drive, which no motion of the block explains"
+                f"{'' if share < 0 else ' (creep can only lower it)'}: sensor-gain of about {share:+.0f} %, or the "
+                "stiffness or the drive's velocity is wrong by as much."
+            )
+        if s.settings.unit != "m":
+            bad.append(f"{t.name}: neither stiffness nor drive is known, so lengths are in seconds of loading.")
+    return good, bad
+
+
+def _slip(pairs: Pairs, slipping: Pairs) -> Verdict:
+    coarse = []
+    for t, s in slipping:
+        samples = float(np.median([e.duration for e in s.events])) * t.sampling_rate
+        if samples < _SLIP_SAMPLES:
+            coarse.append(f"{t.name} ({samples:.0f} samples a slip)")
+    if coarse:
+        return [], [f"Sampled too slowly for the shape of a slip: {_some(coarse)}."]
+    return (["The course of the slips is resolved."] if slipping else []), []
+
+
+def _ringing(pairs: Pairs, slipping: Pairs) -> Verdict:
+    slow = [f"{t.name} ({t.sampling_rate:.3g} Hz)" for t, _ in slipping if t.sampling_rate < _RING_RATE]
+    bad = [f"Sampled too slowly for a ring-down of some 500 Hz: {_some(slow)}; contact stiffness and damping are then known "
+           "from creep and slip alone."] if slow else []  # fmt: skip
+    rest = [t.name for t, s in slipping if t.sampling_rate >= _RING_RATE and t.leading != "spring_force"]
+    return ([f"Ring-down after the slips: contact stiffness and damping ({_some(rest)})."] if rest else []), bad
+
+
+def _creep(pairs: Pairs, slipping: Pairs) -> Verdict:
+    kept, lost = 0, []
+    for t, s in slipping:
+        if is_ramp(t) or t.drive is None:
+            continue
+        found, dropped = creep_processes(t, s)
+        kept += len(found)
+        lost += dropped
+    good = [f"{kept} creep processes can be compared with the static model (v_lim = {V_LIM * 1e6:g} um/s)."] if kept else []
+    bad = []
+    if lost:
+        reasons = {d.reason.split(":")[0].split(" (")[0]: 0 for d in lost}
+        for d in lost:
+            reasons[d.reason.split(":")[0].split(" (")[0]] += d.count
+        text = "; ".join(f"{n} because {reason}" for reason, n in sorted(reasons.items(), key=lambda r: -r[1]))
+        bad.append(f"{sum(d.count for d in lost)} creep processes cannot: {text}.")
+    return good, bad
+
+
+def _ramps(pairs: Pairs, slipping: Pairs) -> Verdict:
+    ramps = [t.name for t, s in pairs if is_ramp(t) and s.events]
+    if not ramps:
+        return [], []
+    return (
+        [f"{len(ramps)} break-away ramps: the normalised static curve (shape H and scale u_max) can be fitted."],
+        ["Ramps without a geometry: h_rms, line length and load cannot be had from them."],
+    )
+
+
+def _unseen(pairs: Pairs, slipping: Pairs) -> Verdict:
+    if len(slipping) < 2 and slipping:
+        return [], ["One trace with slips: no run can be held out, so nothing can be checked on unseen conditions."]
+    return [], []
+
+
+def _some(names: Sequence[str], most: int = 4) -> str:
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

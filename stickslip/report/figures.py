@@ -1,0 +1,113 @@
+"""Pictures of measured traces, drawn from a run folder's arrays alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, remark, scaled, styled
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def plain(text: object, most: int = 120) -> str:
+    """Text from a file as matplotlib shows it literally, without its formula signs."""
+    shown = str(text).replace("\\", "/").replace("$", r"\$")
+    return shown if len(shown) <= most else shown[:most] + "..."
+
+
+def series(data: xarray.Dataset, key: str, name: str) -> np.ndarray | None:
+    """An array of the data set, or None."""
+    found = data.get(f"{key}_{name}")
+    return None if found is None else np.asarray(found.values, float)
+
+
+@styled
+def trace_picture(data: xarray.Dataset, number: int, facts: dict[str, Any]) -> Figure:
+    """The whole trace with its events, one stick and one slip; measured and, where there is one, modelled."""
+    made, axes = figure(1, 3, width=11.0, height=3.4)
+    slips = len(facts.get("events", ()))
+    made.suptitle(plain(f"{facts['name']}: {facts.get('regime', '')}, {slips} slips"), fontsize=11)
+    key = f"trace{number}"
+    _whole(axes[0, 0], data, key)
+    _zoom(axes[0, 1], data, f"{key}_creep", "one stick", clip=True)
+    _zoom(axes[0, 2], data, f"{key}_slip", "one slip and its ring-down", clip=False)
+    return made
+
+
+def _unit(data: xarray.Dataset, name: str) -> str:
+    return str(data[name].attrs.get("units", "m"))
+
+
+def _whole(axes: Axes, data: xarray.Dataset, key: str) -> None:
+    t, y = series(data, f"{key}_whole", "time"), series(data, f"{key}_whole", "position")
+    axes.set_title("whole trace")
+    if t is None or y is None:
+        remark(axes, "no samples")
+        return
+    k, unit = scaled(y - y[0], _unit(data, f"{key}_whole_position"))
+    drive = series(data, f"{key}_whole", "drive")
+    if drive is not None:
+        axes.plot(t, (drive - y[0]) * k, color=MIDDLE, ls="--", lw=1.0, label="load point")
+    axes.plot(t, (y - y[0]) * k, color=DARK, lw=1.0, label="measured")
+    model = series(data, f"{key}_model", "position")
+    if model is not None:
+        at = series(data, f"{key}_model", "time")
+        assert at is not None
+        axes.plot(at, (model - y[0]) * k, color=MIDDLE, lw=1.0, ls=":", label="model")
+    onset = series(data, f"{key}_event", "onset")
+    if onset is not None:
+        at = np.interp(onset, t, y)
+        axes.plot(onset, (at - y[0]) * k, "v", ms=4, color=MIDDLE, label="onset")
+    axes.set(xlabel="time / s", ylabel=f"position / {unit}")
+    axes.legend(loc="upper left", fontsize=8)
+
+
+def _zoom(axes: Axes, data: xarray.Dataset, key: str, title: str, *, clip: bool) -> None:
+    t, y = series(data, key, "time"), series(data, key, "position")
+    axes.set_title(title)
+    if t is None or y is None or t.size < 3:
+        remark(axes, "no slip")
+        return
+    zero = float(np.median(y[len(y) // 4 : max(len(y) // 2, len(y) // 4 + 1)])) if clip else float(y[0])
+    shown = y - zero
+    if clip:
+        # the slip's own start would hide the creep before it
+        low, high = np.quantile(shown, (0.02, 0.97))
+        margin = 0.35 * (high - low) + 1e-15
+        k, unit = scaled(np.array([high - low]), _unit(data, f"{key}_position"))
+        axes.set_ylim((low - margin) * k, (high + margin) * k)
+        when, factor, text = t - t[-1], 1.0, "time before onset / s"
+    else:
+        k, unit = scaled(shown, _unit(data, f"{key}_position"))
+        factor, suffix = (1e3, "ms") if np.ptp(t) < 1 else (1.0, "s")
+        when, text = t - t[0], f"time / {suffix}"
+    axes.plot(when * factor, shown * k, color=DARK if series(data, key, "model") is None else LIGHT, lw=1.2, label="measured")
+    model = series(data, key, "model")
+    if model is not None:
+        axes.plot(when * factor, (model - zero) * k, color=MIDDLE, ls="--", lw=1.2, label="model")
+        axes.legend(fontsize=8)
+    axes.set(xlabel=text, ylabel=f"position / {unit}")
+
+
+@styled
+def ripple_picture(data: xarray.Dataset, number: int, facts: dict[str, Any]) -> Figure:
+    """Amplitude spectrum of the position while the block sticks, with its lines."""
+    made, axes = figure(1, 1, width=6.5, height=3.0)
+    frequency, amplitude = (series(data, f"trace{number}_ripple", n) for n in ("frequency", "amplitude"))
+    ax = axes[0, 0]
+    if frequency is None or amplitude is None:
+        remark(ax, "no sticks long enough")
+        return made
+    k, unit = scaled(amplitude, _unit(data, f"trace{number}_ripple_amplitude"))
+    ax.loglog(frequency, amplitude * k, color=DARK, lw=0.8)
+    for line in facts.get("lines", ()):
+        f = 1.0 / line["period"]
+        ax.axvline(f, color=MIDDLE, ls="--", lw=0.8)
+        ax.annotate(f"{line['period']:.3g} s", (f, line["amplitude"] * k), fontsize=8, color=MIDDLE)
+    ax.set(xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title=plain(f"{facts['name']}: ripple in the sticks"))
+    return made

@@ -1,0 +1,157 @@
+"""Pictures of fits, drawn from a run folder alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, remark, scaled, styled
+from .figures import plain, series
+
+if TYPE_CHECKING:
+    import xarray
+
+_MARKS = {"creep": ("o", DARK), "slip": ("s", MIDDLE), "ring-down": ("^", LIGHT), "recurrence": ("D", "#4f772d"), "hold": ("v", "#7b5ea7")}  # fmt: skip
+_COORDINATES = (
+    ("position", "m", "position at the slip"),
+    ("velocity", "m/s", "drive velocity"),
+    ("start", "s", "time in the run"),
+    ("contact_time", "s", "time in contact"),
+    ("load", "N", "spring force at the slip"),
+    ("event", "1", "event"),
+)
+
+
+@styled
+def heat_map(table: Mapping[str, Any]) -> Figure:
+    """Errors of runs (rows, by velocity) and phases (columns), logarithmic colours from 1 to 30 floors."""
+    errors = np.array([[np.nan if e is None else e for e in row] for row in table["errors"]], float)
+    made, axes = figure(1, 1, width=6.5, height=1.4 + 0.38 * len(table["runs"]))
+    ax = axes[0, 0]
+    shown = ax.imshow(np.log10(np.clip(errors, 0.3, 100.0)), cmap="OrRd", vmin=-0.3, vmax=1.6, aspect="auto")
+    for i, j in np.argwhere(np.isfinite(errors)):
+        ax.text(j, i, f"{errors[i, j]:.2g}", ha="center", va="center", color="white" if errors[i, j] > 10 else DARK)
+    ax.set_xticks(range(len(table["phases"])), table["phases"])
+    speeds = ["" if v is None else f"  {v * 1e6:.3g} um/s" for v in table["velocities"]]
+    ax.set_yticks(range(len(table["runs"])), [plain(n, 30) + v for n, v in zip(table["runs"], speeds, strict=True)])
+    ax.grid(False)
+    bar = made.colorbar(shown, ax=ax, ticks=np.log10([0.5, 1, 3, 10, 30]))
+    bar.ax.set_yticklabels(["0.5", "1", "3", "10", "30"])
+    bar.set_label("residual / floor")
+    return made
+
+
+@styled
+def residual_plots(data: xarray.Dataset) -> Figure:
+    """Error of every cycle by phase against position, velocity, time, time in contact, force and event number."""
+    made, axes = figure(2, 3, width=11.0, height=6.0)
+    phases = [str(p) for p in data["phase"].values]
+    error = data["residual"].values  # (cycle, phase)
+    for ax, (name, unit, text) in zip(axes.flat, _COORDINATES, strict=True):
+        x = data[f"cycle_{name}"].values.astype(float) if f"cycle_{name}" in data else np.full(error.shape[0], np.nan)
+        if not np.isfinite(x).any():
+            remark(ax, f"{text}: not known")
+            continue
+        k, shown = scaled(x, unit)
+        for j, phase in enumerate(phases):
+            mark, colour = _MARKS.get(phase, ("x", DARK))
+            ok = np.isfinite(error[:, j]) & (error[:, j] > 0)
+            ax.plot(x[ok] * k, error[ok, j], mark, ms=4, color=colour, label=phase, alpha=0.85)
+        ax.axhline(1.0, color=LIGHT, lw=1.0, ls="--")
+        ax.set_yscale("log")
+        if name == "velocity" and np.nanmax(x) > 3 * max(np.nanmin(x), 1e-300):
+            ax.set_xscale("log")
+        ax.set(xlabel=text + (f" / ({shown})" if "/" in shown else f" / {shown}" if shown != "1" else ""), ylabel="residual / floor")
+    axes[0, 0].legend(fontsize=8)
+    return made
+
+
+@styled
+def creep_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: int = 8) -> Figure:
+    """Some creep processes, the best and the worst among them, with the model and the residual."""
+    known = [i for i in range(len(fits)) if f"creep{i}_time" in data]
+    order = sorted(known, key=lambda i: fits[i]["nrmse"] or 0.0)
+    chosen = [order[int(k)] for k in np.unique(np.linspace(0, len(order) - 1, min(most, len(order))).round())]
+    columns = min(4, len(chosen))
+    rows = -(-len(chosen) // columns)
+    made, axes = figure(2 * rows, columns, width=2.9 * columns, height=3.6 * rows)
+    for a in axes.flat[len(chosen) :]:
+        a.set_visible(False)
+    for n, i in enumerate(chosen):
+        top, low = axes[2 * (n // columns), n % columns], axes[2 * (n // columns) + 1, n % columns]
+        low.set_visible(True)
+        top.set_visible(True)
+        t, u, model = (series(data, f"creep{i}", name) for name in ("time", "displacement", "model"))
+        assert t is not None and u is not None and model is not None
+        k, unit = scaled(u, "m")
+        top.plot(t, u * k, color=DARK, lw=1.2)
+        top.plot(t, model * k, color=MIDDLE, ls="--", lw=1.2)
+        fit = fits[i]
+        top.set_title(plain(f"{fit['trace']}, event {fit['event'] + 1}: {100 * fit['nrmse']:.2g} %", 40), fontsize=9)
+        top.set_ylabel(f"u / {unit}")
+        k, unit = scaled(u - model, "m")
+        low.plot(t, (u - model) * k, color=DARK, lw=1.0)
+        low.axhline(0.0, color=LIGHT, lw=0.8)
+        low.set(xlabel="time to v_lim / s", ylabel=f"residual / {unit}")
+    return made
+
+
+@styled
+def ramp_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: int = 16) -> Figure:
+    """Break-away ramps with their fits."""
+    chosen = [i for i in range(len(fits)) if f"ramp{i}_tau" in data][:most]
+    columns = min(4, len(chosen))
+    rows = -(-len(chosen) // columns)
+    made, axes = figure(rows, columns, width=2.8 * columns, height=2.3 * rows)
+    for a in axes.flat[len(chosen) :]:
+        a.set_visible(False)
+    for ax, i in zip(axes.flat, chosen, strict=False):
+        tau, u, model = (series(data, f"ramp{i}", name) for name in ("tau", "displacement", "model"))
+        assert tau is not None and u is not None and model is not None
+        scale = fits[i]["u_max"]
+        ax.plot(tau, u / scale, color=DARK, lw=1.2)
+        ax.plot(tau, model / scale, color=MIDDLE, ls="--", lw=1.2)
+        ax.set_title(plain(f"{fits[i]['trace']}: {100 * fits[i]['nrmse']:.2g} %", 36), fontsize=9)
+        ax.set(xlabel="share of break-away force", ylabel="u / u_max")
+    return made
+
+
+@styled
+def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
+    """Errors of every model: by phase, and on fitted and unseen runs together."""
+    made, axes = figure(1, 2, width=10.0, height=3.8)
+    labels = [plain(("+ " if i else "") + str(step.get("added") or "/".join(step.get("model") or ["model"])), 28) for i, step in enumerate(ladder)]
+    x = np.arange(len(ladder))
+    for name, text, style in (("train_error", "fitted runs", "-"), ("heldout_error", "unseen runs", "--")):
+        y = np.array([np.nan if step.get(name) is None else step[name] for step in ladder], float)
+        if np.isfinite(y).any():
+            axes[0, 0].plot(x, y, style, marker="o", color=DARK if style == "-" else MIDDLE, label=text)
+    phases = list(dict.fromkeys(p for step in ladder for p in (step.get("by_phase") or {})))
+    for phase in phases:
+        mark, colour = _MARKS.get(phase, ("x", DARK))
+        y = np.array([np.nan if (v := (step.get("by_phase") or {}).get(phase)) is None else v for step in ladder], float)
+        axes[0, 1].plot(x, y, marker=mark, color=colour, label=phase)
+    for ax in axes.flat:
+        ax.axhline(1.0, color=LIGHT, ls=":", lw=1.0)
+        if ax.get_lines()[:-1]:
+            ax.set_yscale("log")
+            ax.legend(fontsize=8)
+        ax.set_xticks(x, labels, rotation=20, ha="right")
+        ax.set_ylabel("residual / floor")
+    return made
+
+
+@styled
+def profile_picture(profile: Mapping[str, Any]) -> Figure:
+    """Rise of chi-square against a held parameter."""
+    made, axes = figure(1, 1, width=5.0, height=3.0)
+    ax = axes[0, 0]
+    value, unit = scaled(np.array(profile["value"], float), profile.get("unit") or "1")
+    ax.plot(np.array(profile["value"]) * value, profile["rise"], "o-", color=DARK)
+    ax.axhline(3.84, color=MIDDLE, ls="--", lw=1.0, label="95 %")
+    ax.set(xlabel=plain(f"{profile['name']}" + (f" / {unit}" if unit != "1" else "")), ylabel="rise of chi-square")
+    ax.legend()
+    return made

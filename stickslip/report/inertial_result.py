@@ -1,0 +1,174 @@
+"""The dynamic model's part of a ``result.json``, and its arrays: parameters, misfit, overlays, residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..features.layout import PHASES
+from ..features.measurement import Measurement
+from ..fit.composition import Composition
+from ..fit.effective import effective_line
+from ..fit.inertial import Fit
+from ..fit.overlay import modelled_runs
+from ..fit.problem import Problem
+from ..fit.static_table import StaticRig
+from ..residual import Misfit
+from ..segment import Segmentation
+from ..trace import Trace
+from ..uncertainty import flat_directions
+from .pieces import ZOOM, Variables, middle_event, thinned
+from .sentences import misfit_sentence, phase_table
+
+
+def parameters(composition: Composition, fit: Fit) -> dict[str, dict[str, Any]]:
+    """Value, standard deviation, unit and meaning of every parameter, fixed ones included."""
+    values, std = fit.values, fit.std()
+    out: dict[str, dict[str, Any]] = {}
+    for f, z in zip(fit.free, fit.z, strict=True):
+        low, high = f.bounds
+        note = ""
+        if min(z - low, high - z) < 1e-3 * (high - low):
+            note = "at its bound"
+        elif np.isfinite(f.width) and std[f.name] / max(abs(f.slope(float(z))), 1e-300) > 0.8 * f.width:
+            note = "not determined by the data: this is its prior"
+        out[f.name] = {"value": values[f.name], "std": std[f.name], "unit": f.unit, "doc": f.doc, "note": note}
+    for name, value in composition.fixed.items():
+        out[name] = {"value": value, "std": 0.0, "unit": "N/m" if name.endswith("stiffness") else "1", "doc": "", "note": "given"}
+    out["rig.mass"] = {"value": composition.mass, "std": 0.0, "unit": "kg", "doc": "mass of the block", "note": "given"}
+    return out
+
+
+def identifiability(fit: Fit) -> list[str]:
+    """The identifiability table in words."""
+    names = [f.name for f in fit.free]
+    found = flat_directions(names, fit.covariance, widths=[f.width for f in fit.free])
+    lines = [d.text for d in found]
+    lines.append("h_rms, L, F_n and E* act only together, through u_max and the shape p of the contact")
+    return lines
+
+
+def effective(fit: Fit, rig: Any, contacts: int) -> dict[str, Any] | None:
+    """(H, h_rms) implied by the fitted (u_max, p); None where load or friction is not known at all."""
+    values = fit.values
+    try:
+        known = StaticRig.of(rig, spring_stiffness=1.0)
+    except InputError:
+        return None
+    line = effective_line(values["contact.u_max"], values["contact.p"], known)
+    text = (
+        f"Effective rough line of a contact with u_max = {values['contact.u_max'] * 1e6:.3g} um and p = "
+        f"{values['contact.p']:.3g}: H = {line.hurst:.2f} (1/(p - 1) = {line.power_law_hurst:.2f}), h_rms = "
+        f"{line.h_rms * 1e6:.3g} um, for L = {line.length * 1e6:g} um, N = {line.n_springs}, F_n = "
+        f"{known.normal_force:.3g} N and friction {known.friction:.3g}"
+        f"{' (guessed)' if known.guessed else ''}; {line.note}."
+    )
+    return {
+        "text": text,
+        "H": line.hurst,
+        "h_rms": line.h_rms,
+        "N": line.n_springs,
+        "L": line.length,
+        "mismatch": line.mismatch,
+        "contacts": contacts,
+    }
+
+
+def misfit_part(measurement: Measurement, model: np.ndarray, floor: np.ndarray, found: Misfit) -> dict[str, Any]:
+    """Table phase by velocity and the sentence."""
+    velocities = dict(zip(measurement.names, (float(v) for v in measurement.velocities), strict=True))
+    return {
+        "total": found.total,
+        "by_phase": found.by_phase,
+        "by_run": found.by_run,
+        "table": phase_table(found.by_run, velocities),
+        "sentence": misfit_sentence(measurement, model, floor, found.by_phase),
+    }
+
+
+def overlay(
+    problem: Problem, fit: Fit, traces: Sequence[Trace], segmentations: Sequence[Segmentation]
+) -> Variables:
+    """The model beside the measured zooms, and through the whole trace; arrays as of `trace_pieces`."""
+    m = problem.measurement
+    runs = dict(zip(m.names, modelled_runs(problem, fit.z, fit.events), strict=True))
+    out: Variables = {}
+    for i, (trace, found) in enumerate(zip(traces, segmentations, strict=True)):
+        if trace.name not in runs or trace.displacement is None:
+            continue
+        run, r = runs[trace.name], m.names.index(trace.name)
+        starts = np.asarray(m.cycles.start[r])[: len(run.times)]
+        key = f"trace{i}_model"
+        t, y = (np.concatenate(part) for part in (run.times, run.readings))
+        order = np.argsort(t, kind="stable")
+        t, y = thinned(t[order], y[order], ZOOM)
+        out[f"{key}_time"] = (key, t, {"units": "s"})
+        out[f"{key}_position"] = (key, y, {"units": "m"})
+        within = [e for e in found.events[: len(run.times)]]
+        if not within:
+            continue
+        # the zooms show an event that the model was run through
+        event = middle_event(_Part(tuple(within[:-1] if len(within) > 2 else within)))
+        before = found.events[event.index - 1].t_arrest if event.index else float(trace.time[0])
+        for piece, start, stop in (
+            ("creep", before, event.t_onset),
+            ("slip", event.t_onset - 0.3 * event.duration, event.t_arrest + 1.5 * event.duration),
+        ):
+            low, high = np.searchsorted(trace.time, [start, stop])
+            t, y = thinned(trace.time[low:high], trace.displacement[low:high], ZOOM)
+            name = f"trace{i}_{piece}"
+            out[f"{name}_time"] = (name, t, {"units": "s"})
+            out[f"{name}_position"] = (name, y, {"units": "m"})
+            out[f"{name}_model"] = (name, run.reading(t, starts), {"units": "m"})
+    return out
+
+
+class _Part:
+    """Events alone, as `middle_event` asks for them."""
+
+    def __init__(self, events: tuple) -> None:
+        self.events = events
+
+
+def residual_arrays(
+    measurement: Measurement,
+    model: np.ndarray,
+    floor: np.ndarray,
+    segmentations: dict[str, Segmentation],
+    stiffness: float,
+    traces: dict[str, Trace],
+) -> Variables:
+    """Residual over floor of every feature, and of every cycle by phase beside what might explain it."""
+    m, phase = measurement, measurement.layout.phase_index()
+    z = np.where(m.valid, (m.values - model) / floor, np.nan)
+    used = np.argwhere(np.asarray(m.cycles.used))
+    rows, columns = [], {name: [] for name in ("position", "velocity", "start", "contact_time", "load", "event")}
+    for r, n in used:
+        event = segmentations[m.names[r]].events[n]
+        trace = traces[m.names[r]]
+        with np.errstate(invalid="ignore"):
+            rows.append([_rms(z[r, n, phase == k]) for k in range(len(PHASES))])
+        own = float(np.asarray(m.cycles.stiffness)[r])
+        drive = float(trace.drive.position(event.t_onset)) if trace.drive is not None else np.nan
+        columns["position"].append(event.x_onset)
+        columns["velocity"].append(float(m.velocities[r]))
+        columns["start"].append(event.t_onset)
+        columns["contact_time"].append(event.stick_time)
+        columns["load"].append((own if np.isfinite(own) else stiffness) * (drive - event.x_onset))
+        columns["event"].append(float(n + 1))
+    units = {"position": "m", "velocity": "m/s", "start": "s", "contact_time": "s", "load": "N", "event": "1"}
+    out: Variables = {
+        "residual": (("cycle", "phase"), np.array(rows), {"units": "1"}),  # type: ignore[dict-item]
+        "feature_residual": (("run", "cycle_of_run", "feature"), z, {"units": "1"}),  # type: ignore[dict-item]
+    }
+    for name, values in columns.items():
+        out[f"cycle_{name}"] = ("cycle", np.array(values), {"units": units[name]})
+    return out
+
+
+def _rms(values: np.ndarray) -> float:
+    values = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")

@@ -1,0 +1,70 @@
+"""The parts of a trace that pictures show, as arrays for a run folder: the whole, one creep, one slip."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..segment import Segmentation, block_motion
+from ..trace import Trace
+
+OVERVIEW, ZOOM = 3000, 1500
+Variables = dict[str, tuple[str, np.ndarray, dict[str, Any]]]
+
+
+def trace_pieces(trace: Trace, found: Segmentation, number: int) -> Variables:
+    """Variables of an xarray data set, named ``trace0_whole_time``, ``trace0_whole_position`` and so on.
+
+    Pieces: ``whole`` (thinned so that extremes stay), ``creep`` (the stick before a middle event), ``slip`` (that event
+    and its ring-down), and the events themselves. Positions are as `block_motion` gives them.
+    """
+    position, _, _, unit = block_motion(trace, gain=found.settings.gain)
+    out: Variables = {}
+
+    def put(piece: str, time: np.ndarray, values: np.ndarray) -> None:
+        key = f"trace{number}_{piece}"
+        out[f"{key}_time"] = (key, np.asarray(time, float), {"units": "s"})
+        out[f"{key}_position"] = (key, np.asarray(values, float), {"units": unit})
+
+    put("whole", *thinned(trace.time, position, OVERVIEW))
+    if found.events:
+        event = middle_event(found)
+        before = found.events[event.index - 1].t_arrest if event.index else float(trace.time[0])
+        put("creep", *thinned(*_cut(trace.time, position, before, event.t_onset), ZOOM))
+        ring = event.t_arrest + 1.5 * event.duration
+        put("slip", *thinned(*_cut(trace.time, position, event.t_onset - 0.3 * event.duration, ring), ZOOM))
+        key = f"trace{number}_event"
+        out[f"{key}_onset"] = (key, np.array([e.t_onset for e in found.events]), {"units": "s"})
+        out[f"{key}_arrest"] = (key, np.array([e.t_arrest for e in found.events]), {"units": "s"})
+    if trace.drive is not None:
+        key = f"trace{number}_whole"
+        at = out[f"{key}_time"][1]
+        drive = trace.drive.position(at)
+        start = out[f"{key}_position"][1][0] - drive[0]
+        out[f"{key}_drive"] = (key, drive + start, {"units": unit if unit == "m" else "m"})
+    return out
+
+
+def middle_event(found: Segmentation) -> Any:
+    """The event shown in the zooms: one of middle size, not the first where there are others."""
+    events = found.events[1:] or found.events
+    order = sorted(events, key=lambda e: e.slip)
+    return order[len(order) // 2]
+
+
+def _cut(t: np.ndarray, y: np.ndarray, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+    low, high = max(int(np.searchsorted(t, start)) - 1, 0), int(np.searchsorted(t, stop)) + 1
+    return t[low:high], y[low:high]
+
+
+def thinned(t: np.ndarray, y: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """At most about ``points`` samples that keep the extremes of every bucket."""
+    if t.size <= points:
+        return t, y
+    bucket = -(-t.size * 2 // points)
+    n = t.size // bucket * bucket
+    blocks = y[:n].reshape(-1, bucket)
+    start = np.arange(0, n, bucket)
+    keep = np.unique(np.concatenate([start + blocks.argmin(1), start + blocks.argmax(1), [0, t.size - 1]]))
+    return t[keep], y[keep]

@@ -1,0 +1,46 @@
+"""Which pictures a result has, in which section of the report they stand, and what is said under them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from .figures import ripple_picture, series, trace_picture
+from .fit_figures import (
+    creep_grid,
+    heat_map,
+    ladder_picture,
+    profile_picture,
+    ramp_grid,
+    residual_plots,
+)
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+MOST_TRACES = 12
+
+
+def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str, str, Figure]]:
+    """(section, caption, figure) of everything this result can show."""
+    if len(result.get("ladder") or []) > 1:
+        yield "ladder", "Error of every model by phase, on fitted and on unseen runs.", ladder_picture(result["ladder"])
+    misfit = result.get("misfit") or {}
+    if misfit.get("table"):
+        yield "misfit", "Error by phase of the cycle and drive velocity.", heat_map(misfit["table"])
+    if "residual" in data:
+        yield "misfit", "Error of every cycle against what might explain it.", residual_plots(data)
+    if result.get("static") and "creep0_time" in data:
+        yield "static", "Creep before slips (dark) and the static model (dashed); residuals below.", creep_grid(data, result["static"]["fits"])
+    if result.get("ramps") and "ramp0_tau" in data:
+        yield "ramps", "Displacement against force up to break-away (dark) and the static curve (dashed).", ramp_grid(data, result["ramps"]["fits"])
+    for p in result.get("profiles") or []:
+        yield "parameters", p.get("text", ""), profile_picture(p)
+    traces = result.get("traces") or []
+    for i, facts in enumerate(traces[:MOST_TRACES]):
+        if series(data, f"trace{i}_whole", "time") is not None:
+            yield "traces", f"{facts['name']}: the whole, one stick, one slip.", trace_picture(data, i, facts)
+        if (facts.get("ripple") or {}).get("lines") and series(data, f"trace{i}_ripple", "frequency") is not None:
+            caption = f"{facts['name']}: {facts['ripple'].get('text', '')}"
+            yield "traces", caption, ripple_picture(data, i, {**facts["ripple"], "name": facts["name"]})

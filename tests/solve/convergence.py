@@ -1,0 +1,84 @@
+"""Convergence in step, tolerance and number of elements, and what does not converge: the phase of the ringing."""
+
+from __future__ import annotations
+
+import functools
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from stickslip.contact import Bank
+from stickslip.model import Model, State
+from stickslip.solve import ContactStepper, Tolerance, integrate
+
+from .rig import FAR, MASS, bank, drive, rig, slips, tighter
+from .slip_events import run
+
+TERM = diffrax.ODETerm(lambda t, y, args: y)
+QUANTITIES = ("onset", "slip", "peak", "recurrence")
+
+
+@jax.jit
+def _fixed(model: Model, state: State, t0: Array, t1: Array, step: Array) -> tuple[Array, Array]:
+    solution = diffrax.diffeqsolve(
+        TERM, ContactStepper(Tolerance(1e-9, 1e-18, 1e-15)), t0, t1, step, state, args=(model, model.shaped()),
+        saveat=diffrax.SaveAt(t1=True, fn=lambda t, y, args: (y.x, y.v)), stepsize_controller=diffrax.ConstantStepSize(),
+        adjoint=diffrax.ForwardMode(), max_steps=200_000,
+    )  # fmt: skip
+    x, v = solution.ys
+    return x[0], v[0]
+
+
+def fixed_steps(model: Model, state: State, t0: float, t1: float, steps: int) -> tuple[float, float]:
+    """Displacement (m) and velocity (m/s) at ``t1`` after so many equal steps."""
+    x, v = _fixed(model, state, jnp.asarray(t0), jnp.asarray(t1), jnp.asarray((t1 - t0) / steps))
+    return float(x), float(v)
+
+
+def oscillator(damping: float = 5.0) -> tuple[Model, State, float, float]:
+    """A block whose contact never slides; its angular frequency and decay rate (1/s)."""
+    stuck = Bank(jnp.array([1e5]), jnp.array([1e3]))
+    model = rig(springs=stuck, load_point=drive((FAR, 0.0)), damping=damping, ratio=1.0)
+    decay = damping / (2.0 * MASS)
+    return model, model.rest(v=1e-3), float(np.sqrt(101e3 / MASS - decay**2)), decay
+
+
+def oscillator_errors(steps: np.ndarray, end: float = 0.05) -> np.ndarray:
+    """Error of displacement over its amplitude at ``end`` (s), for numbers of equal steps."""
+    model, state, omega, decay = oscillator()
+    exact = 1e-3 / omega * np.exp(-decay * end) * np.sin(omega * end)
+    return np.array([abs(fixed_steps(model, state, 0.0, end, n)[0] - exact) for n in steps]) * omega / 1e-3
+
+
+@functools.cache
+def before_slip(start: float = 5.165) -> tuple[Model, State, float]:
+    """The rig shortly before its first slip, which begins at 5.18 s and ends at 5.21 s."""
+    model = rig()
+    return model, integrate(model, start, tolerance=tighter(10.0))[1], start
+
+
+def slip_errors(steps: np.ndarray, end: float = 5.195, fine: int = 32_000) -> np.ndarray:
+    """Error of displacement (m) in the middle of a slip, for numbers of equal steps."""
+    model, state, start = before_slip()
+    exact = fixed_steps(model, state, start, end, fine)[0]
+    return np.array([abs(fixed_steps(model, state, start, end, n)[0] - exact) for n in steps])
+
+
+def second_event(springs: int = 128, factor: float = 1.0, **options: float) -> np.ndarray:
+    """Onset of the first event; slip, peak velocity and recurrence of the second (QUANTITIES; s, m, m/s, s)."""
+    e = run(rig(springs=bank(springs), **options), 6.3, tighter(factor)).events
+    return np.array([e.onset[0], e.size[1], e.peak[1], e.recurrence[0]])
+
+
+def onset_scatter(damping: float, kicks: np.ndarray, duration: float = 9.0) -> np.ndarray:
+    """Onsets (s) after kicks (m/s) to the block at the start, shape (kicks, events common to all)."""
+    model = rig(damping=damping)
+    made = [
+        integrate(model, duration, state=model.rest(v=float(kick)), tolerance=tighter(10.0))[0].steps for kick in kicks
+    ]
+    onsets = [slips(s.t, s.x, s.v).onset for s in made]
+    number = min(len(o) for o in onsets)
+    return np.array([o[:number] for o in onsets])

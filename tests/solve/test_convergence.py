@@ -1,0 +1,51 @@
+"""The solver converges; what does not converge is the phase of ringing that nothing damps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from .convergence import onset_scatter, oscillator_errors, second_event, slip_errors
+from .rig import order
+
+
+def test_second_order_for_a_damped_oscillator():
+    steps = np.array([200, 400, 800, 1600])
+    errors = oscillator_errors(steps)
+    assert order(1.0 / steps, errors) == pytest.approx(2.0, abs=0.15)
+    assert errors[-1] < 1e-3
+
+
+def test_second_order_within_a_slip():
+    steps = np.array([250, 500, 1000, 2000])
+    errors = slip_errors(steps)
+    assert order(1.0 / steps, errors) == pytest.approx(2.0, abs=0.15)
+    assert errors[0] < 1e-8
+
+
+@pytest.mark.slow
+def test_event_quantities_converge_with_the_tolerance():
+    exact = second_event(factor=3000.0)
+    errors = np.abs(np.array([second_event(factor=f) for f in (1.0, 10.0, 100.0)]) / exact - 1.0)
+    assert np.all(errors[0] < [1e-4, 1e-2, 5e-3, 1e-3])
+    assert np.all(errors[2] < [1e-5, 1e-4, 1e-4, 1e-4])
+    assert np.all(errors[2] < 0.2 * errors[0])
+
+
+@pytest.mark.slow
+def test_event_quantities_converge_with_the_number_of_elements():
+    exact = second_event(2048, 30.0)
+    coarse = np.abs(second_event(32, 30.0) / exact - 1.0)
+    fine = np.abs(second_event(256, 30.0) / exact - 1.0)
+    assert np.all(fine < 1e-4)
+    assert np.all(fine < coarse)
+    assert np.all(np.abs(second_event(128, 30.0) / exact - 1.0) < 5e-4)
+
+
+@pytest.mark.slow
+def test_undamped_ringing_decides_the_onset():
+    """A kick too small to matter, of another phase at each onset: milliseconds without damping, none with it."""
+    kicks = np.linspace(0.0, 2e-6, 6)
+    bare, damped = (np.ptp(onset_scatter(c, kicks), axis=0) for c in (0.0, 10.0))
+    assert np.max(bare) > 1e-3
+    assert np.max(damped) < 5e-5
