@@ -103,7 +103,7 @@ def _check_point(
 
 
 def _slopes(rig: Rig, p: np.ndarray, places: list[int], steps: tuple) -> tuple[np.ndarray, float]:
-    """Derivatives of the features along the given parameters, shape (parameters, features), and the agreement to expect."""
+    """Derivatives of the features, shape (parameters, features), and the agreement to expect."""
     rows, failed = [], 0.0
     for first in range(0, len(places), AT_ONCE):
         some = places[first : first + AT_ONCE]

@@ -7,8 +7,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
-from ..segment import Dropped, Event, Segmentation, block_motion, position_at, velocity
+from ..segment import Dropped, Event, Segmentation, block_motion, position_at
 from ..segment.kinematics import half_window, velocity_noise
 from ..trace import Trace
 
@@ -19,6 +20,7 @@ SHARE = 0.3
 LONGEST = 0.05  # share of a stick that the window of a velocity may take to either side
 LEAST_NOISE = 12.0  # creep smaller than this many noise levels of a mean is not fitted
 POINTS = 160
+LEAST_WINDOW = 10  # samples
 Sampling = Literal["log", "uniform"]
 
 
@@ -119,14 +121,12 @@ def _process(
     low, high = int(np.searchsorted(time, start)), event.i_onset
     if high - low < 4 * half + 8:
         return "too few samples between ring-down and onset"
-    part = slice(low, high)
-    speeds = event.direction * velocity(time[part], position[part], half)
-    slow = np.flatnonzero(speeds <= v_lim)
-    if slow.size < 8 or slow[-1] + 1 >= speeds.size:
+    # where x - v_lim t is smallest the isotonic fit of the velocity passes v_lim: hum and counts do not fool it
+    smooth = uniform_filter1d(event.direction * position[low:high], 2 * half + 1, mode="nearest")
+    i = int(np.argmin(smooth - v_lim * (time[low:high] - time[low])))
+    if i < 8 or i >= high - low - 1:
         return f"the block never creeps through v_lim = {v_lim:.3g} m/s (sampled or sensed too coarsely)"
-    i = int(slow[-1])
-    share = (v_lim - speeds[i]) / max(speeds[i + 1] - speeds[i], 1e-300)
-    moment = float(time[low + i] + np.clip(share, 0.0, 1.0) * (time[low + i + 1] - time[low + i]))
+    moment = float(time[low + i])
     there = position_at(time, position, moment, max(half, 2))
     t, u, n = _windows(
         time[low : low + i + 1] - moment, event.direction * (position[low : low + i + 1] - there), points, sampling
@@ -152,10 +152,11 @@ def _begin(trace: Trace, found: Segmentation, event: Event) -> tuple[float | Non
 
 def _windows(t: Array, u: Array, points: int, sampling: Sampling) -> tuple[Array, Array, Array]:
     """Means over windows even in ln(time left) or in time; times, displacements and samples in each."""
-    left = -t + max(float(np.median(np.diff(t))), 1e-12)
-    spaced = np.geomspace if sampling == "log" else np.linspace
-    edges = spaced(left[-1], left[0] * (1 + 1e-12), points + 1)
-    bucket = np.searchsorted(edges, left, side="right")
-    starts = np.flatnonzero(np.diff(np.concatenate([[-1], bucket])))
-    n = np.diff(np.append(starts, t.size)).astype(float)
+    size = t.size
+    spaced = np.geomspace(1, size, points + 1) if sampling == "log" else np.linspace(0, size, points + 1)
+    # counted from the end, no window with fewer than so many samples
+    back = np.maximum(spaced, LEAST_WINDOW * np.arange(points + 1))
+    starts = np.unique(np.clip(size - np.round(back[1:]).astype(int), 0, size - 1))
+    starts[0] = 0
+    n = np.diff(np.append(starts, size)).astype(float)
     return np.add.reduceat(t, starts) / n, np.add.reduceat(u, starts) / n, n

@@ -51,10 +51,11 @@ def misfit_sentence(
     worst = named[0]
     z = np.where(measurement.valid, (measurement.values - model) / floor, np.nan)
     place = " and ".join(_place(measurement, z, phase) for phase in named)
-    text = f"{share:.0f} % of the misfit is in {place}{_trend(measurement, z, worst)}"
+    rest = max(by_phase.values()) < GOOD
+    text = f"{share:.0f} % of {'what is left' if rest else 'the misfit'} is in {place}{_trend(measurement, z, worst)}"
     error = float(np.sqrt(whole / len(squares)))
-    if max(by_phase.values()) < GOOD:
-        return f"The data are described as well as they allow (error {error:.2g} floors); of the rest, {text}."
+    if rest:
+        return f"The data are described as well as they allow (error {error:.2g} floors); {text}."
     return f"{text}; there the model is {by_phase[worst]:.3g} floors off."
 
 
@@ -101,5 +102,5 @@ def _trend(m: Measurement, z: np.ndarray, phase: str) -> str:
         return ""
     slope = float(np.polyfit(np.log(v), np.log(error[ok]), 1)[0])
     if abs(slope) < _TREND:
-        return " and is about the same at all velocities"
-    return f" and {'grows' if slope > 0 else 'falls'} with velocity"
+        return ", and it is about the same at all velocities"
+    return f", and it {'grows' if slope > 0 else 'falls'} with velocity"

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..fit.creep_process import CreepProcess, creep_processes
 from ..fit.normalised import Ramp, break_away, fit_ramps, is_ramp
-from ..fit.static import Align, CreepFit, Form, StaticFit, fit_static, tied_quantities
+from ..fit.static import SATISFYING, Align, CreepFit, Form, StaticFit, fit_static, tied_quantities
 from ..fit.static_table import StaticRig
 from ..segment import Segmentation
 from ..trace import Trace
@@ -100,6 +100,9 @@ def _creep_part(fit: StaticFit, v_lim: float) -> dict[str, Any]:
         f"lines: H and h_rms hold for this N and L only. Alignment '{fit.align}', virtual time '{fit.form}', "
         f"v_lim = {v_lim * 1e6:g} um/s{guessed}. Median residual {100 * numbers['median_nrmse']:.2g} % of the creep."
     )
+    hidden = sum(_noise_share(f) > 0.5 * SATISFYING for f in fit.fits)
+    if hidden:
+        text += f" In {hidden} processes counts and noise of the sensor alone make 1 % of the creep or more."
     return {
         "text": text,
         "align": fit.align,
@@ -131,9 +134,14 @@ def _one(f: CreepFit) -> dict[str, Any]:
         "u_max": f.u_max,
         "nrmse": f.nrmse,
         "creep": f.process.amplitude,
+        "noise": _noise_share(f),
         "satisfying": f.satisfying,
         "note": note,
     }
+
+
+def _noise_share(f: CreepFit) -> float:
+    return float(np.sqrt(np.mean(np.square(f.process.noise)))) / max(f.process.amplitude, 1e-300)
 
 
 def _words(fit: StaticFit) -> list[str]:

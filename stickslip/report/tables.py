@@ -35,9 +35,9 @@ def show(value: Any, unit: str = "1", digits: int = 4) -> str:
         return "–"
     if value == 0 or unit in ("1", "", None) or " " in unit.split("/")[0]:
         return f"{value:.{digits}g} {unit if unit not in ('1', None) else ''}".strip()
+    if unit == "kg":
+        value, unit = 1e3 * value, "g"
     power = max(-12, min(9, 3 * math.floor(math.log10(abs(value) * (1 + 10.0**-digits)) / 3)))
-    if unit in ("kg",):
-        return f"{value:.{digits}g} kg"
     return f"{value / 10.0**power:.{digits}g} {_PREFIXES[power]}{unit}"
 
 

@@ -45,11 +45,13 @@ class HermiteInterpolation(diffrax.AbstractLocalInterpolation):
         if t1 is not None:
             return jax.tree.map(jnp.subtract, self.evaluate(t1), self.evaluate(t0))
         h = self.t1 - self.t0
-        s = jnp.where(h > 0, (t0 - self.t0) / jnp.where(h > 0, h, 1.0), 0.0)
+        length = jnp.where(h > 0, h, 1.0)
+        s = jnp.where(h > 0, (t0 - self.t0) / length, 0.0)
         y = jax.tree.map(lambda a, b: a + s * (b - a), self.y0, self.y1)
-        dx = self.y1.x - self.y0.x
-        x = self.y0.x + hermite(s, h, dx, self.y0.v, self.y1.v)
-        return eqx.tree_at(lambda y: y.x, y, x)
+        dx, v0, v1 = self.y1.x - self.y0.x, self.y0.v, self.y1.v
+        x = self.y0.x + hermite(s, h, dx, v0, v1)
+        v = 6.0 * s * (1.0 - s) * dx / length + (1.0 - s) * (1.0 - 3.0 * s) * v0 + s * (3.0 * s - 2.0) * v1
+        return eqx.tree_at(lambda y: (y.x, y.v), y, (x, v))
 
 
 def hermite(s: Array, h: Array, dx: Array, v0: Array, v1: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import diffrax
@@ -80,8 +81,30 @@ def trace(
     return tuple(jnp.where(done, a, a[last]) for a in solution.ys)
 
 
-def differences(function, step: float) -> np.ndarray:  # type: ignore[no-untyped-def]
-    """Central differences of ``function(theta)`` in every parameter, shape (parameters, outcomes)."""
-    eye = np.eye(len(BASE)) * step
-    rows = [[np.asarray(function(s * e)) for s in (1.0, -1.0)] for e in eye]
-    return np.stack([(a - b) / (2.0 * step) for a, b in rows])
+def differences(function: Callable, step: float, which: Sequence[int] | None = None) -> np.ndarray:
+    """Central differences of ``function(theta)`` in some parameters (all), shape (parameters, outcomes)."""
+    moves = step * np.eye(len(BASE))[range(len(BASE)) if which is None else which]
+    return np.stack([(np.asarray(function(m)) - np.asarray(function(-m))) / (2.0 * step) for m in moves])
+
+
+def creep_displacements(tolerance: Tolerance, times: tuple[float, ...], most: int = 1024) -> Callable:
+    """Displacement (m) at ``times`` (s) of the first creep as a function of theta, by adaptive steps."""
+
+    def displacement(theta: Array) -> Array:
+        t, x, _ = trace(jnp.asarray(theta), None, 0.0, times[-1] + 0.1, tolerance, most, True)
+        return jnp.interp(jnp.asarray(times), t, x)
+
+    return displacement
+
+
+def two_events(tolerance: Tolerance, end: float = 6.3, most: int = 8192, fixed: bool = False) -> Callable:
+    """Onset of the first event and recurrence of the second (s) as a function of theta."""
+
+    def times(theta: Array) -> Array:
+        t, _, v = trace(jnp.asarray(theta), None, 0.0, end, tolerance, most, not fixed)
+        i, first = crossing(t, v, 5e-4, jnp.zeros((), int), True)
+        j, _ = crossing(t, v, 0.0, i, False)
+        _, second = crossing(t, v, 5e-4, j, True)
+        return jnp.stack([first, second - first])
+
+    return times

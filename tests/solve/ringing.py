@@ -34,7 +34,7 @@ def free_ringing(model: Model, velocity: float, duration: float, tolerance: Tole
     return Ringing(t, curve(t))
 
 
-def undriven(spring_stiffness: float = 1000.0, **options: float):  # type: ignore[no-untyped-def]
+def undriven(spring_stiffness: float = 1000.0, **options: float):
     return rig(
         springs=fine_start_bank(4000), load_point=drive((FAR, 0.0)), damping=0.0, ratio=1.0,
         spring_stiffness=spring_stiffness, **options,

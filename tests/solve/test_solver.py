@@ -63,9 +63,9 @@ def test_a_trace_is_read_off_between_the_steps(first_event):
     for own, stock in zip((at.x, at.v, at.psi), solution, strict=True):
         assert own == pytest.approx(np.asarray(stock), rel=1e-9, abs=1e-13)
     assert not np.any(np.isin(ts, first_event.steps.t))
-    slope = np.diff(at.x) / np.diff(ts)
-    middle = first_event.at(0.5 * (ts[1:] + ts[:-1])).v
-    assert slope == pytest.approx(middle, abs=0.02 * np.max(middle))
+    fine = np.linspace(5.15, 5.25, 40_001)
+    slope = np.gradient(first_event.at(fine).x, fine)
+    assert slope[1:-1] == pytest.approx(first_event.at(fine).v[1:-1], abs=1e-3 * np.max(at.v))
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ class _Jump(BodyForce):
 
 
 def test_a_number_lost_on_the_way_is_reported_with_its_time():
-    with pytest.raises(SolveError, match=r"t = [1-3]\.\d+ s .*an effect with a force that jumps"):
+    with pytest.raises(SolveError, match=r"t = [1-3]\.\d+ s .*no longer a number|force that jumps"):
         integrate(rig(effects=(_Lost(),)), 4.0)
 
 

@@ -1,0 +1,154 @@
+"""The rules of a verdict and of what is held out, on made-up numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from stickslip.diagnose.candidate import Candidate, starts
+from stickslip.diagnose.heldout import HeldOut
+from stickslip.diagnose.holdout import training_cycles
+from stickslip.diagnose.pieces import fit_arrays, fit_from
+from stickslip.diagnose.thresholds import THRESHOLDS
+from stickslip.diagnose.verdict import decide, is_complete, judge
+from stickslip.effects import catalogue
+from stickslip.errors import InputError
+from stickslip.features.layout import Layout
+from stickslip.features.measurement import Measurement
+from stickslip.fit.inertial import Fit, robust
+from stickslip.fit.parameters import effect_parameters
+from stickslip.forward import Cycles
+from stickslip.residual import Misfit
+
+
+def measurement(velocities=(5e-5, 1e-4, 2e-4, 4e-4, 1e-4), cycles=6, hold_runs=(4,)) -> Measurement:
+    """Nothing but shapes, velocities and holds (in the fourth and sixth cycle of the hold runs)."""
+    layout = Layout(0.06, 0.004)
+    runs = len(velocities)
+    used = np.ones((runs, cycles), bool)
+    valid = np.ones((runs, cycles, layout.size), bool)
+    valid[..., layout.slices()["hold"]] = False
+    for r in hold_runs:
+        valid[r, [3, 5], layout.slices()["hold"]] = True
+    c = Cycles(*([jnp.zeros((runs, cycles))] * 4), jnp.asarray(used), jnp.asarray(used), *([jnp.zeros((runs, 2))] * 2),
+               jnp.full(runs, jnp.nan), jnp.ones(runs, bool))  # fmt: skip
+    zero = np.zeros((runs, cycles, layout.size))
+    names = tuple(f"run{r}" for r in range(runs))
+    return Measurement(layout, c, None, zero, valid, zero + 1, names, np.array(velocities))
+
+
+def test_a_middle_velocity_and_the_later_hold_are_held_out():
+    train = training_cycles(measurement())
+    assert not train[2].any() or not train[1].any()
+    held_runs = [r for r in range(4) if not train[r].any()]
+    assert len(held_runs) == 1
+    assert held_runs[0] not in (0, 3)  # neither the slowest nor the fastest
+    assert train[4, :4].all()
+    assert not train[4, 5]
+
+
+def test_named_runs_are_held_out_and_unknown_names_refused():
+    train = training_cycles(measurement(), ["run1.csv"])
+    assert not train[1].any()
+    assert train[[0, 2, 3, 4]].all()
+    with pytest.raises(InputError, match="run of this name"):
+        training_cycles(measurement(), ["run9"])
+    with pytest.raises(InputError, match="every run"):
+        training_cycles(measurement(), [f"run{r}" for r in range(5)])
+
+
+def test_a_single_velocity_still_holds_something_out():
+    data = measurement((1e-4,), 6, ())
+    train = training_cycles(data)
+    assert 0 < train.sum() < 6
+
+
+def held(score: float, n: int = 8) -> HeldOut:
+    return HeldOut(np.sqrt(score), score, {"creep": np.sqrt(score)}, score * np.linspace(0.9, 1.1, n))
+
+
+def candidate(tag: str, cost: float, score: float, amplitude_in_sd: float = 30.0, at_bound: bool = False) -> Candidate:
+    effect = catalogue.make(tag)
+    free = tuple(effect_parameters(effect))
+    z = np.array([f.inward(f.start) for f in free])
+    if at_bound:
+        z[0] = free[0].bounds[1]
+    sd = np.ones(len(free)) * 1e-3
+    index = next(i for i, f in enumerate(free) if f.amplitude)
+    sd[index] = abs(z[index]) / amplitude_in_sd
+    shape = (1, 1, 3)
+    fit = Fit(z, np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.diag(sd**2), free, np.zeros((*shape, len(z))),
+              np.ones((1, 1), bool), 1, 1)  # fmt: skip
+    train = Misfit(1.0, {"creep": 1.0}, {})
+    return Candidate(tag, {}, effect, 0.5, None, fit, train, held(score))
+
+
+def test_a_clear_winner_is_named():
+    base = held(9.0)
+    tried = [candidate("contact-ageing", 300, 0.8), candidate("viscous-drag", 950, 8.5)]
+    best, close = decide([judge(c, 1000.0, base) for c in tried])
+    assert best is not None
+    assert best.candidate.tag == "contact-ageing"
+    assert len(close) == 1
+
+
+def test_two_that_explain_as_well_are_a_set():
+    base = held(9.0)
+    tried = [candidate("sensor-drift", 300, 0.8), candidate("thermal-creep", 320, 0.9)]
+    best, close = decide([judge(c, 1000.0, base) for c in tried])
+    assert best is not None
+    assert [j.candidate.tag for j in close] == ["sensor-drift", "thermal-creep"]
+
+
+@pytest.mark.parametrize(
+    ("made", "why"),
+    [
+        (lambda: candidate("viscous-drag", 700, 0.8), "training cost"),
+        (lambda: candidate("viscous-drag", 300, 8.0), "unseen cycles does not fall"),
+        (lambda: candidate("viscous-drag", 300, 0.8, amplitude_in_sd=1.0), "not significant"),
+        (lambda: candidate("viscous-drag", 300, 0.8, at_bound=True), "border"),
+    ],
+)
+def test_every_condition_can_refuse_a_name(made, why):
+    judged = judge(made(), 1000.0, held(9.0))
+    assert not judged.passed
+    assert any(why in f for f in judged.failures)
+    assert decide([judged]) == (None, [])
+
+
+def test_complete_means_every_phase_also_where_no_fit_looked():
+    good = Misfit(0.9, {"creep": 0.8, "slip": 1.0}, {})
+    assert is_complete(good, HeldOut(1.0, 1.0, {"creep": 1.2}, np.array([1.0])))
+    bad = HeldOut(2.0, 4.0, {"creep": THRESHOLDS.complete + 0.1}, np.array([4.0]))
+    assert not is_complete(good, bad)
+    assert not is_complete(replace(good, by_phase={"slip": THRESHOLDS.complete + 0.1}), held(1.0))
+
+
+def test_a_fit_survives_being_kept():
+    fit = candidate("contact-ageing", 10.0, 1.0).fit
+    assert fit is not None
+    again = fit_from(fit_arrays(fit))
+    assert again.free == fit.free
+    assert again.cost == fit.cost
+    np.testing.assert_array_equal(again.z, fit.z)
+    np.testing.assert_array_equal(again.columns, fit.columns)
+    assert again.values == fit.values
+
+
+@pytest.mark.parametrize("tag", catalogue.tags())
+def test_a_search_starts_inside_the_bounds_and_away_from_the_null(tag):
+    effect = catalogue.make(tag)
+    free = {f.name.split(".", 1)[1]: f for f in effect_parameters(effect)}
+    spec = catalogue.amplitude(effect)
+    for values in starts(effect):
+        assert values[effect.amplitude] != spec.null
+        for name, value in values.items():
+            assert free[name].lower <= value <= free[name].upper
+
+
+def test_huber_is_quadratic_inside_and_straight_outside():
+    assert robust(np.array([2.0])) == 4.0
+    assert robust(np.array([10.0])) == pytest.approx(2 * 3 * 10 - 9)

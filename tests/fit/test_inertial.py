@@ -1,0 +1,86 @@
+"""The chain from a trace to fitted parameters: the model finds itself again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.fit.inertial import fit
+from stickslip.fit.problem import Problem
+from stickslip.residual import floors, misfit
+
+from . import synthetic
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    found = synthetic.traces()
+    return synthetic.measured(found)
+
+
+@pytest.fixture(scope="module")
+def problem(campaign):
+    return Problem(synthetic.composition(), campaign)
+
+
+def test_cycles_begin_at_the_arrests(campaign):
+    used = np.asarray(campaign.cycles.used)
+    assert used.sum(axis=1).min() >= 3
+    recurrence = campaign.values[:, 1:, 0][used[:, 1:]]
+    assert np.all((recurrence > 0.15) & (recurrence < 0.8))
+    # the slip size of a damped block on a spring: F_s (1 - r)(1 + exp(-pi zeta))/c_s, weakening not quite complete
+    size = campaign.values[..., 1][used]
+    assert np.all((size > 30e-6) & (size < 90e-6))
+
+
+def test_features_of_data_and_model_agree_at_the_truth(campaign, problem):
+    events = np.zeros((*campaign.values.shape[:2], 2))
+    model = problem.features(synthetic.truth(), events)
+    floor = floors(campaign)
+    error = misfit(campaign, model, floor)
+    for phase, value in error.by_phase.items():
+        assert value < 1.0, (phase, value)
+    # and they do not where a parameter is wrong by a tenth
+    wrong = synthetic.truth()
+    wrong[0] += 0.1
+    assert misfit(campaign, problem.features(wrong, events), floor).total > 10.0
+
+
+def test_differences_of_the_jacobian_follow_the_features(campaign, problem):
+    z, events = synthetic.truth(), np.zeros((*campaign.values.shape[:2], 2))
+    base = problem.features(z, events)
+    columns = problem.columns(z, events, [0, 1], base)
+    moved = z.copy()
+    moved[0] += 0.01
+    moved[1] += 0.01
+    change = problem.features(moved, events) - base
+    predicted = 0.01 * columns[..., 0] + 0.01 * columns[..., 1]
+    for feature in (0, 1):  # recurrence, slip size
+        got, want = change[..., feature], predicted[..., feature]
+        scale = np.abs(want).max()
+        assert np.abs(got - want)[campaign.valid[..., feature]].max() < 0.05 * scale
+
+
+def test_event_wise_factor_acts_on_its_own_cycle(campaign, problem):
+    z, events = synthetic.truth(), np.zeros((*campaign.values.shape[:2], 2))
+    base = problem.features(z, events)
+    events[0, 2, 0] = 0.05
+    moved = problem.features(z, events) - base
+    creep = campaign.layout.slices()["creep"]
+    own = np.abs(moved[0, 2, creep]).max()
+    assert own > 1e-9
+    assert np.abs(moved[0, :2]).max() == 0.0  # nothing before it changes
+    assert np.abs(moved[1]).max() == 0.0  # nor another run
+
+
+@pytest.mark.slow
+def test_fit_recovers_the_truth(campaign):
+    start = {name: value * f for (name, (_, value)), f in zip(synthetic.TRUTH.items(), START, strict=True)}
+    problem = Problem(synthetic.composition(start), campaign)
+    found = fit(problem, floors(campaign))
+    for name, (_, value) in synthetic.TRUTH.items():
+        tolerance = {"contact.spread": 0.6, "contact.p": 0.1, "contact.u_max": 0.15}.get(name, 0.05)
+        assert found.values[name] == pytest.approx(value, rel=tolerance), name
+
+
+START = (1.03, 0.85, 0.8, 1.3, 0.8, 1.1, 1.0, 1.2)
