@@ -140,7 +140,7 @@ def _try(effect, form, base, optimum, measurement, floor, train, threads, progre
     columns = np.concatenate(
         [optimum.columns, problem.columns(z, optimum.events, range(k, len(composition.free)), features)], axis=-1
     )
-    found = fit(problem, floor, z=z, events=optimum.events, stages=WIDE, use=train, columns=columns)
+    found = fit(problem, floor, z=z, events=optimum.events, stages=WIDE, use=train, columns=columns, anew=False)
     tell(f"{effect.tag}: cost {base_cost:.0f} -> {found.cost:.0f} at wide floors")
     wide = WIDE[-1][0]
     note = ""

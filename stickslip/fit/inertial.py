@@ -73,6 +73,7 @@ class _Residuals:
         self._at: np.ndarray | None = None
         self._features: np.ndarray | None = None
         self._columns: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.anew = True  # whether derivatives may be taken again where Broyden's update fails
         self.evaluations = self.jacobians = 0
 
     def events(self, x: np.ndarray) -> np.ndarray:
@@ -104,7 +105,8 @@ class _Residuals:
             size = np.linalg.norm((f - old) * weight)
             if size < QUIET * np.sqrt(weight.astype(bool).sum()):
                 return columns  # a step this small says more of the solver's noise than of a slope
-            if dz @ dz > 0 and np.linalg.norm(miss * weight) < TRUST * size:
+            good = not self.anew or np.linalg.norm(miss * weight) < TRUST * size
+            if dz @ dz > 0 and good:
                 columns = columns + miss[..., None] * dz / (dz @ dz)
                 self._columns = (x.copy(), f, columns)
                 return columns
@@ -174,6 +176,7 @@ def fit(
     event_scale: float = 1.0,
     use: np.ndarray | None = None,
     columns: np.ndarray | None = None,
+    anew: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Fit:
     """Levenberg-Marquardt (trust region with bounds) at falling floors.
@@ -186,6 +189,7 @@ def fit(
         event_scale: on the prior width of the event-wise variation.
         use: cycles to fit, shape (R, n); default all.
         columns: derivatives at the start if they are known, shape (R, n, F, k).
+        anew: whether derivatives may be taken again; if not, those given are only updated.
         progress: told the error after every evaluation.
 
     Raises:
@@ -196,6 +200,7 @@ def fit(
     start = vector(problem.composition.free) if z is None else np.asarray(z, float)
     ev = np.zeros((*res.used.shape, 2)) if events is None else events
     x = np.clip(np.concatenate([start, ev[res.used].ravel()]), low + 1e-9, high - 1e-9)
+    res.anew = anew or columns is None
     if columns is not None:
         res.start(x, columns)
     scale = np.concatenate([[min(f.width, 1.0) for f in res.free], np.tile(res.widths, int(res.used.sum()))])

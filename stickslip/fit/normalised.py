@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 POINTS = 160
 CROWDING = 5e-2  # q = F_n / (E* L h_rms) of the paper's example; the shape hardly depends on it
 _LEAST = 12.0  # displacement in noise levels
+BEYOND = 0.05  # by which share full friction may exceed the force at which the slip was seen to begin
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class RampFit:
     Attributes:
         ramp: what was fitted.
         hurst, hurst_std: Hurst exponent of lines of ``n_springs`` springs, and its standard deviation.
-        u_max, u_max_std: displacement at break-away, m.
+        u_max, u_max_std: displacement at full sliding, m.
+        friction_force: force at full sliding, N; up to 5 % more than where the slip was seen to begin.
         nrmse: rms of the residual over the displacement at break-away.
         model: displacements of the model, m, shape (n,).
         n_springs: springs of a line, without which H means nothing.
@@ -60,6 +62,7 @@ class RampFit:
     hurst_std: float
     u_max: float
     u_max_std: float
+    friction_force: float
     nrmse: float
     model: Array
     n_springs: int
@@ -109,7 +112,7 @@ def break_away(trace: Trace, segmentation: Segmentation, points: int = POINTS) -
 
 
 def fit_ramps(ramps: Sequence[Ramp], n_springs: int = 4096, lines: int = 100, seed: int = 0) -> tuple[RampFit, ...]:
-    """Fit (H, u_max) to every ramp by itself, to the mean of the lines.
+    """Fit (H, u_max) and full friction to every ramp by itself, with the mean curve of the lines.
 
     Raises:
         InputError: no ramp.
@@ -132,12 +135,14 @@ def _fit_one(ramp: Ramp, table: StaticTable, n_springs: int) -> RampFit:
 
     def residual(x: Array) -> Array:
         shape = table.shape(float(x[0]), CROWDING)
-        return (x[1] * span * np.interp(ramp.tau, table.tau, shape / shape[-1]) - ramp.displacement) / span
+        model = np.interp(ramp.tau / (1.0 + x[2]), table.tau, shape / shape[-1])
+        return (x[1] * span * model - ramp.displacement) / span
 
-    bounds = ([HURST[0], 0.1], [HURST[1], 10.0])
-    runs = [least_squares(residual, [h, 1.0], bounds=bounds, diff_step=1e-4) for h in (0.15, 0.6)]
+    # the onset is seen at a speed, a little before the last spring slides: full friction is a third unknown
+    bounds = ([HURST[0], 0.1, 0.0], [HURST[1], 10.0, BEYOND])
+    runs = [least_squares(residual, [h, 1.2, 0.02], bounds=bounds, diff_step=1e-4) for h in (0.15, 0.6)]
     best = min(runs, key=lambda r: float(r.cost))
-    covariance = np.linalg.pinv(best.jac.T @ best.jac) * float(best.fun @ best.fun) / max(best.fun.size - 2, 1)
+    covariance = np.linalg.pinv(best.jac.T @ best.jac) * float(best.fun @ best.fun) / max(best.fun.size - 3, 1)
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     edge = min(best.x[0] - HURST[0], HURST[1] - best.x[0]) < 1e-3
     return RampFit(
@@ -146,6 +151,7 @@ def _fit_one(ramp: Ramp, table: StaticTable, n_springs: int) -> RampFit:
         float("nan") if edge else float(sd[0]),
         float(best.x[1] * span),
         float(sd[1] * span),
+        float(ramp.force * (1.0 + best.x[2])),
         float(np.sqrt(np.mean(best.fun**2))),
         best.fun * span + ramp.displacement,
         n_springs,

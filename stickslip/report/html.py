@@ -29,11 +29,13 @@ def write_report(folder: str | Path) -> Path:
     """
     folder = Path(folder)
     result = read_result(folder)
+    from jinja2 import UndefinedError
+
     from .sections import pictures
 
     try:
         text = render(result, pictures(result, _arrays(folder)))
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, UndefinedError) as error:
         what = f"the result does not have the form of a stickslip result ({type(error).__name__}: {error})"
         raise RunFolderError(what, file=folder / RESULT) from error
     path = folder / REPORT

@@ -18,6 +18,7 @@ _RATE = 1000.0  # Hz, what faster records are averaged down to
 _HIGHEST = 200.0  # Hz
 _LEAST_STICKS, _LINES, _APART = 12, 4, 1.2  # fewer sticks that look alike make lines of their own
 _MARGIN = 1.3  # on the highest line that noise alone makes
+_SIDEBANDS = 2.6  # of a line, in units of one over the recurrence time, within which the gaps of the slips blur it
 _FAINT = 0.05  # lines below this share of the noise of one sample are not told
 _POINTS = 3000
 _GRID = np.linspace(-1, 1, 301)
@@ -65,13 +66,14 @@ def stick_ripple(trace: Trace, found: Segmentation) -> dict[str, Any] | None:
     count = float(frequency.size)
     # largest of `count` sums of three exponential powers, over their median
     limit = _MARGIN * (np.log(count) + 2 * np.log(np.log(count))) / 2.674
+    sideband = _SIDEBANDS / float(np.median([event.recurrence for event in found.events[1:]]))
     lines: list[dict[str, float]] = []
     for i in np.argsort(-prominence):
         if prominence[i] < limit or len(lines) == _LINES:
             break
         if power[i] < (_FAINT * found.settings.noise) ** 2:
             continue
-        if all(max(frequency[i] * x["period"], 1 / (frequency[i] * x["period"])) > _APART for x in lines):
+        if not any(_belongs(float(frequency[i]), float(np.sqrt(power[i])), x, sideband) for x in lines):
             lines.append(
                 {
                     "period": float(1.0 / frequency[i]),
@@ -88,6 +90,13 @@ def stick_ripple(trace: Trace, found: Segmentation) -> dict[str, Any] | None:
         "frequency": frequency[:usable].reshape(-1, size).mean(axis=1),
         "amplitude": np.sqrt(power[:usable].reshape(-1, size).max(axis=1)),
     }
+
+
+def _belongs(frequency: float, amplitude: float, line: dict[str, float], sideband: float) -> bool:
+    """Whether a line is part of a known one: beside it, or one of the sidebands that the slips cut out of it."""
+    ratio = frequency * line["period"]
+    beside = max(ratio, 1 / ratio) < _APART
+    return beside or (abs(frequency - 1 / line["period"]) < sideband and amplitude < 0.75 * line["amplitude"])
 
 
 def _tapered(rest: np.ndarray, sticks: list[tuple[int, int]]) -> float:

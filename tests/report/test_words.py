@@ -1,0 +1,135 @@
+"""Sentences about data and misfit, the ripple in the sticks, the gain of a force sensor."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stickslip.features.layout import PHASES, Layout
+from stickslip.report import abilities, misfit_sentence, phase_table
+from stickslip.report.describe import describe_trace, stick_gain
+from stickslip.report.ripple import stick_ripple
+from stickslip.segment import segment
+from stickslip.trace import Drive, Trace
+
+
+def sawtooth(*, v0=42e-6, rate=2000.0, sticks=60, stiffness=168.0, gain=1.0, ripple=0.0, period=0.4, noise=1e-6, seed=0, holds=()):
+    """A block that stands still, then slips by a half cosine of 38 ms; recurrence varies, so that nothing repeats."""
+    rng = np.random.default_rng(seed)
+    onsets = np.cumsum(rng.uniform(1.3, 1.9, sticks))
+    t = np.arange(0.0, onsets[-1] + 1.0, 1 / rate)
+    x, before = np.zeros_like(t), 0.0
+    for onset in onsets:
+        size = v0 * (onset - before)
+        x += 0.5 * size * (1 - np.cos(np.pi * np.clip((t - onset) / 0.038, 0, 1)))
+        before = onset
+    drive = Drive.constant(v0, 0.0, t[-1])
+    position = drive.position(t) + ripple * np.sin(2 * np.pi * t / period)
+    force = gain * stiffness * (position - x) + stiffness * noise * rng.standard_normal(t.size)
+    return Trace("saw", t, spring_force=force, drive=drive, spring_stiffness=stiffness, noise=stiffness * noise)
+
+
+def test_a_force_sensor_that_reads_too_much_is_named_with_its_size():
+    trace = sawtooth(gain=1.1)
+    found = segment(trace)
+    assert stick_gain(trace, found)["value"] == pytest.approx(1.1, abs=0.005)
+    text = " ".join(abilities([trace], [found]).cannot)
+    assert "sensor-gain of about +10 %" in text
+    trace = sawtooth(gain=1.0)
+    assert "sensor-gain" not in " ".join(abilities([trace], [segment(trace)]).cannot)
+
+
+def test_ripple_of_the_drive_is_found_below_the_noise():
+    trace = sawtooth(ripple=150e-9, period=0.4)
+    found = stick_ripple(trace, segment(trace))
+    assert found["lines"][0]["period"] == pytest.approx(0.4, rel=0.005)
+    assert found["lines"][0]["amplitude"] == pytest.approx(150e-9, rel=0.3)
+    assert len(found["lines"]) == 1
+    assert "um of drive" in found["text"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_ripple_where_there_is_none(seed):
+    trace = sawtooth(seed=seed)
+    assert stick_ripple(trace, segment(trace))["lines"] == []
+
+
+def test_hum_is_called_by_its_name():
+    trace = sawtooth(ripple=500e-9, period=0.02)
+    assert "mains, 50 Hz" in stick_ripple(trace, segment(trace))["text"]
+
+
+def test_one_velocity_identifies_nothing_and_three_do():
+    one = sawtooth(sticks=8)
+    said = abilities([one], [segment(one)])
+    assert any("identifies nothing" in line for line in said.cannot)
+    assert any("No hold" in line for line in said.cannot)
+    assert any("No virgin start" in line for line in said.cannot)
+    assert any("Spring force only" in line for line in said.cannot)
+    assert any("too slowly for a ring-down" in line for line in said.cannot)
+    traces = [sawtooth(sticks=8, v0=v) for v in (2e-5, 5e-5, 1e-4)]
+    said = abilities(traces, [segment(t) for t in traces])
+    assert not any("identifies nothing" in line for line in said.cannot)
+    assert any(line.startswith("3 drive velocities") for line in said.can)
+
+
+def test_no_slip_at_all_is_said_first():
+    t = np.linspace(0.0, 10.0, 2000)
+    sliding = Trace("slide", t, displacement=5e-5 * t, drive=Drive.constant(5e-5, 0.0, 10.0))
+    assert abilities([sliding], [segment(sliding)]).cannot[0].startswith("No trace holds a slip")
+
+
+def test_events_are_described_with_their_units():
+    trace = sawtooth(sticks=8)
+    row = describe_trace(trace, segment(trace))
+    assert len(row["events"]) == 8
+    event = row["events"][3]
+    assert set(event) - {"warnings"} <= set(row["units"])
+    assert row["units"]["slip"] == "m"
+    assert event["slip"] == pytest.approx(42e-6 * event["recurrence"], rel=0.1)
+    assert event["t_arrest"] > event["t_onset"]
+
+
+def measured(phase, growth, point=None, runs=4):
+    """A measurement whose misfit lies in one phase and changes with the drive's velocity."""
+    layout = Layout(0.06, 0.004)
+    velocities = 5e-5 * 2.0 ** np.arange(runs)
+    values = np.zeros((runs, 5, layout.size))
+    index = layout.phase_index() == PHASES.index(phase)
+    if point is not None:
+        index &= np.arange(layout.size) < layout.slices()["creep"].start + point
+    values[..., index] = 10.0
+    values *= (velocities / velocities[0])[:, None, None] ** growth
+    anchors = SimpleNamespace(creep=np.broadcast_to(np.geomspace(0.004, 1.0, 16), (runs, 5, 16)))
+    m = SimpleNamespace(layout=layout, values=values, valid=np.ones(values.shape, bool), velocities=velocities, anchors=anchors)
+    z = [float(np.sqrt(np.mean(values[..., layout.phase_index() == i] ** 2))) for i in range(len(PHASES))]
+    by_phase = {p: max(e, 0.3) for p, e in zip(PHASES, z, strict=True)}
+    return misfit_sentence(m, np.zeros_like(values), np.ones_like(values), by_phase)
+
+
+def test_the_sentence_says_where_and_how_it_depends_on_velocity():
+    text = measured("creep", 1.0, point=7)
+    assert "before the slip" in text
+    assert "the last" in text
+    assert "grows with velocity" in text
+    assert "falls with velocity" in measured("ring-down", -1.0)
+    assert "ring-down" in measured("ring-down", -1.0)
+    assert "same at all velocities" in measured("hold", 0.0)
+    share = int(text.split(" %")[0])
+    assert share >= 80
+
+
+def test_a_good_fit_is_not_called_a_failure():
+    layout = Layout(0.06, 0.004)
+    values = np.full((2, 3, layout.size), 0.9)
+    anchors = SimpleNamespace(creep=np.broadcast_to(np.geomspace(0.004, 1.0, 16), (2, 3, 16)))
+    m = SimpleNamespace(layout=layout, values=values, valid=np.ones(values.shape, bool), velocities=np.array([1e-5, 2e-5]), anchors=anchors)
+    text = misfit_sentence(m, np.zeros_like(values), np.ones_like(values), dict.fromkeys(PHASES, 0.9))
+    assert text.startswith("The data are described as well as they allow")
+
+
+def test_table_is_sorted_by_velocity():
+    table = phase_table({"fast": {"slip": 2.0}, "slow": {"creep": 1.0, "slip": 3.0}}, {"fast": 4e-4, "slow": 5e-5})
+    assert table["runs"] == ["slow", "fast"]
+    assert table["phases"] == ["creep", "slip"]
+    assert table["errors"] == [[1.0, 3.0], [None, 2.0]]
