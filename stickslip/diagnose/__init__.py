@@ -1,0 +1,1 @@
+"""Which physical effect is missing: score, refit, held-out comparison, verdict."""

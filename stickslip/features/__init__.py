@@ -1,0 +1,1 @@
+"""Features of a stick-slip cycle, taken by the same lines from a measurement and from the model."""
