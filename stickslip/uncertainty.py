@@ -64,7 +64,11 @@ def null_directions(names: Sequence[str], jacobian: Array, tolerance: float = 1e
     """
     _, s, vt = np.linalg.svd(np.asarray(jacobian, float), full_matrices=True)
     s = np.concatenate([s, np.zeros(vt.shape[0] - s.size)])
-    return [_direction(names, _sparse(v), float("inf"), None) for v, size in zip(vt, s, strict=True) if size < tolerance * s[0]]
+    return [
+        _direction(names, _sparse(v), float("inf"), None)
+        for v, size in zip(vt, s, strict=True)
+        if size < tolerance * s[0]
+    ]
 
 
 def _sparse(vector: Array) -> Array:
@@ -107,8 +111,11 @@ def _tied(names: Sequence[str], covariance: Array) -> list[Direction]:
     out = []
     for i, j in sorted(pairs, key=lambda p: -abs(correlation[p])):
         way = "the same way" if correlation[i, j] > 0 else "against each other"
-        text = f"{names[j]} and {names[i]} move {way} (correlation {correlation[i, j]:.2f}): an error of one is taken up by the other"
-        out.append(Direction((names[j], names[i]), (1.0, float(np.sign(correlation[i, j]))), float(max(sd[i], sd[j])), text))
+        text = f"{names[j]} and {names[i]} move {way} (correlation {correlation[i, j]:.2f}): "
+        text += "an error of one is taken up by the other"
+        out.append(
+            Direction((names[j], names[i]), (1.0, float(np.sign(correlation[i, j]))), float(max(sd[i], sd[j])), text)
+        )
     return out
 
 

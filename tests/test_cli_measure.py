@@ -135,7 +135,24 @@ def test_paper_s_alignment_is_an_option(capsys):
     write()
     results = []
     for align in ("consistent", "paper"):
-        assert run(["fit", "c.toml", "--model", "static", "--align", align, "--time", "paper", "--sampling", "uniform", "--json"]) == 0
+        assert (
+            run(
+                [
+                    "fit",
+                    "c.toml",
+                    "--model",
+                    "static",
+                    "--align",
+                    align,
+                    "--time",
+                    "paper",
+                    "--sampling",
+                    "uniform",
+                    "--json",
+                ]
+            )
+            == 0
+        )
         results.append(json.loads(capsys.readouterr().out)["static"])
     assert results[1]["align"] == "paper"
     assert results[1]["fits"][0]["h_rms"] > 1.5 * results[0]["fits"][0]["h_rms"]
@@ -146,13 +163,19 @@ def test_inertial_fit_of_a_simulated_campaign(capsys):
     from stickslip.challenge.generator.__main__ import main
 
     main(["camp", "--effect", "none", "--seed", "3"])
-    assert run(["fit", "camp/campaign.toml", "--out", "fitted", "--most-events", "4", "--profile", "weakening.drop"]) == 0
+    assert (
+        run(["fit", "camp/campaign.toml", "--out", "fitted", "--most-events", "4", "--profile", "weakening.drop"]) == 0
+    )
     found = json.loads(Path("fitted/result.json").read_text())
     assert [step["model"] for step in found["ladder"]] == [["static"], ["static", "inertia"]]
     assert found["ladder"][1]["train_error"] < 1.5 < found["ladder"][0]["train_error"]
     assert found["misfit"]["sentence"].startswith("The data are described")
     assert found["parameters"]["contact.u_max"]["std"] > 0
-    assert found["profiles"][0]["interval"][0] < found["parameters"]["weakening.drop"]["value"] < found["profiles"][0]["interval"][1]
+    assert (
+        found["profiles"][0]["interval"][0]
+        < found["parameters"]["weakening.drop"]["value"]
+        < found["profiles"][0]["interval"][1]
+    )
     assert 0.02 <= found["effective"]["H"] <= 0.98
     assert "act only together" in found["identifiability"][-1]
 

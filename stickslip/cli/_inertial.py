@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from ..campaign import Campaign
@@ -106,9 +107,7 @@ def fit_inertial(
         variables |= trace_pieces(t, s, i)
     variables |= drawn
     by_name = dict(zip((t.name for t in traces), found, strict=True))
-    variables |= residual_arrays(
-        shown, optimum.features, floor, by_name, float(stiffness), {t.name: t for t in traces}
-    )
+    variables |= residual_arrays(shown, optimum.features, floor, by_name, float(stiffness), {t.name: t for t in traces})
     variables["coordinates"] = {"phase": list(PHASES), "feature": list(m.layout.names), "run": list(m.names)}
     return result, variables
 
@@ -167,7 +166,10 @@ def _climb(
     """The base model, then one effect after the other."""
     problem = Problem(base, m)
     optimum = _best_of(problem, floor, train, starts, tell)
-    ladder = [_static_step(problem, optimum, floor, train), _step(problem, optimum, floor, train, ["static", "inertia"], None)]
+    ladder = [
+        _static_step(problem, optimum, floor, train),
+        _step(problem, optimum, floor, train, ["static", "inertia"], None),
+    ]
     composition = base
     for effect in effects:
         tell(f"adding {effect.tag}")
@@ -228,7 +230,9 @@ def _step(
 
 def _static_step(problem: Problem, optimum: Fit, floor: np.ndarray, train: np.ndarray) -> dict[str, Any]:
     m = problem.measurement
-    stiffness = problem.composition.fixed.get("rig.spring_stiffness") or optimum.values.get("rig.spring_stiffness", np.nan)
+    stiffness = problem.composition.fixed.get("rig.spring_stiffness") or optimum.values.get(
+        "rig.spring_stiffness", np.nan
+    )
     model = static_features(m, floor, optimum, stiffness, train)
     errors = [
         misfit(replace(m, valid=m.valid & part[..., None]), model, floor)
@@ -245,8 +249,8 @@ def _static_step(problem: Problem, optimum: Fit, floor: np.ndarray, train: np.nd
 
 def _equations(composition: Composition, optimum: Fit) -> list[dict[str, str]]:
     """Equations of the fitted model with its values."""
-    m = composition
-    model = m.model(optimum.z, np.zeros(2), (np.array([0.0, 1.0]), np.array([0.0, 1.0])), np.array(np.nan))
+    nodes = jnp.array([0.0, 1.0])
+    model = composition.model(jnp.asarray(optimum.z), jnp.zeros(2), (nodes, nodes), jnp.array(jnp.nan))
     found = equations(model.effects, block=model.block, weakening=model.weakening)
     return [{"text": found.text(), "latex": found.latex()}]
 

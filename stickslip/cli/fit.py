@@ -81,6 +81,7 @@ def fit(
         refuse_existing(out, force)
     began = _now()
     loaded, traces, found = load_and_segment(campaign)
+    found, notes = _gains(traces, found)
     if model == "static":
         result, variables = _static(loaded, traces, found, align, time, speed, sampling)
     else:
@@ -89,11 +90,32 @@ def fit(
         options = Options(add, effect, profile, starts, 2.0 if new_lines else 1.0, most_events)
         result, variables = fit_inertial(loaded, traces, found, options)
     result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
+    result["notes"] = [*notes, *result.get("notes", ())]
     if out is not None:
         with open_run(out, force=force) as run:
             _write(run, result, variables)
     print(json_text(result) if json else _text(result, out))
     return 0
+
+
+def _gains(traces: list[Trace], found: list[Segmentation]) -> tuple[list[Segmentation], list[str]]:
+    """Events of traces of spring force, with the force's scale set right where the sticks show that it is wrong."""
+    from ..report.describe import stick_gain
+    from ..segment import segment
+
+    out, notes = [], []
+    for trace, old in zip(traces, found, strict=True):
+        gain = stick_gain(trace, old)
+        if gain is None or trace.spring_stiffness is None or abs(gain["value"] - 1.0) < max(0.02, 3 * gain["std"]):
+            out.append(old)
+            continue
+        out.append(segment(trace, spring_stiffness=trace.spring_stiffness * gain["value"]))
+        notes.append(
+            f"{trace.name}: sensor-gain of {100 * (gain['value'] - 1):+.1f} % (+-{100 * gain['std']:.1f} %): while the "
+            f"block sticks, the force rises {gain['value']:.3f} times as fast as stiffness times drive. The force was "
+            "divided by it; stiffness or drive velocity may be what is wrong instead."
+        )
+    return out, notes
 
 
 def _now() -> float:
@@ -163,12 +185,16 @@ def _write(run: Run, result: dict[str, Any], variables: dict[str, Any]) -> None:
 
 def _quantity(value: float | None, unit: str, digits: int = 4) -> str:
     """A quantity; grams, because prefixes go with them."""
-    return show.quantity(None if value is None else 1e3 * value, "g", digits) if unit == "kg" else show.quantity(value, unit, digits)
+    return (
+        show.quantity(None if value is None else 1e3 * value, "g", digits)
+        if unit == "kg"
+        else show.quantity(value, unit, digits)
+    )
 
 
 def _text(result: dict[str, Any], out: Path | None) -> str:
     """What is printed."""
-    lines = [f"{result['title']}: {result['model']} model"]
+    lines = [f"{result['title']}: {result['model']} model", *result["notes"]]
     for key in ("static", "ramps"):
         if result.get(key):
             lines += ["", result[key]["text"]]

@@ -48,9 +48,7 @@ def modelled_runs(problem: Problem, z: Array, events: Array) -> list[ModelledRun
 
     @jax.jit
     def tracks(z: jax.Array, event: jax.Array, cycles: Cycles) -> Track:
-        return run_cycles(
-            lambda e, nodes: composition.model(z, e, nodes, cycles.stiffness), event, cycles, tolerance
-        )
+        return run_cycles(lambda e, nodes: composition.model(z, e, nodes, cycles.stiffness), event, cycles, tolerance)
 
     out = []
     for r in range(problem.measurement.runs):

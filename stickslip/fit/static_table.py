@@ -66,16 +66,18 @@ class StaticRig:
 
         def known(name: str, unit: str, default: float | None = None) -> float:
             value = getattr(rig, name, None)
-            if hasattr(value, "guess"):
+            guess: Any = getattr(value, "guess", None)
+            if guess is not None:
                 guessed.append(name)
-                return float(value.guess)
-            if value is None and default is None:
+                return float(guess)
+            value = default if value is None else value
+            if value is None:
                 raise InputError(
                     f"the static model needs '{name}'",
                     key=f"rig.{name}",
                     hint=f'write  {name} = "... {unit}"  or a guess: {{ guess = "...", lower = "...", upper = "..." }}',
                 )
-            return float(default if value is None else value)
+            return float(value)
 
         stiffness = spring_stiffness or known("spring_stiffness", "N/m")
         steel = (known("youngs_modulus", "Pa", 210e9), known("poisson_ratio", "1", 0.3))
@@ -97,7 +99,7 @@ class StaticRig:
 
     @cached_property
     def _stiff(self) -> tuple[float, float]:
-        return float(self.elastic.normal), float(self.elastic.tangential)
+        return float(np.asarray(self.elastic.normal)), float(np.asarray(self.elastic.tangential))
 
     @property
     def reach(self) -> float:
@@ -132,15 +134,15 @@ class StaticTable:
     def __init__(self, n_springs: int, lines: int, seed: int) -> None:
         self.tau = default_loads(LOADS)
         self._hurst = np.linspace(*HURST, _HURST_NODES)
-        self._load = np.linspace(*np.log(_LOAD_RANGE), _LOAD_NODES)
-        elastic = equal_bodies()
+        self._load = np.linspace(np.log(_LOAD_RANGE[0]), np.log(_LOAD_RANGE[1]), _LOAD_NODES)
+        normal, tangential = (float(np.asarray(m)) for m in equal_bodies())
         length, height = _REFERENCE
-        force = np.exp(self._load) * float(elastic.normal) * length * height
+        force = np.exp(self._load) * normal * length * height
         sets = [a.ravel() for a in np.meshgrid(self._hurst, force, indexing="ij")]
         u = creep_displacements(
             sets[0], height, sets[1], 1.0, self.tau, length=length, n_springs=n_springs, lines=lines, seed=seed
         )
-        shape = u.reshape(_HURST_NODES, _LOAD_NODES, LOADS) * float(elastic.tangential / elastic.normal) / height
+        shape = u.reshape(_HURST_NODES, _LOAD_NODES, LOADS) * (tangential / normal) / height
         # logarithms, the zero at no load left out: power laws become smooth
         columns = np.log(shape[..., 1:])
         spline = make_interp_spline(self._hurst, columns, k=3, axis=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -79,7 +80,9 @@ def _events(pairs: Pairs, slipping: Pairs) -> Verdict:
     good = [f"{n} slips in {len(slipping)} of {len(pairs)} traces."] if n else []
     bad = []
     if few:
-        bad.append(f"Fewer than three slips in {_some(few)}: no recurrence time and no scatter from slip to slip there.")
+        bad.append(
+            f"Fewer than three slips in {_some(few)}: no recurrence time and no scatter from slip to slip there."
+        )
     odd = [f"{t.name} ({s.regime})" for t, s in pairs if not s.events or s.regime != "stick-slip"]
     if odd and slipping:
         bad.append(f"No regular stick-slip in {_some(odd)}.")
@@ -112,7 +115,7 @@ def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
         f"Spring force only in {_some(force)}: the block's position is drive - F/c_s, so every error of the force's "
         "scale, of the stiffness or of the drive is taken for motion."
     ]
-    good = []
+    good: list[str] = []
     for t, s in pairs:
         gain = stick_gain(t, s)
         if gain is not None and abs(gain["value"] - 1.0) > max(0.02, 3 * gain["std"]):
@@ -141,8 +144,12 @@ def _slip(pairs: Pairs, slipping: Pairs) -> Verdict:
 
 def _ringing(pairs: Pairs, slipping: Pairs) -> Verdict:
     slow = [f"{t.name} ({t.sampling_rate:.3g} Hz)" for t, _ in slipping if t.sampling_rate < _RING_RATE]
-    bad = [f"Sampled too slowly for a ring-down of some 500 Hz: {_some(slow)}; contact stiffness and damping are then known "
-           "from creep and slip alone."] if slow else []  # fmt: skip
+    bad = []
+    if slow:
+        text = (
+            f"Sampled too slowly for a ring-down of some 500 Hz: {_some(slow)}; contact stiffness and damping are then"
+        )
+        bad.append(f"{text} known from creep and slip alone.")
     rest = [t.name for t, s in slipping if t.sampling_rate >= _RING_RATE and t.leading != "spring_force"]
     return ([f"Ring-down after the slips: contact stiffness and damping ({_some(rest)})."] if rest else []), bad
 
@@ -155,12 +162,17 @@ def _creep(pairs: Pairs, slipping: Pairs) -> Verdict:
         found, dropped = creep_processes(t, s)
         kept += len(found)
         lost += dropped
-    good = [f"{kept} creep processes can be compared with the static model (v_lim = {V_LIM * 1e6:g} um/s)."] if kept else []
+    good = (
+        [f"{kept} creep processes can be compared with the static model (v_lim = {V_LIM * 1e6:g} um/s)."]
+        if kept
+        else []
+    )
     bad = []
     if lost:
-        reasons = {d.reason.split(":")[0].split(" (")[0]: 0 for d in lost}
+        reasons: dict[str, int] = {}
         for d in lost:
-            reasons[d.reason.split(":")[0].split(" (")[0]] += d.count
+            short = re.sub(r" \([^)]*\)", "", d.reason).split(":")[0]  # numbers differ from one to the next
+            reasons[short] = reasons.get(short, 0) + d.count
         text = "; ".join(f"{n} because {reason}" for reason, n in sorted(reasons.items(), key=lambda r: -r[1]))
         bad.append(f"{sum(d.count for d in lost)} creep processes cannot: {text}.")
     return good, bad

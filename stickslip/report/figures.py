@@ -86,7 +86,9 @@ def _zoom(axes: Axes, data: xarray.Dataset, key: str, title: str, *, clip: bool)
         k, unit = scaled(shown, _unit(data, f"{key}_position"))
         factor, suffix = (1e3, "ms") if np.ptp(t) < 1 else (1.0, "s")
         when, text = t - t[0], f"time / {suffix}"
-    axes.plot(when * factor, shown * k, color=DARK if series(data, key, "model") is None else LIGHT, lw=1.2, label="measured")
+    axes.plot(
+        when * factor, shown * k, color=DARK if series(data, key, "model") is None else LIGHT, lw=1.2, label="measured"
+    )
     model = series(data, key, "model")
     if model is not None:
         axes.plot(when * factor, (model - zero) * k, color=MIDDLE, ls="--", lw=1.2, label="model")

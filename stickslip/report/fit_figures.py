@@ -14,7 +14,13 @@ from .figures import plain, series
 if TYPE_CHECKING:
     import xarray
 
-_MARKS = {"creep": ("o", DARK), "slip": ("s", MIDDLE), "ring-down": ("^", LIGHT), "recurrence": ("D", "#4f772d"), "hold": ("v", "#7b5ea7")}  # fmt: skip
+_MARKS = {
+    "creep": ("o", DARK),
+    "slip": ("s", MIDDLE),
+    "ring-down": ("^", LIGHT),
+    "recurrence": ("D", "#4f772d"),
+    "hold": ("v", "#7b5ea7"),
+}
 _COORDINATES = (
     ("position", "m", "position at the slip"),
     ("velocity", "m/s", "drive velocity"),
@@ -64,7 +70,10 @@ def residual_plots(data: xarray.Dataset) -> Figure:
         ax.set_yscale("log")
         if name == "velocity" and np.nanmax(x) > 3 * max(np.nanmin(x), 1e-300):
             ax.set_xscale("log")
-        ax.set(xlabel=text + (f" / ({shown})" if "/" in shown else f" / {shown}" if shown != "1" else ""), ylabel="residual / floor")
+        ax.set(
+            xlabel=text + (f" / ({shown})" if "/" in shown else f" / {shown}" if shown != "1" else ""),
+            ylabel="residual / floor",
+        )
     axes[0, 0].legend(fontsize=8)
     return made
 
@@ -123,7 +132,10 @@ def ramp_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: int
 def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
     """Errors of every model: by phase, and on fitted and unseen runs together."""
     made, axes = figure(1, 2, width=10.0, height=3.8)
-    labels = [plain(("+ " if i else "") + str(step.get("added") or "/".join(step.get("model") or ["model"])), 28) for i, step in enumerate(ladder)]
+    labels = [
+        plain(("+ " if i else "") + str(step.get("added") or "/".join(step.get("model") or ["model"])), 28)
+        for i, step in enumerate(ladder)
+    ]
     x = np.arange(len(ladder))
     for name, text, style in (("train_error", "fitted runs", "-"), ("heldout_error", "unseen runs", "--")):
         y = np.array([np.nan if step.get(name) is None else step[name] for step in ladder], float)
@@ -132,7 +144,9 @@ def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
     phases = list(dict.fromkeys(p for step in ladder for p in (step.get("by_phase") or {})))
     for phase in phases:
         mark, colour = _MARKS.get(phase, ("x", DARK))
-        y = np.array([np.nan if (v := (step.get("by_phase") or {}).get(phase)) is None else v for step in ladder], float)
+        y = np.array(
+            [np.nan if (v := (step.get("by_phase") or {}).get(phase)) is None else v for step in ladder], float
+        )
         axes[0, 1].plot(x, y, marker=mark, color=colour, label=phase)
     for ax in axes.flat:
         ax.axhline(1.0, color=LIGHT, ls=":", lw=1.0)

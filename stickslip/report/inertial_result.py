@@ -37,7 +37,13 @@ def parameters(composition: Composition, fit: Fit) -> dict[str, dict[str, Any]]:
             note = "not determined by the data: this is its prior"
         out[f.name] = {"value": values[f.name], "std": std[f.name], "unit": f.unit, "doc": f.doc, "note": note}
     for name, value in composition.fixed.items():
-        out[name] = {"value": value, "std": 0.0, "unit": "N/m" if name.endswith("stiffness") else "1", "doc": "", "note": "given"}
+        out[name] = {
+            "value": value,
+            "std": 0.0,
+            "unit": "N/m" if name.endswith("stiffness") else "1",
+            "doc": "",
+            "note": "given",
+        }
     out["rig.mass"] = {"value": composition.mass, "std": 0.0, "unit": "kg", "doc": "mass of the block", "note": "given"}
     return out
 
@@ -89,9 +95,7 @@ def misfit_part(measurement: Measurement, model: np.ndarray, floor: np.ndarray, 
     }
 
 
-def overlay(
-    problem: Problem, fit: Fit, traces: Sequence[Trace], segmentations: Sequence[Segmentation]
-) -> Variables:
+def overlay(problem: Problem, fit: Fit, traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> Variables:
     """The model beside the measured zooms, and through the whole trace; arrays as of `trace_pieces`."""
     m = problem.measurement
     runs = dict(zip(m.names, modelled_runs(problem, fit.z, fit.events), strict=True))
@@ -107,11 +111,11 @@ def overlay(
         t, y = thinned(t[order], y[order], ZOOM)
         out[f"{key}_time"] = (key, t, {"units": "s"})
         out[f"{key}_position"] = (key, y, {"units": "m"})
-        within = [e for e in found.events[: len(run.times)]]
+        within = found.events[: len(run.times)]
         if not within:
             continue
         # the zooms show an event that the model was run through
-        event = middle_event(_Part(tuple(within[:-1] if len(within) > 2 else within)))
+        event = middle_event(within[:-1] if len(within) > 2 else within)
         before = found.events[event.index - 1].t_arrest if event.index else float(trace.time[0])
         for piece, start, stop in (
             ("creep", before, event.t_onset),
@@ -126,13 +130,6 @@ def overlay(
     return out
 
 
-class _Part:
-    """Events alone, as `middle_event` asks for them."""
-
-    def __init__(self, events: tuple) -> None:
-        self.events = events
-
-
 def residual_arrays(
     measurement: Measurement,
     model: np.ndarray,
@@ -145,7 +142,10 @@ def residual_arrays(
     m, phase = measurement, measurement.layout.phase_index()
     z = np.where(m.valid, (m.values - model) / floor, np.nan)
     used = np.argwhere(np.asarray(m.cycles.used))
-    rows, columns = [], {name: [] for name in ("position", "velocity", "start", "contact_time", "load", "event")}
+    rows: list[list[float]] = []
+    columns: dict[str, list[float]] = {
+        name: [] for name in ("position", "velocity", "start", "contact_time", "load", "event")
+    }
     for r, n in used:
         event = segmentations[m.names[r]].events[n]
         trace = traces[m.names[r]]

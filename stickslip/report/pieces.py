@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ..segment import Segmentation, block_motion
+from ..segment import Event, Segmentation, block_motion
 from ..trace import Trace
 
 OVERVIEW, ZOOM = 3000, 1500
@@ -29,7 +30,7 @@ def trace_pieces(trace: Trace, found: Segmentation, number: int) -> Variables:
 
     put("whole", *thinned(trace.time, position, OVERVIEW))
     if found.events:
-        event = middle_event(found)
+        event = middle_event(found.events)
         before = found.events[event.index - 1].t_arrest if event.index else float(trace.time[0])
         put("creep", *thinned(*_cut(trace.time, position, before, event.t_onset), ZOOM))
         ring = event.t_arrest + 1.5 * event.duration
@@ -46,10 +47,9 @@ def trace_pieces(trace: Trace, found: Segmentation, number: int) -> Variables:
     return out
 
 
-def middle_event(found: Segmentation) -> Any:
+def middle_event(events: Sequence[Event]) -> Event:
     """The event shown in the zooms: one of middle size, not the first where there are others."""
-    events = found.events[1:] or found.events
-    order = sorted(events, key=lambda e: e.slip)
+    order = sorted(events[1:] or events, key=lambda e: e.slip)
     return order[len(order) // 2]
 
 

@@ -1,4 +1,4 @@
-"""Periodic motion while the block sticks: ripple of the drive, hum, vibration, as lines of one spectrum over all sticks.
+"""Periodic motion while the block sticks (ripple of the drive, hum, vibration): lines of one spectrum over all sticks.
 
 The sticks keep their place in the record, so a ripple that goes on through the slips adds up in phase over the whole
 run, and a line of a few nanometres stands out of micrometres of creep and noise.
@@ -27,8 +27,8 @@ _GRID = np.linspace(-1, 1, 301)
 def stick_ripple(trace: Trace, found: Segmentation) -> dict[str, Any] | None:
     """Lines in the spectrum of the position in all sticks, or None where there are too few sticks.
 
-    Each stick is freed from a cubic in time and from the course that all sticks share (creep), and tapered. A line is a sum over three neighbouring frequencies that
-    exceeds 1.3 times what the largest of as many sums of noise would be.
+    Each stick is freed from a cubic in time and from the course that all sticks share (creep), and tapered. A line is a
+    sum over three neighbouring frequencies that exceeds 1.3 times what the largest of as many sums of noise would be.
 
     Returns:
         ``lines``: list of period (s), amplitude (in ``unit``) and prominence, the strongest first; ``unit``;

@@ -32,9 +32,17 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
     if "residual" in data:
         yield "misfit", "Error of every cycle against what might explain it.", residual_plots(data)
     if result.get("static") and "creep0_time" in data:
-        yield "static", "Creep before slips (dark) and the static model (dashed); residuals below.", creep_grid(data, result["static"]["fits"])
+        yield (
+            "static",
+            "Creep before slips (dark) and the static model (dashed); residuals below.",
+            creep_grid(data, result["static"]["fits"]),
+        )
     if result.get("ramps") and "ramp0_tau" in data:
-        yield "ramps", "Displacement against force up to break-away (dark) and the static curve (dashed).", ramp_grid(data, result["ramps"]["fits"])
+        yield (
+            "ramps",
+            "Displacement against force up to break-away (dark) and the static curve (dashed).",
+            ramp_grid(data, result["ramps"]["fits"]),
+        )
     for p in result.get("profiles") or []:
         yield "parameters", p.get("text", ""), profile_picture(p)
     traces = result.get("traces") or []

@@ -10,6 +10,7 @@ from ..features.layout import PHASES
 from ..features.measurement import Measurement
 
 GOOD = 1.3  # error (rms over floor) up to which a phase counts as described
+FAILED = 50.0  # error from which a fit describes nothing
 _SHARE = 0.8
 _TREND = 0.25  # exponent of the error in the velocity from which it grows or falls
 
@@ -26,9 +27,7 @@ def phase_table(by_run: dict[str, dict[str, float]], velocities: dict[str, float
     }
 
 
-def misfit_sentence(
-    measurement: Measurement, model: np.ndarray, floor: np.ndarray, by_phase: dict[str, float]
-) -> str:
+def misfit_sentence(measurement: Measurement, model: np.ndarray, floor: np.ndarray, by_phase: dict[str, float]) -> str:
     """Where most of the misfit is, and how it depends on the drive velocity.
 
     Args:
@@ -56,7 +55,10 @@ def misfit_sentence(
     error = float(np.sqrt(whole / len(squares)))
     if rest:
         return f"The data are described as well as they allow (error {error:.2g} floors); {text}."
-    return f"{text}; there the model is {by_phase[worst]:.3g} floors off."
+    text = f"{text}; there the model is {by_phase[worst]:.3g} floors off."
+    if error > FAILED:
+        return f"The fit failed ({error:.3g} floors in the mean of the phases), so its parameters mean little: {text}"
+    return text
 
 
 def _place(m: Measurement, z: np.ndarray, phase: str) -> str:
@@ -95,7 +97,9 @@ def _seconds(value: float) -> str:
 def _trend(m: Measurement, z: np.ndarray, phase: str) -> str:
     """How the error of a phase depends on the drive velocity, over the runs."""
     index = m.layout.phase_index() == PHASES.index(phase)
-    error = np.array([np.sqrt(np.nanmean(np.square(r[..., index]))) if np.isfinite(r[..., index]).any() else np.nan for r in z])
+    error = np.array(
+        [np.sqrt(np.nanmean(np.square(r[..., index]))) if np.isfinite(r[..., index]).any() else np.nan for r in z]
+    )
     ok = np.isfinite(error) & (error > 0) & (m.velocities > 0)
     v = m.velocities[ok]
     if ok.sum() < 3 or v.max() < 1.5 * v.min():

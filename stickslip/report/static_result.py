@@ -95,7 +95,8 @@ def _creep_part(fit: StaticFit, v_lim: float) -> dict[str, Any]:
         else "so there is no mean to give"
     )
     text = (
-        f"{len(fit.good)} of {len(fit.fits)} creep processes ({100 * fit.share:.0f} %) are described to within 2 % of their "
+        f"{len(fit.good)} of {len(fit.fits)} creep processes ({100 * fit.share:.0f} %) are described to within 2 % of "
+        "their "
         f"creep; {mean}. Lines of N = {rig.n_springs} springs and L = {rig.length * 1e6:g} um, mean of {rig.lines} "
         f"lines: H and h_rms hold for this N and L only. Alignment '{fit.align}', virtual time '{fit.form}', "
         f"v_lim = {v_lim * 1e6:g} um/s{guessed}. Median residual {100 * numbers['median_nrmse']:.2g} % of the creep."
@@ -146,10 +147,15 @@ def _noise_share(f: CreepFit) -> float:
 
 def _words(fit: StaticFit) -> list[str]:
     best = min(fit.fits, key=lambda f: f.nrmse)
-    lines = [tied_quantities(best, fit.rig), "H depends on the number of springs N, and less the larger H is (from about 0.5 on it does not)"]
+    lines = [
+        tied_quantities(best, fit.rig),
+        "H depends on the number of springs N, and less the larger H is (from about 0.5 on it does not)",
+    ]
     loose = [f for f in fit.fits if not np.isfinite(f.hurst_std) or f.hurst_std > 0.3]
     if loose:
-        lines.append(f"H is not determined in {len(loose)} of {len(fit.fits)} processes (at a bound, or +-0.3 and more)")
+        lines.append(
+            f"H is not determined in {len(loose)} of {len(fit.fits)} processes (at a bound, or +-0.3 and more)"
+        )
     return lines
 
 
@@ -163,7 +169,7 @@ def _ramp_part(ramps: list[Ramp], springs: int | None) -> tuple[dict[str, Any], 
         f"{100 * float(np.median([f.nrmse for f in fits])):.2g} %. Lines of N = {fits[0].n_springs} springs."
     )
     if at_edge:
-        text += f" In {at_edge} the curve is steeper at its end than any such line (H at the edge of its range)."
+        text += f" In {at_edge} the curve is more bent than that of any such line (H at the edge of its range)."
     variables: Variables = {}
     for i, f in enumerate(fits[:MOST_SHOWN]):
         key = f"ramp{i}"

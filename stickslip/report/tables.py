@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-_KNOWN = {
+_KNOWN: dict[str, Any] = {
     "verdict": {}, "ladder": [], "ranking": [], "parameters": {}, "equations": [], "identifiability": [], "traces": [],
     "dropped": [], "inputs": [], "versions": {}, "static": None, "misfit": None, "next_experiment": None, "can": [],
     "cannot": [], "effective": None, "profiles": [], "ramps": None, "notes": [], "title": "", "kind": "run",

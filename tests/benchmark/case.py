@@ -39,12 +39,14 @@ class Accuracy(NamedTuple):
 
 def leapfrog(dt: float) -> Answer:
     """By brute force with a fixed step."""
-    every = round(GRID[0] / dt)
+    every = max(1, round(GRID[0] / dt))
     path = brute_force.simulate(
         STIFFNESS, CAP, duration=DURATION, mass=MASS, spring_stiffness=C_S, damping=DAMPING, ratio=RATIO,
         slip_distance=D_C, healing_time=T_H, times=[0.0, 1.0], positions=[0.0, VELOCITY], dt=dt, every=every,
     )  # fmt: skip
-    return Answer(path.x, path.v)
+    if len(path.t) == len(GRID):
+        return Answer(path.x, path.v)
+    return Answer(np.interp(GRID, path.t, path.x), np.interp(GRID, path.t, path.v))
 
 
 def measure(answer: Answer, reference: Answer) -> Accuracy:
@@ -56,7 +58,7 @@ def measure(answer: Answer, reference: Answer) -> Accuracy:
     creep = 0.0
     for i, onset in enumerate(exact.onset):
         start, own = (exact.arrest[i - 1], seen.arrest[i - 1]) if i else (0.0, 0.0)
-        slow = GRID[(GRID < onset) & (reference.v < 1e-6)][-1]
+        slow = GRID[(onset > GRID) & (reference.v < 1e-6)][-1]
         t = np.linspace(0.0, slow - start, 4000)
         gap = np.interp(own + t, GRID, answer.x) - np.interp(start + t, GRID, reference.x)
         settled = (t > 0.2 * t[-1]) & (t < 0.4 * t[-1])

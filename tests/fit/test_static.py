@@ -1,4 +1,4 @@
-"""The static model's fit: what was put in comes out, the paper's alignment does what it must, creep is cut out rightly."""
+"""The static model's fit: what was put in comes out, the paper's alignment biases, creep is cut out rightly."""
 
 import time
 from dataclasses import replace
@@ -176,7 +176,9 @@ def test_effective_line_of_a_backbone_that_is_a_line_s(hurst):
     u = table.displacement(RIG, hurst, 2e-6)
     part = (table.tau > 0.02) & (table.tau < 0.98)
     # exponent of the power-law backbone nearest to this line's curve
-    p = min(np.linspace(1.5, 6, 451), key=lambda p: np.sum((1 - (1 - table.tau[part]) ** (1 / p) - u[part] / u[-1]) ** 2))
+    p = min(
+        np.linspace(1.5, 6, 451), key=lambda p: np.sum((1 - (1 - table.tau[part]) ** (1 / p) - u[part] / u[-1]) ** 2)
+    )
     line = effective_line(float(u[-1]), float(p), RIG)
     # nearest line to the nearest power law: near the line it came from, and nearer to the power law than that one
     assert line.hurst == pytest.approx(hurst, abs=0.12)

@@ -21,28 +21,70 @@ DIAGNOSIS = {
     "title": EVIL,
     "verdict": {"kind": "ambiguous", "effects": ["tilt"], "set": ["tilt", "nonlinear-spring"], "text": EVIL},
     "ladder": [
-        {"model": ["static"], "added": None, "train_error": 41.0, "heldout_error": 39.5, "by_phase": {"creep": 30.1, "slip": 55.0}},
-        {"model": ["static", "inertia"], "added": "inertia", "train_error": 2.0, "heldout_error": None, "by_phase": {"creep": 2.5, "slip": 1.0}},
+        {
+            "model": ["static"],
+            "added": None,
+            "train_error": 41.0,
+            "heldout_error": 39.5,
+            "by_phase": {"creep": 30.1, "slip": 55.0},
+        },
+        {
+            "model": ["static", "inertia"],
+            "added": "inertia",
+            "train_error": 2.0,
+            "heldout_error": None,
+            "by_phase": {"creep": 2.5, "slip": 1.0},
+        },
     ],
-    "ranking": [{"effect": "tilt", "score": 0.61, "refit": True, "heldout_gain": 0.8, "amplitude": {"value": 0.01, "std": 0.0004, "unit": "1"}}],
-    "parameters": {"contact.u_max": {"value": 9.2e-7, "std": 2e-8, "unit": "m"}, "rig.mass": {"value": 0.0894, "std": None, "unit": "kg"}},
+    "ranking": [
+        {
+            "effect": "tilt",
+            "score": 0.61,
+            "refit": True,
+            "heldout_gain": 0.8,
+            "amplitude": {"value": 0.01, "std": 0.0004, "unit": "1"},
+        }
+    ],
+    "parameters": {
+        "contact.u_max": {"value": 9.2e-7, "std": 2e-8, "unit": "m"},
+        "rig.mass": {"value": 0.0894, "std": None, "unit": "kg"},
+    },
     "equations": [{"text": "m x'' = F < 0 & more", "latex": "x"}],
     "next_experiment": {"text": "start in reverse", "separates": ["tilt", "nonlinear-spring"]},
     "identifiability": ["h_rms, L and F_n act only together"],
     "misfit": {
         "sentence": "80 % of the misfit is in the last 50 ms before the slip, and it grows with velocity",
-        "table": {"phases": ["creep", "slip"], "runs": [EVIL, "v400"], "velocities": [5e-5, 4e-4], "errors": [[1.0, 12.0], [3.0, None]]},
+        "table": {
+            "phases": ["creep", "slip"],
+            "runs": [EVIL, "v400"],
+            "velocities": [5e-5, 4e-4],
+            "errors": [[1.0, 12.0], [3.0, None]],
+        },
     },
     "traces": [
-        {"name": EVIL, "file": EVIL, "sha256": "0" * 64, "drive_velocity": 5e-5, "duration": 10.0, "sampling_rate": 1e4,
-         "regime": "stick-slip", "reason": EVIL, "units": {"slip": "m", "peak_velocity": "m/s"}, "warnings": [EVIL], "repairs": [], "dropped": [],
-         "events": [{"index": 0, "t_onset": 4.8, "slip": 5e-5, "recurrence": None, "peak_velocity": 2e-3, "hold_time": 0.0}]}
+        {
+            "name": EVIL,
+            "file": EVIL,
+            "sha256": "0" * 64,
+            "drive_velocity": 5e-5,
+            "duration": 10.0,
+            "sampling_rate": 1e4,
+            "regime": "stick-slip",
+            "reason": EVIL,
+            "units": {"slip": "m", "peak_velocity": "m/s"},
+            "warnings": [EVIL],
+            "repairs": [],
+            "dropped": [],
+            "events": [
+                {"index": 0, "t_onset": 4.8, "slip": 5e-5, "recurrence": None, "peak_velocity": 2e-3, "hold_time": 0.0}
+            ],
+        }
     ],
     "dropped": [EVIL],
     "inputs": [{"file": EVIL, "sha256": "1" * 64}],
     "versions": {"stickslip": "0"},
     "seconds": 143.0,
-}  # fmt: skip
+}
 
 
 class Reader(HTMLParser):
@@ -77,7 +119,9 @@ def folder(tmp_path, result=DIAGNOSIS, arrays=True):
             "trace0_whole_time": ("w", t, {"units": "s"}),
             "trace0_whole_position": ("w", 1e-6 * np.floor(t), {"units": "m"}),
             "residual": (("cycle", "phase"), np.array([[1.0, 2.0], [3.0, np.nan]])),
-            **{f"cycle_{n}": ("cycle", np.array([1.0, 2.0])) for n in ("position", "velocity", "start", "contact_time")},
+            **{
+                f"cycle_{n}": ("cycle", np.array([1.0, 2.0])) for n in ("position", "velocity", "start", "contact_time")
+            },
         }
         xarray.Dataset(data, coords={"phase": ["creep", "slip"]}).to_netcdf(where / "arrays.nc", engine="h5netcdf")
     return where
@@ -148,7 +192,9 @@ def browser(tmp_path):
         flags = "--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking "
         flags += "--disable-component-update --disable-sync --hide-scrollbars --window-size=1100,2400"
         command = [program, *flags.split(), f"--user-data-dir={tmp_path / 'profile'}", *arguments]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, env={**os.environ, "HOME": str(tmp_path)})
+        return subprocess.run(
+            command, capture_output=True, text=True, timeout=120, env={**os.environ, "HOME": str(tmp_path)}
+        )
 
     return call
 
@@ -161,7 +207,7 @@ def test_a_browser_shows_it(tmp_path, browser):
     done = browser(f"--screenshot={picture}", f"file://{path}")
     assert picture.is_file(), done.stderr
     shown = imread(picture)[..., :3]
-    # rows of figures hold coloured ink over a wide part of the page; a page without its figures holds text and grey only
+    # rows of figures hold coloured ink; a page without its figures holds text and grey only
     coloured = (shown.max(axis=2) - shown.min(axis=2) > 0.15).any(axis=1)
     assert coloured.sum() > 400
     dom = browser("--dump-dom", f"file://{path}").stdout

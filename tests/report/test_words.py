@@ -13,7 +13,9 @@ from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
 
 
-def sawtooth(*, v0=42e-6, rate=2000.0, sticks=60, stiffness=168.0, gain=1.0, ripple=0.0, period=0.4, noise=1e-6, seed=0, holds=()):
+def sawtooth(
+    *, v0=42e-6, rate=2000.0, sticks=60, stiffness=168.0, gain=1.0, ripple=0.0, period=0.4, noise=1e-6, seed=0, holds=()
+):
     """A block that stands still, then slips by a half cosine of 38 ms; recurrence varies, so that nothing repeats."""
     rng = np.random.default_rng(seed)
     onsets = np.cumsum(rng.uniform(1.3, 1.9, sticks))
@@ -101,7 +103,9 @@ def measured(phase, growth, point=None, runs=4):
     values[..., index] = 10.0
     values *= (velocities / velocities[0])[:, None, None] ** growth
     anchors = SimpleNamespace(creep=np.broadcast_to(np.geomspace(0.004, 1.0, 16), (runs, 5, 16)))
-    m = SimpleNamespace(layout=layout, values=values, valid=np.ones(values.shape, bool), velocities=velocities, anchors=anchors)
+    m = SimpleNamespace(
+        layout=layout, values=values, valid=np.ones(values.shape, bool), velocities=velocities, anchors=anchors
+    )
     z = [float(np.sqrt(np.mean(values[..., layout.phase_index() == i] ** 2))) for i in range(len(PHASES))]
     by_phase = {p: max(e, 0.3) for p, e in zip(PHASES, z, strict=True)}
     return misfit_sentence(m, np.zeros_like(values), np.ones_like(values), by_phase)
@@ -123,7 +127,13 @@ def test_a_good_fit_is_not_called_a_failure():
     layout = Layout(0.06, 0.004)
     values = np.full((2, 3, layout.size), 0.9)
     anchors = SimpleNamespace(creep=np.broadcast_to(np.geomspace(0.004, 1.0, 16), (2, 3, 16)))
-    m = SimpleNamespace(layout=layout, values=values, valid=np.ones(values.shape, bool), velocities=np.array([1e-5, 2e-5]), anchors=anchors)
+    m = SimpleNamespace(
+        layout=layout,
+        values=values,
+        valid=np.ones(values.shape, bool),
+        velocities=np.array([1e-5, 2e-5]),
+        anchors=anchors,
+    )
     text = misfit_sentence(m, np.zeros_like(values), np.ones_like(values), dict.fromkeys(PHASES, 0.9))
     assert text.startswith("The data are described as well as they allow")
 

@@ -29,7 +29,7 @@ def path_with_turns(s: Steps) -> tuple[np.ndarray, np.ndarray]:
     for i in range(len(s.t) - 1):
         if s.v[i] * s.v[i + 1] < 0.0:
             inside = CubicHermiteSpline(s.t[i : i + 2], s.x[i : i + 2], s.v[i : i + 2])
-            turns = [r for r in inside.derivative().roots(extrapolate=False)]
+            turns = list(inside.derivative().roots(extrapolate=False))
             x += [float(inside(r)) for r in turns]
             own += [False] * len(turns)
         x.append(s.x[i + 1])

@@ -63,8 +63,8 @@ def _march(dt, n, every, m, c_s, c, stiffness, cap, ratio, d_c, t_h, times, posi
 def springs(gaps: np.ndarray, dx: float, load: float, friction: float, normal: float, tangential: float) -> tuple:
     """Stiffness (N/m) and cap (N) of every touching spring of one line, pressed by ``load`` (N).
 
-    ``gaps`` (m) below the highest point; ``normal`` and ``tangential`` are the moduli E*, G* (Pa). The depth is found by
-    bisection.
+    ``gaps`` (m) below the highest point; ``normal`` and ``tangential`` are the moduli E*, G* (Pa).
+    The depth is found by bisection.
     """
     low, high = 0.0, float(gaps.max() - gaps.min()) + load / (normal * dx)
     for _ in range(200):
@@ -100,7 +100,7 @@ def simulate(
 ) -> Path:
     """March for ``duration`` (s) with the step ``dt`` (s); the load point is linear between its nodes. SI units."""
     force = np.zeros(len(cap)) if force is None else np.array(force, float)
-    n = int(round(duration / dt / every)) * every
+    n = round(duration / dt / every) * every
     out = _march(
         dt, n, every, mass, spring_stiffness, damping, np.ascontiguousarray(stiffness, float),
         np.ascontiguousarray(cap, float), ratio, slip_distance, healing_time, np.asarray(times, float),

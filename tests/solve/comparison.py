@@ -42,7 +42,9 @@ def rough_contact(lines: int, n_springs: int, hurst: float, h_rms: float, bins: 
     moduli = equal_bodies()
     load = 4.0 * LOAD / lines
     each = [
-        brute_force.springs(h.max() - h, LENGTH / n_springs, load, FRICTION, float(moduli.normal), float(moduli.tangential))
+        brute_force.springs(
+            h.max() - h, LENGTH / n_springs, load, FRICTION, float(moduli.normal), float(moduli.tangential)
+        )
         for h in heights
     ]
     table: Indentation = indentation(from_heights(heights, LENGTH / n_springs))
@@ -50,7 +52,9 @@ def rough_contact(lines: int, n_springs: int, hurst: float, h_rms: float, bins: 
     return np.concatenate([k for k, _ in each]), np.concatenate([c for _, c in each]), binned
 
 
-def pair(stiffness: np.ndarray, cap: np.ndarray, bank: Bank, duration: float, tolerance: Tolerance, dt: float = 1e-6) -> Pair:
+def pair(
+    stiffness: np.ndarray, cap: np.ndarray, bank: Bank, duration: float, tolerance: Tolerance, dt: float = 1e-6
+) -> Pair:
     """Both at the default drive, from a virgin contact at rest."""
     path = brute_force.simulate(
         stiffness, cap, duration=duration, mass=MASS, spring_stiffness=1000.0, damping=10.0, ratio=0.85,

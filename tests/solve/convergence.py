@@ -25,8 +25,8 @@ QUANTITIES = ("onset", "slip", "peak", "recurrence")
 def _fixed(model: Model, state: State, t0: Array, t1: Array, step: Array) -> tuple[Array, Array]:
     solution = diffrax.diffeqsolve(
         TERM, ContactStepper(Tolerance(1e-9, 1e-18, 1e-15)), t0, t1, step, state, args=(model, model.shaped()),
-        saveat=diffrax.SaveAt(t1=True, fn=lambda t, y, args: (y.x, y.v)), stepsize_controller=diffrax.ConstantStepSize(),
-        adjoint=diffrax.ForwardMode(), max_steps=200_000,
+        saveat=diffrax.SaveAt(t1=True, fn=lambda t, y, args: (y.x, y.v)), adjoint=diffrax.ForwardMode(),
+        stepsize_controller=diffrax.ConstantStepSize(), max_steps=200_000,
     )  # fmt: skip
     x, v = solution.ys
     return x[0], v[0]

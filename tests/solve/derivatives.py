@@ -19,7 +19,8 @@ from stickslip.solve.integrate import step_control
 from .rig import MASS, STRENGTH, U_MAX, P, bank
 
 NAMES = (
-    "mass", "spring_stiffness", "damping", "ratio", "slip_distance", "healing_time", "u_max", "p", "strength", "velocity",
+    "mass", "spring_stiffness", "damping", "ratio", "slip_distance", "healing_time", "u_max", "p", "strength",
+    "velocity",
 )  # fmt: skip
 BASE = np.array([MASS, 1000.0, 10.0, 0.85, 1e-6, 0.02, U_MAX, P, STRENGTH, 5e-5])
 TERM = diffrax.ODETerm(lambda t, y, args: y)

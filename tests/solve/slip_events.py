@@ -26,7 +26,7 @@ def run(model: Model, duration: float, tolerance: Tolerance | None = None, **opt
 
 
 class Classical(NamedTuple):
-    """A rigid block on a spring with a drop of friction: slip (m), duration (s), peak velocity (m/s), force left (N)."""
+    """A rigid block on a spring with a drop of friction: slip (m), duration (s), peak velocity (m/s), force left."""
 
     slip: float
     duration: float

@@ -49,7 +49,7 @@ def base_law_prediction(velocity: float, w: np.ndarray, ratio: float = 0.85, cri
 
 
 def breakaway_lag(velocity: float, spring_stiffness: float = 1000.0) -> tuple[float, float]:
-    """By how much later than in the static model the last element slides (s), and the scale T* of the boundary layer."""
+    """By how much later than statically the last element slides (s), and the scale T* of the boundary layer (s)."""
     model = rig(velocity, springs=bank(FINE), damping=0.0, ratio=1.0, spring_stiffness=spring_stiffness)
     static = (STRENGTH / spring_stiffness + U_MAX) / velocity
     loading = STRENGTH / (spring_stiffness * velocity)

@@ -1,0 +1,319 @@
+"""Make the figures of docs/verification.md and print its numbers: ``python docs/make_verification.py [name ...]``."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+import jax
+import jax.numpy as jnp
+
+from stickslip.contact import reload_displacement
+from stickslip.solve import Tolerance, integrate
+from tests.solve import books, comparison, convergence, derivatives, ringing, slip_events, static_limit
+from tests.solve.rig import STRENGTH, order, rig, tighter
+
+FOLDER = ROOT / "docs" / "verification"
+DRAW: dict[str, Callable[[], plt.Figure]] = {}
+
+
+def figure(work: Callable[[], plt.Figure]) -> Callable[[], plt.Figure]:
+    DRAW[work.__name__] = work
+    return work
+
+
+def axes(n: int, **options: float) -> tuple[plt.Figure, list[plt.Axes]]:
+    fig, ax = plt.subplots(1, n, figsize=(4.6 * n, 3.6), layout="constrained", squeeze=False, **options)
+    for a in ax[0]:
+        a.grid(alpha=0.3)
+    return fig, list(ax[0])
+
+
+@figure
+def static() -> plt.Figure:
+    fig, (left, right) = axes(2)
+    fast = np.array([8e-4, 1.6e-3, 3.2e-3])
+    constant = np.array([static_limit.constant_friction(v).error.max() for v in fast])
+    slow = np.array([2.5e-5, 5e-5, 1e-4, 2e-4])
+    seen = [static_limit.base_law(v) for v in slow]
+    base = np.array([d.error.max() for d in seen])
+    told = np.array([static_limit.base_law_prediction(v, d.w).max() for v, d in zip(slow, seen, strict=True)])
+    print(
+        "constant friction: order",
+        order(fast, constant),
+        "base law: order",
+        order(slow, base),
+        "coefficient",
+        base / told,
+    )
+    left.loglog(fast * 1e6, constant, "o", label="constant friction")
+    left.loglog(fast * 1e6, constant[0] * (fast / fast[0]) ** 2, "k--", lw=0.8, label="$v_0^2$")
+    left.loglog(slow * 1e6, base, "s", label="base law")
+    left.loglog(slow * 1e6, told, "k-", lw=0.8, label=r"$(1-r)\,\Phi_{slip}\,v/v_c$")
+    left.set(xlabel="drive velocity (µm/s)", ylabel="departure from the static curve (1)", title="u < u_max/2")
+    left.legend()
+    for c_s, mark in ((300.0, "^"), (1000.0, "o")):
+        v = np.array([2.5e-5, 1e-4, 4e-4, 1.6e-3])
+        share = np.array([np.divide(*static_limit.breakaway_lag(a, c_s)) for a in v])
+        print("breakaway lag over T*:", c_s, dict(zip(v, share.round(3), strict=True)))
+        right.semilogx(v * 1e6, share, mark + "-", label=f"$c_s$ = {c_s:g} N/m")
+    right.axhspan(0.8, 1.0, alpha=0.15, color="k")
+    right.set(xlabel="drive velocity (µm/s)", ylabel="lag / T*", title="Lag of the last element")
+    right.legend()
+    return fig
+
+
+@figure
+def slips() -> plt.Figure:
+    fig, (left, middle, right) = axes(3)
+    made = slip_events.run(rig(damping=0.5), 8.0)
+    s, e = made.trajectory.steps, made.events
+    near = (s.t > e.onset[1] - 0.02) & (s.t < e.arrest[1] + 0.06)
+    left.plot((s.t[near] - e.onset[1]) * 1e3, s.v[near] * 1e3)
+    told = slip_events.classical(1000.0, 0.5)
+    left.axhline(told.peak * 1e3, color="k", ls="--", lw=0.8)
+    left.axvline(told.duration * 1e3, color="k", ls="--", lw=0.8)
+    left.set(xlabel="time since onset (ms)", ylabel="velocity (mm/s)", title="A slip; dashed: block on a spring")
+    for c_s in (500.0, 1000.0, 2000.0):
+        e = slip_events.run(rig(damping=0.5, spring_stiffness=c_s), 9.0 * np.sqrt(1000.0 / c_s) + 3.0).events
+        told = slip_events.classical(c_s, 0.5)
+        shares = [e.size / told.slip, (e.arrest - e.onset) / told.duration, e.peak / told.peak]
+        print(
+            f"c_s {c_s:g}: slip, duration, peak over the classical ones (second event)", [float(q[1]) for q in shares]
+        )
+        middle.plot(["slip", "duration", "peak velocity"], [q[1] for q in shares], "o-", label=f"$c_s$ = {c_s:g} N/m")
+    middle.axhspan(0.9, 1.1, alpha=0.15, color="k")
+    middle.set(ylabel="seen / classical", title="Second event", ylim=(0.8, 1.2))
+    middle.legend()
+    critical = slip_events.critical_velocity()
+    share = np.array([0.85, 0.9, 0.95, 1.0, 1.05, 1.1])
+    rate = [slip_events.growth(a * critical) for a in share]
+    print("critical velocity", critical, "seen at", np.interp(0.0, -np.array(rate), share))
+    right.plot(share, rate, "o-")
+    right.axhline(0.0, color="k", lw=0.8)
+    right.set(xlabel="velocity / critical velocity", ylabel="growth rate (1/s)", title="Steady sliding, c = 0.5 N s/m")
+    return fig
+
+
+@figure
+def ring_down() -> plt.Figure:
+    fig, (left,) = axes(1)
+    for amplitude in (10e-9, 20e-9, 50e-9, 100e-9):
+        seen, law = ringing.microslip(amplitude)
+        print(f"ring-down {amplitude * 1e9:g} nm: largest departure", np.max(np.abs(seen.amplitude / law - 1.0)))
+        (line,) = left.semilogy(seen.t * 1e3, seen.amplitude * 1e9, "o", ms=3)
+        left.semilogy(seen.t * 1e3, law * 1e9, color=line.get_color(), lw=1)
+    print("frequency, seen and expected", [ringing.frequency(spring_stiffness=c) for c in (1e3, 1e5)])
+    left.set(xlabel="time (ms)", ylabel="amplitude (nm)", title="Microslip alone; lines: hyperbolic law")
+    return fig
+
+
+@figure
+def after_an_event() -> plt.Figure:
+    fig, (left, right) = axes(2)
+    model = rig(damping=2.0)
+    events = slip_events.run(model, 8.0, tighter(10.0)).events
+    settled = float(events.arrest[0]) + 0.5
+    first, state = integrate(model, settled, tolerance=tighter(10.0))
+    later, _ = integrate(model, 8.0, t0=settled, state=state, tolerance=tighter(10.0))
+    s = later.steps
+    creep = (s.t < events.onset[1]) & (s.spring_force < 0.98 * STRENGTH)
+    static = np.asarray(reload_displacement(model.bank, state.force, s.spring_force[creep]))
+    virgin = first.steps.t < events.onset[0]
+    left.plot(first.steps.x[virgin] * 1e9, first.steps.spring_force[virgin], label="virgin contact")
+    left.plot((s.x[creep] - s.x[0]) * 1e9, s.spring_force[creep], label="after the first event")
+    left.plot(static * 1e9, s.spring_force[creep], "k--", lw=0.8, label="static, from the same forces")
+    left.set(xlabel="creep (nm)", ylabel="spring force (N)", xlim=(-20, 800))
+    left.legend()
+    print("creep after an event against the static curve, nm:", np.max(np.abs(s.x[creep] - s.x[0] - static)) * 1e9)
+    table = {0.95: 21.0, 0.90: 9.2, 0.85: 5.7, 0.70: 2.6}
+    for damping, mark in ((0.5, "o"), (2.0, "s")):
+        factors = {}
+        for ratio in table:
+            virgin_creep, *creeps = slip_events.creep_to(slip_events.run(rig(damping=damping, ratio=ratio), 9.0), 1e-6)
+            factors[ratio] = virgin_creep / creeps[-1]
+        print(f"factor of creep, c = {damping:g}:", {k: round(v, 2) for k, v in factors.items()})
+        right.semilogy(list(factors), list(factors.values()), mark, label=f"simulated, c = {damping:g} N s/m")
+    right.semilogy(list(table), list(table.values()), "k_", ms=20, label="static, after an undamped slip")
+    right.set(xlabel=r"$\mu_k/\mu_s$", ylabel="virgin creep / later creep", title="Creep up to 1 µm/s")
+    right.legend()
+    return fig
+
+
+@figure
+def brute_force() -> plt.Figure:
+    fig, (left, middle, right) = axes(3)
+    stiffness, cap, binned = comparison.rough_contact(4, 4096, 0.3, 2.46e-6, bins=256)
+    both = comparison.pair(stiffness, cap, binned, 7.2, tighter(10.0))
+    period = np.mean(both.reference.recurrence)
+    print("springs", len(cap), "onset error over the period", (both.made.events.onset - both.reference.onset) / period)
+    onset = both.reference.onset[1]
+    t = np.linspace(onset - 0.02, onset + 0.1, 6000)
+    left.plot((t - onset) * 1e3, np.interp(t, both.path.t, both.path.x) * 1e6, lw=3, alpha=0.4, label="brute force")
+    left.plot((t - onset) * 1e3, both.made.trajectory.at(t).x * 1e6, "k", lw=0.8, label="solver")
+    left.set(xlabel="time since onset (ms)", ylabel="displacement (µm)", title=f"Second slip, {len(cap)} springs")
+    left.legend()
+    for number, (t, gap) in enumerate(comparison.creep_gaps(both)):
+        print("creep, nm:", np.max(np.abs(gap)) * 1e9)
+        middle.plot(t, gap * 1e9, lw=0.8, label=f"stick phase {number + 1}")
+    middle.set(xlabel="time since its start (s)", ylabel="solver - brute force (nm)", title="Creep up to 1 µm/s")
+    middle.legend()
+    bins = (64, 128, 256, 512, 1024)
+    worst = []
+    for n in bins:
+        made = slip_events.run(rig(springs=comparison.rough_contact(4, 4096, 0.3, 2.46e-6, n)[2]), 7.2, tighter(10.0))
+        gaps = comparison.creep_gaps(comparison.Pair(both.path, both.reference, made))
+        worst.append([np.max(np.abs(g)) * 1e9 for _, g in gaps])
+        print(
+            n,
+            "elements: creep, nm",
+            np.round(worst[-1], 2),
+            "onset",
+            (made.events.onset - both.reference.onset)[0] / period,
+        )
+    for phase in (0, 1):
+        right.loglog(bins, np.array(worst)[:, phase], "o-", label=f"stick phase {phase + 1}")
+    right.axhline(1.0, color="k", lw=0.8)
+    right.set(xlabel="elements of the bank", ylabel="largest difference (nm)", title="Four rough lines")
+    right.legend()
+    return fig
+
+
+@figure
+def converge() -> plt.Figure:
+    fig, (left, middle, right) = axes(3)
+    steps = np.array([100, 200, 400, 800, 1600])
+    errors = convergence.oscillator_errors(steps)
+    fine = np.array([250, 500, 1000, 2000])
+    slip = convergence.slip_errors(fine)
+    print("order: oscillator", order(1.0 / steps[1:], errors[1:]), "within a slip", order(1.0 / fine, slip))
+    left.loglog(0.05 / steps, errors, "o-", label="oscillator (share of amplitude)")
+    left.loglog(0.03 / fine, slip / 4e-5, "s-", label="within a slip (share of slip)")
+    left.loglog(0.05 / steps, errors[-1] * (steps[-1] / steps) ** 2.0, "k--", lw=0.8, label="$h^2$")
+    left.set(xlabel="fixed step (s)", ylabel="error")
+    left.legend()
+    factors = np.array([1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+    exact = convergence.second_event(factor=3000.0)
+    by_tolerance = np.abs(np.array([convergence.second_event(factor=f) for f in factors]) / exact - 1.0)
+    bins = np.array([32, 64, 128, 256, 512])
+    exact = convergence.second_event(2048, 30.0)
+    by_bins = np.abs(np.array([convergence.second_event(int(n), 30.0) for n in bins]) / exact - 1.0)
+    for i, name in enumerate(convergence.QUANTITIES):
+        middle.loglog(factors, by_tolerance[:, i], "o-", label=name)
+        right.loglog(bins, by_bins[:, i], "o-", label=name)
+        print(name, "by tolerance", by_tolerance[:, i], "by elements", by_bins[:, i])
+    middle.set(xlabel="default tolerance divided by", ylabel="relative error")
+    right.set(xlabel="elements of the bank", ylabel="relative error")
+    middle.legend()
+    return fig
+
+
+@figure
+def scatter() -> plt.Figure:
+    fig, (left,) = axes(1)
+    kicks = np.linspace(0.0, 2e-6, 12)
+    for damping, mark in ((0.0, "o"), (1.0, "s"), (10.0, "^")):
+        onsets = convergence.onset_scatter(damping, kicks)
+        print(f"c = {damping:g}: range of onsets, ms", np.ptp(onsets, axis=0) * 1e3)
+        left.plot(kicks * 1e6, (onsets[:, 1] - onsets[:, 1].mean()) * 1e3, mark + "-", label=f"c = {damping:g} N s/m")
+    left.set(xlabel="kick at the start (µm/s)", ylabel="second onset, from its mean (ms)")
+    left.legend()
+    return fig
+
+
+@figure
+def energy() -> plt.Figure:
+    fig, (left, middle, right) = axes(3)
+    factors, worst, steps, spent = np.array([1.0, 10.0, 100.0, 1000.0]), [], [], []
+    for f in factors:
+        start = time.process_time()
+        made = slip_events.run(rig(), 8.0, tighter(f))
+        spent.append(time.process_time() - start)
+        worst.append(np.max(np.abs(books.imbalance(made.trajectory.steps))))
+        steps.append(made.trajectory.stats.steps)
+    print("energy: tolerance/", factors, "imbalance", worst, "steps", steps, "processor s", np.round(spent, 2))
+    s = made.trajectory.steps
+    for name in ("spring_work", "friction_work", "viscous_work", "stored"):
+        left.plot(s.t, getattr(s, name) * 1e6, label=name.replace("_", " "))
+    left.set(xlabel="time (s)", ylabel="energy (µJ)")
+    left.legend()
+    middle.loglog(steps, worst, "o-")
+    middle.axhline(1e-6, color="k", lw=0.8)
+    middle.set(xlabel="steps for 8 s with four events", ylabel="largest imbalance / work of the spring")
+    cycle = books.slow_cycle()
+    s = cycle.steps
+    print("hysteresis: largest departure over strength", np.max(np.abs(s.contact_force - cycle.force)) / STRENGTH)
+    right.plot(s.x * 1e6, s.contact_force, lw=2.5, alpha=0.4, label="solver")
+    right.plot(s.x * 1e6, cycle.force, "k", lw=0.8, label="Masing, turning points")
+    right.set(xlabel="displacement (µm)", ylabel="contact force (N)")
+    right.legend()
+    return fig
+
+
+@figure
+def derivative() -> plt.Figure:
+    fig, (left, right) = axes(2)
+    size = len(derivatives.BASE)
+    start, early, end = 5.13, 5.16, 5.23
+    _, state = integrate(derivatives.build(jnp.zeros(size)), start, tolerance=tighter(10.0))
+    n = round((end - start) / 2e-5)
+
+    def outcomes(theta: jax.Array) -> jax.Array:
+        trace = derivatives.trace(jnp.asarray(theta), state, start, end, Tolerance(), n, False)
+        return jnp.stack(derivatives.outcome(*trace, early))
+
+    zero = jnp.zeros(size)
+    exact = np.stack([np.asarray(jax.jvp(outcomes, (zero,), (e,))[1]) for e in jnp.eye(size)])
+    scale = np.max(np.abs(exact), axis=0)
+    rungs = 10.0 ** -np.arange(2.0, 9.5, 1.0)
+    gaps = np.array([np.max(np.abs(derivatives.differences(outcomes, h) - exact) / scale, axis=0) for h in rungs])
+    for i, name in enumerate(derivatives.Outcome._fields):
+        left.loglog(rungs, gaps[:, i], "o-", label=name)
+        print(
+            name, "differences against the derivative, by step", dict(zip(rungs, np.round(gaps[:, i], 5), strict=True))
+        )
+    left.set(
+        xlabel="step of the difference (1)", ylabel="disagreement / largest derivative", title="One slip, fixed steps"
+    )
+    left.legend()
+    which = derivatives.NAMES.index("spring_stiffness")
+    direction = jnp.eye(size)[which]
+    for factor, colour in ((1.0, "C0"), (100.0, "C1")):
+        function = derivatives.two_events(tighter(factor), most=32768)
+        moves = np.linspace(-0.02, 0.02, 41)
+        t = np.array([np.asarray(function(m * np.asarray(direction))) for m in moves])[:, 1]
+        slope = float(jax.jvp(function, (zero,), (direction,))[1][1])
+        wide = np.polyfit(moves, t, 1)[0]
+        print(f"recurrence by ln c_s, tolerance/{factor:g}: derivative {slope:.3f} s, slope of the curve {wide:.3f} s")
+        right.plot(moves * 100, t, ".-", color=colour, lw=0.6, label=f"default tolerance/{factor:g}")
+        near = np.array([-0.004, 0.004])
+        right.plot(near * 100, t[20] + slope * near, color=colour, lw=2.5, alpha=0.5)
+    right.set(xlabel="change of spring stiffness (%)", ylabel="recurrence (s)", title="Thick: exact derivative")
+    right.legend()
+    return fig
+
+
+def main() -> None:
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for name in sys.argv[1:] or DRAW:
+        start = time.process_time()
+        print(f"--- {name}")
+        fig = DRAW[name]()
+        fig.savefig(FOLDER / f"{name}.png", dpi=110)
+        plt.close(fig)
+        print(f"    ({time.process_time() - start:.0f} s)", flush=True)
+
+
+if __name__ == "__main__":
+    main()
