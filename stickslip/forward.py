@@ -21,7 +21,7 @@ from .model import Model, State
 from .solve.integrate import _TERM, step_control
 from .solve.stepper import ContactStepper, Tolerance
 
-MOST_STEPS = 1536  # of one cycle; a cycle of ordinary stick-slip takes 300 to 600
+MOST_STEPS = 3072  # of one cycle; ordinary stick-slip takes 300 to 1200, a hold a hundred more each second
 
 
 class Cycles(NamedTuple):

@@ -162,7 +162,7 @@ def test_paper_s_alignment_is_an_option(capsys):
 def test_inertial_fit_of_a_simulated_campaign(capsys):
     from stickslip.challenge.generator.__main__ import main
 
-    main(["camp", "--effect", "none", "--seed", "3"])
+    main(["camp", "--seed", "3"])
     assert (
         run(["fit", "camp/campaign.toml", "--out", "fitted", "--most-events", "4", "--profile", "weakening.drop"]) == 0
     )

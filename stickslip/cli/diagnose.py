@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -123,7 +124,6 @@ def diagnose(
 
 def _teller(began: float) -> Any:
     """Progress on stderr: what was finished, the share of the round, the time left."""
-    import sys
 
     def tell(text: str, share: float) -> None:
         if not sys.stderr.isatty():
@@ -139,12 +139,12 @@ def _print(result: dict[str, Any], out: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else 110)
     table = Table(title="Ladder of models: error in units of what the data can tell (1 is as good as they allow)")
     table.add_column("model")
     phases = sorted({p for rung in result["ladder"] for p in rung["by_phase"]})
-    for name in ("fitted runs", "unseen", *phases):
-        table.add_column(name, justify="right")
+    for name in ("fitted", "unseen", *phases):
+        table.add_column(name, justify="right", no_wrap=True)
     for rung in result["ladder"]:
         label = "static" if rung["added"] is None else f"+ {rung['added']}"
         held = rung["heldout_error"]

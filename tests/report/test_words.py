@@ -14,16 +14,27 @@ from stickslip.trace import Drive, Trace
 
 
 def sawtooth(
-    *, v0=42e-6, rate=2000.0, sticks=60, stiffness=168.0, gain=1.0, ripple=0.0, period=0.4, noise=1e-6, seed=0, holds=()
+    *,
+    v0=42e-6,
+    rate=2000.0,
+    sticks=60,
+    stiffness=168.0,
+    gain=1.0,
+    ripple=0.0,
+    period=0.4,
+    noise=1e-6,
+    seed=0,
+    creep=0.0,
 ):
-    """A block that stands still, then slips by a half cosine of 38 ms; recurrence varies, so that nothing repeats."""
+    """A block that stands still, creeps before it slips by a half cosine of 38 ms; recurrence varies at random."""
     rng = np.random.default_rng(seed)
     onsets = np.cumsum(rng.uniform(1.3, 1.9, sticks))
     t = np.arange(0.0, onsets[-1] + 1.0, 1 / rate)
     x, before = np.zeros_like(t), 0.0
     for onset in onsets:
-        size = v0 * (onset - before)
+        size = v0 * (onset - before) - creep
         x += 0.5 * size * (1 - np.cos(np.pi * np.clip((t - onset) / 0.038, 0, 1)))
+        x += creep * np.clip((t - onset + 0.5) / 0.5, 0, 1) ** 2
         before = onset
     drive = Drive.constant(v0, 0.0, t[-1])
     position = drive.position(t) + ripple * np.sin(2 * np.pi * t / period)
@@ -32,12 +43,12 @@ def sawtooth(
 
 
 def test_a_force_sensor_that_reads_too_much_is_named_with_its_size():
-    trace = sawtooth(gain=1.1)
+    trace = sawtooth(gain=1.1, creep=8e-6)
     found = segment(trace)
     assert stick_gain(trace, found)["value"] == pytest.approx(1.1, abs=0.005)
     text = " ".join(abilities([trace], [found]).cannot)
     assert "sensor-gain of about +10 %" in text
-    trace = sawtooth(gain=1.0)
+    trace = sawtooth(gain=1.0, creep=8e-6)
     assert "sensor-gain" not in " ".join(abilities([trace], [segment(trace)]).cannot)
 
 
