@@ -65,7 +65,7 @@ def diagnose(
     campaign:
         TOML file that describes the rig and its measured runs.
     out:
-        Folder for result.json and the finished pieces; an interrupted diagnosis into the same folder goes on.
+        Folder for report.html, result.json and the finished pieces; an interrupted diagnosis goes on from them.
     candidates:
         Try these effects only: contact-ageing,drive-ripple.
     max_effects:
@@ -87,6 +87,7 @@ def diagnose(
     from ..diagnose.engine import diagnose as run_diagnosis
     from ..diagnose.summary import summary
     from ..effects import catalogue
+    from ..report import write_report
 
     for path in effect:
         catalogue.load_file(path)
@@ -109,12 +110,14 @@ def diagnose(
             progress=_teller(began),
         )
         result: dict[str, Any] = {
+            "title": loaded.title,
             **summary(found),
             "inputs": inputs,
             "versions": versions(),
             "seconds": round(time.perf_counter() - began, 1),
         }
         run.json(result)
+        write_report(run.folder)
     if json:
         print(json_text(result))
     else:
@@ -156,4 +159,4 @@ def _print(result: dict[str, Any], out: Path) -> None:
     console.print(f"[bold]{verdict['kind']}[/bold]: {verdict['text']}", highlight=False)
     if result["next_experiment"]:
         console.print(f"next experiment: {result['next_experiment']['text']}", highlight=False)
-    console.print(f"result in {out / 'result.json'}", highlight=False)
+    console.print(f"report in {out / 'report.html'}", highlight=False)

@@ -78,7 +78,7 @@ def _parameters(rung: Rung) -> dict[str, Any]:
     assert rung.fit is not None
     sd = rung.fit.std()
     values = rung.fit.values
-    return {f.name: {"value": values[f.name], "std": sd[f.name], "unit": f.unit} for f in rung.fit.free}
+    return {f.name: {"value": values[f.name], "std": sd[f.name], "unit": f.unit, "doc": f.doc} for f in rung.fit.free}
 
 
 def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
