@@ -60,7 +60,7 @@ def before_slip(start: float = 5.165) -> tuple[Model, State, float]:
     return model, integrate(model, start, tolerance=tighter(10.0))[1], start
 
 
-def slip_errors(steps: np.ndarray, end: float = 5.195, fine: int = 32_000) -> np.ndarray:
+def slip_errors(steps: np.ndarray, end: float = 5.195, fine: int = 16_000) -> np.ndarray:
     """Error of displacement (m) in the middle of a slip, for numbers of equal steps."""
     model, state, start = before_slip()
     exact = fixed_steps(model, state, start, end, fine)[0]
