@@ -2,8 +2,8 @@
 
 The Jacobian is taken by differences over steps of two per cent. A forward-mode derivative of an adaptive integration is
 exact for the discrete solution, which has a fine saw-tooth where kinks of the contact cross the borders of steps: its
-slope is not the slope of the curve it follows. (Measured, docs/verification: that of the second event's time is wrong
-in sign at the tolerance used here; with small fixed steps it is right to four digits.)
+slope is not the slope of the curve it follows. (Measured, docs/verification: it is right within one slip, and
+that of the second event's time is wrong in sign at every tolerance.)
 """
 
 from __future__ import annotations
