@@ -1,6 +1,6 @@
 """The static contact: rough lines, indentation, tangential loading, banks of Jenkins elements, hysteresis."""
 
-from .. import precision  # noqa: F401  (64-bit before the first array)
+from .. import jax_settings  # noqa: F401  (before the first array)
 from .bank import Bank, bank_from_backbone, binning_error, concatenate, default_edges, return_map
 from .creep import (
     CreepCurve,

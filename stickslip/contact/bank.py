@@ -13,7 +13,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from .. import precision  # noqa: F401  (64-bit before the first array)
+from .. import jax_settings  # noqa: F401  (before the first array)
 from ..errors import InputError
 
 Backbone = Callable[[Array], Array]

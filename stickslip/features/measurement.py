@@ -95,8 +95,9 @@ def measure(
     settling = float(2.2 * np.median(durations))
     layout = Layout(settling, float(max(0.13 * np.median(durations), 2.0 * ring_period)))
     rows = [_run(t, s, layout, ring_period, most_cycles) for t, s in pairs]
-    width = max(len(r[1]) for r in rows)
-    nodes = max(r[0][0].size for r in rows)
+    # padded to round sizes, so that campaigns of about one size share a compiled program
+    width = _round_up(max(len(r[1]) for r in rows))
+    nodes = _round_up(max(r[0][0].size for r in rows))
     cycles, anchors, values, valid, sensor = zip(*(_stack(r, width, nodes, layout) for r in rows), strict=True)
     return Measurement(
         layout,
@@ -109,6 +110,12 @@ def measure(
         np.array([s.settings.speed for _, s in pairs]),
         tuple(dropped),
     )
+
+
+def _round_up(n: int) -> int:
+    """The next multiple of four, of sixteen beyond."""
+    step = 4 if n <= 16 else 16
+    return -(-n // step) * step
 
 
 def _run(trace: Trace, found: Segmentation, layout: Layout, ring_period: float, most: int) -> tuple:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -17,6 +18,20 @@ from ..model import Block, LoadPoint, Model, Weakening
 from .parameters import Free
 
 EVENT_WIDTHS = (0.12, 0.08)  # prior s.d. of ln(u_max) and ln(p) from event to event where lines are new every time
+
+
+class Given(NamedTuple):
+    """The numbers of a composition that a fit does not move; apart, so that one compiled program serves them all.
+
+    Attributes:
+        mass: of the block (kg).
+        fixed: SI values of base parameters that are not free.
+        effects: instances; their free fields are overwritten.
+    """
+
+    mass: Any
+    fixed: dict[str, Any]
+    effects: tuple[Effect, ...]
 
 
 @dataclass(frozen=True)
@@ -39,14 +54,13 @@ class Composition:
     fixed: dict[str, float] = field(default_factory=dict)
     effects: tuple[Effect, ...] = ()
 
-    def outward(self, z: Array) -> dict[str, Array]:
-        """Search scale -> SI, traceable."""
-        fixed = {name: jnp.asarray(value) for name, value in self.fixed.items()}
-        return fixed | {
-            f.name: jnp.exp(v) if f.scale == "log" else v * float(f.scale) for f, v in zip(self.free, z, strict=True)
-        }
+    def given(self) -> Given:
+        """What is not free, as arrays."""
+        return Given(
+            jnp.asarray(self.mass), {name: jnp.asarray(value) for name, value in self.fixed.items()}, self.effects
+        )
 
-    def model(self, z: Array, event: Array, nodes: Any, stiffness: Array) -> Model:
+    def model(self, z: Array, event: Array, nodes: Any, stiffness: Array, given: Given | None = None) -> Model:
         """The model of one cycle.
 
         Args:
@@ -54,8 +68,12 @@ class Composition:
             event: ln factors on u_max and p in this cycle, shape (2,).
             nodes: times and positions of the load point.
             stiffness: of the spring where the run has its own, else nan (N/m).
+            given: the numbers that are not free; default this composition's own.
         """
-        v = self.outward(z)
+        given = self.given() if given is None else given
+        v = given.fixed | {
+            f.name: jnp.exp(x) if f.scale == "log" else x * float(f.scale) for f, x in zip(self.free, z, strict=True)
+        }
         bank = power_law_bank(
             v["contact.strength"],
             v["contact.u_max"] * jnp.exp(event[0]),
@@ -65,7 +83,7 @@ class Composition:
             n=self.bins,
         )
         block = Block(
-            mass=jnp.asarray(self.mass),
+            mass=given.mass,
             spring_stiffness=jnp.where(jnp.isnan(stiffness), v["rig.spring_stiffness"], stiffness),
             damping=v["rig.damping"],
         )
@@ -74,7 +92,7 @@ class Composition:
             slip_distance=v["weakening.slip_distance"],
             healing_time=v["weakening.healing_time"],
         )
-        return Model(block, bank, weakening, LoadPoint(*nodes), tuple(self._set(e, v) for e in self.effects))
+        return Model(block, bank, weakening, LoadPoint(*nodes), tuple(self._set(e, v) for e in given.effects))
 
     def _set(self, effect: Effect, values: dict[str, Array]) -> Effect:
         mine = {k.split(".", 1)[1]: v for k, v in values.items() if k.split(".", 1)[0] == effect.tag}
@@ -89,13 +107,6 @@ class Composition:
         )
 
     def key(self) -> tuple[Any, ...]:
-        """What decides about a compilation."""
-        return (
-            self.contacts,
-            self.bins,
-            tuple((f.name, f.scale) for f in self.free),
-            tuple(sorted(self.fixed)),
-            tuple(
-                (type(e), tuple(sorted((k, v) for k, v in vars(e).items() if isinstance(v, str)))) for e in self.effects
-            ),
-        )
+        """What decides about a compilation: everything but the numbers of :meth:`given` and the free ones."""
+        names = tuple((f.name, f.scale) for f in self.free)
+        return self.contacts, self.bins, names, tuple(sorted(self.fixed)), jax.tree.structure(self.effects)

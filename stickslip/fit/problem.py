@@ -23,9 +23,9 @@ from ..features.curve import StepCurve
 from ..features.evaluate import Anchors, features
 from ..features.layout import Layout
 from ..features.measurement import Measurement
-from ..forward import Cycles, run_cycles
+from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
-from .composition import Composition
+from .composition import Composition, Given
 
 STEP = 0.02  # of a difference, on the search scale
 THREADS = max(1, min(4, os.cpu_count() or 1))
@@ -87,19 +87,26 @@ class Problem:
 
     def _call(self, lanes: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
         m = self.measurement
-        run = _compiled(_Key(self.composition), m.layout)
+        tracks = _tracks(_Key(self.composition))
+        given = self.composition.given()
+        times = jnp.asarray([m.layout.settling, m.layout.shortest])
         self.runs_done += len(lanes) * m.runs
 
         def one(task: tuple[int, int]) -> np.ndarray:
             lane, r = task
             z, events = lanes[lane]
-            return np.asarray(run(jnp.asarray(z), jnp.asarray(events[r]), *self._data[r], self.tolerance))
+            cycles, anchors = self._data[r]
+            run = tracks(jnp.asarray(z), jnp.asarray(events[r]), cycles, given, self.tolerance)
+            return np.asarray(_features(run, anchors, times))
 
         # the longest runs first, so that no thread is left with one at the end
         order = np.argsort([-np.count_nonzero(m.cycles.used[r]) for r in range(m.runs)])
         tasks = [(lane, int(r)) for r in order for lane in range(len(lanes))]
-        with ThreadPoolExecutor(self.threads) as pool:
-            done = dict(zip(tasks, pool.map(one, tasks), strict=True))
+        if self.threads == 1:
+            done = {task: one(task) for task in tasks}
+        else:
+            with ThreadPoolExecutor(self.threads) as pool:
+                done = dict(zip(tasks, pool.map(one, tasks), strict=True))
         return [np.stack([done[lane, r] for r in range(m.runs)]) for lane in range(len(lanes))]
 
 
@@ -108,7 +115,7 @@ class _Key:
 
     def __init__(self, composition: Composition) -> None:
         self.composition = composition
-        self._key = (*composition.key(), composition.mass, tuple(sorted(composition.fixed.items())))
+        self._key = composition.key()
 
     def __hash__(self) -> int:
         return hash(self._key)
@@ -118,13 +125,19 @@ class _Key:
 
 
 @lru_cache(maxsize=64)
-def _compiled(key: _Key, layout: Layout) -> Any:
+def _tracks(key: _Key) -> Any:
+    """The compiled integration of one run. What the features ask of it is compiled apart, once for all models."""
     composition = key.composition
 
-    def one_run(z: Array, events: Array, cycles: Cycles, anchors: Anchors, tolerance: Tolerance) -> Array:
-        tracks = run_cycles(
-            lambda event, nodes: composition.model(z, event, nodes, cycles.stiffness), events, cycles, tolerance
+    def one_run(z: Array, events: Array, cycles: Cycles, given: Given, tolerance: Tolerance) -> Track:
+        return run_cycles(
+            lambda event, nodes: composition.model(z, event, nodes, cycles.stiffness, given), events, cycles, tolerance
         )
-        return jax.lax.map(lambda pair: features(StepCurve(pair[0]), pair[1], layout), (tracks, anchors))
 
     return jax.jit(one_run)
+
+
+@jax.jit
+def _features(tracks: Track, anchors: Anchors, times: Array) -> Array:
+    layout = Layout(times[0], times[1])  # type: ignore[arg-type]  # traced
+    return jax.lax.map(lambda pair: features(StepCurve(pair[0]), pair[1], layout), (tracks, anchors))
