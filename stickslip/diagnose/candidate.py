@@ -19,12 +19,18 @@ from ..fit.problem import Problem
 from ..params import specs
 from ..residual import Misfit, misfit
 from .heldout import HeldOut, held_out
+from .linear import Linear
+from .periods import periods
 
-START = 0.05  # of the amplitude's range; the linear step finds size and sign
-MOST_STARTS = 9
-WIDE = ((7.0, 4), (2.5, 5))  # factors on the floors and evaluations, for all candidates
-REFIT = ((1.0, 8),)  # for those that explain something
-HOPELESS = 0.93  # share of the base's cost that must be undercut at wide floors to be followed further
+START = 0.02  # of the amplitude's range; scaled until its effect on the features is moderate
+MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
+MOST_STARTS = 12
+SHARES = (1.0, 0.4)  # of a linear step that are tried
+FEW = 5  # evaluations at floors as wide as the base's misfit, for all candidates
+SOME = 4  # at the floors themselves, for all candidates
+MORE = 12  # for the better half
+MOST = 30  # for the leaders
+WIDEST = 30.0
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,7 @@ class Candidate:
         tag: of the effect.
         form: of its law.
         effect: the instance whose free fields the composition overwrites.
-        score: share of the base's misfit that a change of amplitude explains to first order (R squared).
+        score: share of the base's misfit that the effect explains to first order, everything else refitted.
         fit: the refit, or None where the effect was dropped before.
         train: errors on the cycles fitted.
         held: errors on the others.
@@ -59,17 +65,30 @@ class Candidate:
             return None
         return next((f for f in self.fit.free if f.amplitude and f.name.startswith(f"{self.tag}.")), None)
 
+    @property
+    def cost(self) -> float:
+        """Robust chi-square of the refit; infinite where there is none."""
+        return np.inf if self.fit is None else self.fit.cost
 
-def starts(effect: Effect) -> list[dict[str, float]]:
-    """Values of the effect's parameters to begin a search from: a small amplitude, a grid of the inner ones."""
+
+def starts(effect: Effect, found: list[float] | None = None) -> list[dict[str, float]]:
+    """Values of the effect's inner parameters to begin a search from: their grid.
+
+    Args:
+        effect: with its form chosen.
+        found: periods the data hint at, for an effect that is periodic; they stand before the grid's.
+    """
     table = specs(effect)
-    spec = table[effect.amplitude]
-    null = spec.null or 0.0
-    reach = spec.upper - null if spec.upper > null else spec.lower - null
     inner = {k: s.grid for k, s in table.items() if k != effect.amplitude and s.grid}
+    if effect.periodic is not None:
+        name = effect.periodic[0]
+        inner.pop("phase", None)
+        if found:
+            low, high = table[name].lower, table[name].upper
+            at = [1.0 / p if name == "frequency" else p for p in found]
+            inner[name] = tuple(v for v in (*at, *inner.get(name, ())) if low < v < high)
     grid = [dict(zip(inner, values, strict=True)) for values in product(*inner.values())]
-    grid = grid[:: int(np.ceil(len(grid) / MOST_STARTS))]
-    return [{effect.amplitude: null + START * reach, **g} for g in grid]
+    return grid[:: int(np.ceil(len(grid) / MOST_STARTS))]
 
 
 def try_effect(
@@ -83,7 +102,7 @@ def try_effect(
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Candidate:
-    """Score and refit one effect on top of the base.
+    """Score one effect on top of the base and refit everything with it to the end.
 
     Args:
         effect: with its form chosen.
@@ -93,126 +112,172 @@ def try_effect(
         threads: runs integrated at the same time.
         progress: told what goes on.
     """
+    begun = begin(effect, base, optimum, measurement, floor, train, threads=threads, progress=progress)
+    return refine(begun, measurement, floor, train, MOST, threads=threads, progress=progress)
+
+
+def begin(
+    effect: Effect,
+    base: Composition,
+    optimum: Fit,
+    measurement: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    *,
+    threads: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Candidate:
+    """Score one effect, find where to start with it, and take the first steps; arguments as :func:`try_effect`."""
     form = {k: str(v) for k, v in vars(effect).items() if isinstance(v, str)}
     try:
-        return _try(effect, form, base, optimum, measurement, floor, train, threads, progress)
+        return _begin(effect, form, base, optimum, measurement, floor, train, threads, progress or _silent)
     except StickslipError as error:
         return Candidate(effect.tag, form, effect, 0.0, note=str(error))
 
 
-def _try(effect, form, base, optimum, measurement, floor, train, threads, progress) -> Candidate:
+def refine(
+    candidate: Candidate,
+    measurement: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    evaluations: int,
+    *,
+    threads: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Candidate:
+    """The same candidate after at most so many ``evaluations`` more at the floors themselves."""
+    if candidate.fit is None or candidate.composition is None:
+        return candidate
+    problem = Problem(candidate.composition, measurement, threads=threads)
+    old = candidate.fit
+    try:
+        new = fit(problem, floor, z=old.z, events=old.events, stages=((1.0, evaluations),), use=train)
+    except StickslipError as error:
+        return replace(candidate, note=str(error))
+    (progress or _silent)(f"{candidate.tag}: cost {old.cost:.0f} -> {new.cost:.0f}")
+    return _with_fit(candidate, new if new.cost < old.cost else old, problem, floor, train)
+
+
+def _silent(text: str) -> None:
+    """Progress that nobody asked for."""
+
+
+def _with_fit(candidate: Candidate, found: Fit, problem: Problem, floor: np.ndarray, train: np.ndarray) -> Candidate:
+    m = problem.measurement
+    used = np.asarray(m.cycles.used)
+    shown = replace(m, valid=m.valid & (train & used)[..., None])
+    return replace(
+        candidate,
+        fit=found,
+        train=misfit(shown, found.features, floor),
+        held=held_out(problem, found, floor, used & ~train, found.features),
+    )
+
+
+def ease(optimum: Fit, measurement: Measurement, floor: np.ndarray) -> float:
+    """Factor on the floors at which the base's misfit is moderate: where a search for what is missing begins."""
+    valid = measurement.valid & optimum.use[..., None]
+    r = np.abs(np.nan_to_num((optimum.features - measurement.values) / floor, nan=1e4))[valid]
+    return float(np.clip(np.quantile(r, 0.9) / 3.0, 1.0, WIDEST))
+
+
+def _begin(effect, form, base, optimum, measurement, floor, train, threads, tell) -> Candidate:
     free = effect_parameters(effect)
     composition = base.with_effect(effect, free)
     problem = Problem(composition, measurement, threads=threads)
     k = len(base.free)
     use = train & np.asarray(measurement.cycles.used)
     valid = measurement.valid & use[..., None]
-    tell = progress or (lambda text: None)
-
-    # score and starts: from each start one linear step of everything, which says what could be reached from there
-    project = _Projection(problem, optimum, floor, valid)
-    best: tuple[float, np.ndarray, np.ndarray] | None = None
+    factor = ease(optimum, measurement, floor)
+    linear = Linear(problem, optimum, measurement, floor, valid, factor)
+    hints: list[float] = []
+    if effect.periodic is not None:
+        spec = specs(effect)[effect.periodic[0]]
+        bounds = (spec.lower, spec.upper)
+        if effect.periodic[0] == "frequency":
+            bounds = (1.0 / spec.upper, 1.0 / spec.lower)
+        residual = (measurement.values - optimum.features) / floor
+        hints = periods(effect.periodic[1], measurement, np.nan_to_num(residual), use, bounds)
+    search = _Search(problem, optimum, floor, valid, factor, free, k, effect)
     score = 0.0
-    for values in starts(effect):
-        begun = [f.starting(values.get(f.name.split(".", 1)[1], f.start)) for f in free]
-        z = np.concatenate([optimum.z, [f.inward(f.start) for f in begun]])
-        features = problem.features(z, optimum.events)
-        if not np.isfinite(features[valid]).all():
-            continue
-        amplitude = k + next(i for i, f in enumerate(free) if f.amplitude)
-        null = free[amplitude - k].inward(specs(effect)[effect.amplitude].null or 0.0)
-        direction = (features - optimum.features) / (z[amplitude] - null)
-        share, cost, step = project.line(direction)
+    for values in starts(effect, hints):
+        share = search.along(values, linear)
         score = max(score, share)
-        low, high = free[amplitude - k].bounds
-        landing = float(np.clip(null + step, low + 1e-6, high - 1e-6))
         tell(f"{effect.tag}: start {values}, explains {100 * share:.0f} %")
-        if best is None or cost < best[0]:
-            at = z.copy()
-            # not all the way: far steps of a nonlinear effect overshoot
-            at[amplitude] = landing if abs(landing - null) < 3 * abs(z[amplitude] - null) else z[amplitude]
-            best = (cost, at, features)
-    if best is None:
+    if search.best is None:
         return Candidate(effect.tag, form, effect, score, composition, note="the model could not be evaluated with it")
-    z = best[1]
-    base_cost = optimum.cost
-    features = problem.features(z, optimum.events)
-    columns = np.concatenate(
-        [optimum.columns, problem.columns(z, optimum.events, range(k, len(composition.free)), features)], axis=-1
-    )
-    found = fit(problem, floor, z=z, events=optimum.events, stages=WIDE, use=train, columns=columns, anew=False)
-    tell(f"{effect.tag}: cost {base_cost:.0f} -> {found.cost:.0f} at wide floors")
-    wide = WIDE[-1][0]
-    note = ""
-    if cost_at(found, measurement, floor, wide) > HOPELESS * cost_at(optimum, measurement, floor, wide):
-        note = "explains little"
-    else:
-        found = fit(problem, floor, z=found.z, events=found.events, stages=REFIT, use=train, columns=found.columns)
-        tell(f"{effect.tag}: cost {base_cost:.0f} -> {found.cost:.0f}")
-    unseen = np.asarray(measurement.cycles.used) & ~train
-    shown = replace(measurement, valid=valid)
-    return Candidate(
-        effect.tag,
-        form,
-        effect,
-        score,
-        composition,
-        found,
-        misfit(shown, found.features, floor),
-        held_out(problem, found, floor, unseen, found.features),
-        note,
-    )
+    _, z, events = search.best
+    stages = ((factor, FEW), (1.0, SOME)) if factor > 1.5 else ((1.0, FEW + SOME),)
+    found = fit(problem, floor, z=z, events=events, stages=stages, use=train)
+    tell(f"{effect.tag}: cost {optimum.cost:.0f} -> {found.cost:.0f}")
+    return _with_fit(Candidate(effect.tag, form, effect, score, composition), found, problem, floor, train)
 
 
-def cost_at(found: Fit, measurement: Measurement, floor: np.ndarray, factor: float) -> float:
-    """Robust chi-square of the fitted cycles with all floors times ``factor``, event-wise priors included."""
-    valid = measurement.valid & found.use[..., None]
-    r = (found.features - measurement.values) / (factor * floor)
-    event = found.events[found.use] / np.array(EVENT_WIDTHS)
-    return robust(np.nan_to_num(r[valid], nan=1e4)) + float(np.sum(event**2))
+class _Search:
+    """The best place to start with an effect: linear steps of everything, each tried with the model itself."""
 
+    def __init__(self, problem, optimum, floor, valid, factor, free, k, effect) -> None:
+        self.problem, self.optimum, self.floor, self.valid, self.factor = problem, optimum, floor, valid, factor
+        self.free, self.k, self.effect = free, k, effect
+        self.amplitude = next(i for i, f in enumerate(free) if f.amplitude)
+        self.null = free[self.amplitude].inward(specs(effect)[effect.amplitude].null or 0.0)
+        self.best: tuple[float, np.ndarray, np.ndarray] | None = None
 
-class _Projection:
-    """The base's residual and Jacobian, whitened, with priors: what a direction explains beyond refitting the base."""
+    def point(self, values: dict[str, float], amplitude: float, base: np.ndarray | None = None) -> np.ndarray:
+        """Free parameters with the effect's inner ``values`` and its ``amplitude`` on the search scale."""
+        inner = [f.inward(f.starting(values.get(f.name.split(".", 1)[1], f.start)).start) for f in self.free]
+        low, high = self.free[self.amplitude].bounds
+        inner[self.amplitude] = float(np.clip(amplitude, low + 1e-6, high - 1e-6))
+        return np.concatenate([self.optimum.z if base is None else base, inner])
 
-    def __init__(self, problem: Problem, optimum: Fit, floor: np.ndarray, valid: np.ndarray) -> None:
-        m = problem.measurement
-        self.valid, self.floor = valid, floor
-        r = (m.values - optimum.features) / floor
-        self.weight = np.where(np.abs(r) > 3.0, np.sqrt(3.0 / np.maximum(np.abs(r), 3.0)), 1.0)
-        event = problem.event_columns(optimum.columns, optimum.z, optimum.events)
-        w = (self.weight / floor)[..., None]
-        shared = np.nan_to_num(optimum.columns * w)[valid]
-        cells = np.argwhere(valid.any(axis=-1))
-        blocks = np.zeros((int(valid.sum()), 2 * len(cells)))
-        index = np.full(valid.shape[:2], -1)
-        index[valid.any(axis=-1)] = np.arange(len(cells))
-        owner = np.broadcast_to(index[..., None], valid.shape)[valid]
-        rows = np.arange(len(owner))
-        e = np.nan_to_num(event * w)[valid]
-        blocks[rows, 2 * owner], blocks[rows, 2 * owner + 1] = e[:, 0], e[:, 1]
-        jac = np.hstack([shared, blocks])
-        prior = np.concatenate(
-            [[1.0 / min(f.width, 1e3) for f in optimum.free], np.tile(1.0 / np.array(EVENT_WIDTHS), len(cells))]
-        )
-        self.q, _ = np.linalg.qr(np.vstack([jac, np.diag(prior)]))
-        self.pad = np.zeros(len(prior))
-        self.residual = self._clean((r * self.weight)[valid])
+    def secant(self, values: dict[str, float]) -> tuple[np.ndarray, float] | None:
+        """Change of the features for a unit of the amplitude, over a step whose effect is moderate; and that step."""
+        low, high = self.free[self.amplitude].bounds
+        reach = high - self.null if high > self.null else low - self.null
+        size, longest = START * reach, 0.98 * abs(reach)
+        best = None
+        for _ in range(4):
+            features = self.problem.features(self.point(values, self.null + size), self.optimum.events)
+            change = features - self.optimum.features
+            moved = np.abs(np.nan_to_num(change / self.floor, nan=1e3))[self.valid]
+            rms = float(np.sqrt(np.mean(np.minimum(moved, 100.0) ** 2)))
+            if np.isfinite(features[self.valid]).all():
+                best = change / size, size
+            if MODERATE[0] <= rms <= MODERATE[1] or (rms < MODERATE[0] and abs(size) >= longest):
+                break
+            wanted = size * float(np.clip(np.sqrt(MODERATE[0] * MODERATE[1]) / max(rms, 1e-6), 0.02, 20.0))
+            size = float(np.sign(wanted) * min(abs(wanted), longest))
+        return best
 
-    def _clean(self, column: np.ndarray) -> np.ndarray:
-        padded = np.concatenate([column, self.pad])
-        return padded - self.q @ (self.q.T @ padded)
+    def along(self, values: dict[str, float], linear: Linear) -> float:
+        """Try the linear step from these inner values; returns the share of the misfit it should explain."""
+        phased = self.effect.periodic is not None
+        lines = [{**values, "phase": p} for p in (0.0, np.pi / 2)] if phased else [values]
+        found = [self.secant(v) for v in lines]
+        known = [f for f in found if f is not None]
+        if len(known) < len(lines):
+            return 0.0
+        step = linear.step([f[0] for f in known])
+        size = float(np.hypot(*step.sizes)) if phased else float(step.sizes[0])
+        if phased:
+            values = {**values, "phase": float(np.arctan2(step.sizes[1], step.sizes[0]))}
+        bounds = np.array([f.bounds for f in self.optimum.free])
+        for share in SHARES:
+            moved = np.clip(self.optimum.z + share * np.clip(step.z, -1.0, 1.0), *bounds.T)
+            events = self.optimum.events + share * np.clip(step.events, -0.3, 0.3)
+            self._offer(self.point(values, self.null + share * size, moved), events)
+        # the least there is: the base with a little of the effect
+        self._offer(self.point(values, self.null + np.sign(size or 1.0) * 0.1 * abs(known[0][1])), self.optimum.events)
+        return step.share
 
-    def line(self, direction: np.ndarray) -> tuple[float, float, float]:
-        """Share of the residual a direction explains, the cost then left, and the best step along it."""
-        d = self._clean(np.nan_to_num(direction * self.weight / self.floor)[self.valid])
-        norm = float(d @ d)
-        total = float(self.residual @ self.residual)
-        if norm < 1e-20 or total <= 0:
-            return 0.0, robust(self.residual), 0.0
-        step = float(d @ self.residual) / norm
-        share = step * step * norm / total
-        return share, total * (1.0 - share), step
+    def _offer(self, z: np.ndarray, events: np.ndarray) -> None:
+        features = self.problem.features(z, events)
+        r = (features - self.problem.measurement.values) / (self.factor * self.floor)
+        off = [(v - f.inward(f.prior)) / min(f.width, 1e3) for v, f in zip(z, self.optimum.free, strict=False)]
+        at = events[self.valid.any(axis=-1)] / np.array(EVENT_WIDTHS)
+        cost = robust(np.nan_to_num(r[self.valid], nan=1e4)) + float(np.sum(np.square(off)) + np.sum(at**2))
+        if self.best is None or cost < self.best[0]:
+            self.best = (cost, z, events)
 
 
 def forms_of(tag: str) -> list[Effect]:

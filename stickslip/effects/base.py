@@ -8,7 +8,7 @@ continuous, and has no switch that resets a state. Concrete effects are final; r
 from __future__ import annotations
 
 import abc
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -97,6 +97,8 @@ class Effect(eqx.Module):
         confused_with: tags whose signature is alike, each with the experiment that separates the two.
         source: paper or book.
         amplitude: name of the parameter whose null value makes the effect vanish.
+        periodic: for an effect with a ``phase``: the parameter that is its period (or "frequency"), and over what it is
+            periodic: "time", "load point" or "displacement".
     """
 
     tag: ClassVar[str] = ""
@@ -106,6 +108,7 @@ class Effect(eqx.Module):
     confused_with: ClassVar[dict[str, str]] = {}
     source: ClassVar[str] = ""
     amplitude: ClassVar[str] = ""
+    periodic: ClassVar[tuple[str, Literal["time", "load point", "displacement"]] | None] = None
     family: ClassVar[str] = "contact"
 
 
@@ -186,7 +189,20 @@ class Geometry(Effect):
 
 
 class Sensor(Effect):
-    """Changes what is read, not what happens."""
+    """Changes what is read, not what happens.
+
+    Class attributes:
+        place: where in the chain it stands, whatever the order in which effects are named: ``TARGET`` (what the sensor
+            looks at; the default), then ``LOW_PASS``, ``HIGH_PASS``, ``GAIN``, ``OFFSET``.
+    """
+
+    TARGET: ClassVar[int] = 0
+    LOW_PASS: ClassVar[int] = 1
+    HIGH_PASS: ClassVar[int] = 2
+    GAIN: ClassVar[int] = 3
+    OFFSET: ClassVar[int] = 4
+
+    place: ClassVar[int] = TARGET
 
     @abc.abstractmethod
     def read(self, state: Any, reading: Array, motion: Motion, contact_force: Array) -> Array:

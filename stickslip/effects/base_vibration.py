@@ -28,6 +28,7 @@ class BaseVibration(BodyForce):
     }
     source = "Newton's law in the frame of an accelerated base; levels: Gordon, Proc. SPIE 1619 (1992) 71"
     amplitude = "acceleration"
+    periodic = ("frequency", "time")
     family = "drive"
 
     acceleration: Array = parameter(

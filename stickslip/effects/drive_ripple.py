@@ -27,6 +27,7 @@ class DriveRipple(Drive):
     }
     source = "ISO 3408-3: travel deviation of ball screws"
     amplitude = "ripple"
+    periodic = ("pitch", "load point")
     family = "drive"
 
     ripple: Array = parameter(

@@ -28,6 +28,7 @@ class LoadModulation(Threshold):
     }
     source = "Tolstoi, Wear 10 (1967) 199: normal degree of freedom in friction"
     amplitude = "depth"
+    periodic = ("frequency", "time")
     family = "contact"
 
     depth: Array = parameter(

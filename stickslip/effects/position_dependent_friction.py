@@ -30,6 +30,7 @@ class PositionDependentFriction(Threshold):
     }
     source = "Armstrong-Helouvry, Control of Machines with Friction (1991), ch. 4"
     amplitude = "depth"
+    periodic = ("wavelength", "displacement")
     family = "friction"
 
     depth: Array = parameter(

@@ -28,6 +28,7 @@ class SensorDrift(Sensor):
     source = "thermal expansion of the mount, 12 ppm/K of its length in steel"
     amplitude = "rate"
     family = "sensor"
+    place = Sensor.OFFSET
 
     rate: Array = parameter(
         0.0, unit="m/s", lower=-5e-8, upper=5e-8, null=0.0, symbol=r"\varepsilon", doc="rate of the drift"

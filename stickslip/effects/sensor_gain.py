@@ -26,6 +26,7 @@ class SensorGain(Sensor):
     source = "Polytec OFV-3001 manual: amplitude error of the displacement decoder; cosine error of a tilted beam"
     amplitude = "gain"
     family = "sensor"
+    place = Sensor.GAIN
 
     gain: Array = parameter(
         0.0, unit="1", lower=-0.05, upper=0.05, null=0.0, symbol=r"\gamma", doc="relative error of the scale"

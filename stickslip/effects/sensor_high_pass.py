@@ -17,7 +17,8 @@ from .lag import follow
 class SensorHighPass(Memory, Sensor):
     """First-order high-pass; its state is the slow part of the displacement, which is not shown.
 
-    The filter acts on the displacement; a gain commutes with it when listed after it, a drift after it is not filtered.
+    The filter acts on the displacement. In the chain of sensor effects a gain comes after it and scales it as well; a
+    drift comes last and is not filtered.
     """
 
     tag = "sensor-high-pass"
@@ -31,6 +32,7 @@ class SensorHighPass(Memory, Sensor):
     source = "first-order RC coupling; Oppenheim & Willsky, Signals and Systems (1997), ch. 6"
     amplitude = "cutoff"
     family = "sensor"
+    place = Sensor.HIGH_PASS
 
     cutoff: Array = parameter(
         0.0, unit="Hz", lower=0.0, upper=5.0, null=0.0, symbol="f_c", doc="frequency below which motion is lost"

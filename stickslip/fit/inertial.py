@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,11 +11,13 @@ from scipy.optimize import least_squares
 from ..errors import FitError
 from .composition import EVENT_WIDTHS
 from .parameters import Free, to_si, vector
-from .problem import Problem
+from .problem import STEP, Problem
 
 HUBER = 3.0
 QUIET = 0.15  # floors; mean change of the features below which derivatives are kept as they are
 TRUST = 0.3  # share of a step's change that Broyden's update may have missed
+MODERATE = 4.0  # floors, rms, by which the step of a difference should move the features
+LEAST, LARGEST = 1e-3, (0.05, 0.5)  # such a step on the search scale; the largest of a logarithm, of another scale
 STAGES = ((30.0, 6), (7.0, 6), (2.5, 6), (1.0, 12))  # factor on the floors, most evaluations at it
 
 
@@ -75,6 +77,7 @@ class _Residuals:
         self._columns: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self.anew = True  # whether derivatives may be taken again where Broyden's update fails
         self.evaluations = self.jacobians = 0
+        self.steps = np.full(self.k, STEP)
 
     def events(self, x: np.ndarray) -> np.ndarray:
         out = np.zeros((*self.used.shape, 2))
@@ -110,10 +113,29 @@ class _Residuals:
                 columns = columns + miss[..., None] * dz / (dz @ dz)
                 self._columns = (x.copy(), f, columns)
                 return columns
-        columns = self.problem.columns(x[: self.k], self.events(x), range(self.k), f)
+        columns = self._differences(x, f, range(self.k))
+        again = self._adapt(columns, range(self.k))
+        if again:
+            columns[..., again] = self._differences(x, f, again)
+            self._adapt(columns, again)
         self.jacobians += 1
         self._columns = (x.copy(), f, columns)
         return columns
+
+    def _differences(self, x: np.ndarray, f: np.ndarray, which: Sequence[int]) -> np.ndarray:
+        return self.problem.columns(x[: self.k], self.events(x), which, f, self.steps[list(which)])
+
+    def _adapt(self, columns: np.ndarray, which: Sequence[int]) -> list[int]:
+        """Set the steps of the next differences by what these moved; returns those that moved far too much."""
+        far = []
+        for i in which:
+            moved = np.abs(np.nan_to_num(columns[..., i] * self.steps[i] / self.floor, nan=1e3))[self.valid]
+            rms = float(np.sqrt(np.mean(np.minimum(moved, 100.0) ** 2)))
+            if rms > 4.0 * MODERATE:
+                far.append(i)
+            largest = LARGEST[0] if self.free[i].scale == "log" else LARGEST[1]
+            self.steps[i] = np.clip(self.steps[i] * np.clip(MODERATE / max(rms, 1e-9), 0.1, 5.0), LEAST, largest)
+        return far
 
     def start(self, x: np.ndarray, columns: np.ndarray) -> None:
         """Take ``columns`` for the derivatives at ``x``."""
@@ -205,22 +227,27 @@ def fit(
         res.start(x, columns)
     scale = np.concatenate([[min(f.width, 1.0) for f in res.free], np.tile(res.widths, int(res.used.sum()))])
     for factor, most in stages:
+        # sought as a distance from where the stage begins, in units of the priors: scipy takes the length of the
+        # start vector for the radius it trusts, and that of logarithms is far too long
+        begun = x
 
-        def residual(x: np.ndarray, factor: float = factor) -> np.ndarray:
-            r = res.residual(x, factor)
+        def residual(u: np.ndarray, factor: float = factor, begun: np.ndarray = begun) -> np.ndarray:
+            r = res.residual(begun + scale * u, factor)
             if progress is not None:
                 done = f"evaluation {res.evaluations} ({res.jacobians} Jacobians)"
                 progress(f"floors x{factor:g}, {done}, cost {robust(r):.1f}")
             return r
 
-        if not np.all(np.isfinite(residual(x))):
+        def jacobian(u: np.ndarray, factor: float = factor, begun: np.ndarray = begun) -> np.ndarray:
+            return res.jacobian(begun + scale * u, factor) * scale
+
+        if not np.all(np.isfinite(residual(np.zeros_like(x)))):
             raise FitError("the model gives no finite features at the start of the fit")
         found = least_squares(
             residual,
-            x,
-            jac=lambda x, factor=factor: res.jacobian(x, factor),
-            bounds=(low, high),
-            x_scale=scale,
+            np.zeros_like(x),
+            jac=jacobian,
+            bounds=((low - begun) / scale, (high - begun) / scale),
             loss="huber",
             f_scale=HUBER,
             max_nfev=most,
@@ -228,11 +255,12 @@ def fit(
             xtol=1e-4,
             gtol=1e-6,
         )
-        x = found.x
+        x = np.clip(begun + scale * found.x, low + 1e-9, high - 1e-9)
     features = res.evaluate(x)
     data, prior = res.data(x, 1.0), res.priors(x)
     # the scipy Jacobian at the optimum carries Huber's weights already
-    hessian = found.jac.T @ found.jac
+    slopes = found.jac / scale
+    hessian = slopes.T @ slopes
     covariance = np.linalg.pinv(hessian)[: res.k, : res.k]
     return Fit(
         x[: res.k],

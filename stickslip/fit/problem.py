@@ -1,9 +1,9 @@
 """Features of all runs for a vector of parameters, and their Jacobian.
 
-The Jacobian is taken by differences over steps of two per cent. A forward-mode derivative of an adaptive integration is
-exact for the discrete solution, which has a fine saw-tooth where kinks of the contact cross the borders of steps: its
-slope is not the slope of the curve it follows. (Measured, docs/verification: it is right within one slip, and
-that of the second event's time is wrong in sign at every tolerance.)
+The Jacobian is taken by differences over steps that move the features moderately. A forward-mode derivative of an
+adaptive integration is exact for the discrete solution, which has a fine saw-tooth where kinks of the contact cross the
+borders of steps: its slope is not the slope of the curve it follows. (Measured, docs/verification: it is right within
+one slip, and that of the second event's time is wrong in sign at every tolerance.)
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
 from .composition import Composition, Given
 
-STEP = 0.02  # of a difference, on the search scale
+STEP = 0.01  # of a difference, on the search scale, until it is known better
+BROKEN = 0.3  # change of a slip's size within such a step that can only be another event
 THREADS = max(1, min(4, os.cpu_count() or 1))
 
 
@@ -58,21 +59,32 @@ class Problem:
         """Features of the model, shape (R, n, F)."""
         return self._call([(np.asarray(z, float), events)])[0]
 
-    def columns(self, z: np.ndarray, events: np.ndarray, which: Sequence[int], base: np.ndarray) -> np.ndarray:
+    def columns(
+        self,
+        z: np.ndarray,
+        events: np.ndarray,
+        which: Sequence[int],
+        base: np.ndarray,
+        steps: np.ndarray | None = None,
+    ) -> np.ndarray:
         """Derivatives of the features in some of the free parameters, shape (R, n, F, len(which)).
 
-        ``base`` are the features at ``z``. A step that would leave the bounds is taken the other way.
+        ``base`` are the features at ``z``, ``steps`` the differences on the search scale, shape (len(which),). A step
+        that would leave the bounds is taken the other way. Where a slip becomes another one within a step (it falls on
+        the other side of a hold), nothing is known of the slope and it is set to zero.
         """
-        lanes, steps = [], []
-        for i in which:
+        lanes, taken = [], []
+        for i, size in zip(which, np.full(len(which), STEP) if steps is None else steps, strict=True):
             _, high = self.composition.free[i].bounds
-            step = STEP if z[i] + STEP <= high else -STEP
+            step = float(size) if z[i] + size <= high else -float(size)
             moved = np.array(z, float)
             moved[i] += step
             lanes.append((moved, events))
-            steps.append(step)
-        out = self._call(lanes)
-        return np.stack([(o - base) / h for o, h in zip(out, steps, strict=True)], axis=-1)
+            taken.append(step)
+        at = self.measurement.layout.slices()["size"]
+        out = np.stack([(o - base) / h for o, h in zip(self._call(lanes), taken, strict=True)], axis=-1)
+        jump = np.abs(out[:, :, at] * np.array(taken)) > BROKEN * np.abs(base[:, :, at, None])
+        return np.where(jump, 0.0, out)
 
     def event_columns(self, columns: np.ndarray, z: np.ndarray, events: np.ndarray) -> np.ndarray:
         """Derivatives in the two event-wise factors, each in its own cycle, shape (R, n, F, 2).

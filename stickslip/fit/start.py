@@ -96,7 +96,8 @@ def base_composition(
     own = np.asarray(m.cycles.stiffness)
     stiffness, stiffness_width, low, high, measured = _known(rig.spring_stiffness, 1000.0, 0.8)
     times = m.values[later][:, s["times"]]
-    duration = float(np.median(times[:, -1] - times[:, 0])) / 0.66
+    # a half-cosine spends 0.75 of its time between the two levels; nucleation and damping lengthen that
+    duration = float(np.median(times[:, -1] - times[:, 0])) / 0.83
     if not measured and not np.isfinite(own).all():
         stiffness = float(np.clip(mass * (np.pi / duration) ** 2, low or 1e-3, high or 1e9))
     load = _known(rig.normal_force, np.nan, 0.0)[0]
@@ -107,7 +108,7 @@ def base_composition(
     if not np.isfinite(nominal):
         nominal = float(np.median(seen)) if seen.size else 3.0 * stiffness * size
     strength = float(np.median(seen)) if seen.size else nominal
-    drop = float(np.clip(0.55 * stiffness * size / strength, 0.02, 0.8))
+    drop = float(np.clip(0.8 * stiffness * size / strength, 0.02, 0.8))
     u_max = SHAPE * strength / (mass * (2 * np.pi / period) ** 2)
 
     def log(

@@ -1,0 +1,84 @@
+"""What a small change of an effect would do if everything else were refitted with it, to first order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..features.measurement import Measurement
+from ..fit.composition import EVENT_WIDTHS
+from ..fit.inertial import HUBER, Fit
+from ..fit.problem import Problem
+
+
+@dataclass(frozen=True)
+class Step:
+    """A linear step of everything.
+
+    Attributes:
+        z: change of the base's free parameters on the search scale, shape (k,).
+        events: change of the event-wise factors, shape (R, n, 2).
+        sizes: along each of the directions asked for, shape (d,).
+        share: of the robust cost that it takes away.
+    """
+
+    z: np.ndarray
+    events: np.ndarray
+    sizes: np.ndarray
+    share: float
+
+
+class Linear:
+    """The base's residual and Jacobian at its optimum, whitened, with its priors and Huber's weights.
+
+    Args:
+        problem, optimum: the base and its fit.
+        measurement, floor: the data.
+        valid: features that count, shape (R, n, F).
+        factor: on the floors.
+    """
+
+    def __init__(
+        self, problem: Problem, optimum: Fit, measurement: Measurement, floor: np.ndarray, valid: np.ndarray,
+        factor: float = 1.0,
+    ) -> None:  # fmt: skip
+        self.valid, self.optimum = valid, optimum
+        r = np.nan_to_num((measurement.values - optimum.features) / (factor * floor))
+        r = np.clip(r, -1e4, 1e4)
+        weight = np.where(np.abs(r) > HUBER, np.sqrt(HUBER / np.maximum(np.abs(r), HUBER)), 1.0)
+        self.scale = weight / (factor * floor)
+        event = problem.event_columns(optimum.columns, optimum.z, optimum.events)
+        self.cells = np.argwhere(valid.any(axis=-1))
+        index = np.full(valid.shape[:2], -1)
+        index[valid.any(axis=-1)] = np.arange(len(self.cells))
+        owner = np.broadcast_to(index[..., None], valid.shape)[valid]
+        rows = np.arange(owner.size)
+        shared = np.nan_to_num(optimum.columns * self.scale[..., None])[valid]
+        own = np.nan_to_num(event * self.scale[..., None])[valid]
+        blocks = np.zeros((owner.size, 2 * len(self.cells)))
+        blocks[rows, 2 * owner], blocks[rows, 2 * owner + 1] = own[:, 0], own[:, 1]
+        widths = np.array([min(f.width, 1e3) for f in optimum.free])
+        off = [(v - f.inward(f.prior)) / w for v, f, w in zip(optimum.z, optimum.free, widths, strict=True)]
+        at = optimum.events[tuple(self.cells.T)] / np.array(EVENT_WIDTHS)
+        prior = np.concatenate([1.0 / widths, np.tile(1.0 / np.array(EVENT_WIDTHS), len(self.cells))])
+        self.matrix = np.vstack([np.hstack([shared, blocks]), np.diag(prior)])
+        self.target = np.concatenate([(r * weight)[valid], -np.array(off), -at.ravel()])
+
+    def step(self, directions: list[np.ndarray]) -> Step:
+        """The least-squares step along features' ``directions`` (R, n, F) together with everything in the base."""
+        columns = [np.clip(np.nan_to_num(d * self.scale)[self.valid], -1e6, 1e6) for d in directions]
+        pad = np.zeros(self.target.size - int(self.valid.sum()))
+        matrix = np.hstack([self.matrix, *(np.concatenate([c, pad])[:, None] for c in columns)])
+        before = self.target - self.matrix @ np.linalg.lstsq(self.matrix, self.target, rcond=1e-10)[0]
+        # columns of very different size: scaled, so that the cut on small singular values means something
+        size = np.linalg.norm(matrix, axis=0)
+        size[size == 0.0] = 1.0
+        found = np.linalg.lstsq(matrix / size, self.target, rcond=1e-9)[0] / size
+        after = self.target - matrix @ found
+        k, d = len(self.optimum.free), len(directions)
+        events = np.zeros_like(self.optimum.events)
+        events[tuple(self.cells.T)] = found[k : found.size - d].reshape(-1, 2)
+        total = float(before @ before)
+        share = 1.0 - float(after @ after) / total if total > 0 else 0.0
+        return Step(found[:k], events, found[found.size - d :], share)
