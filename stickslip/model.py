@@ -97,6 +97,7 @@ class State(eqx.Module):
         x, v: displacement (m) and velocity (m/s) of the block.
         force: force of every Jenkins element (N), shape (n,).
         cap: cap of every element as it was last (N), shape (n,); for the books of energy and sliding only.
+        stiffness: stiffness of every element as it was last (N/m), shape (n,); for the books of energy only.
         psi: weakening state, 1 rested ... 0 fully weakened.
         memory: one state for each effect, in their order (``()`` where it has none).
         work: energies since the start (J).
@@ -106,13 +107,18 @@ class State(eqx.Module):
     v: Array
     force: Array
     cap: Array
+    stiffness: Array
     psi: Array
     memory: tuple[Any, ...]
     work: Work
 
 
 class Work(NamedTuple):
-    """Energies since the start (J): done by the spring, lost in friction and viscous damping, done by effects."""
+    """Energies since the start (J): done by the spring, lost in friction and viscous damping, done by effects.
+
+    ``body`` is the work of effects' forces on the block, and what they give to loaded elements by changing the
+    stiffness.
+    """
 
     spring: Array
     friction: Array
@@ -123,7 +129,8 @@ class Work(NamedTuple):
 class Forces(NamedTuple):
     """Forces at the end of an increment (N): pull of the spring, contact (holding back), viscous, of effects.
 
-    ``dissipated`` is the energy lost by sliding and flow within the increment (J).
+    Within the increment (J): ``dissipated`` is lost by sliding and flow, ``given`` is what elements store more because
+    effects changed their stiffness under load.
     """
 
     spring: Array
@@ -131,6 +138,7 @@ class Forces(NamedTuple):
     viscous: Array
     body: Array
     dissipated: Array
+    given: Array
 
     @property
     def net(self) -> Array:
@@ -145,7 +153,7 @@ class Model(eqx.Module):
         bank: Jenkins elements of all contacts together, at full strength.
         weakening: the base law of friction.
         load_point: where the spring is pulled to.
-        effects: what else acts, in the order of application.
+        effects: what else acts, in the order of application (those of the sensor by their place in its chain).
     """
 
     block: Block
@@ -186,11 +194,13 @@ class Model(eqx.Module):
     def rest(self, t: float | Array = 0.0, x: float | Array = 0.0, v: float | Array = 0.0) -> State:
         """A virgin contact: no force in any element, full strength."""
         zero = jnp.zeros(())
+        bank = self.shaped()
         return State(
             x=jnp.asarray(x, float) + zero,
             v=jnp.asarray(v, float) + zero,
             force=jnp.zeros_like(self.bank.stiffness),
-            cap=self.shaped().strength,
+            cap=bank.strength,
+            stiffness=bank.stiffness,
             psi=jnp.ones(()),
             memory=tuple(e.start(self.bank) if isinstance(e, Memory) else () for e in self.effects),
             work=Work(zero, zero, zero, zero),
@@ -248,20 +258,21 @@ class Model(eqx.Module):
             viscous=self.block.damping * motion.v,
             body=body,
             dissipated=dissipated,
+            given=0.5 * jnp.sum(state.force**2 * (_compliance(stiffness) - _compliance(state.stiffness))),
         )
-        return State(motion.x, motion.v, force, cap, psi, memory, state.work), forces
+        return State(motion.x, motion.v, force, cap, stiffness, psi, memory, state.work), forces
 
     def read(self, state: State, motion: Motion, contact_force: Array) -> Array:
-        """Displacement (m) that the sensor shows."""
+        """Displacement (m) that the sensor shows: its effects in the order of their places in the chain."""
         reading = motion.x
-        for e, m in zip(self.effects, state.memory, strict=True):
-            if isinstance(e, Sensor):
-                reading = e.read(m, reading, motion, contact_force)
+        chain = [(e, m) for e, m in zip(self.effects, state.memory, strict=True) if isinstance(e, Sensor)]
+        for e, m in sorted(chain, key=lambda link: link[0].place):
+            reading = e.read(m, reading, motion, contact_force)
         return reading
 
-    def stored(self, state: State, bank: Bank, t: Array) -> Array:
+    def stored(self, state: State) -> Array:
         """Kinetic energy plus what is stored in the Jenkins elements (J)."""
-        return 0.5 * self.mass() * state.v**2 + jnp.sum(0.5 * state.force**2 * _compliance(bank.stiffness))
+        return 0.5 * self.mass() * state.v**2 + jnp.sum(0.5 * state.force**2 * _compliance(state.stiffness))
 
 
 def _return_map(trial: Array, stiffness: Array, cap: Array, mean_cap: Array) -> tuple[Array, Array]:

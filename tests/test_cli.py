@@ -133,6 +133,7 @@ def test_overrides_may_follow_one_set(scenario, capsys):
     assert result["changes"] == ["contact.p=2", "drive.events=1"]
 
 
+ROUGH = ["--set", 'contact={kind="rough-line", normal_force=0.3, friction_coefficient=0.2, H=0.5, springs=64}']
 BAD = {
     "no such file": (["simulate", "rg.toml"], ["rg.toml", "did you mean 'rig.toml'"]),
     "no unit": (["simulate", "rig.toml", "--set", "block.mass=3 x"], ["--set", "block.mass", "3 x"]),
@@ -151,6 +152,16 @@ BAD = {
         ["simulate", "rig.toml", "--sweep", "drive.velocty=1e-5:1e-4:3"],
         ["did you mean 'velocity'"],
     ),
+    "series in a wrong unit": (
+        ["simulate", "rig.toml", "--sweep", "drive.velocity=20um/s:1mm:3"],
+        ["drive.velocity", "'mm'", "m/s"],
+    ),
+    "values in a wrong unit": (["simulate", "rig.toml", "--sweep", "drive.velocity=20um/s,1mm"], ["'mm'", "m/s"]),
+    "full contact": (
+        ["simulate", "rig.toml", *ROUGH, "--set", "contact.h_rms=1nm"],
+        ["rig.toml", "line_length L", "h_rms", "F_n"],
+    ),
+    "creep in full contact": (["creep", "rig.toml", *ROUGH, "--set", "contact.h_rms=1nm"], ["rig.toml", "h_rms"]),
     "unknown effect": (["effects", "wear-and-tear"], ["wear"]),
     "unknown model": (["effects", "--model", "static,weer"], ["did you mean 'wear'"]),
     "no such thing": (["new", "thing"], ["thing"]),

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
+
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from stickslip.contact import power_law_bank
+from stickslip.effects import Motion, make
 from stickslip.errors import InputError
+from stickslip.model import Block, LoadPoint, Model, Weakening
 from stickslip.sensor import Vibrometer, flicker_noise, measure, random_walk, white_noise
 from stickslip.sensor.chain import FRINGE, low_pass
 
@@ -159,3 +166,24 @@ def test_a_counter_needs_a_resolution():
         measure(Vibrometer(resolution=0.0, counter_steps=10), ramp, T)
     with pytest.raises(InputError, match="two samples"):
         measure(Vibrometer(), ramp, T[:1])
+
+
+def test_effects_of_the_sensor_stand_in_the_order_of_the_instrument():
+    """Whatever order they are named in: what it looks at, low-pass, high-pass, scale, drift."""
+    chain = {
+        "machine-compliance": {"compliance": 1e-7},
+        "sensor-low-pass": {"time_constant": 1e-3},
+        "sensor-high-pass": {"cutoff": 0.5},
+        "sensor-gain": {"gain": 0.05},
+        "sensor-drift": {"rate": 5e-8},
+    }
+    x, t, force, lag, slow = 3e-5, 20.0, 0.2, 2e-7, 1e-6
+    # the filters' states say how far the reading lags, and what of it is slow
+    states = {"sensor-low-pass": jnp.asarray(lag), "sensor-high-pass": jnp.asarray(slow)}
+    expected = (x + 1e-7 * force - lag - slow) * 1.05 + 5e-8 * t
+    bank, still = power_law_bank(0.26, 1e-6, 3.2, n=8), LoadPoint(jnp.array([0.0, 1.0]), jnp.zeros(2))
+    for tags in itertools.permutations(chain):
+        model = Model(Block(), bank, Weakening(), still, tuple(make(tag, **chain[tag]) for tag in tags))
+        state = eqx.tree_at(lambda s: s.memory, model.rest(), tuple(states.get(tag, ()) for tag in tags))
+        motion = Motion(*map(jnp.asarray, (t, 1e-3, x, 0.0, 0.0, 0.0, 0.0)))
+        assert float(model.read(state, motion, jnp.asarray(force))) == pytest.approx(expected, rel=1e-14)

@@ -60,7 +60,10 @@ def creep(
     loaded = load_scenario(path, changes)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
-        curve = static_creep(loaded, points, average, time)
+        try:
+            curve = static_creep(loaded, points, average, time)
+        except InputError as error:
+            raise error.at(file=path) from None
     notes = [str(w.message) for w in caught if issubclass(w.category, UserWarning)]
     for text in notes:
         show.warn(text)

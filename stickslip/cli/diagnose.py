@@ -4,46 +4,15 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
-from ..runstore import Run, file_record, json_text, open_run, refuse_existing, versions
+from ..runstore import json_text
+from ..workflow import diagnose_campaign
 
 UNRESOLVED = 3
-
-
-class Pieces:
-    """Finished pieces in the run folder, one file each, written aside and renamed."""
-
-    def __init__(self, run: Run, inputs: str) -> None:
-        self._run, self._inputs = run, inputs
-
-    def _path(self, key: str) -> Path:
-        return self._run.path(f"pieces/{key}.npz")
-
-    def load(self, key: str) -> Mapping[str, np.ndarray] | None:
-        """A finished piece of the same inputs, or None."""
-        path = self._path(key)
-        if not path.is_file():
-            return None
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = dict(file)
-        except (OSError, ValueError, EOFError, KeyError):
-            return None
-        return arrays if str(arrays.pop("inputs", "")) == self._inputs else None
-
-    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
-        """Keep a finished piece."""
-        path = self._path(key)
-        aside = path.with_suffix(".part")
-        with aside.open("wb") as stream:
-            np.savez(stream, allow_pickle=False, inputs=np.array(self._inputs), **piece)
-        aside.replace(path)
 
 
 def diagnose(
@@ -81,43 +50,18 @@ def diagnose(
     force:
         Replace an existing run folder.
     """
-    refuse_existing(out, force)
-    began = time.perf_counter()
-    from ..campaign import load_campaign, load_traces
-    from ..diagnose.engine import diagnose as run_diagnosis
-    from ..diagnose.summary import summary
-    from ..effects import catalogue
-    from ..report import write_report
-
-    for path in effect:
-        catalogue.load_file(path)
-    loaded = load_campaign(campaign)
-    traces = load_traces(loaded)
     chosen = None if candidates is None else [c.strip() for c in candidates.split(",") if c.strip()]
-    for tag in chosen or ():
-        catalogue.get(tag)
-    inputs = [file_record(campaign), *({"file": t.provenance.file, "sha256": t.provenance.sha256} for t in traces)]
-    with open_run(out, force=force, resume=True) as run:
-        key = json_text({"inputs": inputs, "holdout": list(holdout), "versions": versions()})
-        found = run_diagnosis(
-            loaded,
-            traces,
-            candidates=chosen,
-            max_effects=max_effects,
-            holdout=holdout,
-            jobs=jobs,
-            store=Pieces(run, key),
-            progress=_teller(began),
-        )
-        result: dict[str, Any] = {
-            "title": loaded.title,
-            **summary(found),
-            "inputs": inputs,
-            "versions": versions(),
-            "seconds": round(time.perf_counter() - began, 1),
-        }
-        run.json(result)
-        write_report(run.folder)
+    result = diagnose_campaign(
+        campaign,
+        out,
+        candidates=chosen,
+        max_effects=max_effects,
+        holdout=holdout,
+        effect_files=effect,
+        jobs=jobs,
+        force=force,
+        progress=_teller(time.perf_counter()),
+    )
     if json:
         print(json_text(result))
     else:

@@ -222,8 +222,8 @@ def _report(result: dict[str, Any], out: Path | None) -> str:
         lines.append(f"interrupted: {result['interrupted']}")
     lines.append(f"{result['seconds']:.1f} s")
     if out is not None:
-        pictures = sorted(p.name for p in out.glob("*.png"))
-        lines.append(f"written to {out}: {', '.join(pictures)}, result.json, arrays.nc")
+        written = sorted((p.name for p in out.iterdir()), key=lambda name: (not name.endswith(".png"), name))
+        lines.append(f"written to {out}: {', '.join(written)}")
     return "\n".join(lines)
 
 
@@ -253,7 +253,16 @@ def _facts(facts: dict[str, Any]) -> str:
     return (
         f"full friction {q(facts['friction_force'], 'N')}, contact stiffness {q(facts['contact_stiffness'], 'N/m')}, "
         f"u_max {q(facts['u_max'], 'm')}, resonance {q(facts['contact_resonance'], 'Hz')}\n"
-        f"stick-slip below {q(facts['critical_velocity'], 'm/s')} and with springs softer than "
-        f"{q(facts['critical_stiffness'], 'N/m')}{line}\n"
+        f"{_stick_slip_range(facts)}{line}\n"
         f"{facts['steps']} steps, {facts['rejected']} rejected, energy balance to {facts['energy_error']:.1e}"
     )
+
+
+def _stick_slip_range(facts: dict[str, Any]) -> str:
+    """Where steady sliding is unstable: velocities with this spring, springs at this velocity."""
+    fastest, stiffest = facts["critical_velocity"], facts["critical_stiffness"]
+    slow = f"below {show.quantity(fastest, 'm/s')}" if fastest > 0 else "at no velocity with this spring"
+    soft = (
+        f"with springs softer than {show.quantity(stiffest, 'N/m')}" if stiffest > 0 else "at this one with no spring"
+    )
+    return f"stick-slip {slow} and {soft}"

@@ -19,6 +19,7 @@ _PANELS = (
     ("peak_velocity", "m/s", "peak velocity"),
     ("creep_before_slip", "m", "creep before a slip"),
 )
+_ABSENT = {"recurrence time": "fewer than two slips"}
 
 
 @styled
@@ -36,7 +37,7 @@ def series_figure(table: xarray.Dataset) -> Figure:
     spread = bool(np.all(value > 0) and value.max() > 4 * value.min())
     for panel, (name, si, text) in zip(axes.flat, _PANELS, strict=True):
         _panel(panel, value * k, table[name].values, table[f"{name}_std"].values, si, text, spread)
-        panel.set_xlabel(f"{table.attrs['key']}" + (f" / {shown}" if shown not in ("1", "") else ""))
+        panel.set_xlabel(f"{table.attrs['key']}" + (f" / {_bracketed(shown)}" if shown not in ("1", "") else ""))
     made.suptitle(f"{table.attrs['title']}: {int((table['events'].values > 0).sum())} of {value.size} runs slip")
     return made
 
@@ -47,7 +48,7 @@ def _panel(
     axes.set_title(text)
     good = np.isfinite(mean)
     if not good.any():
-        remark(axes, "no events")
+        remark(axes, _ABSENT.get(text, "no slip"))
         return
     k, shown = scaled(mean, unit)
     axes.errorbar(
@@ -62,8 +63,11 @@ def _panel(
     for at in value[~good]:
         axes.axvline(at, color=LIGHT, ls=":", lw=1.2)
     if (~good).any():
-        axes.plot(
-            [], [], color=LIGHT, ls=":", label="fewer than two slips" if text.startswith("recurrence") else "no slip"
-        )
+        axes.plot([], [], color=LIGHT, ls=":", label=_ABSENT.get(text, "no slip"))
         axes.legend()
-    axes.set_ylabel(f"{text} / {shown}" if "/" not in shown else f"{text} / ({shown})")
+    axes.set_ylabel(f"{text} / {_bracketed(shown)}")
+
+
+def _bracketed(unit: str) -> str:
+    """A unit that is itself a quotient stands in brackets."""
+    return f"({unit})" if "/" in unit else unit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -33,7 +33,7 @@ def whole(axes: Axes, data: xarray.Dataset) -> None:
     axes.plot(*thin(t, drive * k), color=MIDDLE, ls="--", lw=1.1, label="load point")
     axes.plot(*thin(t, x * k), color=DARK, label="block")
     axes.set(xlabel="time / s", ylabel=f"displacement / {unit}", title="whole run")
-    axes.legend(loc="upper left")
+    axes.legend(loc=_free_corner(drive))
 
 
 def creep(axes: Axes, data: xarray.Dataset) -> None:
@@ -59,7 +59,13 @@ def creep(axes: Axes, data: xarray.Dataset) -> None:
     low, high = (x[part] - zero).min() * k, (x[part] - zero).max() * k
     axes.set_ylim(low - 0.15 * (high - low) - 1e-12, high + 0.15 * (high - low) + 1e-12)
     axes.set(xlabel=label, ylabel=f"displacement / {unit}")
-    axes.legend(loc="upper left")
+    axes.locator_params(axis="x", nbins=6)
+    axes.legend(loc=_free_corner(x[part] - zero))
+
+
+def _free_corner(y: np.ndarray) -> Literal["lower left", "upper left"]:
+    """Where a curve from zero leaves room: on the left above one that rises, below one that falls."""
+    return "lower left" if y[-1] < y[0] else "upper left"
 
 
 def slip(axes: Axes, data: xarray.Dataset) -> None:
@@ -87,7 +93,10 @@ def slip(axes: Axes, data: xarray.Dataset) -> None:
     other.spines["right"].set_visible(True)
     lines = [*axes.get_lines(), *other.get_lines()]
     axes.legend(lines, [str(line.get_label()) for line in lines], loc="center right", bbox_to_anchor=(1.0, 0.66))
-    after = (t >= arrest + 0.03 * (arrest - onset)) & (t <= arrest + 0.8 * (arrest - onset))
+    # a slip ends when it no longer outruns the drive; with a fast drive the block comes to rest only after that
+    rests = np.flatnonzero((t >= arrest) & (data["velocity"].values * np.sign(x[-1] - x[0]) <= 0.0))
+    begin = t[rests[0]] if rests.size else arrest
+    after = (t >= begin + 0.03 * (arrest - onset)) & (t <= arrest + 0.8 * (arrest - onset))
     if after.sum() > 8:
         _ring(axes, t[after] - onset, data["displacement"].values[after])
 
@@ -108,6 +117,12 @@ def phase_plane(axes: Axes, data: xarray.Dataset) -> None:
     kf, unit_f = scaled(force, "N")
     kv, unit_v = scaled(v, "m/s")
     axes.plot(force * kf, v * kv, color=DARK, lw=0.8)
-    axes.axvline(data.attrs["friction_force"] * kf, color=MIDDLE, ls="--", lw=1.1, label="full static friction")
+    full, label = data.attrs["friction_force"] * kf, "full static friction"
+    for side, reached in ((full, force.max() * kf > 0.02 * full), (-full, force.min() * kf < -0.02 * full)):
+        if reached:
+            axes.axvline(side, color=MIDDLE, ls="--", lw=1.1, label=label)
+            label = "_" + label  # named once
     axes.set(xlabel=f"spring force / {unit_f}", ylabel=f"velocity / ({unit_v})", title="phase plane")
-    axes.legend(loc="upper left")
+    if axes.get_legend_handles_labels()[0]:
+        both = force.max() * kf > 0.02 * full and force.min() * kf < -0.02 * full
+        axes.legend(loc="upper center" if both else "upper left" if v.max() > -v.min() else "lower right")

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from ..contact import arrest
+from ..errors import InputError
 from ..model import Block, LoadPoint, Model, State, Weakening
 from ..solve import Tolerance
 from .contacts import Built, build_contact
@@ -51,7 +52,10 @@ def build(scenario: Scenario) -> Setup:
         InputError: something the file names cannot be used.
     """
     file = scenario.file
-    built = build_contact(file.contact, scenario.folder)
+    try:
+        built = build_contact(file.contact, scenario.folder)
+    except InputError as error:
+        raise error.at(file=scenario.path) from None
     motion = load_point(file.drive, scenario.folder)
     block = Block(*map(jnp.asarray, (file.block.mass, file.block.spring_stiffness, file.block.damping)))
     law = file.weakening

@@ -26,7 +26,8 @@ class Each(Table):
 class ContactTable(Table):
     """What all kinds share. ``each`` holds one table for every contact where they differ.
 
-    Keys: contacts (how many), normal_force of one contact (N), friction_coefficient, bins (Jenkins elements), residual
+    Keys: contacts (how many), normal_force of one contact (N), friction_coefficient, bins (Jenkins elements of all
+    contacts together; 256 for rough lines, whose last springs slide one by one, 128 for what is smooth), residual
     (share of the load left by a slip event that the contact starts with; 0 virgin).
     """
 
@@ -80,6 +81,7 @@ class RoughLineTable(ElasticTable):
     """Self-affine rough lines; every contact its own line (``realisation = "each"``) or the mean of many."""
 
     kind: Literal["rough-line"]
+    bins: Annotated[int, Field(ge=8, le=100_000)] = 256
     H: Annotated[float, quantity("1", above=0, below=1)]
     h_rms: Annotated[float, quantity("m", above=0)]
     line_length: Annotated[float, quantity("m", above=0)] = 20e-6

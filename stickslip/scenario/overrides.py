@@ -121,12 +121,13 @@ def sweep_values(key: str, start: Any, stop: Any, points: int | None, values: Se
     if values is not None:
         return [si_value(value, key) for value in values]
     ends = si_value(start, key), si_value(stop, key)
-    if isinstance(start, str) and isinstance(stop, str) and (_bare(start) != _bare(stop)):
+    if isinstance(start, str) and isinstance(stop, str) and (is_bare(start) != is_bare(stop)):
         raise InputError("one end of the series has a unit and the other has none", file="--sweep", key=key)
     return series(*ends, points or 2)
 
 
-def _bare(text: str) -> bool:
+def is_bare(text: str) -> bool:
+    """Whether a text is a number without a unit."""
     try:
         float(text)
     except ValueError:
@@ -134,4 +135,4 @@ def _bare(text: str) -> bool:
     return True
 
 
-__all__ = ["parse_assignment", "parse_sweep", "series", "si_value", "sweep_values", "with_overrides"]
+__all__ = ["is_bare", "parse_assignment", "parse_sweep", "series", "si_value", "sweep_values", "with_overrides"]

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from .events import UNITS
 from .load import Scenario
-from .overrides import sweep_values
+from .overrides import is_bare, sweep_values
 from .schema import SweepTable
 from .simulation import Progress, simulate
 
@@ -35,14 +35,17 @@ def scenarios_of(scenario: Scenario, sweep: SweepTable) -> list[tuple[float, Sce
     """Every value of the series and the scenario with it, all checked before the first runs.
 
     Raises:
-        InputError: the key is unknown or a value is not allowed.
+        InputError: the key is unknown, or a value or its unit is not allowed.
     """
-    values = sweep_values(sweep.key, sweep.start, sweep.stop, sweep.points, sweep.values)
     table, _, name = sweep.key.rpartition(".")
     if not table:
         raise InputError(
             "the key of a series is that of a table", key="sweep.key", value=sweep.key, allowed="table.key"
         )
+    for written in (sweep.start, sweep.stop, *(sweep.values or ())):
+        if isinstance(written, str) and not is_bare(written):
+            scenario.with_changes([(sweep.key, written)])  # the schema knows the unit; what follows is plain numbers
+    values = sweep_values(sweep.key, sweep.start, sweep.stop, sweep.points, sweep.values)
     found = []
     for value in values:
         number = int(value) if value == int(value) and name in _INTEGERS else value

@@ -38,7 +38,7 @@ poisson_ratio = 0.3
 realisation = "each"               # every contact its own line; or "mean": the mean of 'lines' lines
 lines = 100
 seed = 0
-bins = 128                         # Jenkins elements of the dynamic model
+bins = 256                         # Jenkins elements of the dynamic model (other kinds than rough-line: 128)
 residual = 0                       # share of the load a slip leaves behind that is there at the start; 0: virgin
 # Contacts that differ: one table each, instead of 'contacts'
 #   each = [ { normal_force = "0.2 N", h_rms = "2 um" }, { normal_force = "0.4 N" } ]
@@ -83,6 +83,12 @@ seed = 0
 sampling_rate = "10 kHz"
 # trace = "trace.csv"              # also .nc, .mat, .uff: written like a measurement, with a campaign.toml
 # channels = ["displacement"]      # and velocity, spring_force, drive_position
+
+# Error allowed in a step; tighten all three by ten to see what it changes
+# [solver]
+# relative = 1e-3                  # of the step's own increment and of its velocity
+# displacement = "1 pm"
+# velocity = "10 nm/s"
 
 # A series of runs: recurrence and slip against one key
 # [sweep]

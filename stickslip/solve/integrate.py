@@ -14,13 +14,15 @@ import numpy as np
 
 from ..contact import Bank
 from ..effects.base import Motion
-from ..errors import SolveError
+from ..errors import InputError, SolveError
 from ..model import Model, State
+from ..params import check
 from .stepper import ContactStepper, Step, Tolerance
 from .trajectory import Stats, Steps, Trajectory, energy_error
 
 PIECE = 4096  # steps between two looks at the clock; bounds the memory of one compiled call
 SMALLEST_STEP = 1e-10  # s; four orders below the period of any contact resonance a vibrometer could see
+LEAST_ADVANCE = 1e-2  # of the contact's period in PIECE steps; the tightest tolerance takes a hundred times as much
 
 _TERM = diffrax.ODETerm(lambda t, y, args: y)  # never called: the solver takes the model through an increment itself
 
@@ -57,7 +59,7 @@ def observe(t: Any, y: State, args: tuple[Model, Bank]) -> Steps:
         friction_work=y.work.friction,
         viscous_work=y.work.viscous,
         body_work=y.work.body,
-        stored=model.stored(y, bank, t),
+        stored=model.stored(y),
     )
 
 
@@ -129,11 +131,13 @@ def integrate(
         The trajectory and the state at ``t1``.
 
     Raises:
-        SolveError: the step size fell below its limit or a number was lost; says when and what to change.
+        InputError: mass, spring, damping, weakening or an element of the contact is outside its range.
+        SolveError: the steps became too small to get anywhere or a number was lost; says when and what to change.
     """
     began = time.perf_counter()
     tolerance = Tolerance() if tolerance is None else tolerance
     bank = model.shaped()
+    least = LEAST_ADVANCE / PIECE * _refuse_impossible(model, bank)
     state = model.rest(t0) if state is None else state
     kinks = sorted({float(s) for s in stops if t0 < s < t1} | {float(t1)})
     pieces = [jax.tree.map(lambda a: np.asarray(a)[None], _observe_once(jnp.asarray(float(t0)), state, (model, bank)))]
@@ -151,6 +155,13 @@ def integrate(
                 pieces.append(piece)
             reached = float(piece.t[-1]) if n else now
             _refuse_failure(result, reached, state, accepted, most_steps)
+            tried = n + int(stats["num_rejected_steps"])
+            if reached < stop and reached - now < least * tried:
+                raise SolveError(
+                    f"the integration stopped at t = {reached:.6g} s (v = {float(state.v):.3g} m/s): {tried} steps "
+                    f"advanced it by only {reached - now:.3g} s; look for an effect with a force that jumps, or loosen "
+                    "the tolerance"
+                )
             if n > 1:
                 dt = float(piece.t[-1] - piece.t[-2])
             now = reached
@@ -160,6 +171,22 @@ def integrate(
     steps = Steps(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
     stats = Stats(accepted, rejected, energy_error(steps), time.perf_counter() - began)
     return Trajectory(steps, stats), state
+
+
+def _refuse_impossible(model: Model, bank: Bank) -> float:
+    """Refuse what cannot be a rig; the period of the block on its virgin contact and spring (s)."""
+    check(model.block, where="block")
+    check(model.weakening, where="weakening")
+    mass = float(model.mass())
+    if not (np.isfinite(mass) and mass > 0.0):
+        raise InputError("the moving mass must be positive", key="block.mass", value=mass, allowed="above 0 kg")
+    for name, values in (("stiffness", bank.stiffness), ("strength", bank.strength)):
+        if not np.all(np.isfinite(values) & (np.asarray(values) >= 0.0)):
+            worst = float(np.min(values))
+            raise InputError(
+                f"{name} of a Jenkins element is impossible", key=f"bank.{name}", value=worst, allowed=">= 0"
+            )
+    return float(2.0 * np.pi * np.sqrt(mass / (np.sum(bank.stiffness) + model.block.spring_stiffness)))
 
 
 def _refuse_failure(result: Any, now: float, state: State, accepted: int, most_steps: int) -> None:

@@ -170,7 +170,7 @@ def _work(y0: State, contact: Contact, v: tuple, f: tuple, h: Array, model: Mode
     viscous = quadrature(model.block.damping * v0 * v0, f1.viscous * v1, f2.viscous * v2)
     body = quadrature(f1.body * v0, f1.body * v1, f2.body * v2)
     w = y0.work
-    return Work(w.spring + spring, w.friction + f2.dissipated, w.viscous + viscous, w.body + body)
+    return Work(w.spring + spring, w.friction + f2.dissipated, w.viscous + viscous, w.body + body + f2.given)
 
 
 def _path(t: Array, dt: Array, x0: Array, v0: Array, v: Array, dx: Array, lead: Array) -> Motion:

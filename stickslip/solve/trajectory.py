@@ -14,7 +14,7 @@ class Steps(NamedTuple):
     """Accepted steps, the start included; every field has shape (n,).
 
     Units: s, m, m/s, m, N, N, 1, 1, and J for the energies (done by the spring; lost in friction; lost in viscous
-    damping; given by effects' forces; stored, kinetic energy included).
+    damping; given by effects; stored, kinetic energy included).
     """
 
     t: Any

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from stickslip.cli import run
-from stickslip.cli.diagnose import Pieces
 from stickslip.runstore import open_run
+from stickslip.workflow import Pieces
 
 CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 

@@ -151,3 +151,10 @@ def test_a_drive_from_a_file_needs_a_unit_and_increasing_times(tmp_path):
     drive = {"file": "drive.csv", "position": {"column": "pos", "unit": "um"}}
     with pytest.raises(InputError, match="do not increase"):
         build(make_scenario(rig(drive=drive), tmp_path))
+
+
+def test_rough_lines_have_more_elements_unless_told_otherwise():
+    """Their last springs slide one by one, which 128 elements do not resolve; a smooth backbone needs no more."""
+    rough = {key: value for key, value in ROUGH.items() if key != "bins"}
+    assert build_contact(contact(**rough)).bank.stiffness.size == 256
+    assert build_contact(contact(kind="power-law", **COMMON, u_max=1e-6, p=3.2)).bank.stiffness.size == 128

@@ -172,3 +172,14 @@ def test_an_output_that_would_not_fit_is_refused():
                 drive__duration="5 s", drive__velocity="1 nm/s"
             )
         )
+
+
+def test_the_default_tolerance_keeps_what_a_scenario_promises():
+    """Recurrence to a thousandth, creep to a nanometre, against a tolerance a hundred times tighter."""
+    base = make_scenario(rig(contact__bins=128))
+    tight = {f"solver__{key}": getattr(base.file.solver, key) / 100 for key in ("relative", "displacement", "velocity")}
+    seen, exact = simulate(base), simulate(base.changed(**tight))
+    assert exact.attrs["steps"] > 5 * seen.attrs["steps"]
+    assert seen["recurrence"].values[1:] == pytest.approx(exact["recurrence"].values[1:], rel=1e-3)
+    assert seen["slip"].values == pytest.approx(exact["slip"].values, rel=1e-3)
+    assert seen["creep_before_slip"].values == pytest.approx(exact["creep_before_slip"].values, abs=1e-9)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from stickslip.contact import Hysteresis
+from stickslip.effects.wear import Wear
+from stickslip.solve import integrate
 
 from .books import imbalance, slow_cycle
 from .rig import STRENGTH, rig, tighter
@@ -26,6 +28,21 @@ def test_energy_balance_closes():
 def test_energy_balance_at_the_default_tolerance():
     made = run(rig(), 5.6)
     assert np.max(np.abs(imbalance(made.trajectory.steps))) < 5e-4
+
+
+@pytest.mark.parametrize("drift", [0.4, -0.4])
+def test_energy_balance_closes_while_wear_changes_the_stiffness(drift):
+    """What loaded elements store more or less because their stiffness changed is in the books."""
+    worn = Wear(drift=drift, path=5e-5, changes="thresholds")
+    trajectory, state = integrate(rig(effects=(worn,)), 6.5, tolerance=tighter(100.0))
+    s = trajectory.steps
+    assert trajectory.stats.energy_error < 1e-5
+    # far more than that is at stake
+    assert abs(s.body_work[-1]) > 1e-3 * s.spring_work[-1]
+    assert np.max(np.abs(imbalance(s))) > 1e-3
+    assert float(state.stiffness.sum()) == pytest.approx(
+        float(rig().bank.total_stiffness) * np.exp(-drift * float(state.memory[0]) / 5e-5), rel=1e-9
+    )
 
 
 def test_slow_cycles_obey_masing_and_forget_closed_loops():

@@ -1,0 +1,77 @@
+"""Where the cases are diagnosed: a cluster of dask.distributed, of one's own or on this machine."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from ..errors import InputError, StickslipError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+PATIENCE = 20.0  # s for a scheduler to answer
+_TALKERS = ("distributed.client", "distributed.core", "distributed.utils")
+
+
+@contextmanager
+def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterator[Client]:
+    """A client of the cluster.
+
+    Args:
+        scheduler: address of a running one, ``tcp://host:8786``; None starts one here with processes of one thread.
+        workers: of the local cluster; default the number of cores.
+
+    Raises:
+        InputError: no scheduler answers there. StickslipError: dask.distributed is missing.
+    """
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise StickslipError(
+            "running a challenge needs dask.distributed\n  to mend: pip install 'stickslip[challenge]'"
+        ) from None
+    if scheduler is not None:
+        if workers is not None:
+            raise InputError("an existing cluster has its own workers", key="--workers", hint="leave --workers out")
+        try:
+            client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise InputError(
+                "no scheduler answers there", key="--scheduler", value=scheduler, allowed="such as tcp://host:8786",
+                hint="start one with 'dask scheduler', and workers with 'dask worker ADDRESS --nthreads 1'",
+            ) from error  # fmt: skip
+        with _quiet(), client:
+            yield client
+        return
+    if workers is not None and workers < 1:
+        raise InputError("a cluster needs workers", key="--workers", value=workers, allowed="1 or more")
+    with (
+        _quiet(),
+        LocalCluster(
+            n_workers=workers or os.cpu_count() or 1,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=None,  # a case is all a worker holds; pausing it would not free anything
+            silence_logs=logging.CRITICAL,
+        ) as local,
+        Client(local, set_as_default=False) as client,
+    ):
+        yield client
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """What dask logs about lost connections is said in one message of our own."""
+    before = {name: logging.getLogger(name).level for name in _TALKERS}
+    for name in _TALKERS:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)

@@ -1,0 +1,200 @@
+"""The figures of a score, from the marks of its cases."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .answers import Answer
+from .marks import Marked, rate
+from .sizes import Size
+
+KINDS = ("nothing", "one", "two", "outside")
+BINS = (1.0, 2.0, 5.0, 10.0, 30.0)  # multiples of detection
+VISIBLE = 5.0  # multiples of detection from which the aim holds
+WITHIN = 1.5  # floors
+
+
+def figures(marked: Sequence[Marked]) -> dict[str, Any]:
+    """All figures of a score."""
+    if not marked:
+        raise InputError("there are no cases to score")
+    of = {kind: [m for m in marked if m.kind == kind] for kind in KINDS}
+    hidden = of["one"] + of["two"]
+    states = Counter(m.answer.kind for m in marked)
+    return {
+        "cases": len(marked),
+        "finished": len(marked) - states["failed"] - states["not run"],
+        "failed": states["failed"],
+        "not_run": states["not run"],
+        "by_kind": {kind: _accuracy(cases) for kind, cases in of.items()},
+        "effects": _accuracy(hidden),
+        "false_alarms": rate(m.alarm for m in of["nothing"] if m.answered),
+        "false_names": rate(bool(m.answer.named or m.answer.set) for m in of["nothing"] if m.answered),
+        "unknown_recall": rate(m.answer.kind == "unknown" for m in of["outside"]),
+        "unknown_without_a_name": rate(m.answer.kind == "unknown" and not m.answer.named for m in of["outside"]),
+        "amplitude": {
+            "all": _sizes(hidden, lambda s: True),
+            "textbook_form": _sizes(hidden, lambda s: not s.own_form),
+            "own_form": _sizes(hidden, lambda s: s.own_form),
+        },
+        "heldout": {kind: _heldout(cases) for kind, cases in {**of, "right": _explained(marked)}.items()},
+        "calibration": _calibration(marked),
+        "by_amplitude": [_bin(low, high, hidden, of["outside"]) for low, high in _edges()],
+        "confusion": _confusion(marked),
+        "aims": _aims(of["nothing"], hidden, marked),
+        "list": [_line(m) for m in marked],
+    }
+
+
+def _accuracy(cases: Sequence[Marked]) -> dict[str, Any]:
+    return {
+        "exact": rate(m.exact for m in cases),
+        "right": rate(m.right for m in cases),
+        "class": rate(m.class_right for m in cases),
+    }
+
+
+def _sizes(cases: Sequence[Marked], which: Callable[[Size], bool]) -> dict[str, Any]:
+    return rate(s.within_two for m in cases for s in m.sizes if which(s))
+
+
+def _explained(marked: Sequence[Marked]) -> list[Marked]:
+    """Right cases whose last model should be as good as the data allow."""
+    return [m for m in marked if m.right and m.kind != "outside"]
+
+
+def _heldout(cases: Sequence[Marked]) -> dict[str, Any]:
+    """Quartiles of the held-out error before and after, and of their ratio."""
+    falls = [m.fall for m in cases if m.fall is not None]
+    known = [m for m in cases if m.answer.final is not None]
+    return {
+        "cases": len(falls),
+        "base": _quartiles([m.answer.base for m in cases if m.answer.base is not None]),
+        "final": _quartiles([m.answer.final for m in known if m.answer.final is not None]),
+        "ratio": _quartiles(falls),
+        "within": rate(m.answer.final is not None and m.answer.final <= WITHIN for m in cases),
+    }
+
+
+def _quartiles(values: Sequence[float]) -> list[float] | None:
+    return [float(q) for q in np.quantile(values, (0.25, 0.5, 0.75))] if values else None
+
+
+def _calibration(marked: Sequence[Marked]) -> dict[str, Any]:
+    """How often each kind of verdict is right, how often stated intervals hold, and the same of stated confidences."""
+    sizes = [s for m in marked for s in m.sizes]
+    stated = [(m.answer.confidence, m.right) for m in marked if m.answer.confidence is not None]
+    reliability = []
+    for low, high in ((0.0, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.0)):
+        here = [(c, ok) for c, ok in stated if low <= c < high or (high == 1.0 and c == 1.0)]
+        mean = float(np.mean([c for c, _ in here])) if here else None
+        reliability.append({"from": low, "to": high, "stated": mean, "right": rate(ok for _, ok in here)})
+    return {
+        "by_verdict": {
+            kind: rate(m.right for m in marked if m.answer.kind == kind)
+            for kind in ("complete", "missing", "ambiguous", "unknown")
+        },
+        "within_1_std": {"expected": 0.683, **rate(ok for s in sizes if (ok := s.within(1.0)) is not None)},
+        "within_2_std": {"expected": 0.954, **rate(ok for s in sizes if (ok := s.within(2.0)) is not None)},
+        "brier": float(np.mean([(c - ok) ** 2 for c, ok in stated])) if stated else None,
+        "reliability": reliability,
+    }
+
+
+def _edges() -> list[tuple[float, float]]:
+    return list(itertools.pairwise(BINS))
+
+
+def _within(m: Marked, low: float, high: float) -> bool:
+    return m.multiple is not None and (low <= m.multiple < high or (high == BINS[-1] and m.multiple >= high))
+
+
+def _bin(low: float, high: float, hidden: Sequence[Marked], outside: Sequence[Marked]) -> dict[str, Any]:
+    here = [m for m in hidden if _within(m, low, high)]
+    out = [m for m in outside if _within(m, low, high)]
+    sizes = [s for m in here for s in m.sizes]
+    return {
+        "from": low,
+        "to": high,
+        **_accuracy(here),
+        "one": _accuracy([m for m in here if m.kind == "one"]),
+        "two": _accuracy([m for m in here if m.kind == "two"]),
+        "unknown_recall": rate(m.answer.kind == "unknown" for m in out),
+        "amplitude": rate(s.within_two for s in sizes),
+        "within_2_std": rate(ok for s in sizes if (ok := s.within(2.0)) is not None),
+        "heldout": _heldout(here),
+        "named_right": rate(m.right for m in here if m.answer.kind in ("missing", "ambiguous")),
+    }
+
+
+def verdict_label(m: Marked) -> str:
+    """The answer in the words of the confusion matrix of kinds."""
+    if m.answer.kind == "missing":
+        return "named" if m.exact else "named wrongly"
+    if m.answer.kind == "ambiguous":
+        return "set with it" if m.right else "set without it"
+    return m.answer.kind
+
+
+def name_label(answer: Answer) -> str:
+    """The answer in the words of the confusion matrix of names."""
+    if answer.kind == "missing":
+        return answer.named[0] if len(answer.named) == 1 else "several"
+    return {"complete": "nothing", "ambiguous": "a set"}.get(answer.kind, answer.kind)
+
+
+def _confusion(marked: Sequence[Marked]) -> dict[str, dict[str, dict[str, int]]]:
+    kinds: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
+    names: dict[str, Counter[str]] = {}
+    for m in marked:
+        kinds[m.kind][verdict_label(m)] += 1
+        if m.kind != "two":
+            row = m.tags[0] if m.tags else "nothing"
+            names.setdefault(row, Counter())[name_label(m.answer)] += 1
+    return {
+        "kinds": {row: dict(found) for row, found in kinds.items()},
+        "names": {row: dict(names[row]) for row in sorted(names)},
+    }
+
+
+def _aims(nothing: Sequence[Marked], hidden: Sequence[Marked], marked: Sequence[Marked]) -> list[dict[str, Any]]:
+    visible = rate(m.right for m in hidden if m.multiple is not None and m.multiple >= VISIBLE)
+    alarms = rate(m.alarm for m in nothing if m.answered)
+    within = _heldout(_explained(marked))["within"]
+    return [
+        _aim("right (named, or a set of at most three with it) at 5 times detection and above", visible, least=0.85),
+        _aim("false alarms where nothing is missing", alarms, most=0.05),
+        _aim("held-out error of right cases within 1.5 floors", within, least=1.0),
+    ]
+
+
+def _aim(text: str, found: dict[str, Any], *, least: float | None = None, most: float | None = None) -> dict[str, Any]:
+    share = found["share"]
+    met = None if share is None else share >= least if least is not None else share <= (most or 0.0)
+    return {"text": text, "at_least": least, "at_most": most, **found, "met": met}
+
+
+def _line(m: Marked) -> dict[str, Any]:
+    return {
+        "case": m.name,
+        "kind": m.kind,
+        "hidden": [{k: e[k] for k in ("tag", "multiple", "amplitude", "unit", "form", "own_form")} for e in m.effects],
+        "answer": m.answer.kind,
+        "named": list(m.answer.named),
+        "set": list(m.answer.set),
+        "exact": m.exact,
+        "right": m.right,
+        "class_right": m.class_right,
+        "heldout_base": m.answer.base,
+        "heldout_final": m.answer.final,
+        "amplitudes": [{"effect": s.tag, "value": s.value, "std": s.std, "truth": s.truth} for s in m.sizes],
+        "text": m.answer.text,
+        "failed_before": m.failed_before,
+        "seconds": m.answer.seconds,
+    }

@@ -1,0 +1,90 @@
+"""The marks of single cases, and rates with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from .answers import Answer, is_class_right, is_exact, is_right
+from .sizes import Size, compared
+
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Marked:
+    """A case with its truth, its answer and the marks for it.
+
+    Attributes:
+        kind: what was hidden: ``nothing``, ``one``, ``two`` or ``outside``. effects: the truth of each.
+        multiple: of detection, of the weakest effect; None where nothing is hidden.
+        sizes: amplitudes found against hidden.
+        failed_before: how many attempts at this case failed.
+    """
+
+    name: str
+    kind: str
+    effects: tuple[dict[str, Any], ...]
+    multiple: float | None
+    answer: Answer
+    sizes: tuple[Size, ...]
+    failed_before: int = 0
+
+    @property
+    def tags(self) -> tuple[str, ...]:
+        return tuple(effect["tag"] for effect in self.effects)
+
+    @property
+    def exact(self) -> bool:
+        return is_exact(self.kind, self.tags, self.answer)
+
+    @property
+    def right(self) -> bool:
+        return is_right(self.kind, self.tags, self.answer)
+
+    @property
+    def class_right(self) -> bool:
+        return is_class_right(self.kind, self.tags, self.answer)
+
+    @property
+    def alarm(self) -> bool:
+        """Whether something is said to be missing."""
+        return self.answer.kind in ("missing", "ambiguous", "unknown")
+
+    @property
+    def answered(self) -> bool:
+        """Whether there is a verdict."""
+        return self.answer.kind not in ("failed", "not run")
+
+    @property
+    def fall(self) -> float | None:
+        """Held-out error of the last model over that of the base model."""
+        if self.answer.base is None or self.answer.final is None or self.answer.base <= 0:
+            return None
+        return self.answer.final / self.answer.base
+
+
+def mark(case: dict[str, Any], answer: Answer, failed_before: int = 0) -> Marked:
+    """Put truth and answer of a case together."""
+    effects = tuple(case["effects"])
+    multiple = min((effect["multiple"] for effect in effects), default=None)
+    sizes = tuple(compared(list(effects), answer))
+    return Marked(case["name"], case["kind"], effects, multiple, answer, sizes, failed_before)
+
+
+def rate(marks: Iterable[bool]) -> dict[str, Any]:
+    """Share of true marks with Wilson's 95 % interval; None for shares of nothing."""
+    from scipy.stats import binomtest
+
+    marks = list(marks)
+    if not marks:
+        return {"count": 0, "of": 0, "share": None, "low": None, "high": None}
+    interval = binomtest(sum(marks), len(marks)).proportion_ci(LEVEL, method="wilson")
+    return {
+        "count": sum(marks),
+        "of": len(marks),
+        "share": sum(marks) / len(marks),
+        "low": float(interval.low),
+        "high": float(interval.high),
+    }

@@ -1,0 +1,185 @@
+"""Diagnose every case of a challenge, in parallel; what is finished is never done again, nothing is lost."""
+
+from __future__ import annotations
+
+import json
+import time
+import uuid
+from collections import Counter
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, StickslipError
+from ..runstore import json_text, versions
+from ..workflow import diagnose_campaign
+from .cluster import cluster
+from .one_case import Diagnosis, do_case, failures, is_done
+from .seal import CASES, RUNS, case_names, check_seal, digest
+
+PROTOCOL = "protocol.json"
+ANSWER = 10.0  # s for the answer of a finished case to arrive
+RESUBMITTED = 20  # times a case may be handed out before the cluster is given up
+
+
+@dataclass(frozen=True)
+class Progress:
+    """A finished case and how far the run is; ``left`` is the time left in seconds."""
+
+    case: str
+    state: str
+    message: str
+    seconds: float
+    done: int
+    total: int
+    left: float
+
+
+def run_challenge(
+    folder: str | Path,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    candidates: Sequence[str] | None = None,
+    max_effects: int = 3,
+    retry: bool = False,
+    diagnosis: Diagnosis | None = None,
+    tell: Callable[[Progress], None] | None = None,
+) -> dict[str, int]:
+    """Diagnose every case that has neither a result nor a recorded failure.
+
+    Each case is diagnosed as ``stickslip diagnose`` does it. A case whose process dies is started again from its
+    finished pieces. The truth is not read.
+
+    Args:
+        folder: of the challenge. Workers on other machines must see it under the same path.
+        scheduler, workers: see :func:`stickslip.challenge.cluster.cluster`.
+        candidates, max_effects: of the diagnosis; fixed by the first run of this challenge.
+        retry: try cases again that failed before.
+        diagnosis: called with the campaign file and the run folder to write; default the package's own.
+        tell: told of every finished case.
+
+    Returns:
+        How many cases are ``done``, ``failed`` and ``open``.
+
+    Raises:
+        SealError: a campaign is not as sealed. InputError: other settings than before; no scheduler answers.
+        StickslipError: the cluster was lost.
+    """
+    folder = Path(folder).resolve()
+    seal = check_seal(folder, truth=False)
+    runs = folder / RUNS
+    runs.mkdir(exist_ok=True)
+    tags = None if candidates is None else list(candidates)
+    _protocol(runs, digest(folder), {"candidates": tags, "max_effects": max_effects})
+    cases = case_names(seal)
+    waiting = [c for c in cases if not is_done(runs, c) and (retry or not failures(runs, c))]
+    if waiting:
+        if diagnosis is None:
+            diagnosis = partial(diagnose_campaign, jobs=1, candidates=tags, max_effects=max_effects)
+        with cluster(scheduler, workers) as client:
+            _work(client, folder, waiting, len(cases), diagnosis, tell)
+    done = sum(is_done(runs, c) for c in cases)
+    failed = sum(not is_done(runs, c) and bool(failures(runs, c)) for c in cases)
+    return {"done": done, "failed": failed, "open": len(cases) - done - failed}
+
+
+def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
+    """Write down under what settings this challenge is run, and refuse others later."""
+    from ..diagnose.thresholds import THRESHOLDS
+
+    now = {"seal": seal, **options, "thresholds": asdict(THRESHOLDS), "versions": versions()}
+    path = runs / PROTOCOL
+    if not path.is_file():
+        path.write_text(json_text(now) + "\n", encoding="utf-8")
+        return
+    before = read_protocol(runs)
+    for key in ("seal", "candidates", "max_effects", "thresholds"):
+        if before.get(key) != now[key]:
+            raise InputError(
+                f"this challenge was begun with other {key}", file=path, value=now[key], allowed=json_text(before[key]),
+                hint="one score must rest on one protocol: go on with the same settings, or remove the folder 'runs'",
+            )  # fmt: skip
+
+
+def read_protocol(runs: Path) -> dict[str, Any]:
+    """The settings of the run.
+
+    Raises:
+        InputError: nothing was run yet, or the file is damaged.
+    """
+    path = runs / PROTOCOL
+    if not path.is_file():
+        raise InputError("nothing was run yet", file=runs.parent, hint="stickslip challenge run FOLDER")
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        found["seal"], found["thresholds"], found["candidates"], found["max_effects"]
+    except (ValueError, KeyError, TypeError):
+        raise InputError("the protocol of the run is damaged", file=path) from None
+    return found
+
+
+def _work(
+    client: Any,
+    folder: Path,
+    waiting: list[str],
+    total: int,
+    diagnosis: Diagnosis,
+    tell: Callable[[Progress], None] | None,
+) -> None:
+    """Have the cases done. What the files say counts: a result on a worker that dies is lost, and dask blames a death
+    also on the cases that were only queued there.
+    """
+    from distributed import as_completed
+
+    runs, session = folder / RUNS, uuid.uuid4().hex
+    before = {case: len(failures(runs, case)) for case in waiting}
+    given = Counter(waiting)
+
+    def submit(case: str) -> Any:
+        campaign = str(folder / CASES / case / "campaign.toml")
+        return client.submit(do_case, campaign, str(runs), case, diagnosis, session, pure=False)
+
+    began = time.monotonic()
+    futures = {submit(case): case for case in waiting}
+    completed = as_completed(list(futures), loop=client.loop)
+    count, first = 0, total - len(waiting)
+    try:
+        for future in completed:
+            case = futures[future]
+            told = _outcome(future, runs, case, before[case])
+            if told is None and given[case] <= RESUBMITTED and client.status == "running":
+                given[case] += 1
+                again = submit(case)
+                futures[again] = case
+                completed.add(again)
+                continue
+            if told is None:
+                raise StickslipError(
+                    f"the cluster was lost while {case} was running; what is finished is kept"
+                    "\n  to mend: run the same command again"
+                )
+            count += 1
+            if tell is not None:
+                left = (time.monotonic() - began) / count * (len(waiting) - count)
+                tell(Progress(**told, done=first + count, total=total, left=left))
+    except BaseException:
+        client.cancel(list(futures))
+        raise
+
+
+def _outcome(future: Any, runs: Path, case: str, failed_before: int) -> dict[str, Any] | None:
+    """What became of a case whose task has ended; None where it has neither a result nor a new failure."""
+    if future.status == "finished":
+        with suppress(Exception):  # the worker that held the answer may be gone by now
+            told: dict[str, Any] = future.result(timeout=ANSWER)
+            return told
+    if is_done(runs, case):
+        return {"case": case, "state": "done", "message": "", "seconds": 0.0}
+    found = failures(runs, case)
+    if len(found) > failed_before:
+        return {"case": case, "state": "failed", "message": found[-1]["message"], "seconds": found[-1]["seconds"]}
+    return None

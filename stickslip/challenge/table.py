@@ -1,0 +1,124 @@
+"""A score as text: every figure with its interval, every wrong answer with its reason."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+WIDTH = 110
+_KINDS = {"nothing": "nothing missing", "one": "one effect", "two": "two effects", "outside": "outside the catalogue"}
+
+
+def share(found: Mapping[str, Any]) -> str:
+    """A rate with its interval: ``12/15  80 % (55-93)``."""
+    if not found["of"]:
+        return "-"
+    number = f"{found['count']}/{found['of']}"
+    return f"{number:>6} {100 * found['share']:3.0f} % ({100 * found['low']:.0f}-{100 * found['high']:.0f})"
+
+
+def score_text(score: Mapping[str, Any]) -> str:
+    """The whole score for a person; intervals are Wilson's at 95 %."""
+    s = score
+    lines = [
+        f"Challenge of {s['cases']} cases, seed {s['seed']}",
+        f"seal {s['seal']}",
+        f"{s['finished']} diagnosed, {s['failed']} failed, {s['not_run']} not run (both count as wrong)",
+        f"stickslip {s['protocol']['versions'].get('stickslip', '?')}, at most {s['protocol']['max_effects']} effects, "
+        f"candidates: {', '.join(s['protocol']['candidates'] or []) or 'the whole catalogue'}",
+        "",
+        *_aims(s["aims"]),
+        *_block(
+            "What was hidden", ("exact", "right", "class"),
+            [
+                (_KINDS.get(name, name), [share(row[k]) for k in ("exact", "right", "class")])
+                for name, row in [*s["by_kind"].items(), ("one or two effects", s["effects"])]
+            ],
+        ),
+        *_block(
+            "Times detection", ("right", "exact", "class", "unknown, outside"),
+            [(_edge(b), [share(b["right"]), share(b["exact"]), share(b["class"]), share(b["unknown_recall"])])
+             for b in s["by_amplitude"]],
+        ),
+        *_block(
+            "Times detection", ("amplitude in 2", "within 2 s.d.", "right if named", "held-out / base"),
+            [(_edge(b), [share(b["amplitude"]), share(b["within_2_std"]), share(b["named_right"]),
+                         _middle(b["heldout"]["ratio"])]) for b in s["by_amplitude"]],
+        ),
+        *_block("Nothing missing, and outside", ("share",), [
+            ("false alarms (not called complete)", [share(s["false_alarms"])]),
+            ("effects named where nothing is missing", [share(s["false_names"])]),
+            ("unknown recall", [share(s["unknown_recall"])]),
+            ("unknown recall, and no effect named", [share(s["unknown_without_a_name"])]),
+        ]),
+        *_block("Held-out error in floors: median (quartiles)", ("base", "last model", "ratio", "within 1.5"), [
+            (_KINDS.get(name, "right answers"),
+             [_middle(row["base"]), _middle(row["final"]), _middle(row["ratio"]), share(row["within"])])
+            for name, row in s["heldout"].items()
+        ]),
+        *_block("Amplitude within a factor of two", ("share",), [
+            (name.replace("_", " "), [share(row)]) for name, row in s["amplitude"].items()
+        ]),
+        *_calibration(s["calibration"]),
+        *_wrong(s["list"]),
+    ]  # fmt: skip
+    return "\n".join(line.rstrip() for line in lines).rstrip() + "\n"
+
+
+def _edge(b: Mapping[str, Any]) -> str:
+    return f"{b['from']:g} to {b['to']:g}"
+
+
+def _middle(quartiles: Sequence[float] | None) -> str:
+    if quartiles is None:
+        return "-"
+    low, middle, high = quartiles
+    return f"{middle:.3g} ({low:.3g}-{high:.3g})"
+
+
+def _block(title: str, heads: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> list[str]:
+    first = max(len(title), *(len(name) for name, _ in rows)) + 2
+    width = max(20, *(len(head) + 2 for head in heads))
+    out = [title.ljust(first) + "".join(head.rjust(width) for head in heads)]
+    return [*out, *(name.ljust(first) + "".join(cell.rjust(width) for cell in cells) for name, cells in rows), ""]
+
+
+def _aims(aims: Sequence[Mapping[str, Any]]) -> list[str]:
+    out = []
+    for aim in aims:
+        met = {None: "no case", True: "met", False: "MISSED"}[aim["met"]]
+        bound = f"at least {100 * aim['at_least']:.0f} %" if aim["at_least"] is not None else ""
+        bound = bound or f"at most {100 * aim['at_most']:.0f} %"
+        out.append(f"aim {met}: {aim['text']}: {share(aim).strip()}, {bound}")
+    return [*out, ""]
+
+
+def _calibration(found: Mapping[str, Any]) -> list[str]:
+    rows = [(f"verdict '{kind}' is right", [share(row)]) for kind, row in found["by_verdict"].items()]
+    for name, text in (("within_1_std", "1 s.d."), ("within_2_std", "2 s.d.")):
+        expected = 100 * found[name]["expected"]
+        rows.append((f"true amplitude within {text} (should be {expected:.0f} %)", [share(found[name])]))
+    if found["brier"] is not None:
+        rows.append(("Brier score of stated confidence", [f"{found['brier']:.3f}"]))
+        rows += [
+            (f"stated {100 * r['stated']:.0f} % on average, right", [share(r["right"])])
+            for r in found["reliability"]
+            if r["stated"] is not None
+        ]
+    return _block("Calibration", ("share",), rows)
+
+
+def _wrong(cases: Sequence[Mapping[str, Any]]) -> list[str]:
+    wrong = [case for case in cases if not case["right"]]
+    out = [f"Wrong or missing answers ({len(wrong)} of {len(cases)})"]
+    for case in wrong:
+        hidden = " + ".join(f"{h['tag']} ({h['form']}) at {h['multiple']:.1f} x detection" for h in case["hidden"])
+        given = " ".join([case["answer"], ", ".join(case["set"] or case["named"])]).strip()
+        head = f"  {case['case']}  {hidden or 'nothing missing'}  ->  {given}"
+        out += [head, *textwrap.wrap(case["text"], WIDTH, initial_indent="      ", subsequent_indent="      ")]
+    again = [case for case in cases if case["failed_before"]]
+    if again:
+        told = ", ".join(f"{c['case']} ({c['failed_before']})" for c in again)
+        out += ["", *textwrap.wrap(f"Failed attempts (how many): {told}", WIDTH)]
+    return out

@@ -1,0 +1,149 @@
+"""``stickslip challenge``: make sealed campaigns with hidden effects, diagnose them, and score the answers."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Parameter
+
+from .working import working
+
+if TYPE_CHECKING:
+    from ..challenge.run import Progress
+
+UNRESOLVED = 3
+challenge = App(
+    name="challenge",
+    help="Test the diagnosis blindly on campaigns with a hidden effect: make, run, score.",
+    help_format="plaintext",
+)
+
+
+@challenge.command
+def make(folder: Path, *, cases: int = 100, seed: int = 0, jobs: int | None = None) -> int:
+    """Make campaigns with hidden effects; the truth is sealed in a file apart.
+
+    Parameters
+    ----------
+    folder:
+        Where to; must not exist yet. An interrupted making goes on where it was.
+    cases:
+        How many: 30 % with nothing missing, 45 % with one effect, 15 % with two, 10 % outside the catalogue.
+    seed:
+        Fixes every file.
+    jobs:
+        Parallel processes; default one a core.
+    """
+    from ..challenge.make import make_challenge
+
+    with working("making campaigns") as tell:
+        seal = make_challenge(folder, cases, seed, jobs=jobs, tell=tell)
+    print(f"{cases} campaigns in {folder}\nseal {seal}")
+    return 0
+
+
+@challenge.command
+def run(
+    folder: Path,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    candidates: str | None = None,
+    max_effects: int = 3,
+    retry: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Diagnose every case; what is finished is not done again, and a case cut off goes on from its pieces.
+
+    Parameters
+    ----------
+    folder:
+        Of the challenge. Workers on other machines must see it under the same path.
+    scheduler:
+        Address of a running dask.distributed scheduler: tcp://host:8786. Default: a cluster on this machine.
+    workers:
+        Processes of the cluster on this machine; default one a core.
+    candidates:
+        Try these effects only: contact-ageing,drive-ripple.
+    max_effects:
+        Add at most so many, one after the other.
+    retry:
+        Try cases again that failed.
+    """
+    from ..challenge.run import run_challenge
+
+    chosen = None if candidates is None else [c.strip() for c in candidates.split(",") if c.strip()]
+    try:
+        found = run_challenge(
+            folder,
+            scheduler=scheduler,
+            workers=workers,
+            candidates=chosen,
+            max_effects=max_effects,
+            retry=retry,
+            tell=_tell,
+        )
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("what is finished is kept; the same command goes on") from None
+    print(f"{found['done']} diagnosed, {found['failed']} failed, {found['open']} open")
+    if found["failed"]:
+        print(f"failures are described in {folder / 'runs'}; try again with --retry")
+    return 0 if not found["open"] and not found["failed"] else UNRESOLVED
+
+
+def _tell(p: Progress) -> None:
+    left = f", about {_time(p.left)} left" if p.done < p.total else ""
+    message = p.message.splitlines()[0] if p.message else ""
+    print(f"{p.done}/{p.total} {p.case} {p.state}: {message} ({p.seconds:.0f} s{left})", file=sys.stderr, flush=True)
+
+
+def _time(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+
+
+@challenge.command
+def score(
+    folder: Path, *, seal: str | None = None, json: Annotated[bool, Parameter(negative="")] = False
+) -> int:  # fmt: skip
+    """Compare the answers with the truth; refuses a folder whose seal does not match.
+
+    Writes score.json, score.txt, confusion.png and amplitude.png into FOLDER/score.
+
+    Parameters
+    ----------
+    folder:
+        Of the challenge.
+    seal:
+        The seal as it was published when the challenge was made; the score is refused for any other.
+    json:
+        Print the score as JSON.
+    """
+    from ..challenge.score import score_challenge
+    from ..runstore import json_text
+
+    found = score_challenge(folder, expected=seal)
+    text = _write(folder / "score", found)
+    print(json_text(found) if json else text, end="")
+    return 0 if not found["not_run"] else UNRESOLVED
+
+
+def _write(out: Path, found: dict[str, Any]) -> str:
+    from ..challenge.pictures import amplitude_figure, confusion_figure
+    from ..challenge.table import score_text
+    from ..errors import RunFolderError
+    from ..plots import save
+    from ..runstore import json_text
+
+    text = score_text(found)
+    try:
+        out.mkdir(exist_ok=True)
+        (out / "score.json").write_text(json_text(found) + "\n", encoding="utf-8")
+        (out / "score.txt").write_text(text, encoding="utf-8")
+        save(confusion_figure(found), out / "confusion.png")
+        save(amplitude_figure(found), out / "amplitude.png")
+    except OSError as error:
+        raise RunFolderError(f"the score cannot be written ({error.strerror})", file=out) from None
+    return text

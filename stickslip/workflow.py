@@ -1,0 +1,110 @@
+"""From a campaign file to the finished run folder of its diagnosis: one path for the command line and the challenge."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .runstore import Run, file_record, json_text, open_run, refuse_existing, versions
+
+
+class Pieces:
+    """Finished pieces in the run folder, one file each, written aside and renamed."""
+
+    def __init__(self, run: Run, inputs: str) -> None:
+        self._run, self._inputs = run, inputs
+
+    def _path(self, key: str) -> Path:
+        return self._run.path(f"pieces/{key}.npz")
+
+    def load(self, key: str) -> Mapping[str, np.ndarray] | None:
+        """A finished piece of the same inputs, or None."""
+        path = self._path(key)
+        if not path.is_file():
+            return None
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = dict(file)
+        except (OSError, ValueError, EOFError, KeyError):
+            return None
+        return arrays if str(arrays.pop("inputs", "")) == self._inputs else None
+
+    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
+        """Keep a finished piece."""
+        path = self._path(key)
+        aside = path.with_suffix(".part")
+        with aside.open("wb") as stream:
+            np.savez(stream, allow_pickle=False, inputs=np.array(self._inputs), **piece)
+        aside.replace(path)
+
+
+def diagnose_campaign(
+    campaign: str | Path,
+    out: str | Path,
+    *,
+    candidates: Sequence[str] | None = None,
+    max_effects: int = 3,
+    holdout: Sequence[str] = (),
+    effect_files: Sequence[str | Path] = (),
+    jobs: int | None = None,
+    force: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+) -> dict[str, Any]:
+    """Diagnose a campaign and write its run folder (``result.json``, ``report.html``, finished pieces).
+
+    An interrupted diagnosis goes on from its pieces.
+
+    Args:
+        campaign: the TOML file. out: the run folder.
+        candidates, max_effects, holdout, jobs, progress: see ``stickslip.diagnose.engine.diagnose``.
+        effect_files: Python files with effects of one's own, which are run.
+        force: replace an existing run folder.
+
+    Returns:
+        What ``result.json`` holds.
+
+    Raises:
+        InputError: the campaign, a trace or a tag cannot be used. RunFolderError: the folder cannot be written.
+    """
+    out = Path(out)
+    refuse_existing(out, force)
+    began = time.perf_counter()
+    from .campaign import load_campaign, load_traces
+    from .diagnose.engine import diagnose
+    from .diagnose.summary import summary
+    from .effects import catalogue
+    from .report import write_report
+
+    for path in effect_files:
+        catalogue.load_file(Path(path))
+    loaded = load_campaign(campaign)
+    traces = load_traces(loaded)
+    for tag in candidates or ():
+        catalogue.get(tag)
+    inputs = [file_record(campaign), *({"file": t.provenance.file, "sha256": t.provenance.sha256} for t in traces)]
+    with open_run(out, force=force, resume=True) as run:
+        key = json_text({"inputs": inputs, "holdout": list(holdout), "versions": versions()})
+        found = diagnose(
+            loaded,
+            traces,
+            candidates=candidates,
+            max_effects=max_effects,
+            holdout=holdout,
+            jobs=jobs,
+            store=Pieces(run, key),
+            progress=progress,
+        )
+        result: dict[str, Any] = {
+            "title": loaded.title,
+            **summary(found),
+            "inputs": inputs,
+            "versions": versions(),
+            "seconds": round(time.perf_counter() - began, 1),
+        }
+        run.json(result)
+        write_report(run.folder)
+    return result

@@ -1,0 +1,74 @@
+"""Challenges without campaigns: invented truths and results in the files of real ones, sealed like them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from stickslip.challenge.run import _protocol
+from stickslip.challenge.seal import CASES, RUNS, TRUTH, digest, make_seal
+from stickslip.runstore import file_record
+
+
+def effect(tag: str, multiple: float, amplitude: float = 1.0, *, own: bool = False, form: str = "") -> dict[str, Any]:
+    return {
+        "tag": tag, "multiple": multiple, "amplitude": amplitude, "unit": "1", "form": form, "own_form": own,
+    }  # fmt: skip
+
+
+def result(
+    kind: str,
+    effects: tuple[str, ...] = (),
+    among: tuple[str, ...] | None = None,
+    base: float = 1.0,
+    final: float | None = None,
+    **parameters: tuple[float, float],
+) -> dict[str, Any]:
+    """A ``result.json``; parameters as ``contact_ageing__rate=(value, std)``."""
+    rungs = [("static", None, 500.0), ("inertia", "inertia", base)]
+    if final is not None:
+        rungs.append(("more", effects[0] if effects else "x", final))
+    return {
+        "schema": 1,
+        "verdict": {"kind": kind, "effects": list(effects), "set": list(effects if among is None else among),
+                    "text": "invented", "reasons": []},
+        "ladder": [
+            {"model": [name], "added": added, "train_error": error, "heldout_error": error, "by_phase": {}}
+            for name, added, error in rungs
+        ],
+        "ranking": [],
+        "parameters": {
+            name.replace("__", ".").replace("_", "-"): {"value": value, "std": std, "unit": "1", "doc": ""}
+            for name, (value, std) in parameters.items()
+        },
+        "next_experiment": None,
+        "dropped": [],
+        "seconds": 2.0,
+    }  # fmt: skip
+
+
+def make(folder: Path, cases: dict[str, tuple[str, list[dict[str, Any]]]]) -> Path:
+    """A sealed challenge of ``name: (kind, effects)`` with a campaign file of one line each."""
+    files = [folder / TRUTH]
+    for name in cases:
+        path = folder / CASES / name / "campaign.toml"
+        path.parent.mkdir(parents=True)
+        path.write_text(f"# {name}\n")
+        files.append(path)
+    (folder / TRUTH).parent.mkdir()
+    listed = [{"name": name, "kind": kind, "effects": effects} for name, (kind, effects) in cases.items()]
+    (folder / TRUTH).write_text(json.dumps({"schema": 1, "seed": 5, "cases": listed}))
+    make_seal(folder, files, cases=len(cases))
+    return folder
+
+
+def answer(folder: Path, results: dict[str, dict[str, Any]]) -> None:
+    """Write results as a run would; the protocol too."""
+    runs = folder / RUNS
+    runs.mkdir(exist_ok=True)
+    _protocol(runs, digest(folder), {"candidates": None, "max_effects": 3})
+    for name, content in results.items():
+        (runs / name).mkdir()
+        inputs = [file_record(folder / CASES / name / "campaign.toml")]
+        (runs / name / "result.json").write_text(json.dumps({**content, "inputs": inputs}))

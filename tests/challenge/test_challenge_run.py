@@ -1,0 +1,243 @@
+"""Running a challenge on clusters with an invented diagnosis: nothing done twice, nothing lost, whatever dies."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from invented import effect, make
+
+from stickslip.challenge.one_case import failures
+from stickslip.challenge.run import Progress, run_challenge
+from stickslip.challenge.score import score_challenge
+from stickslip.challenge.seal import RUNS
+from stickslip.cli import run
+from stickslip.errors import InputError
+
+NAMES = [f"case-{i:03d}" for i in range(1, 7)]
+
+
+def challenge(folder: Path, names: list[str] = NAMES) -> Path:
+    return make(folder, {name: ("one", [effect("wear", 6.0)]) for name in names})
+
+
+def invented_diagnosis(log: Path, slow: float = 0.0, failing: str = "", dying: str = "") -> Callable[[Path, Path], Any]:
+    """A diagnosis that works like the real one: in a run folder that is continued, piece by piece."""
+
+    def diagnosis(campaign: Path, out: Path) -> None:
+        import os
+        import time
+
+        from stickslip.runstore import file_record, open_run
+
+        with log.open("a") as stream:
+            stream.write(f"{out.name} {os.getpid()}\n")
+        with open_run(out, resume=True) as folder:
+            piece = folder.path("pieces/base.txt")
+            pieces = int(piece.read_text()) + 1 if piece.exists() else 1
+            piece.write_text(str(pieces))
+            time.sleep(slow)
+            if out.name == failing:
+                raise ValueError("the fit fell over")
+            if out.name in dying.split():
+                os._exit(9)
+            folder.json(
+                {
+                    "verdict": {"kind": "missing", "effects": ["wear"], "set": ["wear"], "text": ""},
+                    "ladder": [{"added": "inertia", "heldout_error": 2.0}, {"added": "wear", "heldout_error": 1.0}],
+                    "parameters": {}, "inputs": [file_record(campaign)], "seconds": slow, "pieces": pieces,
+                }
+            )  # fmt: skip
+
+    return diagnosis
+
+
+def started(log: Path) -> list[tuple[str, int]]:
+    if not log.exists():
+        return []
+    lines = [line.split() for line in log.read_text().splitlines()]
+    return [(name, int(pid)) for name, pid in lines]
+
+
+def test_local_cluster_runs_every_case_once_and_keeps_failures(tmp_path: Path) -> None:
+    folder, log = challenge(tmp_path / "c"), tmp_path / "log"
+    told: list[Progress] = []
+    found = run_challenge(
+        folder, workers=2, diagnosis=invented_diagnosis(log, failing="case-003"), tell=told.append
+    )  # fmt: skip
+    assert found == {"done": 5, "failed": 1, "open": 0}
+    assert sorted(name for name, _ in started(log)) == NAMES
+    assert os.getpid() not in {pid for _, pid in started(log)}
+    assert [p.done for p in told] == [1, 2, 3, 4, 5, 6]
+    assert {p.total for p in told} == {6}
+    assert told[-1].left == 0.0
+    assert all(p.left > 0 for p in told[:-1])
+    assert {p.case: p.state for p in told} == {n: "failed" if n == "case-003" else "done" for n in NAMES}
+    (entry,) = failures(folder / RUNS, "case-003")
+    assert (entry["error"], entry["message"]) == ("ValueError", "the fit fell over")
+    assert "Traceback" in entry["traceback"]
+    score = score_challenge(folder)
+    assert (score["finished"], score["failed"]) == (5, 1)
+    assert score["by_kind"]["one"]["right"]["count"] == 5
+
+    # again: nothing is done twice; a failure only when asked for, and its record stays
+    log.unlink()
+    assert run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log)) == found
+    assert started(log) == []
+    assert run_challenge(folder, workers=1, retry=True, diagnosis=invented_diagnosis(log))["done"] == 6
+    assert [name for name, _ in started(log)] == ["case-003"]
+    assert json.loads((folder / RUNS / "case-003" / "result.json").read_text())["pieces"] == 2
+    score = score_challenge(folder)
+    assert (score["finished"], score["failed"]) == (6, 0)
+    assert next(c["failed_before"] for c in score["list"] if c["case"] == "case-003") == 1
+
+
+def test_failures_add_up(tmp_path: Path) -> None:
+    folder, log = challenge(tmp_path / "c", NAMES[:1]), tmp_path / "log"
+    failing = invented_diagnosis(log, failing=NAMES[0])
+    for times in (1, 2):
+        assert run_challenge(folder, workers=1, retry=True, diagnosis=failing) == {"done": 0, "failed": 1, "open": 0}
+        assert len(failures(folder / RUNS, NAMES[0])) == times
+
+
+def test_an_interrupted_run_goes_on(tmp_path: Path) -> None:
+    folder, log = challenge(tmp_path / "c", NAMES[:3]), tmp_path / "log"
+
+    def interrupt(progress: Progress) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log, slow=0.5), tell=interrupt)
+    finished = [name for name in NAMES[:3] if (folder / RUNS / name / "result.json").exists()]
+    assert 1 <= len(finished) < 3
+    assert not list((folder / RUNS).glob("*.failures.json"))
+    log.unlink()
+    found = run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log))
+    assert found == {"done": 3, "failed": 0, "open": 0}
+    assert sorted(name for name, _ in started(log)) == sorted(set(NAMES[:3]) - set(finished))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_case_that_kills_its_workers_is_recorded_and_the_others_go_on(tmp_path: Path, workers: int) -> None:
+    folder, log = challenge(tmp_path / "c"), tmp_path / "log"
+    diagnosis = invented_diagnosis(log, dying="case-002")
+    found = run_challenge(folder, workers=workers, diagnosis=diagnosis)
+    assert found == {"done": 5, "failed": 1, "open": 0}
+    (entry,) = failures(folder / RUNS, "case-002")
+    assert entry["error"] == "ProcessDiedError"
+    assert [name for name, _ in started(log)].count("case-002") == 3
+    assert score_challenge(folder)["failed"] == 1
+    # deaths of an earlier run do not count: it gets its three lives again, and this time it lives
+    assert run_challenge(folder, workers=1, retry=True, diagnosis=invented_diagnosis(log))["done"] == 6
+
+
+def test_three_killers_do_not_take_the_others_down_with_them(tmp_path: Path) -> None:
+    folder, log = challenge(tmp_path / "c"), tmp_path / "log"
+    found = run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log, dying="case-001 case-002 case-003"))
+    assert found == {"done": 3, "failed": 3, "open": 0}
+    assert [bool(failures(folder / RUNS, name)) for name in NAMES] == [True] * 3 + [False] * 3
+
+
+def test_a_diagnosis_without_a_result_is_a_failure(tmp_path: Path) -> None:
+    folder = challenge(tmp_path / "c", NAMES[:1])
+    found = run_challenge(folder, workers=1, diagnosis=lambda campaign, out: None)
+    assert found == {"done": 0, "failed": 1, "open": 0}
+    assert "no result.json" in failures(folder / RUNS, NAMES[0])[0]["message"]
+
+
+def test_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = challenge(tmp_path / "c", NAMES[:1])
+    monkeypatch.setattr("stickslip.challenge.cluster.PATIENCE", 1.0)
+    assert run(["challenge", "run", str(folder), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    assert "no scheduler answers" in capsys.readouterr().err
+    assert run(["challenge", "run", str(tmp_path)]) == 2
+    assert "no challenge" in capsys.readouterr().err
+    with pytest.raises(InputError, match="own workers"):
+        run_challenge(folder, scheduler="tcp://127.0.0.1:9", workers=2)
+
+
+def spawn(kind: str, *arguments: str) -> subprocess.Popen:
+    command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *arguments, "--no-dashboard"]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+@contextmanager
+def loopback_cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+    """A scheduler and workers as separate processes; gives its address and the workers."""
+    file = folder / "scheduler.json"
+    processes = [spawn("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))]
+    try:
+        address = wait_for(lambda: json.loads(file.read_text())["address"])
+        processes += [
+            spawn("worker", address, "--no-nanny", "--nthreads", "1", "--host", "127.0.0.1", "--local-directory",
+                  str(folder / f"worker{i}")) for i in range(workers)
+        ]  # fmt: skip
+        yield address, processes[1:]
+    finally:
+        for process in reversed(processes):
+            process.kill()
+        for process in processes:
+            process.wait(10)
+
+
+def wait_for(what: Callable[[], Any], patience: float = 30.0) -> Any:
+    end = time.monotonic() + patience
+    while time.monotonic() < end:
+        with suppress(OSError, ValueError, KeyError):
+            if (found := what()) is not None:
+                return found
+        time.sleep(0.05)
+    raise TimeoutError
+
+
+def test_a_worker_killed_on_the_way_loses_nothing(tmp_path: Path) -> None:
+    """A scheduler and two workers as separate processes; one is killed in the middle of a case."""
+    folder, log = challenge(tmp_path / "c"), tmp_path / "log"
+    killed: list[tuple[str, int]] = []
+
+    def kill(progress: Progress) -> None:
+        if killed:
+            return
+        busy = {pid: name for name, pid in started(log)}
+        # the worker that is at another case than the one just finished
+        for process in workers:
+            name = busy.get(process.pid)
+            if name is not None and name != progress.case and not (folder / RUNS / name).exists():
+                process.send_signal(signal.SIGKILL)
+                killed.append((name, process.pid))
+                return
+
+    with loopback_cluster(tmp_path, 2) as (address, workers):
+        found = run_challenge(folder, scheduler=address, diagnosis=invented_diagnosis(log, slow=0.7), tell=kill)
+        assert [process.poll() for process in workers].count(None) == 1
+    assert found == {"done": 6, "failed": 0, "open": 0}
+    (cut, pid), all_started = killed[0], started(log)
+    assert {pid for _, pid in all_started} == {process.pid for process in workers}
+    # started twice, the second time by the other worker, which went on from the first one's pieces
+    assert [p for name, p in all_started if name == cut] == [pid, next(w.pid for w in workers if w.pid != pid)]
+    pieces = {name: json.loads((folder / RUNS / name / "result.json").read_text())["pieces"] for name in NAMES}
+    assert pieces == {name: 2 if name == cut else 1 for name in NAMES}
+    assert score_challenge(folder)["finished"] == 6
+
+
+@pytest.mark.slow
+def test_the_real_diagnosis_from_making_to_the_score(tmp_path: Path) -> None:
+    folder = str(tmp_path / "c")
+    assert run(["challenge", "make", folder, "--cases", "2", "--seed", "3", "--jobs", "1"]) == 0
+    settings = ["--workers", "1", "--candidates", "contact-ageing", "--max-effects", "1"]
+    assert run(["challenge", "run", folder, *settings]) == 0
+    for name in ("case-001", "case-002"):
+        assert (tmp_path / "c" / RUNS / name / "report.html").stat().st_size > 10_000
+    assert run(["challenge", "score", folder]) == 0
+    score = json.loads((tmp_path / "c" / "score" / "score.json").read_text())
+    assert (score["finished"], score["failed"]) == (2, 0)
+    assert all(case["heldout_base"] > 0 for case in score["list"])

@@ -1,0 +1,212 @@
+"""The score against figures worked out by hand on invented answers."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from invented import answer, effect, make, result
+
+from stickslip.challenge.marks import rate
+from stickslip.challenge.one_case import record_failure
+from stickslip.challenge.score import score_challenge
+from stickslip.challenge.seal import RUNS, SealError
+from stickslip.challenge.table import score_text
+from stickslip.cli import run
+from stickslip.errors import InputError
+
+CASES = {
+    "n1": ("nothing", []),
+    "n2": ("nothing", []),
+    "n3": ("nothing", []),
+    "n4": ("nothing", []),
+    "a1": ("one", [effect("contact-ageing", 6.0, 1.2e-3)]),
+    "a2": ("one", [effect("sensor-drift", 12.0, own=True)]),
+    "a3": ("one", [effect("drive-ripple", 1.5)]),
+    "a4": ("one", [effect("sensor-low-pass", 7.0)]),
+    "a5": ("one", [effect("viscous-drag", 3.0, 2.0, own=True)]),
+    "a6": ("one", [effect("tilt", 25.0)]),
+    "b1": ("two", [effect("wear", 20.0), effect("inertia", 5.0, 0.05)]),
+    "b2": ("two", [effect("adhesion", 8.0), effect("wear", 9.0)]),
+    "o1": ("outside", [effect("yaw-mode", 2.0)]),
+    "o2": ("outside", [effect("eddy-brake", 4.0)]),
+}
+RESULTS = {
+    "n1": result("complete", base=0.8),
+    "n2": result("complete", base=0.9),
+    "n3": result("missing", ("wear",), base=2.0, final=1.0),
+    "a1": result("missing", ("contact-ageing",), base=4.0, final=1.2, contact_ageing__rate=(1.5e-3, 2e-4)),
+    "a2": result("ambiguous", (), ("thermal-creep", "sensor-drift"), base=8.0, final=1.0),
+    "a3": result("complete", base=1.1),
+    "a4": result("missing", ("residual-load",), base=6.0, final=1.4),
+    "a5": result("missing", ("viscous-drag",), base=3.2, final=1.6, viscous_drag__drag=(5e-3, 1e-3)),
+    "a6": result("ambiguous", (), ("tilt", "wear", "adhesion", "inertia"), base=9.0, final=1.0),
+    "b1": result("missing", ("inertia", "wear"), base=5.0, final=1.1, inertia__share=(0.045, 0.01)),
+    "b2": result("missing", ("wear",), base=5.0, final=3.0),
+    "o1": result("unknown", base=7.0),
+    "o2": result("unknown", ("viscous-drag",), base=7.0, final=4.0),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    made = make(tmp_path / "challenge", CASES)
+    answer(made, RESULTS)
+    record_failure(made / RUNS, "n4", ValueError("out of range"), 3.0)
+    return made
+
+
+def of(found: dict) -> tuple[int, int]:
+    return found["count"], found["of"]
+
+
+def test_interval_is_wilsons() -> None:
+    z2 = 1.959963984540054**2
+    assert rate([True, True])["low"] == pytest.approx(2 / (2 + z2))
+    assert rate([True, True])["high"] == pytest.approx(1.0)
+    half = math.sqrt(z2 * (0.25 * 0.75 * 8 + z2 / 4)) / (8 + z2)
+    middle = (2 + z2 / 2) / (8 + z2)
+    found = rate([True] * 2 + [False] * 6)
+    assert (found["low"], found["high"]) == pytest.approx((middle - half, middle + half))
+    assert rate([]) == {"count": 0, "of": 0, "share": None, "low": None, "high": None}
+
+
+def test_names_classes_and_alarms(folder: Path) -> None:
+    s = score_challenge(folder)
+    kinds = s["by_kind"]
+    assert [of(kinds["nothing"][k]) for k in ("exact", "right", "class")] == [(2, 4)] * 3
+    assert [of(kinds["one"][k]) for k in ("exact", "right", "class")] == [(2, 6), (3, 6), (4, 6)]
+    assert [of(kinds["two"][k]) for k in ("exact", "right", "class")] == [(1, 2)] * 3
+    assert of(s["effects"]["right"]) == (4, 8)
+    # a case that failed raised no alarm, but has not shown that it would not
+    assert of(s["false_alarms"]) == (1, 3)
+    assert of(s["false_names"]) == (1, 3)
+    assert of(s["unknown_recall"]) == (2, 2)
+    assert of(s["unknown_without_a_name"]) == (1, 2)
+    assert (s["cases"], s["finished"], s["failed"], s["not_run"]) == (14, 13, 1, 0)
+    assert s["seed"] == 5
+
+
+def test_amplitudes_and_calibration(folder: Path) -> None:
+    s = score_challenge(folder)
+    assert of(s["amplitude"]["all"]) == (2, 3)  # 1.5 of 1.2e-3, 5 of 2e-3, 0.045 of 0.05
+    assert of(s["amplitude"]["textbook_form"]) == (2, 2)
+    assert of(s["amplitude"]["own_form"]) == (0, 1)
+    calibration = s["calibration"]
+    assert of(calibration["within_1_std"]) == (1, 3)
+    assert of(calibration["within_2_std"]) == (2, 3)
+    assert of(calibration["by_verdict"]["complete"]) == (2, 3)
+    assert of(calibration["by_verdict"]["missing"]) == (3, 6)
+    assert of(calibration["by_verdict"]["ambiguous"]) == (1, 2)
+    assert calibration["brier"] is None
+
+
+def test_by_amplitude_bin(folder: Path) -> None:
+    bins = {b["from"]: b for b in score_challenge(folder)["by_amplitude"]}
+    assert {low: of(b["right"]) for low, b in bins.items()} == {1: (0, 1), 2: (1, 1), 5: (2, 4), 10: (1, 2)}
+    assert {low: of(b["exact"]) for low, b in bins.items()} == {1: (0, 1), 2: (1, 1), 5: (2, 4), 10: (0, 2)}
+    assert {low: of(b["unknown_recall"]) for low, b in bins.items()} == {1: (0, 0), 2: (2, 2), 5: (0, 0), 10: (0, 0)}
+    assert of(bins[5]["amplitude"]) == (2, 2)
+    assert of(bins[2]["amplitude"]) == (0, 1)
+    assert of(bins[10]["named_right"]) == (1, 2)
+
+
+def test_fall_of_the_held_out_error(folder: Path) -> None:
+    s = score_challenge(folder)
+    one = s["heldout"]["one"]
+    assert one["cases"] == 6
+    # 1.2/4, 1/8, 1, 1.4/6, 0.5, 1/9
+    assert one["ratio"][1] == pytest.approx((1.4 / 6 + 0.3) / 2)
+    assert one["base"][1] == pytest.approx(5.0)
+    assert of(s["heldout"]["right"]["within"]) == (5, 6)
+    ages = next(line for line in s["list"] if line["case"] == "a1")
+    assert (ages["heldout_base"], ages["heldout_final"]) == (4.0, 1.2)
+
+
+def test_confusion_and_aims(folder: Path) -> None:
+    s = score_challenge(folder)
+    assert s["confusion"]["names"]["nothing"] == {"nothing": 2, "wear": 1, "failed": 1}
+    assert s["confusion"]["names"]["sensor-low-pass"] == {"residual-load": 1}
+    assert s["confusion"]["names"]["sensor-drift"] == {"a set": 1}
+    assert s["confusion"]["kinds"]["two"] == {"named": 1, "named wrongly": 1}
+    assert s["confusion"]["kinds"]["one"] == {
+        "named": 2, "set with it": 1, "set without it": 1, "named wrongly": 1, "complete": 1,
+    }  # fmt: skip
+    right, alarms, within = s["aims"]
+    assert (of(right), right["met"]) == ((3, 6), False)
+    assert (of(alarms), alarms["met"]) == ((1, 3), False)
+    assert (of(within), within["met"]) == ((5, 6), False)
+
+
+def test_stated_confidence_is_judged(tmp_path: Path) -> None:
+    folder = make(tmp_path / "c", {"n1": CASES["n1"], "a1": CASES["a1"], "a3": CASES["a3"]})
+    found = {name: {**RESULTS[name], "verdict": dict(RESULTS[name]["verdict"])} for name in ("n1", "a1", "a3")}
+    for name, confidence in (("n1", 0.9), ("a1", 0.6), ("a3", 0.95)):
+        found[name]["verdict"]["confidence"] = confidence
+    answer(folder, found)
+    calibration = score_challenge(folder)["calibration"]
+    assert calibration["brier"] == pytest.approx((0.1**2 + 0.4**2 + 0.95**2) / 3)
+    high = calibration["reliability"][-1]
+    assert high["stated"] == pytest.approx(0.925)
+    assert of(high["right"]) == (1, 2)
+
+
+def test_a_set_of_four_says_too_much_for_two_effects_as_well(tmp_path: Path) -> None:
+    two = [effect("wear", 20.0), effect("tilt", 9.0)]
+    folder = make(tmp_path / "c", {"b1": ("two", two), "b2": ("two", two), "b3": ("two", two)})
+    answer(
+        folder,
+        {
+            "b1": result("ambiguous", ("wear",), ("wear", "tilt", "inertia")),
+            "b2": result("ambiguous", ("wear",), ("wear", "tilt", "inertia", "adhesion")),
+            "b3": result("ambiguous", ("wear",), ("wear", "inertia")),
+        },
+    )
+    assert [line["right"] for line in score_challenge(folder)["list"]] == [True, False, False]
+
+
+def test_what_was_not_run_or_is_damaged_counts_as_wrong(folder: Path) -> None:
+    before = score_challenge(folder)
+    (folder / RUNS / "a1" / "result.json").unlink()
+    (folder / RUNS / "a5" / "result.json").write_text("{")
+    after = score_challenge(folder)
+    assert after["cases"] == before["cases"]
+    assert (after["not_run"], after["failed"]) == (1, 2)
+    assert of(after["by_kind"]["one"]["right"]) == (1, 6)
+    assert run(["challenge", "score", str(folder)]) == 3
+
+
+def test_command_writes_text_json_and_pictures(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    assert run(["challenge", "score", str(folder)]) == 0
+    text = capsys.readouterr().out
+    found = json.loads((folder / "score" / "score.json").read_text())
+    assert found == json.loads(json.dumps(score_challenge(folder)))
+    assert text == (folder / "score" / "score.txt").read_text() == score_text(found)
+    assert "aim MISSED" in text
+    assert "n4" in text
+    assert "ValueError: out of range" in text
+    assert max(map(len, text.splitlines())) <= 150
+    for name in ("confusion.png", "amplitude.png"):
+        assert (folder / "score" / name).read_bytes().startswith(b"\x89PNG")
+    assert run(["challenge", "score", str(folder), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == found
+
+
+def test_results_of_other_files_are_refused(folder: Path) -> None:
+    path = folder / RUNS / "a1" / "result.json"
+    content = json.loads(path.read_text())
+    content["inputs"][0]["sha256"] = "0" * 64
+    path.write_text(json.dumps(content))
+    with pytest.raises(SealError, match="other files"):
+        score_challenge(folder)
+    content["inputs"] = []
+    path.write_text(json.dumps(content))
+    with pytest.raises(SealError, match="other files"):
+        score_challenge(folder)
+
+
+def test_nothing_run_is_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nothing was run"):
+        score_challenge(make(tmp_path / "c", CASES))
