@@ -37,6 +37,9 @@ class Cycles(NamedTuple):
         load_times, load_positions: nodes of the load point (s, m).
         stiffness: of the driving spring where this run has another than the rig (N/m), else nan.
         virgin: whether the run starts from a force-free contact at rest.
+        run: number of the run.
+        stretch: load point less reading at the first onset (m): where the record does not begin with a virgin contact,
+            the spring is stretched already, by what is known only from when it slips.
     """
 
     start: Any
@@ -49,6 +52,8 @@ class Cycles(NamedTuple):
     load_positions: Any
     stiffness: Any
     virgin: Any
+    run: Any = 0
+    stretch: Any = 0.0
 
 
 class Track(NamedTuple):

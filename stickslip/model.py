@@ -77,10 +77,12 @@ class LoadPoint(eqx.Module):
     Attributes:
         times: nodes (s), shape (n,), increasing, n >= 2.
         positions: displacement at the nodes (m), shape (n,).
+        stretch: elongation of the spring that a record begins with (m); effects on the drive do not see it.
     """
 
     times: Array
     positions: Array
+    stretch: Any = 0.0
 
     def __call__(self, t: Array) -> Array:
         """Displacement (m) at time ``t`` (s)."""
@@ -173,7 +175,7 @@ class Model(eqx.Module):
     def lead(self, t: Array) -> Array:
         """Displacement of the load point (m) at time ``t`` (s), drive effects included."""
         at = self.load_point(t)
-        return at + sum(e.lead(t, at) for e in self.effects if isinstance(e, Drive))
+        return at + self.load_point.stretch + sum(e.lead(t, at) for e in self.effects if isinstance(e, Drive))
 
     def mass(self) -> Array:
         """Moving mass (kg), effects included."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..features.layout import PHASES
-from ..fit.composition import EVENT_WIDTHS
+from ..fit.composition import EVENT_WIDTHS, START
 from ..fit.inertial import HUBER, Fit
 from ..fit.problem import Problem
 
@@ -34,7 +34,8 @@ def held_out(
 ) -> HeldOut:
     """Evaluate a fit on ``cycles`` (R, n) with its event-wise factors there at their prior mean.
 
-    In each cycle the two factors are then set to their most probable values, to first order.
+    In each cycle the two factors are then set to their most probable values, to first order. So is the elongation that
+    a run begins with, where no cycle of that run was fitted.
     """
     m = problem.measurement
     model = problem.features(fit.z, fit.events) if features is None else features
@@ -42,6 +43,7 @@ def held_out(
     widths = np.array(EVENT_WIDTHS)
     phase = m.layout.phase_index()
     cells, scores = [], []
+    model = model + _starts(problem, fit, floor, cycles, model)
     for r, n in np.argwhere(cycles & np.asarray(m.cycles.used)):
         ok = m.valid[r, n]
         res = np.nan_to_num((model[r, n] - m.values[r, n]) / floor[r, n], nan=1e4, posinf=1e4, neginf=-1e4)
@@ -59,3 +61,25 @@ def held_out(
     by_phase = {p: float(np.sqrt(np.nanmean(table[:, i]))) for i, p in enumerate(PHASES) if seen[i]}
     score = float(np.mean(np.square(list(by_phase.values())))) if by_phase else float("nan")
     return HeldOut(float(np.sqrt(score)), score, by_phase, np.array(scores))
+
+
+def _starts(problem: Problem, fit: Fit, floor: np.ndarray, cycles: np.ndarray, model: np.ndarray) -> np.ndarray:
+    """Change of the features by the starts of runs that no fit has seen, shape (R, n, F)."""
+    m = problem.measurement
+    out = np.zeros_like(model)
+    for i, f in enumerate(fit.free):
+        if not f.name.startswith(START):
+            continue
+        r = int(f.name[len(START) :])
+        if fit.use[r].any():
+            continue
+        ok = m.valid[r] & (cycles[r] & np.asarray(m.cycles.used)[r])[:, None]
+        column = np.nan_to_num(fit.columns[r, ..., i] / floor[r])[ok]
+        res = np.nan_to_num((model[r] - m.values[r]) / floor[r])[ok]
+        shift = 0.0
+        for _ in range(8):  # Huber's weights depend on what is left
+            left = np.abs(res + column * shift)
+            weight = np.where(left > HUBER, HUBER / np.maximum(left, HUBER), 1.0)
+            shift = -float(weight * column @ res) / (float(weight * column @ column) + 1.0 / f.width**2)
+        out[r] = np.nan_to_num(fit.columns[r, ..., i]) * shift
+    return out

@@ -98,7 +98,9 @@ def measure(
     # padded to round sizes, so that campaigns of about one size share a compiled program
     width = _round_up(max(len(r[1]) for r in rows))
     nodes = _round_up(max(r[0][0].size for r in rows))
-    cycles, anchors, values, valid, sensor = zip(*(_stack(r, width, nodes, layout) for r in rows), strict=True)
+    cycles, anchors, values, valid, sensor = zip(
+        *(_stack(r, i, width, nodes, layout) for i, r in enumerate(rows)), strict=True
+    )
     return Measurement(
         layout,
         jax.tree.map(lambda *a: jnp.asarray(np.stack(a)), *cycles),
@@ -139,7 +141,9 @@ def _run(trace: Trace, found: Segmentation, layout: Layout, ring_period: float, 
         start, position = begins[n]
         stop = tops[n][0]
         records.append(_cycle(t, y, start, position, stop, found, n, layout, ring_period, width, noise, count, trace))
-    return nodes, records, bool(trace.virgin), trace.spring_stiffness
+    first = events[0].t_onset
+    stretch = float(np.interp(first, *nodes) - np.interp(first, t, y))
+    return nodes, records, bool(trace.virgin), trace.spring_stiffness, stretch
 
 
 def _cycle(
@@ -234,9 +238,9 @@ def _sensor_noise(
     return out
 
 
-def _stack(run: tuple, width: int, nodes: int, layout: Layout) -> tuple:
+def _stack(run: tuple, number: int, width: int, nodes: int, layout: Layout) -> tuple:
     """One run's records as arrays, padded to ``width`` cycles and ``nodes`` nodes of the load point."""
-    (times, positions), records, virgin, stiffness = run
+    (times, positions), records, virgin, stiffness, stretch = run
     n = len(records)
     pad = width - n
     last = records[-1]["stop"]
@@ -259,6 +263,8 @@ def _stack(run: tuple, width: int, nodes: int, layout: Layout) -> tuple:
         load_positions=positions,
         stiffness=np.array(np.nan if stiffness is None else stiffness),
         virgin=np.array(virgin),
+        run=np.array(number),
+        stretch=np.array(stretch),
     )
     filler = jax.tree.map(lambda a: np.asarray(a), records[-1]["anchors"])
     anchors = jax.tree.map(lambda *a: np.stack(a), *[r["anchors"] for r in records], *[filler] * pad)

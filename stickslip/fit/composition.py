@@ -19,6 +19,8 @@ from .parameters import Free
 
 EVENT_WIDTHS = (0.12, 0.08)  # prior s.d. of ln(u_max) and ln(p) from event to event where lines are new every time
 
+START = "start."  # with the number of a run: when its first slip comes, where the record does not begin virgin
+
 
 class Given(NamedTuple):
     """The numbers of a composition that a fit does not move; apart, so that one compiled program serves them all.
@@ -60,7 +62,15 @@ class Composition:
             jnp.asarray(self.mass), {name: jnp.asarray(value) for name, value in self.fixed.items()}, self.effects
         )
 
-    def model(self, z: Array, event: Array, nodes: Any, stiffness: Array, given: Given | None = None) -> Model:
+    def model(
+        self,
+        z: Array,
+        event: Array,
+        nodes: Any,
+        stiffness: Array,
+        given: Given | None = None,
+        start: tuple[Any, Any, Any] | None = None,
+    ) -> Model:
         """The model of one cycle.
 
         Args:
@@ -69,6 +79,8 @@ class Composition:
             nodes: times and positions of the load point.
             stiffness: of the spring where the run has its own, else nan (N/m).
             given: the numbers that are not free; default this composition's own.
+            start: number of the run, whether it starts virgin, and load point less block at its first onset (m);
+                default virgin.
         """
         given = self.given() if given is None else given
         v = given.fixed | {
@@ -82,9 +94,10 @@ class Composition:
             contacts=self.contacts,
             n=self.bins,
         )
+        spring = jnp.where(jnp.isnan(stiffness), v["rig.spring_stiffness"], stiffness)
         block = Block(
             mass=given.mass,
-            spring_stiffness=jnp.where(jnp.isnan(stiffness), v["rig.spring_stiffness"], stiffness),
+            spring_stiffness=spring,
             damping=v["rig.damping"],
         )
         weakening = Weakening(
@@ -92,7 +105,23 @@ class Composition:
             slip_distance=v["weakening.slip_distance"],
             healing_time=v["weakening.healing_time"],
         )
-        return Model(block, bank, weakening, LoadPoint(*nodes), tuple(self._set(e, v) for e in given.effects))
+        return Model(
+            block,
+            bank,
+            weakening,
+            LoadPoint(nodes[0], nodes[1], self._stretch(v, spring, start)),
+            tuple(self._set(e, v) for e in given.effects),
+        )
+
+    def _stretch(self, v: dict[str, Array], spring: Array, start: tuple[Any, Any, Any] | None) -> Array:
+        """Elongation of the spring at the start of the record: the contact slips first at its full strength, or a
+        little (``start.<run>``) of the load point's travel later."""
+        if start is None:
+            return jnp.zeros(())
+        run, virgin, seen = start
+        own = [(int(f.name[len(START) :]), v[f.name]) for f in self.free if f.name.startswith(START)]
+        later = sum((jnp.where(run == r, value, 0.0) for r, value in own), jnp.zeros(()))
+        return jnp.where(virgin, 0.0, v["contact.strength"] / spring - seen + later)
 
     def _set(self, effect: Effect, values: dict[str, Array]) -> Effect:
         mine = {k.split(".", 1)[1]: v for k, v in values.items() if k.split(".", 1)[0] == effect.tag}

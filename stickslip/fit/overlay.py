@@ -48,7 +48,10 @@ def modelled_runs(problem: Problem, z: Array, events: Array) -> list[ModelledRun
 
     @jax.jit
     def tracks(z: jax.Array, event: jax.Array, cycles: Cycles) -> Track:
-        return run_cycles(lambda e, nodes: composition.model(z, e, nodes, cycles.stiffness), event, cycles, tolerance)
+        start = (cycles.run, cycles.virgin, cycles.stretch)
+        return run_cycles(
+            lambda e, nodes: composition.model(z, e, nodes, cycles.stiffness, start=start), event, cycles, tolerance
+        )
 
     out = []
     for r in range(problem.measurement.runs):

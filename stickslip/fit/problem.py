@@ -25,7 +25,7 @@ from ..features.layout import Layout
 from ..features.measurement import Measurement
 from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
-from .composition import Composition, Given
+from .composition import START, Composition, Given
 
 STEP = 0.01  # of a difference, on the search scale, until it is known better
 BROKEN = 0.3  # change of a slip's size within such a step that can only be another event
@@ -82,7 +82,8 @@ class Problem:
             lanes.append((moved, events))
             taken.append(step)
         at = self.measurement.layout.slices()["size"]
-        out = np.stack([(o - base) / h for o, h in zip(self._call(lanes), taken, strict=True)], axis=-1)
+        found = self._call(lanes, [self._alone(i) for i in which], base)
+        out = np.stack([(o - base) / h for o, h in zip(found, taken, strict=True)], axis=-1)
         jump = np.abs(out[:, :, at] * np.array(taken)) > BROKEN * np.abs(base[:, :, at, None])
         return np.where(jump, 0.0, out)
 
@@ -97,12 +98,23 @@ class Problem:
         share = (exponent - 1.0) / exponent
         return np.stack([columns[..., u], columns[..., p] * share], axis=-1)
 
-    def _call(self, lanes: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    def _alone(self, i: int) -> int | None:
+        """The run that a parameter acts on, or None if it acts on all."""
+        name = self.composition.free[i].name
+        return int(name[len(START) :]) if name.startswith(START) else None
+
+    def _call(
+        self,
+        lanes: list[tuple[np.ndarray, np.ndarray]],
+        only: Sequence[int | None] = (),
+        base: np.ndarray | None = None,
+    ) -> list[np.ndarray]:
+        """Features of every lane; a lane that concerns one run only has those of ``base`` in the others."""
         m = self.measurement
+        only = only or [None] * len(lanes)
         tracks = _tracks(_Key(self.composition))
         given = self.composition.given()
         times = jnp.asarray([m.layout.settling, m.layout.shortest])
-        self.runs_done += len(lanes) * m.runs
 
         def one(task: tuple[int, int]) -> np.ndarray:
             lane, r = task
@@ -113,13 +125,17 @@ class Problem:
 
         # the longest runs first, so that no thread is left with one at the end
         order = np.argsort([-np.count_nonzero(m.cycles.used[r]) for r in range(m.runs)])
-        tasks = [(lane, int(r)) for r in order for lane in range(len(lanes))]
+        tasks = [(lane, int(r)) for r in order for lane in range(len(lanes)) if only[lane] in (None, r)]
+        self.runs_done += len(tasks)
         if self.threads == 1:
             done = {task: one(task) for task in tasks}
         else:
             with ThreadPoolExecutor(self.threads) as pool:
                 done = dict(zip(tasks, pool.map(one, tasks), strict=True))
-        return [np.stack([done[lane, r] for r in range(m.runs)]) for lane in range(len(lanes))]
+        return [
+            np.stack([done[lane, r] if (lane, r) in done else base[r] for r in range(m.runs)])  # type: ignore[index]
+            for lane in range(len(lanes))
+        ]
 
 
 class _Key:
@@ -142,8 +158,12 @@ def _tracks(key: _Key) -> Any:
     composition = key.composition
 
     def one_run(z: Array, events: Array, cycles: Cycles, given: Given, tolerance: Tolerance) -> Track:
+        start = (cycles.run, cycles.virgin, cycles.stretch)
         return run_cycles(
-            lambda event, nodes: composition.model(z, event, nodes, cycles.stiffness, given), events, cycles, tolerance
+            lambda event, nodes: composition.model(z, event, nodes, cycles.stiffness, given, start),
+            events,
+            cycles,
+            tolerance,
         )
 
     return jax.jit(one_run)

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..features.measurement import Measurement
 from ..segment import Segmentation
 from ..trace import Trace
-from .composition import Composition
+from .composition import START, Composition
 from .parameters import Free
 
 SHAPE = 3.3  # exponent of the backbone of a self-affine line with H about 0.3
@@ -143,4 +143,9 @@ def base_composition(
             log("rig.spring_stiffness", "N/m", stiffness, stiffness_width, low or stiffness / 10,
                 high or stiffness * 10, "stiffness of the driving spring", prior)
         )  # fmt: skip
+    for r in np.flatnonzero(~np.asarray(m.cycles.virgin)).tolist():
+        doc = f"how far beyond full strength the load point is at the first slip of run {m.names[r]}"
+        # the model slips a little before its full strength; a tenth of the elongation is far more than that
+        reach = 0.1 * nominal / stiffness
+        free.append(Free(f"{START}{r}", "m", 0.1 * reach, 0.0, 0.0, 3.0, -reach, reach, doc))
     return Composition(mass, contacts, bins, tuple(free), fixed)
