@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from ..campaign import Campaign
 from ..effects import catalogue
-from ..effects.base import Effect
 from ..errors import InputError
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
@@ -22,25 +19,16 @@ from ..fit.start import base_composition, ring_period
 from ..residual import Misfit, floors, misfit
 from ..segment import Segmentation, segment
 from ..trace import Trace
-from .candidate import Candidate, forms_of, try_effect
+from .candidate import MORE, MOST, Candidate
 from .heldout import HeldOut, held_out
 from .holdout import training_cycles
-from .pieces import candidate_arrays, candidate_from, fit_arrays, fit_from
+from .pieces import fit_arrays, fit_from
 from .static_rung import static_features
+from .sweep import Ground, Store, Sweep
 from .thresholds import THRESHOLDS, Thresholds
-from .verdict import Judged, Verdict, decide, is_complete, judge, worst_phase
+from .verdict import Judged, Verdict, decide, finished, is_complete, judge, nothing, undecided, worst_phase
 
 MOST_CYCLES = 14
-
-
-class Store(Protocol):
-    """Where finished pieces are kept, so that an interrupted diagnosis goes on."""
-
-    def load(self, key: str) -> Mapping[str, np.ndarray] | None:
-        """A finished piece, or None."""
-
-    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
-        """Keep a finished piece."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +53,29 @@ class Rung:
 
 
 @dataclass(frozen=True)
+class Round:
+    """One sweep over the catalogue.
+
+    Attributes:
+        candidates: every tag in its best form.
+        every: every form that was fitted.
+        judged: the conditions each candidate meets.
+        base: what they were tried on.
+    """
+
+    candidates: tuple[Candidate, ...]
+    every: tuple[Candidate, ...]
+    judged: tuple[Judged, ...]
+    base: Rung
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """Everything a report needs."""
 
     verdict: Verdict
     ladder: tuple[Rung, ...]
-    rounds: tuple[tuple[Candidate, ...], ...]
-    judged: tuple[tuple[Judged, ...], ...]
+    rounds: tuple[Round, ...]
     measurement: Measurement
     floor: np.ndarray
     train: np.ndarray
@@ -128,16 +132,14 @@ def diagnose(
     rung = _rung(("static", "inertia"), "inertia", base, optimum, data, floor, train)
     stiffness = base.fixed.get("rig.spring_stiffness", optimum.values.get("rig.spring_stiffness", np.nan))
     ladder = [_static(data, floor, train, optimum, float(stiffness)), rung]
-    rounds: list[tuple[Candidate, ...]] = []
-    verdicts: list[tuple[Judged, ...]] = []
+    rounds: list[Round] = []
     named: list[str] = []
-    verdict = Verdict("unknown")
     while True:
         assert rung.held is not None
-        if is_complete(rung.train, rung.held, limits):
-            verdict = _finished(named)
-            break
         phase, worst = worst_phase(rung.train, rung.held)
+        if is_complete(rung.train, rung.held, limits):
+            verdict = finished(named)
+            break
         if not named and worst > limits.failed:
             verdict = Verdict(
                 "unknown", text=f"The base model could not be fitted ({phase} is off by {worst:.0f} floors), so no "
@@ -150,29 +152,89 @@ def diagnose(
                 f"{len(named)} effects were added and {phase} is still off by {worst:.1f} floors.",
             )  # fmt: skip
             break
-        tried = _sweep([t for t in tags if t not in named], rung, data, floor, train, jobs, store, len(named), tell)
-        rounds.append(tuple(tried))
-        judged = [judge(c, rung.fit.cost, rung.held, limits) for c in tried if c.fit is not None]  # type: ignore[union-attr]
-        verdicts.append(tuple(judged))
+        rung, done = _round(
+            [t for t in tags if t not in named], rung, data, floor, train, jobs, store, len(rounds), tell
+        )
+        ladder[-1] = rung
+        assert rung.fit is not None
+        assert rung.held is not None
+        judged = [judge(c, rung.fit.cost, rung.held, limits) for c in done[0] if c.fit is not None]
+        rounds.append(Round(tuple(done[0]), tuple(done[1]), tuple(judged), rung))
         best, close = decide(judged, limits)
         if best is None:
-            verdict = _nothing(named, judged, phase, worst)
-            break
-        if len(close) > 1:
-            tags_close = tuple(j.candidate.tag for j in close)
-            verdict = Verdict(
-                "ambiguous", tuple(named), (*named, *tags_close) if named else tags_close,
-                f"These data cannot tell {_listed(tags_close)} apart.", best.failures,
-            )  # fmt: skip
-            ladder.append(_add(rung, best.candidate, data, floor, train))
+            verdict = nothing(named, judged, phase, worst, limits)
             break
         new = _add(rung, best.candidate, data, floor, train)
         ladder.append(new)
+        assert new.held is not None
+        if len(close) > 1 and worst_phase(new.train, new.held)[1] <= limits.adequate:
+            verdict = undecided(named, close)
+            break
         named.append(best.candidate.tag)
         rung = new
-    return Diagnosis(
-        verdict, tuple(ladder), tuple(rounds), tuple(verdicts), data, floor, train, (*data.dropped, *dropped)
-    )
+    if verdict.kind == "missing" and len(named) > 1:
+        tell("trying to do without each effect", 1.0)
+        ladder, named = _without(ladder, named, data, floor, train, limits)
+        verdict = replace(finished(named), reasons=verdict.reasons)
+    return Diagnosis(verdict, tuple(ladder), tuple(rounds), data, floor, train, (*data.dropped, *dropped))
+
+
+def _round(
+    tags: Sequence[str],
+    rung: Rung,
+    data: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    jobs: int,
+    store: Store | None,
+    number: int,
+    tell: Callable[[str, float], None],
+) -> tuple[Rung, tuple[list[Candidate], list[Candidate]]]:
+    """All candidates on a rung, and the rung fitted again from where the best of them arrived.
+
+    A base less converged than its rivals would make a gain of nothing.
+    """
+    assert rung.composition is not None
+    assert rung.fit is not None
+    ground = Ground(rung.composition, rung.fit, data, floor, train)
+    name = f"round{number + 1}"
+    done = Sweep(ground, jobs, store, name, tell).run(tags)
+    best = min(done[0], key=lambda c: c.cost, default=None)
+    if best is None or best.fit is None:
+        return rung, done
+    k = len(rung.composition.free)
+    kept = store.load(f"{name}-again") if store is not None else None
+    if kept is not None:
+        again = fit_from(kept)
+    else:
+        problem = Problem(rung.composition, data)
+        again = fit(problem, floor, z=best.fit.z[:k], events=best.fit.events, stages=((3.0, 4), (1.0, MORE)), use=train)
+        if store is not None:
+            store.save(f"{name}-again", fit_arrays(again))
+    if again.cost < rung.fit.cost:
+        rung = _rung(rung.model, rung.added, rung.composition, again, data, floor, train)
+    return rung, done
+
+
+def _without(
+    ladder: list[Rung], named: list[str], data: Measurement, floor: np.ndarray, train: np.ndarray, limits: Thresholds
+) -> tuple[list[Rung], list[str]]:
+    """The ladder without effects that are no longer needed once the later ones are in."""
+    top = ladder[-1]
+    assert top.composition is not None
+    assert top.fit is not None
+    for tag in named[:-1]:
+        smaller = top.composition.without(tag)
+        kept = [i for i, f in enumerate(top.composition.free) if f in smaller.free]
+        found = fit(
+            Problem(smaller, data), floor, z=top.fit.z[kept], events=top.fit.events, stages=((1.0, MOST),), use=train
+        )
+        left = [t for t in named if t != tag]
+        rung = _rung(("static", "inertia", *left), left[-1], smaller, found, data, floor, train)
+        assert rung.held is not None
+        if found.cost < limits.rival * top.fit.cost and is_complete(rung.train, rung.held, limits):
+            return [*ladder[:2], rung], left
+    return ladder, named
 
 
 def scatter_factor(data: Measurement) -> float:
@@ -210,7 +272,7 @@ def _base_fit(
 
 def _rung(
     model: tuple[str, ...],
-    added: str,
+    added: str | None,
     composition: Composition,
     optimum: Fit,
     data: Measurement,
@@ -237,76 +299,3 @@ def _add(rung: Rung, candidate: Candidate, data: Measurement, floor: np.ndarray,
     assert candidate.composition is not None
     assert candidate.fit is not None
     return _rung((*rung.model, candidate.tag), candidate.tag, candidate.composition, candidate.fit, data, floor, train)
-
-
-def _sweep(
-    tags: Sequence[str],
-    rung: Rung,
-    data: Measurement,
-    floor: np.ndarray,
-    train: np.ndarray,
-    jobs: int,
-    store: Store | None,
-    number: int,
-    tell: Callable[[str, float], None],
-) -> list[Candidate]:
-    """All candidates on top of a rung, in parallel processes; those already in the store are not done again."""
-    done: dict[str, Candidate] = {}
-    for tag in tags:
-        kept = store.load(f"round{number + 1}-{tag}") if store is not None else None
-        if kept is not None and rung.composition is not None:
-            done[tag] = candidate_from(kept, rung.composition, data, floor, train)
-    open_tags = [t for t in tags if t not in done]
-    pool = Parallel(n_jobs=jobs, return_as="generator_unordered") if jobs > 1 else None
-    work = [(tag, forms_of(tag)[0]) for tag in open_tags]
-    assert rung.composition is not None
-    assert rung.fit is not None
-    if pool is not None:
-        results = pool(delayed(_one)(effect, rung.composition, rung.fit, data, floor, train) for _, effect in work)
-    else:
-        results = (_one(effect, rung.composition, rung.fit, data, floor, train) for _, effect in work)
-    for candidate in results:
-        done[candidate.tag] = candidate
-        if store is not None:
-            store.save(f"round{number + 1}-{candidate.tag}", candidate_arrays(candidate))
-        tell(f"round {number + 1}: {candidate.tag} done", len(done) / max(len(tags), 1))
-    return [done[t] for t in tags]
-
-
-def _one(
-    effect: Effect, composition: Composition, optimum: Fit, data: Measurement, floor: np.ndarray, train: np.ndarray
-) -> Candidate:
-    return try_effect(effect, composition, optimum, data, floor, train, threads=1)
-
-
-def _listed(tags: Sequence[str]) -> str:
-    return tags[0] if len(tags) == 1 else f"{', '.join(tags[:-1])} and {tags[-1]}"
-
-
-def _finished(named: Sequence[str]) -> Verdict:
-    if not named:
-        return Verdict("complete", text="Nothing is missing: every phase is described as well as the data allow.")
-    return Verdict(
-        "missing",
-        tuple(named),
-        tuple(named),
-        f"The base model lacks {_listed(named)}. With it every phase is described as well as the data allow.",
-    )
-
-
-def _nothing(named: Sequence[str], judged: Sequence[Judged], phase: str, worst: float) -> Verdict:
-    nearest = min(judged, key=lambda j: j.cost, default=None)
-    text = f"Something is missing ({phase} is off by {worst:.1f} floors) and nothing in the catalogue explains it"
-    if nearest is not None:
-        text += f"; nearest is {nearest.candidate.tag}, but {'; '.join(nearest.failures) or 'it does not suffice'}"
-    reasons = nearest.failures if nearest is not None else ()
-    if named:
-        adequate = worst <= THRESHOLDS.adequate
-        if adequate:
-            return Verdict(
-                "missing", tuple(named), tuple(named),
-                f"The base model lacks {_listed(named)}. A small misfit remains ({phase}, {worst:.1f} floors) that "
-                "nothing in the catalogue explains.", reasons,
-            )  # fmt: skip
-        return Verdict("unknown", tuple(named), tuple(named), f"{_listed(named)} helps, but: {text}.", reasons)
-    return Verdict("unknown", (), (), text + ".", reasons)

@@ -5,12 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 from ..effects import catalogue
+from ..fit.record import KEY, fitted, record
+from ..fit.solved import solved
 from .candidate import Candidate
 from .engine import Diagnosis, Rung
 
 
-def summary(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The verdict, the ladder, the ranking, parameters with units, and what to measure next."""
+def summary(diagnosis: Diagnosis, rig: Any = None) -> dict[str, Any]:
+    """The verdict, the ladder, the ranking, parameters with units, what to measure next, and the last model.
+
+    Args:
+        diagnosis: what was found.
+        rig: ``[rig]`` of the campaign, for the load on a contact.
+    """
     d = diagnosis
     last = next((r for r in reversed(d.ladder) if r.fit is not None), None)
     return {
@@ -28,7 +35,17 @@ def summary(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": next_experiment(d),
         "held_out": {n: [int(k) for k in (~d.train[r]).nonzero()[0]] for r, n in enumerate(d.measurement.names)},
         "dropped": list(d.dropped),
+        **({} if last is None else _model(last, d, rig)),
     }
+
+
+def _model(rung: Rung, d: Diagnosis, rig: Any) -> dict[str, Any]:
+    """The last model, so that it can be made again, and the equations it solves."""
+    assert rung.composition is not None
+    assert rung.fit is not None
+    found = fitted(rung.composition, rung.fit, d.measurement, rig)
+    words = solved(found)
+    return {"equations": [{"text": words.text(), "latex": words.latex()}], KEY: record(found)}
 
 
 def _rung(rung: Rung) -> dict[str, Any]:
@@ -45,7 +62,7 @@ def _rung(rung: Rung) -> dict[str, Any]:
 
 def _order(d: Diagnosis) -> list[Candidate]:
     """Candidates of the first round, the best first; those that were not refitted last."""
-    first = d.rounds[0] if d.rounds else ()
+    first = d.rounds[0].candidates if d.rounds else ()
     return sorted(first, key=lambda c: (c.fit is None, c.fit.cost if c.fit is not None else -c.score))
 
 
@@ -59,14 +76,17 @@ def _ranked(c: Candidate, d: Diagnosis) -> dict[str, Any]:
     }
     if c.fit is None or c.held is None or c.train is None:
         return out
-    base = d.ladder[1].held
-    judged = next((j for j in d.judged[0] if j.candidate is c), None)
+    first = d.rounds[0]
+    base = first.base.held
+    judged = next((j for j in first.judged if j.candidate is c), None)
+    forms = [e for e in first.every if e.tag == c.tag and e.fit is not None]
     out |= {
         "cost": c.fit.cost,
         "train_error": c.train.total,
         "heldout_error": c.held.error,
         "heldout_gain": None if base is None else 1.0 - c.held.score / base.score,
         "failures": [] if judged is None else list(judged.failures),
+        "forms": [{"form": e.form, "cost": e.cost} for e in sorted(forms, key=lambda e: e.cost)],
     }
     if c.amplitude is not None:
         name = c.amplitude.name

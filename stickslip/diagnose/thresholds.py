@@ -23,7 +23,7 @@ class Thresholds:
     """
 
     complete: float = 1.5
-    gain: float = 0.4
+    gain: float = 0.25
     adequate: float = 2.0
     significant: float = 3.0
     rival: float = 1.15

@@ -106,3 +106,48 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
         if all(j.candidate.tag != s.candidate.tag for s in seen):
             seen.append(j)
     return best, seen
+
+
+def finished(named: Sequence[str]) -> Verdict:
+    """The verdict when every phase is at its floor."""
+    if not named:
+        return Verdict("complete", text="Nothing is missing: every phase is described as well as the data allow.")
+    return Verdict(
+        "missing",
+        tuple(named),
+        tuple(named),
+        f"The base model lacks {_listed(named)}. With it every phase is described as well as the data allow.",
+    )
+
+
+def undecided(named: Sequence[str], close: Sequence[Judged]) -> Verdict:
+    """The verdict when several effects describe the data alike."""
+    tags = tuple(j.candidate.tag for j in close)
+    text = f"These data cannot tell {_listed(tags)} apart."
+    if named:
+        text = f"The base model lacks {_listed(named)}, and besides: {text[0].lower()}{text[1:]}"
+    return Verdict("ambiguous", tuple(named), tags, text)
+
+
+def nothing(
+    named: Sequence[str], judged: Sequence[Judged], phase: str, worst: float, limits: Thresholds = THRESHOLDS
+) -> Verdict:
+    """The verdict when something is missing and no candidate passes."""
+    nearest = min(judged, key=lambda j: j.cost, default=None)
+    text = f"Something is missing ({phase} is off by {worst:.1f} floors) and nothing in the catalogue explains it"
+    if nearest is not None:
+        text += f"; nearest is {nearest.candidate.tag}, but {'; '.join(nearest.failures) or 'it does not suffice'}"
+    reasons = nearest.failures if nearest is not None else ()
+    if not named:
+        return Verdict("unknown", (), (), text + ".", reasons)
+    if worst <= limits.adequate:
+        return Verdict(
+            "missing", tuple(named), tuple(named),
+            f"The base model lacks {_listed(named)}. A small misfit remains ({phase}, {worst:.1f} floors) that "
+            "nothing in the catalogue explains.", reasons,
+        )  # fmt: skip
+    return Verdict("unknown", tuple(named), tuple(named), f"{_listed(named)} helps, but: {text}.", reasons)
+
+
+def _listed(tags: Sequence[str]) -> str:
+    return tags[0] if len(tags) == 1 else f"{', '.join(tags[:-1])} and {tags[-1]}"

@@ -91,6 +91,11 @@ def tags() -> list[str]:
     return [*EFFECTS.names(), *_user]
 
 
+def user_modules() -> list[ModuleType]:
+    """The modules of files with effects that were loaded."""
+    return [sys.modules[name] for name in {cls.__module__ for cls in _user.values()} if name in sys.modules]
+
+
 def all() -> dict[str, type[Effect]]:
     """Tag -> class of every effect."""
     return {**dict(EFFECTS), **_user}

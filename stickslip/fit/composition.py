@@ -135,6 +135,12 @@ class Composition:
             self.mass, self.contacts, self.bins, (*self.free, *free), self.fixed, (*self.effects, effect)
         )
 
+    def without(self, tag: str) -> Composition:
+        """The same without an effect and its parameters."""
+        free = tuple(f for f in self.free if not f.name.startswith(f"{tag}."))
+        effects = tuple(e for e in self.effects if e.tag != tag)
+        return Composition(self.mass, self.contacts, self.bins, free, self.fixed, effects)
+
     def key(self) -> tuple[Any, ...]:
         """What decides about a compilation: everything but the numbers of :meth:`given` and the free ones."""
         names = tuple((f.name, f.scale) for f in self.free)

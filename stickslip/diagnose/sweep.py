@@ -1,0 +1,139 @@
+"""All candidates on top of a model, in stages: few steps for all, more for the better half, the end for the best."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from cloudpickle import register_pickle_by_value
+from joblib import Parallel, delayed
+
+from ..effects import catalogue
+from ..effects.base import Effect
+from ..features.measurement import Measurement
+from ..fit.composition import Composition
+from ..fit.inertial import Fit
+from .candidate import MORE, MOST, Candidate, begin, forms_of, refine
+from .pieces import candidate_arrays, candidate_from
+
+HALF = 0.5  # share of the candidates that get more than the first steps
+LEAST = 6  # of them
+NEAR = 1.3  # times the leader's cost: candidates that the data may not tell from it are followed to the end
+LEADERS = 5
+
+
+class Store(Protocol):
+    """Where finished pieces are kept, so that an interrupted diagnosis goes on."""
+
+    def load(self, key: str) -> Mapping[str, np.ndarray] | None:
+        """A finished piece, or None."""
+
+    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
+        """Keep a finished piece."""
+
+
+class Ground(NamedTuple):
+    """What all candidates of a sweep are tried on: the model they are added to, its fit, the measurement, its floors,
+    and the cycles that may be fitted."""
+
+    composition: Composition
+    optimum: Fit
+    data: Measurement
+    floor: np.ndarray
+    train: np.ndarray
+
+
+Job = tuple[Callable[..., Candidate], tuple[Any, ...]]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One round over all candidates.
+
+    Attributes:
+        ground: what they are tried on.
+        jobs: parallel processes.
+        store: keeps finished pieces.
+        name: of this sweep in the store.
+        tell: told the stage and the share of the sweep done.
+    """
+
+    ground: Ground
+    jobs: int
+    store: Store | None
+    name: str
+    tell: Callable[[str, float], None]
+
+    def run(self, tags: Sequence[str]) -> tuple[list[Candidate], list[Candidate]]:
+        """Every tag's candidate in its best form, in the order of ``tags``; and everything that was fitted."""
+        first = self._begin([forms_of(tag)[0] for tag in tags], 0.0, 0.6)
+        order = sorted(first, key=lambda c: c.cost)
+        half = order[: max(LEAST, int(np.ceil(HALF * len(order))))]
+        half += [c for c in order[len(half) :] if c.cost < NEAR * order[0].cost]
+        other = [form for c in half[:LEAST] if c.fit is not None for form in forms_of(c.tag)[1:]]
+        forms = self._begin(other, 0.6, 0.7)
+        more = self._refine([*half, *forms], MORE, "more", 0.7, 0.85)
+        best = min((c.cost for c in more), default=np.inf)
+        near = sorted((c for c in more if c.cost < NEAR * best), key=lambda c: c.cost)[:LEADERS]
+        most = self._refine(near, MOST, "most", 0.85, 1.0)
+        every = {_word(c.effect): c for c in (*first, *forms, *more, *most)}
+        out = {tag: min((c for c in every.values() if c.tag == tag), key=lambda c: c.cost) for tag in tags}
+        return [out[tag] for tag in tags], list(every.values())
+
+    def _begin(self, effects: Sequence[Effect], low: float, high: float) -> list[Candidate]:
+        g = self.ground
+        work = {
+            f"{self.name}-begin-{_word(e)}": (begin, (e, g.composition, g.optimum, g.data, g.floor, g.train))
+            for e in effects
+        }
+        return self._all(work, "first steps", low, high)
+
+    def _refine(self, found: Sequence[Candidate], most: int, stage: str, low: float, high: float) -> list[Candidate]:
+        g = self.ground
+        work = {
+            f"{self.name}-{stage}-{_word(c.effect)}": (refine, (c, g.data, g.floor, g.train, most))
+            for c in found
+            if c.fit is not None
+        }
+        return self._all(work, f"{stage} steps", low, high)
+
+    def _all(self, work: Mapping[str, Job], stage: str, low: float, high: float) -> list[Candidate]:
+        """Do what is not in the store yet."""
+        g = self.ground
+        done: dict[str, Candidate] = {}
+        for key in work:
+            kept = self.store.load(key) if self.store is not None else None
+            if kept is not None:
+                done[key] = candidate_from(kept, g.composition, g.data, g.floor, g.train)
+        for key, candidate in self._results({key: job for key, job in work.items() if key not in done}):
+            done[key] = candidate
+            if self.store is not None:
+                self.store.save(key, candidate_arrays(candidate))
+            self.tell(f"{self.name}, {stage}: {candidate.tag}", low + (high - low) * len(done) / len(work))
+        return [done[key] for key in work]
+
+    def _results(self, work: Mapping[str, Job]) -> Iterable[tuple[str, Candidate]]:
+        if self.jobs == 1 or len(work) < 2:
+            for key, (function, args) in work.items():
+                yield key, function(*args)
+            return
+        for module in catalogue.user_modules():
+            register_pickle_by_value(module)  # a file's module cannot be imported by a worker
+        with warnings.catch_warnings():
+            # a worker whose memory grew with what it compiled is replaced by a new one
+            warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
+            pool = Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1)
+            yield from pool(delayed(_named)(key, job) for key, job in work.items())
+
+
+def _named(key: str, job: Job) -> tuple[str, Candidate]:
+    function, args = job
+    return key, function(*args)
+
+
+def _word(effect: Effect) -> str:
+    """Tag and form, for a file's name."""
+    return "-".join([effect.tag, *(str(v) for v in vars(effect).values() if isinstance(v, str))])
