@@ -19,12 +19,23 @@ sys.path.insert(0, str(ROOT))
 import jax
 import jax.numpy as jnp
 
-from stickslip.contact import reload_displacement
+from stickslip.contact import (
+    flat_punch,
+    indentation,
+    power_law,
+    reload_displacement,
+    rough_table,
+    sphere,
+    static_contact,
+)
+from stickslip.plots.style import logarithmic
 from stickslip.solve import Tolerance, integrate
+from tests.contact import test_indentation, test_tangential
 from tests.solve import books, comparison, convergence, derivatives, ringing, slip_events, static_limit
 from tests.solve.rig import STRENGTH, order, rig, tighter
 
 FOLDER = ROOT / "docs" / "verification"
+MARKS = ("o-", "s--", "^:", "D-.")  # so that a grey print keeps lines apart
 DRAW: dict[str, Callable[[], plt.Figure]] = {}
 
 
@@ -38,6 +49,59 @@ def axes(n: int, **options: float) -> tuple[plt.Figure, list[plt.Axes]]:
     for a in ax[0]:
         a.grid(alpha=0.3)
     return fig, list(ax[0])
+
+
+def tidy(fig: plt.Figure) -> None:
+    """Numbers at 1, 2 and 5 where a logarithmic axis spans less than two decades; matplotlib's would overlap."""
+    for a in fig.axes:
+        for which, (low, high) in (("x", a.get_xlim()), ("y", a.get_ylim())):
+            if getattr(a, f"get_{which}scale")() == "log" and low > 1e-2 and high < 100.0 * low:
+                logarithmic(a, which)
+
+
+@figure
+def contact() -> plt.Figure:
+    fig, (left, middle, right) = axes(3)
+    w, few = np.linspace(0.0, 1.0, 300), np.linspace(0.0, 1.0, 21)
+    length, load, friction = test_tangential.L, 0.31, test_tangential.MU
+    analytic = {
+        "flat punch": (flat_punch(length / 2, 100), 1.0),
+        "sphere (Cattaneo, Mindlin)": (sphere(length, 20_000, 1e-3), 1.5),
+        "cone": (power_law(length / 2, 20_000, 1.0, 0.1), 2.0),
+        "|x|^0.3": (power_law(length / 2, 400_000, 0.3, 1e-6 / (length / 2) ** 0.3), 13.0 / 3.0),
+    }
+    for (name, (profile, p)), mark in zip(analytic.items(), MARKS, strict=True):
+        made = static_contact(indentation(profile), load, friction)
+        left.plot(w, 1.0 - (1.0 - w) ** p, "k", lw=0.8)
+        left.plot(few, np.asarray(made.force(few * made.u_max) / made.strength), mark[0], ms=4, label=name)
+    left.set(xlabel="u / u_max", ylabel="force / full friction", title="Springs; lines: closed forms")
+    left.legend()
+    widths = np.linspace(1.2, 1.25, 11)
+    errors = [np.mean([test_tangential.sphere_error(n, a) for a in widths]) for n in (200, 2000)]
+    print("sphere: largest departure with 200 and 2000 springs", errors, "ratio", errors[0] / errors[1])
+    hursts = np.array([0.1, 0.2, 0.3, 0.5, 0.7, 0.9])
+    for n, lines, mark in ((4096, 100, "o"), (65536, 40, "s")):
+        force, stiffness = np.array([test_indentation.exponents(H, n, lines) for H in hursts]).T
+        print(f"N = {n}: exponents of force {force.round(2)}, of stiffness {stiffness.round(3)}")
+        middle.plot(hursts, force, mark + "-", label=f"force by depth, N = {n}")
+        middle.plot(hursts, stiffness, mark + "--", label=f"stiffness by force, N = {n}")
+    fine = np.linspace(0.15, 0.95, 100)
+    middle.plot(fine, (fine + 1.0) / fine, "k-", lw=0.8, label="(H + 1)/H")
+    middle.plot(fine, 1.0 / (fine + 1.0), "k--", lw=0.8, label="1/(H + 1)")
+    middle.set(xlabel="H", ylabel="exponent", ylim=(0.0, 7.0), title="Rough lines")
+    middle.legend()
+    tau = np.linspace(0.0, 1.0, 101)
+    for H, mark in zip((0.1, 0.5, 0.9), MARKS, strict=False):
+        table = rough_table(H, length, 4096, 100, 0).scaled(2.86e-6)
+        made = static_contact(table, load, friction)
+        u = np.asarray(made.displacement(tau[:, None]).mean(axis=1) / made.u_max.mean())
+        right.plot(u, tau, mark[1:], label=f"H = {H:g}")
+    loads = (0.03, 0.1, 0.31, 1.0)
+    print("w(0.5) by H", {H: test_tangential.mean_w(H, 2.86e-6, 0.31, 0.5) for H in (0.1, 0.5, 0.9)})
+    print("w(0.5) by load", {f: test_tangential.mean_w(0.3, 2.46e-6, f, 0.5, 16384, 400) for f in loads})
+    right.set(xlabel="u / u_max", ylabel="force / full friction", title="Mean of 100 lines, N = 4096")
+    right.legend()
+    return fig
 
 
 @figure
@@ -85,14 +149,15 @@ def slips() -> plt.Figure:
     left.axhline(told.peak * 1e3, color="k", ls="--", lw=0.8)
     left.axvline(told.duration * 1e3, color="k", ls="--", lw=0.8)
     left.set(xlabel="time since onset (ms)", ylabel="velocity (mm/s)", title="A slip; dashed: block on a spring")
-    for c_s in (500.0, 1000.0, 2000.0):
+    left.set_ylim(top=1.1e3 * told.peak)
+    for c_s, mark in zip((500.0, 1000.0, 2000.0), MARKS, strict=False):
         e = slip_events.run(rig(damping=0.5, spring_stiffness=c_s), 9.0 * np.sqrt(1000.0 / c_s) + 3.0).events
         told = slip_events.classical(c_s, 0.5)
         shares = [e.size / told.slip, (e.arrest - e.onset) / told.duration, e.peak / told.peak]
         print(
             f"c_s {c_s:g}: slip, duration, peak over the classical ones (second event)", [float(q[1]) for q in shares]
         )
-        middle.plot(["slip", "duration", "peak velocity"], [q[1] for q in shares], "o-", label=f"$c_s$ = {c_s:g} N/m")
+        middle.plot(["slip", "duration", "peak velocity"], [q[1] for q in shares], mark, label=f"$c_s$ = {c_s:g} N/m")
     middle.axhspan(0.9, 1.1, alpha=0.15, color="k")
     middle.set(ylabel="seen / classical", title="Second event", ylim=(0.8, 1.2))
     middle.legend()
@@ -166,7 +231,7 @@ def brute_force() -> plt.Figure:
     left.legend()
     for number, (t, gap) in enumerate(comparison.creep_gaps(both)):
         print("creep, nm:", np.max(np.abs(gap)) * 1e9)
-        middle.plot(t, gap * 1e9, lw=0.8, label=f"stick phase {number + 1}")
+        middle.plot(t, gap * 1e9, lw=(0.8, 2.2, 0.8)[number % 3], label=f"stick phase {number + 1}")
     middle.set(xlabel="time since its start (s)", ylabel="solver - brute force (nm)", title="Creep up to 1 µm/s")
     middle.legend()
     bins = (64, 128, 256, 512, 1024)
@@ -183,7 +248,7 @@ def brute_force() -> plt.Figure:
             (made.events.onset - both.reference.onset)[0] / period,
         )
     for phase in (0, 1):
-        right.loglog(bins, np.array(worst)[:, phase], "o-", label=f"stick phase {phase + 1}")
+        right.loglog(bins, np.array(worst)[:, phase], MARKS[phase], label=f"stick phase {phase + 1}")
     right.axhline(1.0, color="k", lw=0.8)
     right.set(xlabel="elements of the bank", ylabel="largest difference (nm)", title="Four rough lines")
     right.legend()
@@ -198,10 +263,10 @@ def converge() -> plt.Figure:
     fine = np.array([250, 500, 1000, 2000])
     slip = convergence.slip_errors(fine)
     print("order: oscillator", order(1.0 / steps[1:], errors[1:]), "within a slip", order(1.0 / fine, slip))
-    left.loglog(0.05 / steps, errors, "o-", label="oscillator (share of amplitude)")
-    left.loglog(0.03 / fine, slip / 4e-5, "s-", label="within a slip (share of slip)")
-    left.loglog(0.05 / steps, errors[-1] * (steps[-1] / steps) ** 2.0, "k--", lw=0.8, label="$h^2$")
-    left.set(xlabel="fixed step (s)", ylabel="error")
+    left.loglog(5e4 / steps, errors, "o-", label="oscillator (share of amplitude)")
+    left.loglog(3e4 / fine, slip / 4e-5, "s-", label="within a slip (share of slip)")
+    left.loglog(5e4 / steps, errors[-1] * (steps[-1] / steps) ** 2.0, "k--", lw=0.8, label="$h^2$")
+    left.set(xlabel="fixed step (µs)", ylabel="error", ylim=(2e-8, None))
     left.legend()
     factors = np.array([1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
     exact = convergence.second_event(factor=3000.0)
@@ -210,8 +275,8 @@ def converge() -> plt.Figure:
     exact = convergence.second_event(2048, 30.0)
     by_bins = np.abs(np.array([convergence.second_event(int(n), 30.0) for n in bins]) / exact - 1.0)
     for i, name in enumerate(convergence.QUANTITIES):
-        middle.loglog(factors, by_tolerance[:, i], "o-", label=name)
-        right.loglog(bins, by_bins[:, i], "o-", label=name)
+        middle.loglog(factors, by_tolerance[:, i], MARKS[i], label=name)
+        right.loglog(bins, by_bins[:, i], MARKS[i], label=name)
         print(name, "by tolerance", by_tolerance[:, i], "by elements", by_bins[:, i])
     middle.set(xlabel="default tolerance divided by", ylabel="relative error")
     right.set(xlabel="elements of the bank", ylabel="relative error")
@@ -244,8 +309,8 @@ def energy() -> plt.Figure:
         steps.append(made.trajectory.stats.steps)
     print("energy: tolerance/", factors, "imbalance", worst, "steps", steps, "processor s", np.round(spent, 2))
     s = made.trajectory.steps
-    for name in ("spring_work", "friction_work", "viscous_work", "stored"):
-        left.plot(s.t, getattr(s, name) * 1e6, label=name.replace("_", " "))
+    for name, style in zip(("spring_work", "friction_work", "viscous_work", "stored"), MARKS, strict=True):
+        left.plot(s.t, getattr(s, name) * 1e6, style[1:], label=name.replace("_", " "))
     left.set(xlabel="time (s)", ylabel="energy (µJ)")
     left.legend()
     middle.loglog(steps, worst, "o-")
@@ -279,7 +344,7 @@ def derivative() -> plt.Figure:
     rungs = 10.0 ** -np.arange(2.0, 9.5, 1.0)
     gaps = np.array([np.max(np.abs(derivatives.differences(outcomes, h) - exact) / scale, axis=0) for h in rungs])
     for i, name in enumerate(derivatives.Outcome._fields):
-        left.loglog(rungs, gaps[:, i], "o-", label=name)
+        left.loglog(rungs, gaps[:, i], MARKS[i], label=name)
         print(
             name, "differences against the derivative, by step", dict(zip(rungs, np.round(gaps[:, i], 5), strict=True))
         )
@@ -310,6 +375,7 @@ def main() -> None:
         start = time.process_time()
         print(f"--- {name}")
         fig = DRAW[name]()
+        tidy(fig)
         fig.savefig(FOLDER / f"{name}.png", dpi=110)
         plt.close(fig)
         print(f"    ({time.process_time() - start:.0f} s)", flush=True)

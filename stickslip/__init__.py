@@ -21,6 +21,7 @@ _PUBLIC = {
     "creep_curve": "contact",
     "rough_bank": "contact",
     "power_law_bank": "contact",
+    "load_run": "scenario.fitted",
     "load_campaign": "campaign",
     "load_traces": "campaign",
     "Trace": "trace",

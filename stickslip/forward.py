@@ -38,7 +38,7 @@ class Cycles(NamedTuple):
         stiffness: of the driving spring where this run has another than the rig (N/m), else nan.
         virgin: whether the run starts from a force-free contact at rest.
         run: number of the run.
-        stretch: load point less reading at the first onset (m): where the record does not begin with a virgin contact,
+        stretch: load point less reading at the onsets (m): where the record does not begin with a virgin contact,
             the spring is stretched already, by what is known only from when it slips.
     """
 

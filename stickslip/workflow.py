@@ -99,8 +99,9 @@ def diagnose_campaign(
             progress=progress,
         )
         result: dict[str, Any] = {
+            "kind": "diagnose",
             "title": loaded.title,
-            **summary(found),
+            **summary(found, loaded.rig),
             "inputs": inputs,
             "versions": versions(),
             "seconds": round(time.perf_counter() - began, 1),

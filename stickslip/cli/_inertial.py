@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from ..campaign import Campaign
@@ -15,13 +14,15 @@ from ..diagnose.candidate import forms_of, try_effect
 from ..diagnose.heldout import held_out
 from ..diagnose.static_rung import static_features
 from ..effects import catalogue
-from ..effects.equations import equations
 from ..errors import FitError, InputError, nearest
 from ..features.layout import PHASES
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
-from ..fit.inertial import STAGES, Fit, fit
+from ..fit.inertial import Fit, fit
+from ..fit.multistart import best_of
 from ..fit.problem import Problem
+from ..fit.record import KEY, fitted, record
+from ..fit.solved import solved
 from ..fit.start import base_composition, ring_period
 from ..report import describe_trace, trace_pieces
 from ..report.inertial_result import effective, identifiability, misfit_part, overlay, parameters, residual_arrays
@@ -86,7 +87,7 @@ def fit_inertial(
         "parameters": parameters(composition, optimum),
         "identifiability": identifiability(optimum),
         "effective": effective(optimum, loaded.rig, composition.contacts),
-        "equations": _equations(composition, optimum),
+        **_model(composition, optimum, m, loaded),
         "profiles": profiles,
         "features": {"names": list(m.layout.names), "phases": list(m.layout.phases)},
         "fit": {
@@ -165,7 +166,7 @@ def _climb(
 ) -> tuple[Composition, Fit, list[dict[str, Any]]]:
     """The base model, then one effect after the other."""
     problem = Problem(base, m)
-    optimum = _best_of(problem, floor, train, starts, tell)
+    optimum = best_of(problem, floor, train, starts=starts, progress=tell)
     ladder = [
         _static_step(problem, optimum, floor, train),
         _step(problem, optimum, floor, train, ["static", "inertia"], None),
@@ -182,36 +183,6 @@ def _climb(
     return composition, optimum, ladder
 
 
-def _best_of(problem: Problem, floor: np.ndarray, train: np.ndarray, starts: int, tell: Tell) -> Fit:
-    """The best of several starts: the first from the data, the others spread as the priors allow."""
-    free = problem.composition.free
-    rng = np.random.default_rng(0)
-    first = np.array([f.inward(f.start) for f in free])
-    widths = np.array([min(f.width, 1.0) for f in free])
-    bounds = np.array([f.bounds for f in free])
-    most = float(sum(n for _, n in STAGES) + 2 * len(STAGES))
-    best, failures = None, []
-    for i in range(starts):
-        z = first if i == 0 else np.clip(first + 0.5 * widths * rng.standard_normal(first.size), *bounds.T)
-        done = 0
-
-        def progress(text: str, i: int = i) -> None:
-            nonlocal done
-            done += 1
-            tell(f"start {i + 1} of {starts}, {text}", min((i + done / most) / starts, 0.99))
-
-        try:
-            found = fit(problem, floor, z=z, use=train, progress=progress)
-        except FitError as error:
-            failures.append(error)
-            continue
-        if best is None or found.cost < best.cost:
-            best = found
-    if best is None:
-        raise failures[0]
-    return best
-
-
 def _step(
     problem: Problem, optimum: Fit, floor: np.ndarray, train: np.ndarray, model: list[str], added: str | None
 ) -> dict[str, Any]:
@@ -225,6 +196,7 @@ def _step(
         "train_error": fitted.total,
         "heldout_error": None if held is None else held.error,
         "by_phase": fitted.by_phase,
+        "heldout_by_phase": {} if held is None else held.by_phase,
     }
 
 
@@ -244,15 +216,15 @@ def _static_step(problem: Problem, optimum: Fit, floor: np.ndarray, train: np.nd
         "train_error": errors[0].total,
         "heldout_error": errors[1].total or None,
         "by_phase": errors[0].by_phase,
+        "heldout_by_phase": errors[1].by_phase,
     }
 
 
-def _equations(composition: Composition, optimum: Fit) -> list[dict[str, str]]:
-    """Equations of the fitted model with its values."""
-    nodes = jnp.array([0.0, 1.0])
-    model = composition.model(jnp.asarray(optimum.z), jnp.zeros(2), (nodes, nodes), jnp.array(jnp.nan))
-    found = equations(model.effects, block=model.block, weakening=model.weakening)
-    return [{"text": found.text(), "latex": found.latex()}]
+def _model(composition: Composition, optimum: Fit, m: Measurement, loaded: Campaign) -> dict[str, Any]:
+    """The equations of the fitted model with its values, and all that is needed to make it again."""
+    found = fitted(composition, optimum, m, loaded.rig)
+    words = solved(found)
+    return {"equations": [{"text": words.text(), "latex": words.latex()}], KEY: record(found)}
 
 
 def _profile(name: str, problem: Problem, optimum: Fit, floor: np.ndarray, tell: Callable[..., None]) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def fit(
     add: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     effect: Annotated[tuple[Path, ...], Parameter(negative="")] = (),
     profile: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    starts: int = 1,
+    starts: int = 4,
     align: Literal["consistent", "paper"] = "consistent",
     time: Literal["exact", "paper"] = "exact",
     v_lim: str = "1 um/s",

@@ -29,14 +29,17 @@ def simulate(
     set: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     sweep: str | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,
+    trace: str | None = None,
+    effect: Annotated[tuple[Path, ...], Parameter(negative="")] = (),
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Simulate a scenario: trace, slip events, pictures.
+    """Simulate a scenario, or the model that a fit or a diagnosis found: trace, slip events, pictures.
 
     Parameters
     ----------
     scenario:
-        TOML file that describes the rig and its drive.
+        TOML file that describes the rig and its drive; or the run folder of a fit or a diagnosis, whose model is then
+        driven at the velocity of its first run.
     more:
         Further changes such as contact.H=0.5.
     out:
@@ -47,6 +50,10 @@ def simulate(
         Run a series: --sweep drive.velocity=20um/s:1mm/s:8 (start, stop, number), or values with commas.
     json:
         Print the result as JSON instead of a table.
+    trace:
+        Of a run folder: drive as this measured run was driven, with its holds.
+    effect:
+        A Python file with an effect of your own. Its code is run.
     force:
         Replace an existing run folder.
     """
@@ -54,10 +61,9 @@ def simulate(
     if out is not None:
         refuse_existing(out, force)
     began = time.perf_counter()
-    from ..scenario import load_scenario
     from ..scenario.overrides import parse_sweep
 
-    loaded = load_scenario(path, changes)
+    loaded = _load(path, changes, trace, effect)
     if sweep is not None:
         loaded = loaded.with_changes([("sweep", parse_sweep(sweep))])
     series = loaded.file.sweep
@@ -72,13 +78,33 @@ def simulate(
     return 130 if result.get("interrupted") else 0
 
 
+def _load(path: str, changes: list[str], trace: str | None, files: tuple[Path, ...]) -> Scenario:
+    """A scenario from its file, or the model of a run folder."""
+    if Path(path).is_dir():
+        from ..scenario.fitted import load_run
+
+        return load_run(path, files).scenario(changes, trace)
+    if trace is not None:
+        raise InputError("--trace names a run of a fit or a diagnosis", key="--trace", hint="give a run folder")
+    if files:
+        from ..effects import catalogue
+
+        for file in files:
+            catalogue.load_file(file)
+    from ..scenario import load_scenario
+
+    return load_scenario(path, changes)
+
+
 def scenario_arguments(scenario: str, more: tuple[str, ...], changes: tuple[str, ...]) -> tuple[str, list[str]]:
     """The scenario's path and all changes; both may stand in any order."""
     words = [scenario, *more]
     paths = [word for word in words if "=" not in word or Path(word).is_file()]
     if len(paths) != 1:
         what = "no scenario is given" if not paths else f"more than one scenario is given: {', '.join(paths)}"
-        raise InputError(what, allowed="one TOML file", hint="stickslip simulate SCENARIO --set contact.H=0.5")
+        raise InputError(
+            what, allowed="one TOML file", hint="stickslip simulate SCENARIO --set contact.H=0.5"
+        )
     return paths[0], [*changes, *(word for word in words if word not in paths)]
 
 

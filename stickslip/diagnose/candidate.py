@@ -26,9 +26,8 @@ START = 0.02  # of the amplitude's range; scaled until its effect on the feature
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
 MOST_STARTS = 12
 SHARES = (1.0, 0.4)  # of a linear step that are tried
-FEW = 5  # evaluations at floors as wide as the base's misfit, for all candidates
-SOME = 4  # at the floors themselves, for all candidates
-MORE = 12  # for the better half
+FEW = 9  # evaluations for those that promise something
+MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
 WIDEST = 30.0
 
@@ -42,7 +41,8 @@ class Candidate:
         form: of its law.
         effect: the instance whose free fields the composition overwrites.
         score: share of the base's misfit that the effect explains to first order, everything else refitted.
-        fit: the refit, or None where the effect was dropped before.
+        promise: share of the base's misfit, at floors ``wide`` times as wide, that is gone where a search would start.
+        fit: that start, or the refit; None where the effect was dropped before.
         train: errors on the cycles fitted.
         held: errors on the others.
         note: why it was dropped, if it was.
@@ -52,6 +52,8 @@ class Candidate:
     form: dict[str, str]
     effect: Effect
     score: float
+    promise: float = 0.0
+    wide: float = 1.0
     composition: Composition | None = None
     fit: Fit | None = None
     train: Misfit | None = None
@@ -112,11 +114,12 @@ def try_effect(
         threads: runs integrated at the same time.
         progress: told what goes on.
     """
-    begun = begin(effect, base, optimum, measurement, floor, train, threads=threads, progress=progress)
-    return refine(begun, measurement, floor, train, MOST, threads=threads, progress=progress)
+    found = score(effect, base, optimum, measurement, floor, train, threads=threads, progress=progress)
+    found = refine(found, measurement, floor, train, FEW, threads=threads, progress=progress)
+    return refine(found, measurement, floor, train, MOST, threads=threads, progress=progress)
 
 
-def begin(
+def score(
     effect: Effect,
     base: Composition,
     optimum: Fit,
@@ -127,10 +130,10 @@ def begin(
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Candidate:
-    """Score one effect, find where to start with it, and take the first steps; arguments as :func:`try_effect`."""
+    """Score one effect and find where to start with it; arguments as :func:`try_effect`."""
     form = {k: str(v) for k, v in vars(effect).items() if isinstance(v, str)}
     try:
-        return _begin(effect, form, base, optimum, measurement, floor, train, threads, progress or _silent)
+        return _score(effect, form, base, optimum, measurement, floor, train, threads, progress or _silent)
     except StickslipError as error:
         return Candidate(effect.tag, form, effect, 0.0, note=str(error))
 
@@ -145,17 +148,20 @@ def refine(
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Candidate:
-    """The same candidate after at most so many ``evaluations`` more at the floors themselves."""
+    """The same candidate after at most so many ``evaluations`` more: first at floors as wide as the misfit asks for."""
     if candidate.fit is None or candidate.composition is None:
         return candidate
     problem = Problem(candidate.composition, measurement, threads=threads)
     old = candidate.fit
+    wide = ease(old, measurement, floor)
+    stages = ((wide, evaluations // 2), (1.0, evaluations - evaluations // 2)) if wide > 1.5 else ((1.0, evaluations),)
     try:
-        new = fit(problem, floor, z=old.z, events=old.events, stages=((1.0, evaluations),), use=train)
+        new = fit(problem, floor, z=old.z, events=old.events, stages=stages, use=train)
     except StickslipError as error:
         return replace(candidate, note=str(error))
     (progress or _silent)(f"{candidate.tag}: cost {old.cost:.0f} -> {new.cost:.0f}")
-    return _with_fit(candidate, new if new.cost < old.cost else old, problem, floor, train)
+    better = new if new.cost < old.cost or candidate.note else old
+    return _with_fit(replace(candidate, note=""), better, problem, floor, train)
 
 
 def _silent(text: str) -> None:
@@ -181,7 +187,7 @@ def ease(optimum: Fit, measurement: Measurement, floor: np.ndarray) -> float:
     return float(np.clip(np.quantile(r, 0.9) / 3.0, 1.0, WIDEST))
 
 
-def _begin(effect, form, base, optimum, measurement, floor, train, threads, tell) -> Candidate:
+def _score(effect, form, base, optimum, measurement, floor, train, threads, tell) -> Candidate:
     free = effect_parameters(effect)
     composition = base.with_effect(effect, free)
     problem = Problem(composition, measurement, threads=threads)
@@ -199,18 +205,22 @@ def _begin(effect, form, base, optimum, measurement, floor, train, threads, tell
         residual = (measurement.values - optimum.features) / floor
         hints = periods(effect.periodic[1], measurement, np.nan_to_num(residual), use, bounds)
     search = _Search(problem, optimum, floor, valid, factor, free, k, effect)
-    score = 0.0
+    explained = 0.0
     for values in starts(effect, hints):
         share = search.along(values, linear)
-        score = max(score, share)
+        explained = max(explained, share)
         tell(f"{effect.tag}: start {values}, explains {100 * share:.0f} %")
     if search.best is None:
-        return Candidate(effect.tag, form, effect, score, composition, note="the model could not be evaluated with it")
-    _, z, events = search.best
-    stages = ((factor, FEW), (1.0, SOME)) if factor > 1.5 else ((1.0, FEW + SOME),)
-    found = fit(problem, floor, z=z, events=events, stages=stages, use=train)
-    tell(f"{effect.tag}: cost {optimum.cost:.0f} -> {found.cost:.0f}")
-    return _with_fit(Candidate(effect.tag, form, effect, score, composition), found, problem, floor, train)
+        return Candidate(effect.tag, form, effect, explained, composition=composition, note="cannot be evaluated")
+    cost, z, events, features = search.best
+    promise = 1.0 - cost / search.cost(optimum.z, optimum.events, optimum.features)
+    columns = np.concatenate([optimum.columns, np.zeros((*features.shape, len(free)))], axis=-1)
+    r = np.nan_to_num(((features - measurement.values) / floor)[valid], nan=1e4)
+    begun = Fit(
+        z, events, robust(r), robust(r), features, np.zeros((z.size, z.size)), composition.free, columns, use, 0, 0
+    )
+    candidate = Candidate(effect.tag, form, effect, explained, promise, factor, composition, note="not refitted")
+    return _with_fit(candidate, begun, problem, floor, train)
 
 
 class _Search:
@@ -221,7 +231,7 @@ class _Search:
         self.free, self.k, self.effect = free, k, effect
         self.amplitude = next(i for i, f in enumerate(free) if f.amplitude)
         self.null = free[self.amplitude].inward(specs(effect)[effect.amplitude].null or 0.0)
-        self.best: tuple[float, np.ndarray, np.ndarray] | None = None
+        self.best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def point(self, values: dict[str, float], amplitude: float, base: np.ndarray | None = None) -> np.ndarray:
         """Free parameters with the effect's inner ``values`` and its ``amplitude`` on the search scale."""
@@ -270,14 +280,18 @@ class _Search:
         self._offer(self.point(values, self.null + np.sign(size or 1.0) * 0.1 * abs(known[0][1])), self.optimum.events)
         return step.share
 
-    def _offer(self, z: np.ndarray, events: np.ndarray) -> None:
-        features = self.problem.features(z, events)
+    def cost(self, z: np.ndarray, events: np.ndarray, features: np.ndarray) -> float:
+        """Robust chi-square at the widened floors, with the priors of the base."""
         r = (features - self.problem.measurement.values) / (self.factor * self.floor)
         off = [(v - f.inward(f.prior)) / min(f.width, 1e3) for v, f in zip(z, self.optimum.free, strict=False)]
         at = events[self.valid.any(axis=-1)] / np.array(EVENT_WIDTHS)
-        cost = robust(np.nan_to_num(r[self.valid], nan=1e4)) + float(np.sum(np.square(off)) + np.sum(at**2))
+        return robust(np.nan_to_num(r[self.valid], nan=1e4)) + float(np.sum(np.square(off)) + np.sum(at**2))
+
+    def _offer(self, z: np.ndarray, events: np.ndarray) -> None:
+        features = self.problem.features(z, events)
+        cost = self.cost(z, events, features)
         if self.best is None or cost < self.best[0]:
-            self.best = (cost, z, events)
+            self.best = (cost, z, events, features)
 
 
 def forms_of(tag: str) -> list[Effect]:

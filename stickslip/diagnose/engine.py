@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
 from ..fit.inertial import Fit, fit
+from ..fit.multistart import best_of
 from ..fit.problem import Problem
 from ..fit.start import base_composition, ring_period
 from ..residual import Misfit, floors, misfit
@@ -128,7 +129,7 @@ def diagnose(
 
     base = base_composition(campaign, data)
     tell("fitting the base model", 0.0)
-    base, optimum = _base_fit(base, data, floor, train, store)
+    base, optimum = _base_fit(base, data, floor, train, store, tell)
     rung = _rung(("static", "inertia"), "inertia", base, optimum, data, floor, train)
     stiffness = base.fixed.get("rig.spring_stiffness", optimum.values.get("rig.spring_stiffness", np.nan))
     ladder = [_static(data, floor, train, optimum, float(stiffness)), rung]
@@ -158,7 +159,7 @@ def diagnose(
         ladder[-1] = rung
         assert rung.fit is not None
         assert rung.held is not None
-        judged = [judge(c, rung.fit.cost, rung.held, limits) for c in done[0] if c.fit is not None]
+        judged = [judge(c, rung.fit.cost, rung.held, limits) for c in done[0] if c.fit is not None and not c.note]
         rounds.append(Round(tuple(done[0]), tuple(done[1]), tuple(judged), rung))
         best, close = decide(judged, limits)
         if best is None:
@@ -199,7 +200,7 @@ def _round(
     ground = Ground(rung.composition, rung.fit, data, floor, train)
     name = f"round{number + 1}"
     done = Sweep(ground, jobs, store, name, tell).run(tags)
-    best = min(done[0], key=lambda c: c.cost, default=None)
+    best = min((c for c in done[0] if not c.note), key=lambda c: c.cost, default=None)
     if best is None or best.fit is None:
         return rung, done
     k = len(rung.composition.free)
@@ -259,12 +260,17 @@ def scatter_factor(data: Measurement) -> float:
 
 
 def _base_fit(
-    base: Composition, data: Measurement, floor: np.ndarray, train: np.ndarray, store: Store | None
+    base: Composition,
+    data: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    store: Store | None,
+    tell: Callable[[str, float], None],
 ) -> tuple[Composition, Fit]:
     kept = store.load("base") if store is not None else None
     if kept is not None:
         return base, fit_from(kept)
-    found = fit(Problem(base, data), floor, use=train)
+    found = best_of(Problem(base, data), floor, train, progress=lambda text, share: tell(f"base model, {text}", share))
     if store is not None:
         store.save("base", fit_arrays(found))
     return base, found

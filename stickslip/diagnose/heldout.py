@@ -71,7 +71,7 @@ def _starts(problem: Problem, fit: Fit, floor: np.ndarray, cycles: np.ndarray, m
         if not f.name.startswith(START):
             continue
         r = int(f.name[len(START) :])
-        if fit.use[r].any():
+        if (fit.use[r][:, None] & m.valid[r]).any():
             continue
         ok = m.valid[r] & (cycles[r] & np.asarray(m.cycles.used)[r])[:, None]
         column = np.nan_to_num(fit.columns[r, ..., i] / floor[r])[ok]

@@ -42,8 +42,9 @@ def training_cycles(measurement: Measurement, holdout: Sequence[str] = ()) -> np
         train[middle] = False
     for r in np.flatnonzero(holds).tolist():
         at = np.flatnonzero(m.valid[r][:, m.layout.slices()["hold"]].any(axis=1))
-        cut = (at[0] + at[-1] + 1) // 2 if at.size > 1 else max(int(used[r].sum() * 0.6), 1)
-        train[r, max(cut, 1) :] = False
+        # up to the hold that begins the later half of them
+        cut = int(at[(at.size + 1) // 2]) if at.size > 1 else int(used[r].sum() * 0.6)
+        train[r, max(cut, 3) :] = False
     if (train == used).all():
         for r in range(m.runs):
             n = int(used[r].sum())

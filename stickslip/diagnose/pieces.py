@@ -50,7 +50,8 @@ def fit_from(arrays: Mapping[str, np.ndarray]) -> Fit:
 
 def candidate_arrays(candidate: Candidate) -> dict[str, np.ndarray]:
     """A candidate as named arrays."""
-    head = json.dumps({"tag": candidate.tag, "form": candidate.form, "score": candidate.score, "note": candidate.note})
+    facts = ("tag", "form", "score", "promise", "wide", "note")
+    head = json.dumps({name: getattr(candidate, name) for name in facts})
     return {"head": np.array(head)} | (fit_arrays(candidate.fit) if candidate.fit is not None else {})
 
 
@@ -65,7 +66,7 @@ def candidate_from(
     head = json.loads(str(arrays["head"]))
     effect = catalogue.get(head["tag"])(**head["form"])
     composition = base.with_effect(effect, effect_parameters(effect))
-    candidate = Candidate(head["tag"], head["form"], effect, head["score"], composition, note=head["note"])
+    candidate = Candidate(**head, effect=effect, composition=composition)
     if "z" not in arrays:
         return candidate
     fit = fit_from(arrays)

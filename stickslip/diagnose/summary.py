@@ -63,7 +63,7 @@ def _rung(rung: Rung) -> dict[str, Any]:
 def _order(d: Diagnosis) -> list[Candidate]:
     """Candidates of the first round, the best first; those that were not refitted last."""
     first = d.rounds[0].candidates if d.rounds else ()
-    return sorted(first, key=lambda c: (c.fit is None, c.fit.cost if c.fit is not None else -c.score))
+    return sorted(first, key=lambda c: (bool(c.note), -c.promise if c.note else c.cost))
 
 
 def _ranked(c: Candidate, d: Diagnosis) -> dict[str, Any]:
@@ -71,15 +71,16 @@ def _ranked(c: Candidate, d: Diagnosis) -> dict[str, Any]:
         "effect": c.tag,
         "form": c.form,
         "score": c.score,
-        "refit": c.fit is not None,
+        "promise": c.promise,
+        "refit": c.fit is not None and not c.note,
         "note": c.note,
     }
-    if c.fit is None or c.held is None or c.train is None:
+    if c.fit is None or c.held is None or c.train is None or c.note:
         return out
     first = d.rounds[0]
     base = first.base.held
     judged = next((j for j in first.judged if j.candidate is c), None)
-    forms = [e for e in first.every if e.tag == c.tag and e.fit is not None]
+    forms = [e for e in first.every if e.tag == c.tag and e.fit is not None and not e.note]
     out |= {
         "cost": c.fit.cost,
         "train_error": c.train.total,

@@ -16,11 +16,11 @@ from ..effects.base import Effect
 from ..features.measurement import Measurement
 from ..fit.composition import Composition
 from ..fit.inertial import Fit
-from .candidate import MORE, MOST, Candidate, begin, forms_of, refine
+from .candidate import FEW, MORE, MOST, Candidate, forms_of, refine, score
 from .pieces import candidate_arrays, candidate_from
 
-HALF = 0.5  # share of the candidates that get more than the first steps
-LEAST = 6  # of them
+PROMISING, EXPLAINING = 12, 6  # candidates that are refitted: by the best point seen, and by the linear score
+LEAST = 6  # of those that get more than the first steps
 NEAR = 1.3  # times the leader's cost: candidates that the data may not tell from it are followed to the end
 LEADERS = 5
 
@@ -69,27 +69,28 @@ class Sweep:
 
     def run(self, tags: Sequence[str]) -> tuple[list[Candidate], list[Candidate]]:
         """Every tag's candidate in its best form, in the order of ``tags``; and everything that was fitted."""
-        first = self._begin([forms_of(tag)[0] for tag in tags], 0.0, 0.6)
-        order = sorted(first, key=lambda c: c.cost)
-        half = order[: max(LEAST, int(np.ceil(HALF * len(order))))]
-        half += [c for c in order[len(half) :] if c.cost < NEAR * order[0].cost]
-        other = [form for c in half[:LEAST] if c.fit is not None for form in forms_of(c.tag)[1:]]
-        forms = self._begin(other, 0.6, 0.7)
+        scored = self._score([forms_of(tag)[0] for tag in tags], 0.0, 0.4)
+        promising = sorted(scored, key=lambda c: -c.promise)[:PROMISING]
+        promising += [c for c in sorted(scored, key=lambda c: -c.score)[:EXPLAINING] if c not in promising]
+        few = sorted(self._refine(promising, FEW, "few", 0.4, 0.6), key=lambda c: c.cost)
+        half = few[: max(LEAST, len(few) // 2)]
+        half += [c for c in few[len(half) :] if c.cost < NEAR * few[0].cost]
+        forms = self._score([form for c in half[:LEAST] for form in forms_of(c.tag)[1:]], 0.6, 0.7)
         more = self._refine([*half, *forms], MORE, "more", 0.7, 0.85)
         best = min((c.cost for c in more), default=np.inf)
         near = sorted((c for c in more if c.cost < NEAR * best), key=lambda c: c.cost)[:LEADERS]
         most = self._refine(near, MOST, "most", 0.85, 1.0)
-        every = {_word(c.effect): c for c in (*first, *forms, *more, *most)}
-        out = {tag: min((c for c in every.values() if c.tag == tag), key=lambda c: c.cost) for tag in tags}
+        every = {_word(c.effect): c for c in (*scored, *forms, *few, *more, *most)}
+        out = {tag: min((c for c in every.values() if c.tag == tag), key=_rank) for tag in tags}
         return [out[tag] for tag in tags], list(every.values())
 
-    def _begin(self, effects: Sequence[Effect], low: float, high: float) -> list[Candidate]:
+    def _score(self, effects: Sequence[Effect], low: float, high: float) -> list[Candidate]:
         g = self.ground
         work = {
-            f"{self.name}-begin-{_word(e)}": (begin, (e, g.composition, g.optimum, g.data, g.floor, g.train))
+            f"{self.name}-score-{_word(e)}": (score, (e, g.composition, g.optimum, g.data, g.floor, g.train))
             for e in effects
         }
-        return self._all(work, "first steps", low, high)
+        return self._all(work, "scores", low, high)
 
     def _refine(self, found: Sequence[Candidate], most: int, stage: str, low: float, high: float) -> list[Candidate]:
         g = self.ground
@@ -137,3 +138,8 @@ def _named(key: str, job: Job) -> tuple[str, Candidate]:
 def _word(effect: Effect) -> str:
     """Tag and form, for a file's name."""
     return "-".join([effect.tag, *(str(v) for v in vars(effect).values() if isinstance(v, str))])
+
+
+def _rank(candidate: Candidate) -> tuple[bool, float]:
+    """Refitted ones first, by cost."""
+    return bool(candidate.note), candidate.cost

@@ -141,8 +141,8 @@ def _run(trace: Trace, found: Segmentation, layout: Layout, ring_period: float, 
         start, position = begins[n]
         stop = tops[n][0]
         records.append(_cycle(t, y, start, position, stop, found, n, layout, ring_period, width, noise, count, trace))
-    first = events[0].t_onset
-    stretch = float(np.interp(first, *nodes) - np.interp(first, t, y))
+    onsets = np.array([e.t_onset for e in events[1:] or events])
+    stretch = float(np.median(np.interp(onsets, *nodes) - np.interp(onsets, t, y)))
     return nodes, records, bool(trace.virgin), trace.spring_stiffness, stretch
 
 
@@ -194,6 +194,8 @@ def _cycle(
     short = np.array([start + np.max(SETTLE[:2]) * settling > first])
     if short.any():
         valid[s["ring"]] = False
+    if virgin and not trace.virgin and first - start < 1.6 * settling:
+        valid[:] = False  # the record begins too late to see where this slip started
     valid &= np.isfinite(values)
     sensor = _sensor_noise(values, anchors, layout, noise, count, 1.0 / np.median(np.diff(t)))
     return {

@@ -79,7 +79,7 @@ class Composition:
             nodes: times and positions of the load point.
             stiffness: of the spring where the run has its own, else nan (N/m).
             given: the numbers that are not free; default this composition's own.
-            start: number of the run, whether it starts virgin, and load point less block at its first onset (m);
+            start: number of the run, whether it starts virgin, and load point less block at its onsets (m);
                 default virgin.
         """
         given = self.given() if given is None else given

@@ -126,6 +126,11 @@ def _guess(value: Any) -> float | None:
     return None if found is None else float(found)
 
 
+def _clean(velocity: float) -> float:
+    """Without the rounding errors of a quotient."""
+    return float(f"{velocity:.12g}")
+
+
 def _driven(m: Measurement, r: int) -> Driven:
     used = np.asarray(m.cycles.used[r])
     times, positions = np.asarray(m.cycles.load_times[r]), np.asarray(m.cycles.load_positions[r])
@@ -140,11 +145,11 @@ def _driven(m: Measurement, r: int) -> Driven:
         if pieces and math.isclose(slope, pieces[-1][0], rel_tol=1e-6, abs_tol=1e-15):
             pieces[-1] = (pieces[-1][0], pieces[-1][1] + length)
         else:
-            pieces.append((float(slope), float(length)))
+            pieces.append((_clean(slope), float(length)))
     own = float(np.asarray(m.cycles.stiffness)[r])
     return Driven(
         m.names[r],
-        float(m.velocities[r]),
+        _clean(m.velocities[r]),
         tuple(pieces) if len(pieces) <= MOST_PIECES else (),
         own if math.isfinite(own) else None,
         bool(m.cycles.virgin[r]),

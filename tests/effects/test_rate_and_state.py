@@ -1,5 +1,6 @@
 """Rate-and-state friction against an independent integration (scipy) and the known critical stiffness."""
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -185,7 +186,7 @@ def test_critical_stiffness(law):
         grip = jnp.array([STRENGTH * factor(b, ratio, v_star, phi, v)])
         rest = model.rest(x=-float(grip[0]) / spring, v=v)
         disturbed = (jnp.asarray(phi + 1e-3),)
-        state = type(rest)(rest.x, rest.v, grip, grip, rest.psi, disturbed, rest.work)
+        state = eqx.tree_at(lambda s: (s.force, s.cap, s.memory), rest, (grip, grip, disturbed))
         trajectory, _ = integrate(model, 0.25, state=state, largest_step=2e-4)
         t = np.linspace(0.03, 0.25, 4001)
         swing = trajectory.at(t).v - v

@@ -1,0 +1,48 @@
+"""Sphinx settings: ``make docs``. Pages of the effects are written before the build (see effect_pages.py)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+import stickslip
+
+project = "stickslip"
+author = "the stickslip developers"
+version = release = stickslip.__version__
+copyright = author
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+exclude_patterns = ["_build", "jupyter_execute", "Thumbs.db", ".DS_Store"]
+default_role = "literal"
+html_theme = "furo"
+html_title = "stickslip"
+html_show_sphinx = False
+
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
+myst_heading_anchors = 3
+nb_execution_mode = "force"
+nb_execution_show_tb = True
+nb_execution_timeout = 180
+nb_merge_streams = True
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+autodoc_class_signature = "mixed"
+napoleon_custom_sections = [("Fields", "params_style")]
+napoleon_use_rtype = False
+
+
+def write_effect_pages(app: Any) -> None:
+    """A page for every effect of the catalogue."""
+    import effect_pages
+
+    effect_pages.write_all(HERE / "effects")
+
+
+def setup(app: Any) -> None:
+    app.connect("config-inited", lambda app, config: write_effect_pages(app))

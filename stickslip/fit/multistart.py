@@ -1,0 +1,94 @@
+"""The base model from several starts: one optimum may be a local one, most often in how weakening and healing share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import FitError
+from ..residual import misfit
+from .inertial import STAGES, Fit, fit, robust
+from .parameters import vector
+from .problem import Problem
+
+STARTS = 4
+ENOUGH = 1.2  # floors; a fit with no phase above it needs no other start
+# factors on the distance of weakening and on the time of healing
+PAIRS = ((1.0, 1.0), (1.5, 3.0), (0.4, 1.0), (2.5, 0.5))
+AWAY = 2  # stages at wide floors after which a start that does worse than the best so far is left
+
+
+def best_of(
+    problem: Problem,
+    floor: np.ndarray,
+    use: np.ndarray,
+    *,
+    starts: int = STARTS,
+    progress: Callable[[str, float], None] | None = None,
+) -> Fit:
+    """The best fit from several starts; later ones are taken only while no fit describes every phase.
+
+    Args:
+        problem, floor, use: as for :func:`stickslip.fit.inertial.fit`.
+        starts: most starts: the first from the data, then other shares of weakening and healing, then spread over half
+            the priors' widths.
+        progress: told what goes on and the share of the work done.
+
+    Raises:
+        FitError: the model could not be evaluated at any start.
+    """
+    tell = progress or (lambda text, share: None)
+    most = sum(n for _, n in STAGES)
+    best: Fit | None = None
+    failure: FitError | None = None
+    shown = replace(problem.measurement, valid=problem.measurement.valid & use[..., None])
+    for i, z in enumerate(_starts(problem, starts)):
+        done = 0
+
+        def count(text: str, i: int = i) -> None:
+            nonlocal done
+            done += 1
+            tell(f"start {i + 1} of at most {starts}, {text}", min((i + done / most) / starts, 0.99))
+
+        try:
+            found = fit(problem, floor, z=z, use=use, stages=STAGES[:AWAY], progress=count)
+            wide = STAGES[AWAY - 1][0]
+            if best is not None and _cost(found, problem, floor, wide) > 1.1 * _cost(best, problem, floor, wide):
+                continue
+            found = fit(problem, floor, z=found.z, events=found.events, use=use, stages=STAGES[AWAY:], progress=count)
+        except FitError as error:
+            failure = error
+            continue
+        if best is None or found.cost < best.cost:
+            best = found
+        if max(misfit(shown, best.features, floor).by_phase.values(), default=0.0) <= ENOUGH:
+            break
+    if best is None:
+        raise failure or FitError("the fit was given no start")
+    return best
+
+
+def _cost(found: Fit, problem: Problem, floor: np.ndarray, factor: float) -> float:
+    """Robust chi-square of the data with all floors times ``factor``."""
+    m = problem.measurement
+    r = (found.features - m.values)[m.valid & found.use[..., None]]
+    return robust(np.nan_to_num(r / (factor * floor)[m.valid & found.use[..., None]], nan=1e4))
+
+
+def _starts(problem: Problem, most: int) -> Iterator[np.ndarray]:
+    free = problem.composition.free
+    first = vector(free)
+    bounds = np.array([f.bounds for f in free])
+    names = [f.name for f in free]
+    widths = np.array([min(f.width, 1.0) for f in free])
+    rng = np.random.default_rng(0)
+    for i in range(most):
+        z = first.copy()
+        if i < len(PAIRS) and "weakening.slip_distance" in names:
+            z[names.index("weakening.slip_distance")] += np.log(PAIRS[i][0])
+            z[names.index("weakening.healing_time")] += np.log(PAIRS[i][1])
+        elif i:
+            z = first + 0.5 * widths * rng.standard_normal(first.size)
+        yield np.clip(z, *bounds.T)
