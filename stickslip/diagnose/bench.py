@@ -24,6 +24,7 @@ LEAST_PEAK = 2.0  # times the drive's speed
 PATIENCE = 6.0  # recurrences waited for a slip before the block is said to slide
 HELD_AT = 0.8  # of the stick: where a hold begins
 BACK = 0.8  # of full friction, to which a reversed start pulls the other way
+_PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k"}
 FEATURES = ("recurrence", "size", "peak", "creep", "frequency", "hold")
 
 
@@ -59,7 +60,7 @@ class Experiment:
             return f"add {100 * (self.mass - 1):.0f} % of mass without loading the contacts more"
         if self.reversed:
             return f"start in reverse: pull the other way to {100 * BACK:.0f} % of the slip force, then forward"
-        return f"drive at {conditions.velocity(self) * 1e6:.3g} um/s"
+        return f"drive at {quantity(conditions.velocity(self), 'm/s')}"
 
 
 MENU = (
@@ -151,7 +152,7 @@ def prepared(composition: Composition, z: np.ndarray, conditions: Conditions, ex
     model = composition.model(jnp.asarray(z), jnp.zeros(2), nodes, jnp.asarray(conditions.stiffness))
     if experiment.load != 1.0:
         p = {**composition.fixed, **to_si(composition.free, z)}["contact.p"]
-        stiffer = experiment.load
+        stiffer = experiment.load ** (1.0 - 1.0 / p)
         bank = Bank(model.bank.stiffness * stiffer, model.bank.strength * experiment.load)
         model = eqx.tree_at(lambda m: m.bank, model, bank)
     if experiment.mass != 1.0:
@@ -305,3 +306,11 @@ def _frequency(whole: Trajectory, arrest: float, period: float) -> float:
         return math.nan
     zeros = t[up] - v[up] * (t[up + 1] - t[up]) / (v[up + 1] - v[up])
     return float((zeros.size - 1) / (zeros[-1] - zeros[0]))
+
+
+def quantity(value: float, unit: str) -> str:
+    """``0.0123, "s"`` as ``12 ms``."""
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g} {unit}"
+    power = max(-9, min(3, 3 * math.floor(math.log10(value * 1.005) / 3)))
+    return f"{value / 10.0**power:.3g} {_PREFIXES[power]}{unit}"

@@ -24,6 +24,7 @@ from .bench import (
     estimates,
     outcome,
     prepared,
+    quantity,
     until_slips,
 )
 
@@ -41,7 +42,6 @@ _WORDS = {
     "frequency": ("the ringing after the slip is", "Hz", "higher", "lower"),
     "hold": ("the block's creep in the hold is", "m", "larger", "smaller"),
 }
-_PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k"}
 
 
 class Rival(Protocol):
@@ -243,7 +243,7 @@ def _judged(
         words = "the first slip comes" if experiment.reversed else after
     gap = d.first - d.second
     text = (
-        f"{what}: {words} {_quantity(abs(gap), unit)} {more if gap > 0 else less} with {tags[0]} than with {tags[1]}, "
+        f"{what}: {words} {quantity(abs(gap), unit)} {more if gap > 0 else less} with {tags[0]} than with {tags[1]}, "
         f"{d.floors:.2g} times the scatter"
     )
     return Proposal(experiment.name, d.floors, feature, text, differences)
@@ -298,11 +298,3 @@ def _open(name: str, ran: Sequence[_Ran]) -> float:
     values = [getattr(r.outcome, name) for r in ran if r.outcome is not None]
     rest = [v - values[0] for v in values[1:] if math.isfinite(v)]
     return math.sqrt(sum(v * v for v in rest) / len(rest)) if rest else 0.0
-
-
-def _quantity(value: float, unit: str) -> str:
-    """``0.0123, "s"`` as ``12 ms``."""
-    if value == 0.0 or not math.isfinite(value):
-        return f"{value:g} {unit}"
-    power = max(-9, min(3, 3 * math.floor(math.log10(value * 1.005) / 3)))
-    return f"{value / 10.0**power:.3g} {_PREFIXES[power]}{unit}"

@@ -11,6 +11,8 @@ from ..fit.composition import EVENT_WIDTHS, START
 from ..fit.inertial import HUBER, Fit
 from ..fit.problem import Problem
 
+ITERATIONS = 3
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -34,8 +36,8 @@ def held_out(
 ) -> HeldOut:
     """Evaluate a fit on ``cycles`` (R, n) with its event-wise factors there at their prior mean.
 
-    In each cycle the two factors are then set to their most probable values, to first order. So is the elongation that
-    a run begins with, where no cycle of that run was fitted.
+    In each cycle the two factors are then set to their most probable values, to first order. The elongation that a
+    run begins with is set by its recurrence, where no cycle of that run was fitted.
     """
     m = problem.measurement
     model = problem.features(fit.z, fit.events) if features is None else features
@@ -43,7 +45,7 @@ def held_out(
     widths = np.array(EVENT_WIDTHS)
     phase = m.layout.phase_index()
     cells, scores = [], []
-    model = model + _starts(problem, fit, floor, cycles, model)
+    model = _starts(problem, fit, cycles, model)
     for r, n in np.argwhere(cycles & np.asarray(m.cycles.used)):
         ok = m.valid[r, n]
         res = np.nan_to_num((model[r, n] - m.values[r, n]) / floor[r, n], nan=1e4, posinf=1e4, neginf=-1e4)
@@ -63,23 +65,22 @@ def held_out(
     return HeldOut(float(np.sqrt(score)), score, by_phase, np.array(scores))
 
 
-def _starts(problem: Problem, fit: Fit, floor: np.ndarray, cycles: np.ndarray, model: np.ndarray) -> np.ndarray:
-    """Change of the features by the starts of runs that no fit has seen, shape (R, n, F)."""
+def _starts(problem: Problem, fit: Fit, cycles: np.ndarray, model: np.ndarray) -> np.ndarray:
+    """The features with the starts of runs that no fit has seen set by their recurrence, shape (R, n, F)."""
     m = problem.measurement
-    out = np.zeros_like(model)
+    at = m.layout.slices()["recurrence"].start
     for i, f in enumerate(fit.free):
         if not f.name.startswith(START):
             continue
         r = int(f.name[len(START) :])
         if (fit.use[r][:, None] & m.valid[r]).any():
             continue
-        ok = m.valid[r] & (cycles[r] & np.asarray(m.cycles.used)[r])[:, None]
-        column = np.nan_to_num(fit.columns[r, ..., i] / floor[r])[ok]
-        res = np.nan_to_num((model[r] - m.values[r]) / floor[r])[ok]
-        shift = 0.0
-        for _ in range(8):  # Huber's weights depend on what is left
-            left = np.abs(res + column * shift)
-            weight = np.where(left > HUBER, HUBER / np.maximum(left, HUBER), 1.0)
-            shift = -float(weight * column @ res) / (float(weight * column @ column) + 1.0 / f.width**2)
-        out[r] = np.nan_to_num(fit.columns[r, ..., i]) * shift
-    return out
+        ok = m.valid[r, :, at] & cycles[r] & np.asarray(m.cycles.used)[r] & (np.abs(fit.columns[r, :, at, i]) > 0)
+        if not ok.any():
+            continue
+        z = fit.z.copy()
+        for _ in range(ITERATIONS):
+            late = (m.values[r, ok, at] - model[r, ok, at]) / fit.columns[r, ok, at, i]
+            z[i] = np.clip(z[i] + np.median(late), *f.bounds)
+            model = problem.again(z, fit.events, r, model)
+    return model

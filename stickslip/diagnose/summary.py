@@ -7,8 +7,10 @@ from typing import Any
 from ..effects import catalogue
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
+from .bench import Conditions
 from .candidate import Candidate
-from .engine import Diagnosis, Rung
+from .engine import Diagnosis, Rung, scatter_factor
+from .experiment import TELLING, recommend
 
 
 def summary(diagnosis: Diagnosis, rig: Any = None) -> dict[str, Any]:
@@ -103,14 +105,22 @@ def _parameters(rung: Rung) -> dict[str, Any]:
 
 
 def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
-    """For effects these data cannot tell apart: the experiment the catalogue gives for separating them."""
+    """For effects these data cannot tell apart: the experiment in which their fitted models differ most.
+
+    Where none of the menu tells them apart, what the catalogue knows of the two comes first.
+    """
     if d.verdict.kind != "ambiguous":
         return None
     pair = [t for t in d.verdict.set if t not in d.verdict.effects][:2]
     if len(pair) < 2:
         return None
     a, b = (catalogue.get(t) for t in pair)
-    text = a.confused_with.get(pair[1]) or b.confused_with.get(pair[0])
-    if text is None:
-        text = "add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s, a virgin start"
-    return {"text": text, "separates": pair}
+    known = a.confused_with.get(pair[1]) or b.confused_with.get(pair[0])
+    rivals = [c for t in pair for c in d.rounds[-1].candidates if c.tag == t and c.fit is not None] if d.rounds else []
+    if len(rivals) == 2:
+        found = recommend(rivals[0], rivals[1], Conditions.of(d.measurement), factor=scatter_factor(d.measurement))
+        if found["floors"] < TELLING and known is not None:
+            found["text"] = f"{known} ({found['text']})"
+        return found
+    text = "add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s, a virgin start"
+    return {"text": known or text, "separates": pair}

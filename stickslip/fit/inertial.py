@@ -15,10 +15,10 @@ from .problem import STEP, Problem
 
 HUBER = 3.0
 QUIET = 0.15  # floors; mean change of the features below which derivatives are kept as they are
-TRUST = 0.3  # share of a step's change that Broyden's update may have missed
+TRUST = 0.1  # share of a step's change that Broyden's update may have missed
 MODERATE = 4.0  # floors, rms, by which the step of a difference should move the features
 LEAST, LARGEST = 1e-3, (0.05, 0.5)  # such a step on the search scale; the largest of a logarithm, of another scale
-STAGES = ((30.0, 6), (7.0, 6), (2.5, 6), (1.0, 12))  # factor on the floors, most evaluations at it
+STAGES = ((30.0, 6), (7.0, 8), (2.5, 8), (1.0, 20))  # factor on the floors, most evaluations at it
 
 
 @dataclass(frozen=True)
@@ -226,20 +226,34 @@ def fit(
     if columns is not None:
         res.start(x, columns)
     scale = np.concatenate([[min(f.width, 1.0) for f in res.free], np.tile(res.widths, int(res.used.sum()))])
+    soft = problem.coupled()
+
+    def outward(u: np.ndarray, begun: np.ndarray) -> np.ndarray:
+        x = begun + scale * u
+        if soft is not None:  # the strength goes with the spring's stiffness
+            x[soft[1]] += scale[soft[0]] * u[soft[0]]
+        return np.clip(x, low + 1e-9, high - 1e-9)
+
+    def inward(jac: np.ndarray) -> np.ndarray:
+        out = jac * scale
+        if soft is not None:
+            out[:, soft[0]] += jac[:, soft[1]] * scale[soft[0]]
+        return out
+
     for factor, most in stages:
         # sought as a distance from where the stage begins, in units of the priors: scipy takes the length of the
         # start vector for the radius it trusts, and that of logarithms is far too long
         begun = x
 
         def residual(u: np.ndarray, factor: float = factor, begun: np.ndarray = begun) -> np.ndarray:
-            r = res.residual(begun + scale * u, factor)
+            r = res.residual(outward(u, begun), factor)
             if progress is not None:
                 done = f"evaluation {res.evaluations} ({res.jacobians} Jacobians)"
                 progress(f"floors x{factor:g}, {done}, cost {robust(r):.1f}")
             return r
 
         def jacobian(u: np.ndarray, factor: float = factor, begun: np.ndarray = begun) -> np.ndarray:
-            return res.jacobian(begun + scale * u, factor) * scale
+            return inward(res.jacobian(outward(u, begun), factor))
 
         if not np.all(np.isfinite(residual(np.zeros_like(x)))):
             raise FitError("the model gives no finite features at the start of the fit")
@@ -247,7 +261,7 @@ def fit(
             residual,
             np.zeros_like(x),
             jac=jacobian,
-            bounds=((low - begun) / scale, (high - begun) / scale),
+            bounds=_box(low, high, begun, scale, soft),
             loss="huber",
             f_scale=HUBER,
             max_nfev=most,
@@ -255,13 +269,15 @@ def fit(
             xtol=1e-4,
             gtol=1e-6,
         )
-        x = np.clip(begun + scale * found.x, low + 1e-9, high - 1e-9)
+        x = outward(found.x, begun)
     features = res.evaluate(x)
     data, prior = res.data(x, 1.0), res.priors(x)
     # the scipy Jacobian at the optimum carries Huber's weights already
-    slopes = found.jac / scale
-    hessian = slopes.T @ slopes
-    covariance = np.linalg.pinv(hessian)[: res.k, : res.k]
+    spread = np.linalg.pinv(found.jac.T @ found.jac)[: res.k, : res.k]
+    back = np.diag(scale[: res.k])
+    if soft is not None:
+        back[soft[1], soft[0]] = scale[soft[0]]
+    covariance = back @ spread @ back.T
     return Fit(
         x[: res.k],
         res.events(x),
@@ -275,3 +291,13 @@ def fit(
         res.evaluations,
         res.jacobians,
     )
+
+
+def _box(
+    low: np.ndarray, high: np.ndarray, begun: np.ndarray, scale: np.ndarray, soft: tuple[int, int] | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the search variables; the strength, which moves with the stiffness as well, has none of its own."""
+    box = (low - begun) / scale, (high - begun) / scale
+    if soft is not None:
+        box[0][soft[1]], box[1][soft[1]] = -np.inf, np.inf
+    return box

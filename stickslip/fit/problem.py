@@ -59,6 +59,10 @@ class Problem:
         """Features of the model, shape (R, n, F)."""
         return self._call([(np.asarray(z, float), events)])[0]
 
+    def again(self, z: np.ndarray, events: np.ndarray, run: int, base: np.ndarray) -> np.ndarray:
+        """The features ``base`` with those of one run taken anew, shape (R, n, F)."""
+        return self._call([(np.asarray(z, float), events)], [run], base)[0]
+
     def columns(
         self,
         z: np.ndarray,
@@ -73,19 +77,40 @@ class Problem:
         that would leave the bounds is taken the other way. Where a slip becomes another one within a step (it falls on
         the other side of a hold), nothing is known of the slope and it is set to zero.
         """
+        which = list(which)
+        sizes = np.full(len(which), STEP) if steps is None else np.asarray(steps, float)
+        soft = self.coupled()
+        extra = soft is not None and soft[0] in which and soft[1] not in which
+        if soft is not None and extra:
+            which, sizes = [*which, soft[1]], np.append(sizes, sizes[which.index(soft[0])])
         lanes, taken = [], []
-        for i, size in zip(which, np.full(len(which), STEP) if steps is None else steps, strict=True):
+        for i, size in zip(which, sizes, strict=True):
             _, high = self.composition.free[i].bounds
             step = float(size) if z[i] + size <= high else -float(size)
             moved = np.array(z, float)
             moved[i] += step
+            if soft is not None and i == soft[0]:
+                moved[soft[1]] += step
             lanes.append((moved, events))
             taken.append(step)
         at = self.measurement.layout.slices()["size"]
         found = self._call(lanes, [self._alone(i) for i in which], base)
         out = np.stack([(o - base) / h for o, h in zip(found, taken, strict=True)], axis=-1)
         jump = np.abs(out[:, :, at] * np.array(taken)) > BROKEN * np.abs(base[:, :, at, None])
-        return np.where(jump, 0.0, out)
+        out = np.where(jump, 0.0, out)
+        if soft is not None and soft[0] in which:
+            out[..., which.index(soft[0])] -= out[..., which.index(soft[1])]
+        return out[..., :-1] if extra else out
+
+    def coupled(self) -> tuple[int, int] | None:
+        """Positions of the spring's stiffness and the contact's strength where both are free.
+
+        The recurrence fixes their ratio to a thousandth, so neither can move alone; what both do together is lost in
+        the difference of two derivatives taken apart.
+        """
+        names = [f.name for f in self.composition.free]
+        pair = ("rig.spring_stiffness", "contact.strength")
+        return (names.index(pair[0]), names.index(pair[1])) if set(pair) <= set(names) else None
 
     def event_columns(self, columns: np.ndarray, z: np.ndarray, events: np.ndarray) -> np.ndarray:
         """Derivatives in the two event-wise factors, each in its own cycle, shape (R, n, F, 2).

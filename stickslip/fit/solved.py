@@ -21,7 +21,7 @@ def solved(found: Fitted) -> Equations:
     base = of_model(found.model(constant_drive(1e-4)))
     backbone = [
         Line(
-            "the caps and stiffnesses follow from the virgin curve of the contacts",
+            "caps and stiffnesses follow from the virgin curve, mean over the contacts j (z_j standard normal)",
             r"F(u) = F_s\,\langle 1 - (1 - u/u_j)_+^{p} \rangle_j,\quad u_j = u_{\mathrm{max}} e^{\sigma_u z_j}",
         )
     ]

@@ -103,14 +103,15 @@ def test_ageing_is_told_by_the_longest_hold():
     assert {p.name for p in found} == {e.name for e in MENU}
     best = found[0]
     assert "hold the drive for 100 s" in best.text
-    assert "with contact-ageing than with base" in best.text
     # what a hold of 100 s adds to the strength, 0.01 ln(100/3) of 0.26 N, comes as time on a spring of 1000 N/m
     first, second, _ = best.differences["recurrence"]
     late = 0.01 * np.log1p(100 / 3.0) * 0.26 / 1000.0 / 2e-4
     assert first - second == pytest.approx(late, rel=0.25)
     assert second == pytest.approx(ran(PLAIN)[0].recurrence + 100.0, abs=2e-3)
     turned = propose(model(), ageing(), CONDITIONS, draws=0, menu=HOLDS)[0]
-    assert ("later" in best.text, "larger" in best.text) == ("earlier" in turned.text, "smaller" in turned.text)
+    more, less = {"recurrence": ("later", "earlier"), "size": ("larger", "smaller")}[best.feature]
+    assert f" {more} with contact-ageing than with base" in best.text
+    assert f" {less} with base than with contact-ageing" in turned.text
     assert turned.separation == pytest.approx(best.separation)
 
 

@@ -1,0 +1,84 @@
+"""What a diagnosis proposes to measure next comes from the two fitted models that its data cannot tell apart."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stickslip.diagnose import summary
+from stickslip.diagnose.bench import Conditions
+from stickslip.diagnose.verdict import Verdict
+
+PAIR = ("contact-ageing", "wear")
+
+
+def diagnosis(kind="ambiguous", effects=(), fits=(True, True)):
+    """As much of a diagnosis as the question needs."""
+    candidates = tuple(
+        SimpleNamespace(tag=tag, composition=object(), fit=object() if f else None)
+        for tag, f in zip(PAIR, fits, strict=True)
+    )
+    done = SimpleNamespace(candidates=(*candidates, SimpleNamespace(tag="tilt", composition=None, fit=None)))
+    return SimpleNamespace(verdict=Verdict(kind, effects, (*effects, *PAIR)), rounds=(done,), measurement=object())
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Stands for the simulations; remembers whom it was asked about."""
+    calls = []
+
+    def recommend(first, second, conditions, *, factor):
+        calls.append((first.tag, second.tag, factor))
+        return {"text": "hold the drive", "separates": [first.tag, second.tag], "floors": calls_floors[0], "menu": []}
+
+    calls_floors = [8.0]
+    monkeypatch.setattr(summary, "recommend", recommend)
+    monkeypatch.setattr(summary, "scatter_factor", lambda m: 1.7)
+    monkeypatch.setattr(Conditions, "of", classmethod(lambda cls, m: "conditions"))
+    return calls, calls_floors
+
+
+def test_the_two_best_of_the_set_are_simulated(asked):
+    calls, _ = asked
+    found = summary.next_experiment(diagnosis(effects=("drive-ripple",)))
+    assert calls == [(*PAIR, 1.7)]
+    assert found["text"] == "hold the drive"
+
+
+def test_where_no_experiment_helps_the_catalogue_speaks_first(asked):
+    _, floors = asked
+    floors[0] = 0.5
+    assert summary.next_experiment(diagnosis())["text"] == "go back over the same track after a hold (hold the drive)"
+
+
+def test_a_rival_that_was_not_fitted_leaves_the_catalogue(asked):
+    found = summary.next_experiment(diagnosis(fits=(True, False)))
+    assert found == {"text": "go back over the same track after a hold", "separates": list(PAIR)}
+    assert asked[0] == []
+
+
+@pytest.mark.parametrize("kind", ["complete", "missing", "unknown"])
+def test_only_what_is_ambiguous_needs_one(asked, kind):
+    assert summary.next_experiment(diagnosis(kind)) is None
+
+
+def test_conditions_are_those_of_the_measurement():
+    size = np.zeros((2, 3, 4))
+    size[0, :, 1], size[1, :, 1] = 2e-9, 4e-9
+    size[..., 0] = 3e-5
+    m = SimpleNamespace(
+        layout=SimpleNamespace(slices=lambda: {"recurrence": slice(0, 1), "size": slice(1, 2)}),
+        cycles=SimpleNamespace(
+            used=np.array([[True, True, True], [True, False, False]]), stiffness=np.array([170.0, 170.0])
+        ),
+        anchors=SimpleNamespace(ring_period=np.full((2, 3), 2e-3)),
+        velocities=np.array([2e-4, 5e-5]),
+        sensor=size,
+    )
+    found = Conditions.of(m)
+    assert found.velocities == (5e-5, 2e-4)
+    assert (found.period, found.stiffness, found.noise, found.clock) == pytest.approx((2e-3, 170.0, 2e-9, 3e-5))
+    m.cycles.stiffness = np.array([170.0, np.nan])
+    assert np.isnan(Conditions.of(m).stiffness)
