@@ -13,7 +13,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $(STAMP)
 
 demo: $(STAMP)
-	$(BIN)/stickslip simulate scenarios/grzemba2014.toml --out out/demo --force
+	$(BIN)/stickslip diagnose scenarios/hidden-effect/campaign.toml --out out/demo --force
 
 test: lint types layers
 	$(BIN)/python -m pytest -n $(WORKERS)

@@ -16,7 +16,7 @@ from ..errors import InputError, StickslipError, nearest
 
 # module and function in it -> what it does, in one line
 COMMANDS = {
-    "simulate": "Simulate a scenario: trace, slip events, pictures.",
+    "simulate": "Simulate a scenario, or the model of a run folder: trace, slip events, pictures.",
     "creep": "The static creep curve of a scenario's contacts, without inertia.",
     "new": "Write a commented scenario or campaign file to start from.",
     "inspect": "Traces of a campaign, their events, what was mended or left out, and what they can tell.",

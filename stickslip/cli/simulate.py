@@ -102,9 +102,7 @@ def scenario_arguments(scenario: str, more: tuple[str, ...], changes: tuple[str,
     paths = [word for word in words if "=" not in word or Path(word).is_file()]
     if len(paths) != 1:
         what = "no scenario is given" if not paths else f"more than one scenario is given: {', '.join(paths)}"
-        raise InputError(
-            what, allowed="one TOML file", hint="stickslip simulate SCENARIO --set contact.H=0.5"
-        )
+        raise InputError(what, allowed="one TOML file", hint="stickslip simulate SCENARIO --set contact.H=0.5")
     return paths[0], [*changes, *(word for word in words if word not in paths)]
 
 

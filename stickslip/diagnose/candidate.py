@@ -24,7 +24,7 @@ from .periods import periods
 
 START = 0.02  # of the amplitude's range; scaled until its effect on the features is moderate
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
-MOST_STARTS = 12
+MOST_STARTS = 8
 SHARES = (1.0, 0.4)  # of a linear step that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
@@ -272,12 +272,17 @@ class _Search:
         if phased:
             values = {**values, "phase": float(np.arctan2(step.sizes[1], step.sizes[0]))}
         bounds = np.array([f.bounds for f in self.optimum.free])
+        before = np.inf if self.best is None else self.best[0]
         for share in SHARES:
+            if self.best is not None and self.best[0] < before:
+                break
             moved = np.clip(self.optimum.z + share * np.clip(step.z, -1.0, 1.0), *bounds.T)
             events = self.optimum.events + share * np.clip(step.events, -0.3, 0.3)
             self._offer(self.point(values, self.null + share * size, moved), events)
-        # the least there is: the base with a little of the effect
-        self._offer(self.point(values, self.null + np.sign(size or 1.0) * 0.1 * abs(known[0][1])), self.optimum.events)
+        if not np.isfinite(before):
+            # the least there is: the base with a little of the effect
+            little = self.null + np.sign(size or 1.0) * 0.1 * abs(known[0][1])
+            self._offer(self.point(values, little), self.optimum.events)
         return step.share
 
     def cost(self, z: np.ndarray, events: np.ndarray, features: np.ndarray) -> float:

@@ -13,21 +13,11 @@ from ..errors import StickslipError
 from ..fit.composition import Composition
 from ..fit.inertial import Fit
 from ..residual import Scatter
-from .bench import (
-    BACK,
-    FEATURES,
-    HELD_AT,
-    MENU,
-    Conditions,
-    Experiment,
-    Outcome,
-    estimates,
-    outcome,
-    prepared,
-    quantity,
-    until_slips,
-)
+from .bench import estimates, prepared, until_slips
+from .menu import BACK, MENU, Conditions, Experiment, quantity
+from .outcome import FEATURES, Outcome, floor_of, outcome
 
+HELD_AT = 0.8  # of the stick: where a hold begins
 DRAWS = 4  # of the parameters of each model, for what its fit leaves open
 SLIPS = 3  # of a run: the third is past the start
 SLIDES = "slides"  # why there is no slip to be compared
@@ -231,7 +221,9 @@ def _judged(
         x, y = getattr(a, name), getattr(b, name)
         if not (math.isfinite(x) and math.isfinite(y)):
             continue
-        floor = math.hypot(_floor(name, a, b, experiment, conditions, scatter, factor), *(_open(name, r) for r in ran))
+        floor = math.hypot(
+            floor_of(name, a, b, experiment, conditions, scatter, factor), *(_open(name, r) for r in ran)
+        )
         differences[name] = Difference(x, y, abs(x - y) / floor if floor > 0.0 else math.inf)
     if not differences:
         return Proposal(experiment.name, 0.0, "", f"{what}: nothing can be compared", {})
@@ -266,31 +258,6 @@ def _without(experiment: Experiment, ran: Sequence[list[_Ran]], tags: tuple[str,
         text = f"{text}, though not for all parameters that the fits leave open"
         return Proposal(experiment.name, 1.0, "slips", text, {})
     return Proposal(experiment.name, math.inf, "slips", text, {})
-
-
-def _floor(
-    name: str, a: Outcome, b: Outcome, experiment: Experiment, conditions: Conditions, k: Scatter, factor: float
-) -> float:
-    """Standard deviation of a feature around a perfect model (SI), as of `stickslip.residual.floors`."""
-    size = 0.5 * (abs(getattr(a, name)) + abs(getattr(b, name)))
-    noise = conditions.noise
-    if name == "recurrence":
-        moving = max(size - experiment.hold, 0.0)
-        real, sensor = math.hypot(k.recurrence * moving, k.recurrence_periods * conditions.period), conditions.clock
-    elif name == "size":
-        real, sensor = k.size * size, noise
-    elif name == "peak":
-        # the largest slope of a slip goes as its size over its duration
-        duration = 0.5 * (a.duration + b.duration)
-        real, sensor = math.hypot(k.size, k.times) * size, 2.0 * noise / (0.1 * duration)
-    elif name == "creep":
-        clock = k.creep_clock * 0.5 * (a.approach + b.approach)
-        real, sensor = math.hypot(k.creep * size, k.creep_largest * size, clock, k.resolution), noise
-    elif name == "hold":
-        real, sensor = math.hypot(k.hold * size, k.resolution), noise
-    else:
-        real, sensor = k.frequency * size, 0.0
-    return math.hypot(sensor, factor * real * (k.virgin if experiment.reversed else 1.0))
 
 
 def _open(name: str, ran: Sequence[_Ran]) -> float:

@@ -7,10 +7,10 @@ from typing import Any
 from ..effects import catalogue
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
-from .bench import Conditions
 from .candidate import Candidate
 from .engine import Diagnosis, Rung, scatter_factor
 from .experiment import TELLING, recommend
+from .menu import Conditions
 
 
 def summary(diagnosis: Diagnosis, rig: Any = None) -> dict[str, Any]:

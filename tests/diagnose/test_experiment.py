@@ -10,8 +10,10 @@ import pytest
 
 from stickslip.contact import power_law_bank
 from stickslip.diagnose import experiment as proposals
-from stickslip.diagnose.bench import MENU, Conditions, Experiment, outcome, prepared, until_slips
+from stickslip.diagnose.bench import prepared, until_slips
 from stickslip.diagnose.experiment import TELLING, propose, recommend
+from stickslip.diagnose.menu import MENU, Conditions, Experiment
+from stickslip.diagnose.outcome import outcome
 from stickslip.effects import catalogue
 from stickslip.errors import SolveError
 from stickslip.fit.composition import Composition

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.diagnose import summary
-from stickslip.diagnose.bench import Conditions
+from stickslip.diagnose.menu import Conditions
 from stickslip.diagnose.verdict import Verdict
 
 PAIR = ("contact-ageing", "wear")

@@ -83,7 +83,7 @@ def candidate(tag: str, cost: float, score: float, amplitude_in_sd: float = 30.0
     fit = Fit(z, np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.diag(sd**2), free, np.zeros((*shape, len(z))),
               np.ones((1, 1), bool), 1, 1)  # fmt: skip
     train = Misfit(1.0, {"creep": 1.0}, {})
-    return Candidate(tag, {}, effect, 0.5, None, fit, train, held(score))
+    return Candidate(tag, {}, effect, 0.5, fit=fit, train=train, held=held(score))
 
 
 def test_a_clear_winner_is_named():
@@ -106,7 +106,7 @@ def test_two_that_explain_as_well_are_a_set():
 @pytest.mark.parametrize(
     ("made", "why"),
     [
-        (lambda: candidate("viscous-drag", 700, 0.8), "training cost"),
+        (lambda: candidate("viscous-drag", 1000 * (1 - 0.9 * THRESHOLDS.gain), 0.8), "training cost"),
         (lambda: candidate("viscous-drag", 300, 8.0), "unseen cycles does not fall"),
         (lambda: candidate("viscous-drag", 300, 0.8, amplitude_in_sd=1.0), "not significant"),
         (lambda: candidate("viscous-drag", 300, 0.8, at_bound=True), "border"),

@@ -1,0 +1,121 @@
+"""What the documentation is made of: pages of effects, the tutorial's effect, the paper's rigs. Nothing is built."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from stickslip.effects import catalogue
+from stickslip.effects.plain import plain
+from stickslip.params import specs, variants
+from stickslip.scenario import load_scenario
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+RIGS = sorted((ROOT / "scenarios" / "grzemba2014").glob("*.toml"))
+
+
+@pytest.fixture(scope="module")
+def pages() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("effect_pages", DOCS / "effect_pages.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def written(pages: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder as a build makes it, the pictures left out."""
+    folder = tmp_path_factory.mktemp("effects")
+    draw = pages.draw
+    pages.draw = lambda classes, into: [(into / f"{cls.tag}.png").touch() for cls in classes]
+    try:
+        pages.write_all(folder)
+    finally:
+        pages.draw = draw
+    return folder
+
+
+@pytest.mark.parametrize("tag", catalogue.EFFECTS.names())
+def test_every_effect_has_its_page(written: Path, tag: str) -> None:
+    cls, text = catalogue.get(tag), (written / f"{tag}.md").read_text(encoding="utf-8")
+    assert text.startswith(f"# {tag}\n")
+    assert f"```{{math}}\n{cls.equation}\n```" in text
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    for name, spec in specs(cls).items():
+        (row,) = [r for r in rows if f"| `{name}` |" in r]
+        assert row.count("|") == 8, "a cell too many or too few"
+        assert f"${spec.symbol}$" in row and (spec.unit == "1" or spec.unit in row)
+    for name, choices in variants(cls).items():
+        assert f"`{name}`" in text and all(f"`{choice}`" in text for choice in choices)
+    for other in cls.confused_with:
+        assert f"({other}.md)" in text and (written / f"{other}.md").exists()
+    assert f"({tag}.png)" in text and (written / f"{tag}.png").exists()
+    assert "**Acts on** the" in text or "**Acts on** what" in text
+    assert "## Source" in text
+    assert f"({tag}.md)" in (written / "index.md").read_text(encoding="utf-8")
+
+
+def test_pages_of_effects_that_are_gone_are_removed(pages: ModuleType, written: Path) -> None:
+    stray = written / "no-such-effect.md"
+    stray.write_text("# left over")
+    pages.write_all(written)  # the pictures are up to date: nothing is simulated
+    assert not stray.exists() and (written / "inertia.md").exists()
+
+
+def test_markdown_means_itself(pages: ModuleType) -> None:
+    assert pages.prose("far below v* and ``a_b`` of [x]") == r"far below v\* and `a_b` of \[x\]"
+    assert pages.cell("a | b\n c") == r"a \| b c"
+    assert [pages.number(x) for x in (0.1, 1e-6, -2.5e-7)] == ["0.1", "$10^{-6}$", r"$-2.5\times 10^{-7}$"]
+
+
+def test_every_page_is_in_a_table_of_contents() -> None:
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    listed = [
+        line.strip() for block in re.findall(r"```\{toctree\}(.*?)```", index, re.DOTALL) for line in block.split("\n")
+    ]
+    there = {path.stem for path in DOCS.glob("*.md")} - {"index"}
+    assert there <= set(listed), f"not in docs/index.md: {sorted(there - set(listed))}"
+    missing = [name for name in listed if name and name[0] != ":" and name not in there | {"effects/index"}]
+    assert not missing
+
+
+def test_the_tutorials_effect_is_short_and_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(catalogue, "_user", {})
+    text = (DOCS / "writing-an-effect.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"%%writefile my_effect\.py\n(.*?)```", text, re.DOTALL)
+    assert len(code.strip().splitlines()) < 20
+    path = tmp_path / "my_effect.py"
+    path.write_text(code)
+    (cls,) = catalogue.load_file(path)
+    assert cls.tag == "surface-finish" and plain(cls.equation)
+    assert float(catalogue.make("surface-finish", size=0.05, length="500 um").length) == pytest.approx(5e-4)
+
+
+@pytest.mark.parametrize("path", RIGS, ids=lambda path: path.stem)
+def test_the_papers_rigs_load(path: Path) -> None:
+    scenario = load_scenario(path)
+    contact = scenario.file.contact
+    assert contact.contacts * contact.normal_force * contact.friction_coefficient == pytest.approx(0.2604)
+    assert scenario.file.block.mass == pytest.approx(0.0894)
+    assert scenario.file.drive.velocity == pytest.approx(5e-5)
+
+
+def test_the_papers_page_has_its_numbers() -> None:
+    assert {path.stem for path in RIGS} == {"fig2", "fig4", "fig5", "statistics"}
+    found = json.loads((DOCS / "paper" / "paper.json").read_text())
+    rows = found["statistics"]["table"]
+    assert all(row["processes"] == 27 for row in rows)
+    states = {(row["contacts"], row["state"], row["procedure"]) for row in rows}
+    assert len(states) == len(rows) == 20
+    text = (DOCS / "paper.md").read_text(encoding="utf-8")
+    for picture in re.findall(r"\]\((paper/\w+\.png)\)", text):
+        assert (DOCS / picture).exists()
