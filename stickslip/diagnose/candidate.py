@@ -24,7 +24,8 @@ from .periods import periods
 
 START = 0.02  # of the amplitude's range; scaled until its effect on the features is moderate
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
-MOST_STARTS = 8
+MOST_STARTS = 12
+OTHERS = 2  # further starts that a leader is fitted from
 SHARES = (1.0, 0.4)  # of a linear step that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
@@ -46,6 +47,7 @@ class Candidate:
         train: errors on the cycles fitted.
         held: errors on the others.
         note: why it was dropped, if it was.
+        others: further places to start from, each free parameters and event-wise factors.
     """
 
     tag: str
@@ -59,6 +61,7 @@ class Candidate:
     train: Misfit | None = None
     held: HeldOut | None = None
     note: str = ""
+    others: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     @property
     def amplitude(self) -> Free | None:
@@ -90,7 +93,11 @@ def starts(effect: Effect, found: list[float] | None = None) -> list[dict[str, f
             at = [1.0 / p if name == "frequency" else p for p in found]
             inner[name] = tuple(v for v in (*at, *inner.get(name, ())) if low < v < high)
     grid = [dict(zip(inner, values, strict=True)) for values in product(*inner.values())]
-    return grid[:: int(np.ceil(len(grid) / MOST_STARTS))]
+    if len(grid) <= MOST_STARTS:
+        return grid
+    # spread over all parameters: an even stride would leave one of them at one value
+    chosen = np.random.default_rng(len(grid)).choice(len(grid), MOST_STARTS, replace=False)
+    return [grid[i] for i in sorted(chosen.tolist())]
 
 
 def try_effect(
@@ -116,7 +123,7 @@ def try_effect(
     """
     found = score(effect, base, optimum, measurement, floor, train, threads=threads, progress=progress)
     found = refine(found, measurement, floor, train, FEW, threads=threads, progress=progress)
-    return refine(found, measurement, floor, train, MOST, threads=threads, progress=progress)
+    return settle(found, measurement, floor, train, threads=threads, progress=progress)
 
 
 def score(
@@ -162,6 +169,31 @@ def refine(
     (progress or _silent)(f"{candidate.tag}: cost {old.cost:.0f} -> {new.cost:.0f}")
     better = new if new.cost < old.cost or candidate.note else old
     return _with_fit(replace(candidate, note=""), better, problem, floor, train)
+
+
+def settle(
+    candidate: Candidate,
+    measurement: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    *,
+    threads: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Candidate:
+    """The same candidate refined to the end, from where it is and from its other starts; the best of them."""
+
+    def go(candidate: Candidate, most: int) -> Candidate:
+        return refine(candidate, measurement, floor, train, most, threads=threads, progress=progress)
+
+    best = go(candidate, MOST)
+    if best.fit is None:
+        return best
+    for z, events in candidate.others:
+        begun = replace(candidate, fit=replace(best.fit, z=z, events=events), note="not refitted")
+        other = go(begun, FEW + MORE)
+        if other.cost < best.cost:
+            best = other
+    return best
 
 
 def _silent(text: str) -> None:
@@ -213,13 +245,16 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
     if search.best is None:
         return Candidate(effect.tag, form, effect, explained, composition=composition, note="cannot be evaluated")
     cost, z, events, features = search.best
+    others = tuple((o[1], o[2]) for o in sorted(search.each, key=lambda o: o[0])[1 : 1 + OTHERS])
     promise = 1.0 - cost / search.cost(optimum.z, optimum.events, optimum.features)
     columns = np.concatenate([optimum.columns, np.zeros((*features.shape, len(free)))], axis=-1)
     r = np.nan_to_num(((features - measurement.values) / floor)[valid], nan=1e4)
     begun = Fit(
         z, events, robust(r), robust(r), features, np.zeros((z.size, z.size)), composition.free, columns, use, 0, 0
     )
-    candidate = Candidate(effect.tag, form, effect, explained, promise, factor, composition, note="not refitted")
+    candidate = Candidate(
+        effect.tag, form, effect, explained, promise, factor, composition, note="not refitted", others=others
+    )
     return _with_fit(candidate, begun, problem, floor, train)
 
 
@@ -232,6 +267,7 @@ class _Search:
         self.amplitude = next(i for i, f in enumerate(free) if f.amplitude)
         self.null = free[self.amplitude].inward(specs(effect)[effect.amplitude].null or 0.0)
         self.best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.each: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []  # the best from every start
 
     def point(self, values: dict[str, float], amplitude: float, base: np.ndarray | None = None) -> np.ndarray:
         """Free parameters with the effect's inner ``values`` and its ``amplitude`` on the search scale."""
@@ -272,17 +308,19 @@ class _Search:
         if phased:
             values = {**values, "phase": float(np.arctan2(step.sizes[1], step.sizes[0]))}
         bounds = np.array([f.bounds for f in self.optimum.free])
-        before = np.inf if self.best is None else self.best[0]
+        first = self.best is None
+        offers = []
         for share in SHARES:
-            if self.best is not None and self.best[0] < before:
-                break
             moved = np.clip(self.optimum.z + share * np.clip(step.z, -1.0, 1.0), *bounds.T)
             events = self.optimum.events + share * np.clip(step.events, -0.3, 0.3)
-            self._offer(self.point(values, self.null + share * size, moved), events)
-        if not np.isfinite(before):
+            offers.append(self._offer(self.point(values, self.null + share * size, moved), events))
+            if not first and self.best is not None and offers[-1][0] <= self.best[0]:
+                break
+        if first:
             # the least there is: the base with a little of the effect
             little = self.null + np.sign(size or 1.0) * 0.1 * abs(known[0][1])
-            self._offer(self.point(values, little), self.optimum.events)
+            offers.append(self._offer(self.point(values, little), self.optimum.events))
+        self.each.append(min(offers, key=lambda o: o[0]))
         return step.share
 
     def cost(self, z: np.ndarray, events: np.ndarray, features: np.ndarray) -> float:
@@ -292,11 +330,12 @@ class _Search:
         at = events[self.valid.any(axis=-1)] / np.array(EVENT_WIDTHS)
         return robust(np.nan_to_num(r[self.valid], nan=1e4)) + float(np.sum(np.square(off)) + np.sum(at**2))
 
-    def _offer(self, z: np.ndarray, events: np.ndarray) -> None:
+    def _offer(self, z: np.ndarray, events: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         features = self.problem.features(z, events)
-        cost = self.cost(z, events, features)
-        if self.best is None or cost < self.best[0]:
-            self.best = (cost, z, events, features)
+        offer = self.cost(z, events, features), z, events, features
+        if self.best is None or offer[0] < self.best[0]:
+            self.best = offer
+        return offer
 
 
 def forms_of(tag: str) -> list[Effect]:

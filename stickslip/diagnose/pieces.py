@@ -52,7 +52,8 @@ def candidate_arrays(candidate: Candidate) -> dict[str, np.ndarray]:
     """A candidate as named arrays."""
     facts = ("tag", "form", "score", "promise", "wide", "note")
     head = json.dumps({name: getattr(candidate, name) for name in facts})
-    return {"head": np.array(head)} | (fit_arrays(candidate.fit) if candidate.fit is not None else {})
+    others = {name: np.array([o[i] for o in candidate.others]) for i, name in enumerate(("others_z", "others_events"))}
+    return {"head": np.array(head)} | others | (fit_arrays(candidate.fit) if candidate.fit is not None else {})
 
 
 def candidate_from(
@@ -66,7 +67,8 @@ def candidate_from(
     head = json.loads(str(arrays["head"]))
     effect = catalogue.get(head["tag"])(**head["form"])
     composition = base.with_effect(effect, effect_parameters(effect))
-    candidate = Candidate(**head, effect=effect, composition=composition)
+    others = tuple(zip(arrays["others_z"], arrays["others_events"], strict=True))
+    candidate = Candidate(**head, effect=effect, composition=composition, others=others)
     if "z" not in arrays:
         return candidate
     fit = fit_from(arrays)

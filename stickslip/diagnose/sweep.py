@@ -16,7 +16,7 @@ from ..effects.base import Effect
 from ..features.measurement import Measurement
 from ..fit.composition import Composition
 from ..fit.inertial import Fit
-from .candidate import FEW, MORE, MOST, Candidate, forms_of, refine, score
+from .candidate import FEW, MORE, Candidate, forms_of, refine, score, settle
 from .pieces import candidate_arrays, candidate_from
 
 PROMISING, EXPLAINING = 12, 6  # candidates that are refitted: by the best point seen, and by the linear score
@@ -79,7 +79,7 @@ class Sweep:
         more = self._refine([*half, *forms], MORE, "more", 0.7, 0.85)
         best = min((c.cost for c in more), default=np.inf)
         near = sorted((c for c in more if c.cost < NEAR * best), key=lambda c: c.cost)[:LEADERS]
-        most = self._refine(near, MOST, "most", 0.85, 1.0)
+        most = self._settle(near, 0.85, 1.0)
         every = {_word(c.effect): c for c in (*scored, *forms, *few, *more, *most)}
         out = {tag: min((c for c in every.values() if c.tag == tag), key=_rank) for tag in tags}
         return [out[tag] for tag in tags], list(every.values())
@@ -100,6 +100,11 @@ class Sweep:
             if c.fit is not None
         }
         return self._all(work, f"{stage} steps", low, high)
+
+    def _settle(self, found: Sequence[Candidate], low: float, high: float) -> list[Candidate]:
+        g = self.ground
+        work = {f"{self.name}-settle-{_word(c.effect)}": (settle, (c, g.data, g.floor, g.train)) for c in found}
+        return self._all(work, "to the end", low, high)
 
     def _all(self, work: Mapping[str, Job], stage: str, low: float, high: float) -> list[Candidate]:
         """Do what is not in the store yet."""

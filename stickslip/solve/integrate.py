@@ -150,7 +150,7 @@ def integrate(
             state = jax.tree.map(lambda a: a[0], last)
             n = int(stats["num_accepted_steps"])
             accepted, rejected = accepted + n, rejected + int(stats["num_rejected_steps"])
-            piece = jax.tree.map(lambda a, n=n: np.asarray(a[:n]), steps)
+            piece = jax.tree.map(lambda a, n=n: np.asarray(a)[:n], steps)
             if n:
                 pieces.append(piece)
             reached = float(piece.t[-1]) if n else now
