@@ -62,13 +62,44 @@ def floors(measurement: Measurement, scatter: Scatter | None = None, factor: flo
     largest = np.max(np.abs(creep), axis=-1, keepdims=True)
     real[..., s["creep"]] = _root_sum(k.creep * creep, k.creep_largest * largest, k.creep_clock * slope, k.resolution)
     real[..., s["settle"]] = _root_sum(k.creep * v[..., s["settle"]], k.creep_largest * largest, k.resolution)
-    real[..., s["hold"]] = np.hypot(k.hold * v[..., s["hold"]], k.resolution)
+    real[..., s["hold"]] = _root_sum(k.hold * v[..., s["hold"]], k.creep_largest * largest, k.resolution)
     real[:, 0] *= k.virgin
     return np.hypot(m.sensor, factor * real)
 
 
 def _root_sum(*parts: np.ndarray | float) -> np.ndarray:
     return np.sqrt(sum(np.square(p) for p in parts))
+
+
+def scatter_factor(measurement: Measurement) -> float:
+    """How much the contact varies from event to event, in units of the floors' own share: 1 (same lines) to 2 (new).
+
+    Taken from the slip size, which neither drive nor sensor can scatter much.
+    """
+    s = measurement.layout.slices()["size"]
+    used = np.asarray(measurement.cycles.used)
+    ratios = []
+    for r in range(measurement.runs):
+        sizes = measurement.values[r][used[r]][1:, s].ravel()
+        holds = measurement.valid[r][used[r]][1:, measurement.layout.slices()["hold"]].any(axis=1)
+        sizes = sizes[~holds]
+        if sizes.size >= 4:
+            trend = np.polynomial.polynomial.polyfit(np.arange(sizes.size), sizes, 1)
+            rest = sizes - np.polynomial.polynomial.polyval(np.arange(sizes.size), trend)
+            ratios.append(np.std(rest, ddof=2) / np.mean(sizes))
+    if not ratios:
+        return 1.5
+    return float(np.clip(np.median(ratios) / 0.0015, 1.0, 2.0))
+
+
+def shared_cycles(measurement: Measurement) -> float:
+    """How many cycles have the same lines and so the same realisation of what no model of few parameters describes.
+
+    Their average knows no more of it than one of them. All cycles where the lines are the same at every event
+    (:func:`scatter_factor` 1), one where they are new (2).
+    """
+    n = float(np.sum(np.asarray(measurement.cycles.used)))
+    return 1.0 + (n - 1.0) * float(np.clip(2.0 - scatter_factor(measurement), 0.0, 1.0))
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ..fit.inertial import Fit, fit
 from ..fit.multistart import best_of
 from ..fit.problem import Problem
 from ..fit.start import base_composition, ring_period
-from ..residual import Misfit, floors, misfit
+from ..residual import Misfit, floors, misfit, scatter_factor
 from ..segment import Segmentation, segment
 from ..trace import Trace
 from .candidate import MORE, MOST, Candidate
@@ -236,27 +236,6 @@ def _without(
         if found.cost < limits.rival * top.fit.cost and is_complete(rung.train, rung.held, limits):
             return [*ladder[:2], rung], left
     return ladder, named
-
-
-def scatter_factor(data: Measurement) -> float:
-    """How much the contact varies from event to event, in units of the floors' own share: 1 (same lines) to 2 (new).
-
-    Taken from the slip size, which neither drive nor sensor can scatter much.
-    """
-    s = data.layout.slices()["size"]
-    used = np.asarray(data.cycles.used)
-    ratios = []
-    for r in range(data.runs):
-        sizes = data.values[r][used[r]][1:, s].ravel()
-        holds = data.valid[r][used[r]][1:, data.layout.slices()["hold"]].any(axis=1)
-        sizes = sizes[~holds]
-        if sizes.size >= 4:
-            trend = np.polynomial.polynomial.polyfit(np.arange(sizes.size), sizes, 1)
-            rest = sizes - np.polynomial.polynomial.polyval(np.arange(sizes.size), trend)
-            ratios.append(np.std(rest, ddof=2) / np.mean(sizes))
-    if not ratios:
-        return 1.5
-    return float(np.clip(np.median(ratios) / 0.0015, 1.0, 2.0))
 
 
 def _base_fit(

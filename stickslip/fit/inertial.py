@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..errors import FitError
+from ..residual import shared_cycles
 from .composition import EVENT_WIDTHS
 from .parameters import Free, to_si, vector
 from .problem import STEP, Problem
@@ -175,6 +176,16 @@ class _Residuals:
         event_prior = np.hstack([np.zeros((event.shape[1], self.k)), np.diag(np.tile(1.0 / self.widths, len(cells)))])
         return np.clip(np.vstack([np.hstack([dz, event]), prior, event_prior]), -1e7, 1e7)
 
+    def information(self, x: np.ndarray, shared: float) -> np.ndarray:
+        """The Jacobian whitened for the covariance: Huber's weights, and scatter that ``shared`` cycles have alike."""
+        jac = self.jacobian(x, 1.0)
+        sensor = self.problem.measurement.sensor
+        real = np.maximum(self.floor**2 - sensor**2, 0.0)
+        r = np.abs(self.data(x, 1.0))
+        weight = (self.floor / np.sqrt(sensor**2 + shared * real))[self.valid]
+        jac[: r.size] *= (weight * np.where(r > HUBER, np.sqrt(HUBER / np.maximum(r, HUBER)), 1.0))[:, None]
+        return jac
+
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low, high = zip(*(f.bounds for f in self.free), strict=True)
         n = 2 * int(self.used.sum())
@@ -272,8 +283,8 @@ def fit(
         x = outward(found.x, begun)
     features = res.evaluate(x)
     data, prior = res.data(x, 1.0), res.priors(x)
-    # the scipy Jacobian at the optimum carries Huber's weights already
-    spread = np.linalg.pinv(found.jac.T @ found.jac)[: res.k, : res.k]
+    slopes = inward(res.information(x, shared_cycles(problem.measurement)))
+    spread = np.linalg.pinv(slopes.T @ slopes)[: res.k, : res.k]
     back = np.diag(scale[: res.k])
     if soft is not None:
         back[soft[1], soft[0]] = scale[soft[0]]
