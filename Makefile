@@ -33,6 +33,7 @@ layers: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/python -m tests.benchmark
+	$(BIN)/python -m tests.benchmark.fit_peers
 
 test-newest:
 	$(PYTHON) -m venv .venv-newest

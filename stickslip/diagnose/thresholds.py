@@ -5,7 +5,8 @@ Set on simulated development campaigns (see docs/diagnosis); not to be changed f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -13,7 +14,8 @@ class Thresholds:
     """When is nothing missing, and when is an effect named.
 
     Attributes:
-        complete: largest error of any phase (floors), training and held-out, at which the model is complete.
+        complete: phase -> largest error (floors), training and held-out, at which the model is complete. Set to what
+            nearly all of the development campaigns without a missing effect stay below (docs/diagnosis).
         gain: an effect must take off at least this share of the training cost, and of the held-out score.
         adequate: largest error of any phase (floors) with the named effect; above it something else is missing.
         significant: least amplitude over its standard deviation.
@@ -22,7 +24,9 @@ class Thresholds:
         standard_errors: least gain on held-out cycles over its standard error.
     """
 
-    complete: float = 1.5
+    complete: Mapping[str, float] = field(
+        default_factory=lambda: {"creep": 1.1, "slip": 1.1, "ring-down": 1.5, "recurrence": 1.2, "hold": 1.3}
+    )
     gain: float = 0.25
     adequate: float = 2.0
     significant: float = 3.0

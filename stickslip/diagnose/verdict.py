@@ -32,20 +32,26 @@ class Verdict:
     reasons: tuple[str, ...] = field(default=())
 
 
+def errors(train: Misfit, held: HeldOut | None) -> dict[str, float]:
+    """Phase -> the larger of its errors on fitted and unseen cycles (floors)."""
+    found = dict(train.by_phase)
+    for phase, error in (held.by_phase if held is not None else {}).items():
+        found[phase] = max(found.get(phase, 0.0), error)
+    return found
+
+
 def worst_phase(train: Misfit, held: HeldOut | None) -> tuple[str, float]:
     """The phase with the largest error, training or held out."""
-    errors = dict(train.by_phase)
-    for phase, error in (held.by_phase if held is not None else {}).items():
-        errors[phase] = max(errors.get(phase, 0.0), error)
-    if not errors:
+    found = errors(train, held)
+    if not found:
         return "", 0.0
-    name = max(errors, key=lambda k: errors[k])
-    return name, errors[name]
+    name = max(found, key=lambda k: found[k])
+    return name, found[name]
 
 
 def is_complete(train: Misfit, held: HeldOut | None, limits: Thresholds = THRESHOLDS) -> bool:
     """Whether every phase is at its floor, also where no fit has looked."""
-    return worst_phase(train, held)[1] <= limits.complete
+    return all(error <= limits.complete[phase] for phase, error in errors(train, held).items())
 
 
 @dataclass(frozen=True)

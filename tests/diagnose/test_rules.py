@@ -121,10 +121,13 @@ def test_every_condition_can_refuse_a_name(made, why):
 
 def test_complete_means_every_phase_also_where_no_fit_looked():
     good = Misfit(0.9, {"creep": 0.8, "slip": 1.0}, {})
-    assert is_complete(good, HeldOut(1.0, 1.0, {"creep": 1.2}, np.array([1.0])))
-    bad = HeldOut(2.0, 4.0, {"creep": THRESHOLDS.complete + 0.1}, np.array([4.0]))
+    limit = THRESHOLDS.complete
+    assert is_complete(good, HeldOut(1.0, 1.0, {"creep": limit["creep"]}, np.array([1.0])))
+    bad = HeldOut(2.0, 4.0, {"creep": limit["creep"] + 0.1}, np.array([4.0]))
     assert not is_complete(good, bad)
-    assert not is_complete(replace(good, by_phase={"slip": THRESHOLDS.complete + 0.1}), held(1.0))
+    for phase in limit:
+        assert is_complete(replace(good, by_phase={phase: limit[phase]}), held(1.0))
+        assert not is_complete(replace(good, by_phase={phase: limit[phase] + 0.1}), held(1.0))
 
 
 def test_a_fit_survives_being_kept():
