@@ -25,7 +25,7 @@ _PUBLIC = {
     "load_campaign": "campaign",
     "load_traces": "campaign",
     "Trace": "trace",
-    "segment": "segment",
+    "find_events": "segment:segment",
     "Model": "model",
     "Block": "model",
     "Weakening": "model",

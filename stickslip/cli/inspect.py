@@ -137,7 +137,9 @@ def _print(result: dict[str, Any], out: Path | None) -> None:
     from rich.text import Text
 
     console = Console(highlight=False, width=None if sys.stdout.isatty() else 118)
-    console.print(Text(f"{result['title']}: {len(result['traces'])} traces"), style="bold")
+    console.print(
+        Text(f"{result['title']}: {len(result['traces'])} trace{'s' * (len(result['traces']) != 1)}"), style="bold"
+    )
     table = Table(box=box.SIMPLE_HEAD)
     for name in ("trace", "signal", "drive", "length", "sampling", "motion"):
         table.add_column(name, overflow="fold")

@@ -13,6 +13,9 @@ from ..plots.style import DARK, LIGHT, MIDDLE, figure, remark, scaled, styled
 if TYPE_CHECKING:
     import xarray
 
+HIDDEN = 0.1  # share of the way below which the distance to the load point is drawn in place of both
+CROWD = 40  # slips beyond which marks would cover the trace
+
 
 def plain(text: object, most: int = 120) -> str:
     """Text from a file as matplotlib shows it literally, without its formula signs."""
@@ -44,27 +47,32 @@ def _unit(data: xarray.Dataset, name: str) -> str:
 
 
 def _whole(axes: Axes, data: xarray.Dataset, key: str) -> None:
+    """Position and load point against time; their distance where the way is so long that they could not be told apart."""
     t, y = series(data, f"{key}_whole", "time"), series(data, f"{key}_whole", "position")
     axes.set_title("whole trace")
     if t is None or y is None:
         remark(axes, "no samples")
         return
-    k, unit = scaled(y - y[0], _unit(data, f"{key}_whole_position"))
+    unit, label = _unit(data, f"{key}_whole_position"), "position"
     drive = series(data, f"{key}_whole", "drive")
+    model, at = (series(data, f"{key}_model", name) for name in ("position", "time"))
+    if drive is not None and unit == "m" and np.ptp(drive - y) < HIDDEN * np.ptp(y):
+        model = None if model is None or at is None else np.interp(at, t, drive) - model
+        y, drive, label = drive - y, None, "load point less position"
+    zero = float(y[0] if label == "position" else y.min())
+    k, unit = scaled(y - zero, unit)
     if drive is not None:
-        axes.plot(t, (drive - y[0]) * k, color=MIDDLE, ls="--", lw=1.0, label="load point")
-    axes.plot(t, (y - y[0]) * k, color=DARK, lw=1.0, label="measured")
-    model = series(data, f"{key}_model", "position")
-    if model is not None:
-        at = series(data, f"{key}_model", "time")
-        assert at is not None
-        axes.plot(at, (model - y[0]) * k, color=MIDDLE, lw=1.0, ls=":", label="model")
+        axes.plot(t, (drive - zero) * k, color=MIDDLE, ls="--", lw=1.0, label="load point")
     onset = series(data, f"{key}_event", "onset")
-    if onset is not None:
-        at = np.interp(onset, t, y)
-        axes.plot(onset, (at - y[0]) * k, "v", ms=4, color=MIDDLE, label="onset")
-    axes.set(xlabel="time / s", ylabel=f"position / {unit}")
-    axes.legend(loc="upper left", fontsize=8)
+    crowded = onset is not None and onset.size > CROWD
+    axes.plot(t, (y - zero) * k, color=DARK, lw=0.6 if crowded else 1.0, label="measured")
+    if model is not None and at is not None:
+        axes.plot(at, (model - zero) * k, color=MIDDLE, lw=1.0, ls=":", label="model")
+    if onset is not None and not crowded:
+        axes.plot(onset, (np.interp(onset, t, y) - zero) * k, "v", ms=4, color=MIDDLE, label="onset")
+    axes.set(xlabel="time / s", ylabel=f"{label} / {unit}")
+    if len(axes.get_lines()) > 1:
+        axes.legend(loc="upper left", fontsize=8)
 
 
 def _zoom(axes: Axes, data: xarray.Dataset, key: str, title: str, *, clip: bool) -> None:
@@ -110,6 +118,13 @@ def ripple_picture(data: xarray.Dataset, number: int, facts: dict[str, Any]) -> 
     for line in facts.get("lines", ()):
         f = 1.0 / line["period"]
         ax.axvline(f, color=MIDDLE, ls="--", lw=0.8)
-        ax.annotate(f"{line['period']:.3g} s", (f, line["amplitude"] * k), fontsize=8, color=MIDDLE)
+        ax.annotate(
+            f"{line['period']:.3g} s",
+            (f, line["amplitude"] * k),
+            (4, -2),
+            textcoords="offset points",
+            fontsize=8,
+            color=MIDDLE,
+        )
     ax.set(xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title=plain(f"{facts['name']}: ripple in the sticks"))
     return made

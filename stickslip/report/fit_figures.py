@@ -31,6 +31,11 @@ _COORDINATES = (
 )
 
 
+def _error(value: float) -> str:
+    """Two digits, and never a power of ten."""
+    return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
+
+
 @styled
 def heat_map(table: Mapping[str, Any]) -> Figure:
     """Errors of runs (rows, by velocity) and phases (columns), logarithmic colours from 1 to 30 floors."""
@@ -39,7 +44,7 @@ def heat_map(table: Mapping[str, Any]) -> Figure:
     ax = axes[0, 0]
     shown = ax.imshow(np.log10(np.clip(errors, 0.3, 100.0)), cmap="OrRd", vmin=-0.3, vmax=1.6, aspect="auto")
     for i, j in np.argwhere(np.isfinite(errors)):
-        ax.text(j, i, f"{errors[i, j]:.2g}", ha="center", va="center", color="white" if errors[i, j] > 10 else DARK)
+        ax.text(j, i, _error(errors[i, j]), ha="center", va="center", color="white" if errors[i, j] > 10 else DARK)
     ax.set_xticks(range(len(table["phases"])), table["phases"])
     speeds = ["" if v is None else f"  {v * 1e6:.3g} um/s" for v in table["velocities"]]
     ax.set_yticks(range(len(table["runs"])), [plain(n, 30) + v for n, v in zip(table["runs"], speeds, strict=True)])
@@ -96,8 +101,8 @@ def creep_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: in
         t, u, model = (series(data, f"creep{i}", name) for name in ("time", "displacement", "model"))
         assert t is not None and u is not None and model is not None
         k, unit = scaled(u, "m")
-        top.plot(t, u * k, color=DARK, lw=1.2)
-        top.plot(t, model * k, color=MIDDLE, ls="--", lw=1.2)
+        top.plot(t, u * k, color=DARK, lw=1.2, label="measured")
+        top.plot(t, model * k, color=MIDDLE, ls="--", lw=1.2, label="static model")
         fit = fits[i]
         top.set_title(plain(f"{fit['trace']}, event {fit['event'] + 1}: {100 * fit['nrmse']:.2g} %", 40), fontsize=9)
         top.set_ylabel(f"u / {unit}")
@@ -105,6 +110,7 @@ def creep_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: in
         low.plot(t, (u - model) * k, color=DARK, lw=1.0)
         low.axhline(0.0, color=LIGHT, lw=0.8)
         low.set(xlabel="time to v_lim / s", ylabel=f"residual / {unit}")
+    axes[0, 0].legend(fontsize=8, loc="upper left")
     return made
 
 
@@ -121,10 +127,11 @@ def ramp_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: int
         tau, u, model = (series(data, f"ramp{i}", name) for name in ("tau", "displacement", "model"))
         assert tau is not None and u is not None and model is not None
         scale = fits[i]["u_max"]
-        ax.plot(tau, u / scale, color=DARK, lw=1.2)
-        ax.plot(tau, model / scale, color=MIDDLE, ls="--", lw=1.2)
+        ax.plot(tau, u / scale, color=DARK, lw=1.2, label="measured")
+        ax.plot(tau, model / scale, color=MIDDLE, ls="--", lw=1.2, label="static model")
         ax.set_title(plain(f"{fits[i]['trace']}: {100 * fits[i]['nrmse']:.2g} %", 36), fontsize=9)
         ax.set(xlabel="share of break-away force", ylabel="u / u_max")
+    axes[0, 0].legend(fontsize=8, loc="upper left")
     return made
 
 

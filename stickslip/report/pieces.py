@@ -28,7 +28,12 @@ def trace_pieces(trace: Trace, found: Segmentation, number: int) -> Variables:
         out[f"{key}_time"] = (key, np.asarray(time, float), {"units": "s"})
         out[f"{key}_position"] = (key, np.asarray(values, float), {"units": unit})
 
-    put("whole", *thinned(trace.time, position, OVERVIEW))
+    if trace.drive is None or unit != "m":
+        put("whole", *thinned(trace.time, position, OVERVIEW))
+    else:
+        # a saw-tooth on a long way shows only against the load point: its tips must stay
+        t, gap = thinned(trace.time, trace.drive.position(trace.time) - position, OVERVIEW)
+        put("whole", t, trace.drive.position(t) - gap)
     if found.events:
         event = middle_event(found.events)
         before = found.events[event.index - 1].t_arrest if event.index else float(trace.time[0])

@@ -211,7 +211,7 @@ def pints_ways(measured: np.ndarray) -> Iterator[Way]:
     error = pints.SumOfSquaresError(pints.SingleOutputProblem(Forward(), times(), measured))
 
     def run(start: np.ndarray, method: Any, iterations: int, bounds: Any) -> tuple[np.ndarray, int]:
-        np.random.seed(0)  # what PINTS draws from
+        np.random.seed(0)  # noqa: NPY002  (what PINTS draws from)
         widths = np.array([0.03, 0.1, 300.0])
         search = pints.OptimisationController(error, start, sigma0=widths, boundaries=bounds, method=method)
         search.set_log_to_screen(False)

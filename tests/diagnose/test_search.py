@@ -1,0 +1,81 @@
+"""What a search begins with: the linear step of everything, and the periods that residuals hint at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stickslip.diagnose.linear import Linear
+from stickslip.diagnose.periods import periods
+from stickslip.fit.composition import EVENT_WIDTHS
+from stickslip.fit.inertial import Fit
+from stickslip.fit.parameters import Free
+
+from .test_rules import measurement
+
+
+def made(seed: int = 0):
+    """A linear world of two parameters and one direction, with unit floors."""
+    data = measurement((5e-5, 1e-4), 3, ())
+    data = replace(data, valid=np.ones_like(data.valid))
+    rng = np.random.default_rng(seed)
+    shape = data.values.shape
+    columns, line = rng.standard_normal((*shape, 2)), rng.standard_normal(shape)
+    free = tuple(Free(n, "1", "log", 1.0, 1.0, 1e3, 1e-9, 1e9) for n in ("a", "b"))
+    fit = Fit(np.zeros(2), np.zeros((*shape[:2], 2)), 0, 0, np.zeros(shape), np.eye(2), free, columns,
+              np.ones(shape[:2], bool), 1, 1)  # fmt: skip
+    problem = SimpleNamespace(event_columns=lambda columns, z, events: np.zeros((*shape, 2)))
+    return data, columns, line, fit, problem
+
+
+def test_the_linear_step_finds_what_was_moved_and_by_how_much():
+    data, columns, line, fit, problem = made()
+    data = replace(data, values=columns @ np.array([0.03, -0.05]) + 0.02 * line)
+    linear = Linear(problem, fit, data, np.ones_like(data.values), data.valid)
+    step = linear.step([line])
+    assert step.sizes == pytest.approx([0.02], rel=1e-6)
+    assert step.z == pytest.approx([0.03, -0.05], rel=1e-6)
+    assert step.share == pytest.approx(1.0, abs=1e-6)
+    assert step.events == pytest.approx(np.zeros_like(step.events), abs=1e-12)
+    assert step.events.shape == (*data.values.shape[:2], len(EVENT_WIDTHS))
+
+
+def test_a_direction_that_the_base_covers_explains_nothing():
+    data, columns, line, fit, problem = made(1)
+    data = replace(data, values=columns @ np.array([0.03, -0.05]) + 0.02 * line)
+    linear = Linear(problem, fit, data, np.ones_like(data.values), data.valid)
+    assert linear.step([columns @ np.array([1.0, 2.0])]).share == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(("variable", "scale"), [("time", 1.0), ("load point", 1e-4), ("displacement", 1e-4)])
+def test_a_period_in_the_residual_is_found(variable, scale):
+    data = measurement((1e-4,), 30, ())
+    n = data.values.shape[1]
+    rng = np.random.default_rng(3)
+    recurrence = rng.uniform(0.8, 1.2, n)
+    slips = np.cumsum(recurrence)
+    start = slips - recurrence
+    nodes = np.array([[0.0, 1.0]]), np.array([[0.0, 1e-4]])
+    position = 1e-4 * start
+    cycles = data.cycles._replace(
+        start=start[None], position=position[None], load_times=nodes[0], load_positions=nodes[1]
+    )
+    values = data.values.copy()
+    values[0, :, 0] = recurrence
+    data = replace(data, cycles=cycles, values=values)
+    at = {"time": slips, "load point": 1e-4 * slips, "displacement": position}[variable]
+    true = 5.3 * scale
+    residual = np.zeros_like(values)
+    residual[0, :, 0] = 3.0 * np.sin(2 * np.pi * at / true + 0.7) + 0.3 * rng.standard_normal(n)
+    residual[0, :, 1] = 2.0 * np.cos(2 * np.pi * at / true) + 0.3 * rng.standard_normal(n)
+    found = periods(variable, data, residual, np.ones((1, n), bool), (1.5 * scale, 100 * scale))
+    assert found[0] == pytest.approx(true, rel=0.05)
+    assert len(found) <= 5
+
+
+def test_too_few_slips_hint_at_nothing():
+    data = measurement((1e-4,), 3, ())
+    assert periods("time", data, np.zeros_like(data.values), np.ones((1, 3), bool), (0.1, 10.0)) == []

@@ -1,0 +1,102 @@
+"""The stages of a sweep, with candidates whose costs are invented: who is followed, what is kept, what comes back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip.diagnose import sweep as module
+from stickslip.diagnose.candidate import Candidate, forms_of
+from stickslip.diagnose.sweep import EXPLAINING, PROMISING, Ground, Sweep
+from stickslip.effects import catalogue
+from stickslip.fit.inertial import Fit
+
+FINAL = {"contact-ageing": 100.0, "wear": 110.0}  # where a fit to the end arrives; elsewhere it stays
+
+
+def invented(effect, cost: float, promise: float, note: str = "") -> Candidate:
+    shape = (1, 1, 1)
+    fit = Fit(np.zeros(1), np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.eye(1), (), np.zeros((*shape, 1)),
+              np.ones((1, 1), bool), 1, 1)  # fmt: skip
+    form = {k: str(v) for k, v in vars(effect).items() if isinstance(v, str)}
+    return Candidate(effect.tag, form, effect, promise / 2, promise, fit=fit, note=note)
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    done: list[tuple[str, str]] = []
+    order = catalogue.tags()
+
+    def score(effect, *rest):
+        done.append(("score", effect.tag))
+        promise = 0.9 if effect.tag in FINAL else 0.5 / (1 + order.index(effect.tag))
+        return invented(effect, 1000.0, promise, "not refitted")
+
+    def refine(candidate, data, floor, train, evaluations):
+        done.append((f"refine {evaluations}", candidate.tag))
+        cost = 150.0 if candidate.tag in FINAL else 900.0
+        return replace(invented(candidate.effect, cost, candidate.promise), score=candidate.score)
+
+    def settle(candidate, data, floor, train):
+        done.append(("settle", candidate.tag))
+        return invented(candidate.effect, FINAL.get(candidate.tag, candidate.cost), candidate.promise)
+
+    monkeypatch.setattr(module, "score", score)
+    monkeypatch.setattr(module, "refine", refine)
+    monkeypatch.setattr(module, "settle", settle)
+    monkeypatch.setattr(module, "candidate_from", lambda kept, *rest: kept)
+    monkeypatch.setattr(module, "candidate_arrays", lambda candidate: candidate)
+    return done
+
+
+class Memory(dict):
+    def load(self, key):
+        return self.get(key)
+
+    def save(self, key, piece):
+        self[key] = piece
+
+
+def run(store=None, tags=None):
+    told: list[float] = []
+    ground = Ground(*[None] * 5)  # type: ignore[arg-type]
+    sweep = Sweep(ground, 1, store, "round1", lambda text, share: told.append(share))
+    return *sweep.run(tags or catalogue.tags()), told
+
+
+def test_every_tag_comes_back_and_the_leaders_are_followed_to_the_end(calls):
+    best, every, told = run()
+    assert [c.tag for c in best] == catalogue.tags()
+    costs = {c.tag: c.cost for c in best if not c.note}
+    assert min(costs, key=costs.get) == "contact-ageing"
+    assert costs["contact-ageing"] == 100.0
+    assert {tag for what, tag in calls if what == "settle"} == set(FINAL)
+    followed = {tag for what, tag in calls if what.startswith("refine")}
+    assert len(followed) <= PROMISING + EXPLAINING
+    assert all(c.note == "not refitted" for c in best if c.tag not in followed)
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(1.0)
+    assert len({(c.tag, *c.form.values()) for c in every}) == len(every)
+
+
+def test_other_forms_are_tried_for_those_that_lead(calls):
+    _, every, _ = run()
+    tried = [tuple(c.form.values()) for c in every if c.tag == "wear"]
+    assert len(tried) == len(forms_of("wear")) > 1
+    assert sum(1 for what, tag in calls if (what, tag) == ("score", "wear")) == len(forms_of("wear"))
+
+
+def test_finished_pieces_are_not_done_again(calls):
+    store = Memory()
+    first = run(store)[0]
+    count = len(calls)
+    assert count == len(store)
+    again = run(store)[0]
+    assert len(calls) == count
+    assert [(c.tag, c.cost) for c in again] == [(c.tag, c.cost) for c in first]
+    lost = next(key for key in store if "settle" in key)
+    del store[lost]
+    run(store)
+    assert len(calls) == count + 1
