@@ -19,6 +19,7 @@ QUIET = 0.15  # floors; mean change of the features below which derivatives are 
 TRUST = 0.1  # share of a step's change that Broyden's update may have missed
 MODERATE = 4.0  # floors, rms, by which the step of a difference should move the features
 LEAST, LARGEST = 1e-3, (0.05, 0.5)  # such a step on the search scale; the largest of a logarithm, of another scale
+MODEL_ERROR = 2.5  # on standard deviations: a bank of three parameters is no rough line (tests/fit/test_recovery.py)
 STAGES = ((30.0, 6), (7.0, 8), (2.5, 8), (1.0, 20))  # factor on the floors, most evaluations at it
 
 
@@ -32,7 +33,8 @@ class Fit:
         cost: robust chi-square, priors included.
         data_cost: of the data alone.
         features: of the model at the optimum, shape (R, n, F).
-        covariance: of z, event-wise factors marginalised, shape (k, k).
+        covariance: of z, event-wise factors marginalised, shape (k, k); widened by MODEL_ERROR, which development
+            campaigns asked for.
         free: what z means.
         columns: derivatives of the features in z, the last ones used, shape (R, n, F, k).
         use: cycles the fit has seen, shape (R, n).
@@ -288,7 +290,7 @@ def fit(
     back = np.diag(scale[: res.k])
     if soft is not None:
         back[soft[1], soft[0]] = scale[soft[0]]
-    covariance = back @ spread @ back.T
+    covariance = MODEL_ERROR**2 * back @ spread @ back.T
     return Fit(
         x[: res.k],
         res.events(x),

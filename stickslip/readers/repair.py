@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,10 +10,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import InputError
-from ..trace import Repair
+from ..trace import SIGNALS, Repair
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+_UNITS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
+_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k"}
 
 
 def unwrap(values: Array, period: float, channel: str, resolution: float | None = None) -> tuple[Array, list[Repair]]:
@@ -21,6 +25,7 @@ def unwrap(values: Array, period: float, channel: str, resolution: float | None 
     Args:
         values: shape (n,); NaN is passed over.
         period: range of the counter, in the unit of the values (4096 counts of 7.91 nm: 32.4 um).
+        channel: for messages; the name of a trace's channel, whose values are in its SI unit, or any other name.
         resolution: if given, the period is rounded to whole counts, so that many wraps add up exactly.
 
     Raises:
@@ -47,7 +52,16 @@ def unwrap(values: Array, period: float, channel: str, resolution: float | None 
     places = np.flatnonzero(turns)
     count = int(np.abs(turns).sum())
     where = f"{channel}, first at sample {int(valid[places[0] + 1])}"
-    return result, [Repair("wrap", count, where, f"the counter ran over its range of {period:.6g}")]
+    return result, [Repair("wrap", count, where, f"the counter ran over its range of {_size(period, channel)}")]
+
+
+def _size(value: float, channel: str) -> str:
+    """A size as a person writes it: ``3.24e-05`` of a displacement as ``32.4 um``."""
+    unit = _UNITS.get(channel)
+    if unit is None:
+        return f"{value:.6g}"
+    power = max(-12, min(3, 3 * math.floor(math.log10(value) / 3)))
+    return f"{value / 10.0**power:.6g} {_PREFIXES[power]}{unit}"
 
 
 def join_resets(

@@ -47,7 +47,7 @@ def _unit(data: xarray.Dataset, name: str) -> str:
 
 
 def _whole(axes: Axes, data: xarray.Dataset, key: str) -> None:
-    """Position and load point against time; their distance where the way is so long that they could not be told apart."""
+    """Position and load point against time; their distance where nothing else could be seen of a long way."""
     t, y = series(data, f"{key}_whole", "time"), series(data, f"{key}_whole", "position")
     axes.set_title("whole trace")
     if t is None or y is None:

@@ -54,6 +54,17 @@ def test_counter_wrap_is_undone_to_the_count(record):
     assert count(repairs) == {"wrap": turns}
 
 
+@pytest.mark.parametrize(
+    ("channel", "period", "shown"),
+    [("displacement", 32.4e-6, "32.4 um"), ("spring_force", 2.5, "2.5 N"), ("x", 2.5, "2.5")],
+)
+def test_the_note_of_a_wrap_has_the_channel_s_unit(channel, period, shown):
+    rising = np.linspace(0.0, 3.2, 200) * period
+    _, (repair,) = unwrap(rising % period, period, channel)
+    assert repair.reason == f"the counter ran over its range of {shown}"
+    assert repair.count == 3
+
+
 def test_counter_wrap_passes_over_nan(record):
     _, x = record
     wrapped = (x + 16.2e-6) % 32.4e-6 - 16.2e-6

@@ -17,6 +17,7 @@ from stickslip.residual import floors, scatter_factor
 from stickslip.segment import segment
 
 CAMPAIGNS = 20
+FIRST = 8000  # seeds; the factor on the intervals was set on others
 TWO_SIDED = 1.96
 
 
@@ -54,7 +55,7 @@ def deviations(folder, seed: int) -> dict[str, float]:
 @pytest.mark.timeout(3600)
 def test_intervals_hold_the_truth(tmp_path):
     """95 % intervals of the parameters with a true value, over 20 campaigns with noise and lines of their own."""
-    rows = [deviations(tmp_path / str(seed), seed) for seed in range(7000, 7000 + CAMPAIGNS)]
+    rows = [deviations(tmp_path / str(seed), seed) for seed in range(FIRST, FIRST + CAMPAIGNS)]
     z = np.array([v for row in rows for v in row.values()])
     inside = np.abs(z) <= TWO_SIDED
     for name in sorted({n for row in rows for n in row}):
