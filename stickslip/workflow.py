@@ -54,7 +54,7 @@ def diagnose_campaign(
     force: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> dict[str, Any]:
-    """Diagnose a campaign and write its run folder (``result.json``, ``report.html``, finished pieces).
+    """Diagnose a campaign and write its run folder (``result.json``, ``arrays.nc``, ``report.html``, finished pieces).
 
     An interrupted diagnosis goes on from its pieces.
 
@@ -73,11 +73,16 @@ def diagnose_campaign(
     out = Path(out)
     refuse_existing(out, force)
     began = time.perf_counter()
+    import xarray
+
     from .campaign import load_campaign, load_traces
     from .diagnose.engine import diagnose
     from .diagnose.summary import summary
     from .effects import catalogue
+    from .fit.problem import Problem
     from .report import write_report
+    from .report.inertial_result import fit_sections
+    from .segment import segment
 
     for path in effect_files:
         catalogue.load_file(Path(path))
@@ -88,9 +93,11 @@ def diagnose_campaign(
     inputs = [file_record(campaign), *({"file": t.provenance.file, "sha256": t.provenance.sha256} for t in traces)]
     with open_run(out, force=force, resume=True) as run:
         key = json_text({"inputs": inputs, "holdout": list(holdout), "versions": versions()})
+        segmentations = [segment(t) for t in traces]
         found = diagnose(
             loaded,
             traces,
+            segmentations,
             candidates=candidates,
             max_effects=max_effects,
             holdout=holdout,
@@ -104,8 +111,17 @@ def diagnose_campaign(
             **summary(found, loaded.rig),
             "inputs": inputs,
             "versions": versions(),
-            "seconds": round(time.perf_counter() - began, 1),
         }
+        top = next((r for r in reversed(found.ladder) if r.fit is not None), None)
+        if top is not None and top.fit is not None and top.composition is not None:
+            problem = Problem(top.composition, found.measurement)
+            sections, variables = fit_sections(
+                problem, top.fit, traces, segmentations, found.floor, found.train, loaded.rig
+            )
+            result |= sections
+            coordinates = variables.pop("coordinates")
+            run.arrays(xarray.Dataset(variables, coords=coordinates, attrs={"title": loaded.title}))
+        result["seconds"] = round(time.perf_counter() - began, 1)
         run.json(result)
         write_report(run.folder)
     return result

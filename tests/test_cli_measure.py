@@ -79,15 +79,6 @@ def test_inspect_prints_the_traces_and_what_they_can_tell(capsys):
     assert "No hold" in out
 
 
-def test_inspect_counts_traces_in_words(capsys):
-    path = write()
-    assert run(["inspect", path]) == 0
-    assert capsys.readouterr().out.splitlines()[0] == "rig: 1 trace"
-    Path(path).write_text(RIG + TRACE + TRACE.replace("[[trace]]", '[[trace]]\nname = "again"'))
-    assert run(["inspect", path]) == 0
-    assert capsys.readouterr().out.splitlines()[0] == "rig: 2 traces"
-
-
 def test_inspect_as_json_holds_the_events(capsys):
     assert run(["inspect", write(), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

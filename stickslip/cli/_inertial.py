@@ -15,7 +15,6 @@ from ..diagnose.heldout import held_out
 from ..diagnose.static_rung import static_features
 from ..effects import catalogue
 from ..errors import FitError, InputError, nearest
-from ..features.layout import PHASES
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
 from ..fit.inertial import Fit, fit
@@ -24,8 +23,7 @@ from ..fit.problem import Problem
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
 from ..fit.start import base_composition, ring_period
-from ..report import describe_trace, trace_pieces
-from ..report.inertial_result import effective, identifiability, misfit_part, overlay, parameters, residual_arrays
+from ..report.inertial_result import fit_sections, parameters
 from ..residual import floors, misfit
 from ..segment import Segmentation, block_motion
 from ..trace import Trace
@@ -77,16 +75,12 @@ def fit_inertial(
         problem = Problem(composition, m)
         profiles = [_profile(name, problem, optimum, floor, tell) for name in options.profiles]
         tell("drawing the model through the data")
-        drawn = overlay(problem, optimum, traces, found)
-    shown = replace(m, valid=m.valid & train[..., None])
-    stiffness = composition.fixed.get("rig.spring_stiffness", optimum.values.get("rig.spring_stiffness", np.nan))
+        sections, variables = fit_sections(problem, optimum, traces, found, floor, train, loaded.rig)
     result: dict[str, Any] = {
         "model_parts": ladder[-1]["model"],
         "ladder": ladder,
-        "misfit": misfit_part(shown, optimum.features, floor, misfit(shown, optimum.features, floor)),
+        **sections,
         "parameters": parameters(composition, optimum),
-        "identifiability": identifiability(optimum),
-        "effective": effective(optimum, loaded.rig, composition.contacts),
         **_model(composition, optimum, m, loaded),
         "profiles": profiles,
         "features": {"names": list(m.layout.names), "phases": list(m.layout.phases)},
@@ -101,15 +95,7 @@ def fit_inertial(
         },
         "notes": notes,
         "dropped": [*m.dropped, *(f"{t.name}: {d}" for t, s in zip(traces, found, strict=True) for d in s.dropped)],
-        "traces": [describe_trace(t, s) for t, s in zip(traces, found, strict=True)],
     }
-    variables: dict[str, Any] = {}
-    for i, (t, s) in enumerate(zip(traces, found, strict=True)):
-        variables |= trace_pieces(t, s, i)
-    variables |= drawn
-    by_name = dict(zip((t.name for t in traces), found, strict=True))
-    variables |= residual_arrays(shown, optimum.features, floor, by_name, float(stiffness), {t.name: t for t in traces})
-    variables["coordinates"] = {"phase": list(PHASES), "feature": list(m.layout.names), "run": list(m.names)}
     return result, variables
 
 

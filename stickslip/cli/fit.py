@@ -155,17 +155,20 @@ def _static(
             raise error.at(file=loaded.path) from None
 
     with working("creep processes") as tell:
-        result, variables = static_result(
-            traces,
-            found,
-            rig_of,
-            align=align,
-            form=form,
-            v_lim=v_lim,
-            sampling=sampling,
-            springs=loaded.rig.springs,
-            progress=lambda done, of: tell(f"{done} of {of} fitted", done / of),
-        )
+        try:
+            result, variables = static_result(
+                traces,
+                found,
+                rig_of,
+                align=align,
+                form=form,
+                v_lim=v_lim,
+                sampling=sampling,
+                springs=loaded.rig.springs,
+                progress=lambda done, of: tell(f"{done} of {of} fitted", done / of),
+            )
+        except InputError as error:
+            raise error.at(file=loaded.path) from None
     result["traces"] = [describe_trace(t, s) for t, s in zip(traces, found, strict=True)]
     for i, (t, s) in enumerate(zip(traces, found, strict=True)):
         variables |= trace_pieces(t, s, i)

@@ -85,7 +85,7 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
             fails.append("the gain on unseen cycles is not significant")
     amplitude = candidate.amplitude
     if amplitude is not None:
-        value, sd = candidate.fit.values[amplitude.name], candidate.fit.std()[amplitude.name]
+        value, sd = candidate.fit.values[amplitude.name], _amplitude_sd(candidate)
         null = catalogue.amplitude(candidate.effect).null or 0.0
         if sd > 0 and abs(value - null) < limits.significant * sd:
             fails.append("its amplitude is not significant")
@@ -96,6 +96,22 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
             if min(z - low, high - z) < 0.004 * (high - low) and abs(f.outward(float(z)) - null) > 0:
                 fails.append(f"{f.name.split('.', 1)[1]} ends at the border of its plausible range")
     return Judged(candidate, cost, tuple(fails))
+
+
+def _amplitude_sd(candidate: Candidate) -> float:
+    """Standard deviation (SI) of the amplitude for the inner parameters that were found.
+
+    Inner parameters may be tied to the amplitude (an age and the rate at which it counts); that says nothing against
+    the effect.
+    """
+    fit, amplitude = candidate.fit, candidate.amplitude
+    assert fit is not None
+    assert amplitude is not None
+    own = [i for i, f in enumerate(fit.free) if f.name.startswith(f"{candidate.tag}.")]
+    at = next(j for j, i in enumerate(own) if fit.free[i].name == amplitude.name)
+    precision = np.linalg.pinv(fit.covariance[np.ix_(own, own)], hermitian=True)
+    sd = 1.0 / np.sqrt(precision[at, at]) if precision[at, at] > 0 else 0.0
+    return float(sd * amplitude.slope(float(fit.z[own[at]])))
 
 
 def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[Judged | None, list[Judged]]:

@@ -77,7 +77,7 @@ def _velocities(pairs: Pairs, slipping: Pairs) -> Verdict:
 def _events(pairs: Pairs, slipping: Pairs) -> Verdict:
     few = [t.name for t, s in slipping if len(s.events) < 3]
     n = sum(len(s.events) for _, s in slipping)
-    good = [f"{n} slips in {len(slipping)} of {len(pairs)} traces."] if n else []
+    good = [f"{_count(n, 'slip')} in {len(slipping)} of {_count(len(pairs), 'trace')}."] if n else []
     bad = []
     if few:
         bad.append(
@@ -94,7 +94,7 @@ def _holds(pairs: Pairs, slipping: Pairs) -> Verdict:
     if not slipping:
         return [], []
     if sum(held):
-        return [f"{sum(held)} slips after a hold: strengthening with time and creep at rest show."], []
+        return [f"{_count(sum(held), 'slip')} after a hold: strengthening with time and creep at rest show."], []
     return [], ["No hold: strengthening with time, creep at rest and drift of the sensor cannot be told apart."]
 
 
@@ -143,7 +143,7 @@ def _slip(pairs: Pairs, slipping: Pairs) -> Verdict:
 
 
 def _ringing(pairs: Pairs, slipping: Pairs) -> Verdict:
-    slow = [f"{t.name} ({t.sampling_rate:.3g} Hz)" for t, _ in slipping if t.sampling_rate < _RING_RATE]
+    slow = [f"{t.name} ({_rate(t.sampling_rate)})" for t, _ in slipping if t.sampling_rate < _RING_RATE]
     bad = []
     if slow:
         text = (
@@ -163,7 +163,7 @@ def _creep(pairs: Pairs, slipping: Pairs) -> Verdict:
         kept += len(found)
         lost += dropped
     good = (
-        [f"{kept} creep processes can be compared with the static model (v_lim = {V_LIM * 1e6:g} um/s)."]
+        [f"{_count(kept, 'creep process')} can be compared with the static model (v_lim = {V_LIM * 1e6:g} um/s)."]
         if kept
         else []
     )
@@ -172,9 +172,10 @@ def _creep(pairs: Pairs, slipping: Pairs) -> Verdict:
         reasons: dict[str, int] = {}
         for d in lost:
             short = re.sub(r" \([^)]*\)", "", d.reason).split(":")[0]  # numbers differ from one to the next
+            short = re.sub(r"v_lim = \S+ m/s", f"v_lim = {V_LIM * 1e6:g} um/s", short)
             reasons[short] = reasons.get(short, 0) + d.count
         text = "; ".join(f"{n} because {reason}" for reason, n in sorted(reasons.items(), key=lambda r: -r[1]))
-        bad.append(f"{sum(d.count for d in lost)} creep processes cannot: {text}.")
+        bad.append(f"{_count(sum(d.count for d in lost), 'creep process')} cannot: {text}.")
     return good, bad
 
 
@@ -183,7 +184,7 @@ def _ramps(pairs: Pairs, slipping: Pairs) -> Verdict:
     if not ramps:
         return [], []
     return (
-        [f"{len(ramps)} break-away ramps: the normalised static curve (shape H and scale u_max) can be fitted."],
+        [f"{_count(len(ramps), 'break-away ramp')}: the normalised static curve (H and u_max) can be fitted."],
         ["Ramps without a geometry: h_rms, line length and load cannot be had from them."],
     )
 
@@ -192,6 +193,15 @@ def _unseen(pairs: Pairs, slipping: Pairs) -> Verdict:
     if len(slipping) < 2 and slipping:
         return [], ["One trace with slips: no run can be held out, so nothing can be checked on unseen conditions."]
     return [], []
+
+
+def _count(n: int, thing: str) -> str:
+    """``2 slips``, ``1 creep process``."""
+    return f"{n} {thing}" if n == 1 else f"{n} {thing}{'es' if thing.endswith('s') else 's'}"
+
+
+def _rate(rate: float) -> str:
+    return f"{rate / 1e3:.3g} kHz" if rate >= 1e3 else f"{rate:.3g} Hz"
 
 
 def _some(names: Sequence[str], most: int = 4) -> str:

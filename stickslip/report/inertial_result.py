@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,12 @@ from ..fit.inertial import Fit
 from ..fit.overlay import modelled_runs
 from ..fit.problem import Problem
 from ..fit.static_table import StaticRig
-from ..residual import Misfit
+from ..residual import Misfit, misfit
 from ..segment import Segmentation
 from ..trace import Trace
 from ..uncertainty import flat_directions
-from .pieces import ZOOM, Variables, middle_event, thinned
+from .describe import describe_trace
+from .pieces import ZOOM, Variables, middle_event, thinned, trace_pieces
 from .sentences import misfit_sentence, phase_table
 
 
@@ -93,6 +95,43 @@ def misfit_part(measurement: Measurement, model: np.ndarray, floor: np.ndarray, 
         "table": phase_table(found.by_run, velocities),
         "sentence": misfit_sentence(measurement, model, floor, found.by_phase),
     }
+
+
+def fit_sections(
+    problem: Problem,
+    fit: Fit,
+    traces: Sequence[Trace],
+    segmentations: Sequence[Segmentation],
+    floor: np.ndarray,
+    use: np.ndarray,
+    rig: Any,
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What a report shows of one fitted model: entries of ``result.json``, and the variables behind its pictures.
+
+    Args:
+        problem, fit: the model and its optimum.
+        traces, segmentations: all of the campaign, those without a slip among them.
+        floor: of the features, shape (R, n, F).
+        use: cycles that were fitted, shape (R, n).
+        rig: of the campaign.
+    """
+    m, composition = problem.measurement, problem.composition
+    shown = replace(m, valid=m.valid & use[..., None])
+    stiffness = float(composition.fixed.get("rig.spring_stiffness", fit.values.get("rig.spring_stiffness", np.nan)))
+    result = {
+        "misfit": misfit_part(shown, fit.features, floor, misfit(shown, fit.features, floor)),
+        "identifiability": identifiability(fit),
+        "effective": effective(fit, rig, composition.contacts),
+        "traces": [describe_trace(t, s) for t, s in zip(traces, segmentations, strict=True)],
+    }
+    variables: dict[str, Any] = {}
+    for i, (t, s) in enumerate(zip(traces, segmentations, strict=True)):
+        variables |= trace_pieces(t, s, i)
+    variables |= overlay(problem, fit, traces, segmentations)
+    found = {t.name: s for t, s in zip(traces, segmentations, strict=True)}
+    variables |= residual_arrays(shown, fit.features, floor, found, stiffness, {t.name: t for t in traces})
+    variables["coordinates"] = {"phase": list(PHASES), "feature": list(m.layout.names), "run": list(m.names)}
+    return result, variables
 
 
 def overlay(problem: Problem, fit: Fit, traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> Variables:

@@ -86,6 +86,18 @@ def test_one_velocity_identifies_nothing_and_three_do():
     assert any(line.startswith("3 drive velocities") for line in said.can)
 
 
+def test_one_is_not_said_in_the_plural():
+    one = sawtooth(sticks=1)
+    said = abilities([one], [segment(one)])
+    assert "1 slip in 1 of 1 trace." in said.can
+    assert any(line.startswith("1 creep process cannot: ") for line in said.cannot)
+    many = sawtooth(sticks=8)
+    said = abilities([many, many], [segment(many)] * 2)
+    assert "16 slips in 2 of 2 traces." in said.can
+    assert any(line.startswith("16 creep processes cannot: ") for line in said.cannot)
+    assert any("(2 kHz)" in line for line in said.cannot)
+
+
 def test_no_slip_at_all_is_said_first():
     t = np.linspace(0.0, 10.0, 2000)
     sliding = Trace("slide", t, displacement=5e-5 * t, drive=Drive.constant(5e-5, 0.0, 10.0))

@@ -1,0 +1,123 @@
+"""What pictures of measurements and fits show, and what `inspect` says of them first."""
+
+import numpy as np
+import pytest
+import xarray
+
+from stickslip.cli import run
+from stickslip.report import trace_pieces
+from stickslip.report.figures import trace_picture
+from stickslip.report.fit_figures import creep_grid, heat_map, ramp_grid
+from stickslip.segment import segment
+from stickslip.trace import Drive, Trace
+
+SPEED, PERIOD = 5e-5, 1.0  # m/s, s
+
+
+def sawtooth(slips):
+    """A block that stands still and slips by half a cosine of 40 ms, once a second; 1 kHz."""
+    t = np.arange(0.0, (slips + 0.7) * PERIOD, 1e-3)
+    x = np.zeros_like(t)
+    for k in range(1, slips + 1):
+        x += 0.5 * SPEED * PERIOD * (1 - np.cos(np.pi * np.clip((t - k * PERIOD) / 0.04, 0, 1)))
+    x += np.random.default_rng(3).normal(0, 5e-9, t.size)
+    return Trace(name="run", time=t, displacement=x, drive=Drive.constant(SPEED, 0.0, float(t[-1])), noise=5e-9)
+
+
+def whole(slips):
+    """Axes of the whole trace, and the trace."""
+    trace = sawtooth(slips)
+    found = segment(trace)
+    assert len(found.events) == slips
+    data = xarray.Dataset(trace_pieces(trace, found, 0))
+    return trace_picture(data, 0, {"name": "run", "events": found.events}).axes[0], trace
+
+
+def labels(axes):
+    return [str(line.get_label()) for line in axes.get_lines()]
+
+
+def test_a_short_way_is_drawn_with_its_load_point_and_onsets():
+    axes, _ = whole(4)
+    assert labels(axes) == ["load point", "measured", "onset"]
+    assert axes.get_ylabel().startswith("position / ")
+    assert axes.get_legend() is not None
+
+
+def test_a_long_way_is_drawn_as_distance_to_the_load_point():
+    axes, trace = whole(200)
+    assert labels(axes) == ["measured"]  # 200 marks would cover it
+    assert axes.get_ylabel() == "load point less position / µm"
+    (line,) = axes.get_lines()
+    shown = np.asarray(line.get_ydata(), float) * 1e-6
+    gap = trace.drive.position(trace.time) - trace.displacement
+    # every tip of the saw-tooth is there although far fewer points are drawn than were measured
+    assert line.get_xdata().size < 0.05 * trace.time.size
+    tips = [shown[np.abs(line.get_xdata() - k * PERIOD) < 0.5 * PERIOD].max() for k in range(1, 200)]
+    assert tips == pytest.approx([SPEED * PERIOD - gap.min()] * 199, rel=0.03)
+
+
+def test_errors_in_a_heat_map_have_no_powers_of_ten():
+    table = {"phases": ["creep", "slip", "hold"], "runs": ["a"], "velocities": [5e-5], "errors": [[1.234, 162.4, None]]}
+    assert [text.get_text() for text in heat_map(table).axes[0].texts] == ["1.2", "162"]
+
+
+def test_grids_of_fits_say_which_line_is_the_model():
+    tau = np.linspace(0, 1, 20)
+    data = xarray.Dataset(
+        {
+            f"{kind}0_{name}": (f"{kind}0", tau * 1e-6)
+            for kind, names in (
+                ("ramp", ("tau", "displacement", "model")),
+                ("creep", ("time", "displacement", "model")),
+            )
+            for name in names
+        }
+    )
+    fit = {"trace": "run", "event": 0, "nrmse": 0.01, "u_max": 1e-6}
+    for grid in (ramp_grid, creep_grid):
+        legend = grid(data, [fit]).axes[0].get_legend()
+        assert [text.get_text() for text in legend.get_texts()] == ["measured", "static model"]
+
+
+PART = """[[trace]]
+name = "{}"
+file = "a.csv"
+time = {{ column = 1, unit = "s" }}
+displacement = {{ column = 2, unit = "m" }}
+drive_velocity = "50 um/s"
+"""
+RIG = """[rig]
+spring_stiffness = "1000 N/m"
+normal_force = "0.3 N"
+friction_coefficient = 0.2
+"""
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capsys):
+    """Run a command on a campaign of some traces of one slip or more; its exit code, output and message."""
+    monkeypatch.setenv("STICKSLIP_NO_CACHE", "1")
+
+    def run_it(slips, names, *command):
+        trace = sawtooth(slips)
+        np.savetxt(tmp_path / "a.csv", np.column_stack([trace.time, trace.displacement]), delimiter=",", fmt="%.9g")
+        path = tmp_path / "c.toml"
+        path.write_text('schema = 1\ntitle = "rig"\n' + RIG + "".join(PART.format(name) for name in names))
+        code = run([command[0], str(path), *command[1:]])
+        return code, *capsys.readouterr()
+
+    return run_it
+
+
+@pytest.mark.parametrize(("names", "counted"), [(["a"], "1 trace"), (["a", "b"], "2 traces")])
+def test_inspect_counts_the_traces_in_words(call, names, counted):
+    code, out, _ = call(3, names, "inspect")
+    assert code == 0
+    assert out.splitlines()[0] == f"rig: {counted}"
+
+
+def test_a_campaign_without_a_creep_process_is_named(call):
+    code, _, said = call(1, ["a"], "fit", "--model", "static")
+    assert code == 2
+    assert "c.toml: nothing here can be compared with the static model" in said
