@@ -19,7 +19,7 @@ QUIET = 0.15  # floors; mean change of the features below which derivatives are 
 TRUST = 0.1  # share of a step's change that Broyden's update may have missed
 MODERATE = 4.0  # floors, rms, by which the step of a difference should move the features
 LEAST, LARGEST = 1e-3, (0.05, 0.5)  # such a step on the search scale; the largest of a logarithm, of another scale
-MODEL_ERROR = 2.5  # on standard deviations: a bank of three parameters is no rough line (tests/fit/test_recovery.py)
+MODEL_ERROR = 4.0  # on standard deviations: a bank of three parameters is no rough line (tests/fit/test_recovery.py)
 STAGES = ((30.0, 6), (7.0, 8), (2.5, 8), (1.0, 20))  # factor on the floors, most evaluations at it
 
 

@@ -102,6 +102,7 @@ def _zoom(axes: Axes, data: xarray.Dataset, key: str, title: str, *, clip: bool)
         axes.plot(when * factor, (model - zero) * k, color=MIDDLE, ls="--", lw=1.2, label="model")
         axes.legend(fontsize=8)
     axes.set(xlabel=text, ylabel=f"position / {unit}")
+    axes.locator_params(axis="x", nbins=5)
 
 
 @styled
