@@ -30,6 +30,7 @@ SHARES = (1.0, 0.4)  # of a linear step that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
+AGAIN, SETTLED = 4, 0.98  # a leader is refined again until that takes less than 2 % off its cost
 WIDEST = 30.0
 
 
@@ -193,6 +194,11 @@ def settle(
         other = go(begun, FEW + MORE)
         if other.cost < best.cost:
             best = other
+    for _ in range(AGAIN):
+        before = best.cost
+        best = go(best, MOST)
+        if best.cost > SETTLED * before:
+            break
     return best
 
 

@@ -18,7 +18,7 @@ class Thresholds:
             nearly all of the development campaigns without a missing effect stay below (docs/diagnosis).
         gain: an effect must take off at least this share of the training cost, and of the held-out score.
         adequate: largest error of any phase (floors) with the named effect; above it something else is missing.
-        significant: least amplitude over its standard deviation.
+        significant: an effect must lower the training cost by at least the square of this for each of its parameters.
         rival: the runner-up must cost at least this factor more; otherwise the data cannot tell them apart.
         failed: a base fit with a larger error (floors) is not ranked.
         standard_errors: least gain on held-out cycles over its standard error.

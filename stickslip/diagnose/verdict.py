@@ -85,10 +85,10 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
             fails.append("the gain on unseen cycles is not significant")
     amplitude = candidate.amplitude
     if amplitude is not None:
-        value, sd = candidate.fit.values[amplitude.name], _amplitude_sd(candidate)
         null = catalogue.amplitude(candidate.effect).null or 0.0
-        if sd > 0 and abs(value - null) < limits.significant * sd:
-            fails.append("its amplitude is not significant")
+        own = sum(1 for f in candidate.fit.free if f.name.startswith(f"{candidate.tag}."))
+        if base_cost - cost < limits.significant**2 * own:
+            fails.append("its gain is not significant for the number of its parameters")
         for f, z in zip(candidate.fit.free, candidate.fit.z, strict=True):
             if not f.name.startswith(f"{candidate.tag}."):
                 continue
@@ -98,22 +98,6 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
     return Judged(candidate, cost, tuple(fails))
 
 
-def _amplitude_sd(candidate: Candidate) -> float:
-    """Standard deviation (SI) of the amplitude for the inner parameters that were found.
-
-    Inner parameters may be tied to the amplitude (an age and the rate at which it counts); that says nothing against
-    the effect.
-    """
-    fit, amplitude = candidate.fit, candidate.amplitude
-    assert fit is not None
-    assert amplitude is not None
-    own = [i for i, f in enumerate(fit.free) if f.name.startswith(f"{candidate.tag}.")]
-    at = next(j for j, i in enumerate(own) if fit.free[i].name == amplitude.name)
-    precision = np.linalg.pinv(fit.covariance[np.ix_(own, own)], hermitian=True)
-    sd = 1.0 / np.sqrt(precision[at, at]) if precision[at, at] > 0 else 0.0
-    return float(sd * amplitude.slope(float(fit.z[own[at]])))
-
-
 def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[Judged | None, list[Judged]]:
     """The best candidate that passed, and all that the data cannot tell from it (itself first)."""
     ranked = sorted(judged, key=lambda j: j.cost)
@@ -121,13 +105,20 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
     if not passed:
         return None, []
     best = passed[0]
+    # a special case within reach of the law that contains it: nothing speaks for the rest of that law
+    simpler = [j for j in passed[1:] if j.cost < limits.rival * best.cost and _contains(best, j)]
+    best = simpler[0] if simpler else best
     # a rival counts even where it failed a condition of its own: it explains the data as well
-    close = [j for j in ranked if j.cost < limits.rival * best.cost]
+    close = [j for j in ranked if j.cost < limits.rival * best.cost and not _contains(j, best)]
     seen: list[Judged] = [best]
     for j in close:
         if all(j.candidate.tag != s.candidate.tag for s in seen):
             seen.append(j)
     return best, seen
+
+
+def _contains(general: Judged, special: Judged) -> bool:
+    return special.candidate.tag in general.candidate.effect.generalises
 
 
 def finished(named: Sequence[str]) -> Verdict:

@@ -97,6 +97,8 @@ class Effect(eqx.Module):
         confused_with: tags whose signature is alike, each with the experiment that separates the two.
         source: paper or book.
         amplitude: name of the parameter whose null value makes the effect vanish.
+        generalises: tags of effects that this law contains as special cases; where both describe the data, the simpler is
+            named.
         periodic: for an effect with a ``phase``: the parameter that is its period (or "frequency"), and over what it is
             periodic: "time", "load point" or "displacement".
     """
@@ -108,6 +110,7 @@ class Effect(eqx.Module):
     confused_with: ClassVar[dict[str, str]] = {}
     source: ClassVar[str] = ""
     amplitude: ClassVar[str] = ""
+    generalises: ClassVar[tuple[str, ...]] = ()
     periodic: ClassVar[tuple[str, Literal["time", "load point", "displacement"]] | None] = None
     family: ClassVar[str] = "contact"
 

@@ -34,6 +34,7 @@ class RateAndState(Memory, Threshold):
     }
     source = "Ruina, J. Geophys. Res. 88 (1983) 10359; Rice & Ruina, J. Appl. Mech. 50 (1983) 343"
     amplitude = "evolution"
+    generalises = ("contact-ageing", "direct-effect")
     family = "friction"
 
     evolution: Array = parameter(

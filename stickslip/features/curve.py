@@ -104,10 +104,13 @@ class SampledCurve:
     def rise(self, levels: Any, after: Any) -> np.ndarray:
         first = int(np.searchsorted(self.t, after))
         y, t = self.y[first:], self.t[first:]
+        top = max(int(np.searchsorted(t, self.top[0], side="right")), 1)
         times = []
         for level in np.asarray(levels):
-            j = int(np.argmax(y >= level)) if np.any(y >= level) else y.size - 1
-            j = max(j, 1)
+            # the last passage before the top: noise reaches a low level long before the block does
+            below = np.flatnonzero(y[:top] < level)
+            j = int(below[-1]) + 1 if below.size else 1
+            j = min(max(j, 1), y.size - 1)
             rise = y[j] - y[j - 1]
             s = (level - y[j - 1]) / rise if rise > 0 else 1.0
             times.append(t[j - 1] + np.clip(s, 0.0, 1.0) * (t[j] - t[j - 1]))
