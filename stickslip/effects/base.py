@@ -97,8 +97,8 @@ class Effect(eqx.Module):
         confused_with: tags whose signature is alike, each with the experiment that separates the two.
         source: paper or book.
         amplitude: name of the parameter whose null value makes the effect vanish.
-        generalises: tags of effects that this law contains as special cases; where both describe the data, the simpler is
-            named.
+        generalises: tags of effects that this law contains as special cases; where both describe the data, the special
+            case is named.
         periodic: for an effect with a ``phase``: the parameter that is its period (or "frequency"), and over what it is
             periodic: "time", "load point" or "displacement".
     """
