@@ -151,6 +151,12 @@ def nothing(
     if nearest is not None:
         text += f"; nearest is {nearest.candidate.tag}, but {'; '.join(nearest.failures) or 'it does not suffice'}"
     reasons = nearest.failures if nearest is not None else ()
+    if not named and worst <= limits.adequate:
+        return Verdict(
+            "complete",
+            text=f"A small misfit remains ({phase}, {worst:.1f} floors) that no effect of the catalogue takes away; "
+            "otherwise every phase is described as well as the data allow.",
+        )
     if not named:
         return Verdict("unknown", (), (), text + ".", reasons)
     if worst <= limits.adequate:

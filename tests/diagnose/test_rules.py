@@ -13,7 +13,7 @@ from stickslip.diagnose.heldout import HeldOut
 from stickslip.diagnose.holdout import training_cycles
 from stickslip.diagnose.pieces import fit_arrays, fit_from
 from stickslip.diagnose.thresholds import THRESHOLDS
-from stickslip.diagnose.verdict import decide, is_complete, judge
+from stickslip.diagnose.verdict import decide, is_complete, judge, nothing
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
 from stickslip.features.layout import Layout
@@ -128,6 +128,18 @@ def test_the_special_case_is_named_where_the_general_law_is_no_better(general, s
     assert best is not None
     assert best.candidate.tag == "rate-and-state"
     assert len(close) == 1
+
+
+def test_what_is_left_decides_between_complete_and_unknown():
+    refused = [judge(candidate("viscous-drag", 900, 8.0), 1000.0, held(9.0))]
+    small, large = THRESHOLDS.adequate - 0.1, THRESHOLDS.adequate + 0.1
+    assert nothing([], refused, "slip", small).kind == "complete"
+    assert nothing([], refused, "slip", large).kind == "unknown"
+    assert nothing(["tilt"], refused, "slip", small).kind == "missing"
+    verdict = nothing(["tilt"], refused, "slip", large)
+    assert verdict.kind == "unknown"
+    assert "viscous-drag" in verdict.text
+    assert verdict.reasons == refused[0].failures
 
 
 def test_a_gain_too_small_for_its_parameters_is_refused():
