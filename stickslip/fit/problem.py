@@ -157,10 +157,10 @@ class Problem:
         else:
             with ThreadPoolExecutor(self.threads) as pool:
                 done = dict(zip(tasks, pool.map(one, tasks), strict=True))
-        return [
-            np.stack([done[lane, r] if (lane, r) in done else base[r] for r in range(m.runs)])  # type: ignore[index]
-            for lane in range(len(lanes))
-        ]
+        out = [np.array(m.values if base is None else base) for _ in lanes]
+        for (lane, r), found in done.items():
+            out[lane][r] = found
+        return out
 
 
 class _Key:
