@@ -75,6 +75,10 @@ def residual_plots(data: xarray.Dataset) -> Figure:
         ax.set_yscale("log")
         if name == "velocity" and np.nanmax(x) > 3 * max(np.nanmin(x), 1e-300):
             ax.set_xscale("log")
+            # the velocities themselves: a logarithmic axis labels every digit of a short range, one over the other
+            driven = np.unique(np.round(x[np.isfinite(x)] * k, 6))
+            ax.set_xticks(driven[:8], [f"{v:.3g}" for v in driven[:8]])
+            ax.minorticks_off()
         ax.set(
             xlabel=text + (f" / ({shown})" if "/" in shown else f" / {shown}" if shown != "1" else ""),
             ylabel="residual / floor",
