@@ -10,13 +10,18 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import inspect
+import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+
+import numpy as np
+import xarray
 
 from stickslip.effects import catalogue
 from stickslip.effects.base import Effect
 from stickslip.params import Spec, specs, variants
+from stickslip.plots.style import scaled
 
 # what a role does to the base model
 ACTS = {
@@ -30,6 +35,92 @@ ACTS = {
     "BodyForce": "the block, by a force of its own",
     "Sensor": "what is read, not what happens",
 }
+# symbols of the equations that are no parameters: their meaning everywhere, and on single pages
+SYMBOLS = {
+    "x": "displacement of the block (m)",
+    r"\dot x": "velocity of the block (m/s)",
+    "t": "time (s)",
+    "x_0": "position of the load point (m)",
+    "v_0": "velocity of the drive (m/s)",
+    "m": "mass of the block (kg)",
+    r"\mu": "friction coefficient",
+    "F_s": "full static friction of all contacts (N)",
+    "F_{n,i}": "normal load of an element (N)",
+    "f_i": "force of an element (N)",
+    r"\dot f_i": "rate of an element's force (N/s)",
+    "c_i": "cap of an element (N)",
+    "k_i": "stiffness of an element (N/m)",
+    "u_i": "displacement at which an element slides (m)",
+    "u_{max}": "displacement at which the last element slides (m)",
+    "k": "stiffness of all elements together (N/m)",
+    "c_s": "stiffness of the driving spring (N/m)",
+    r"\varphi": "phase",
+    "i": "number of the element",
+}
+_SHAPE = {"Q": "share of the stiffness that still sticks", "u": "displacement at which only this share sticks (m)"}
+_READ = {"y": "reading of the sensor (m)"}
+OWN = {
+    "base-vibration": {"F": "force on the block in the frame of the base (N)"},
+    "contact-ageing": {r"\theta": "age of the contact (s)", r"\dot\theta": "rate of the age"},
+    "contact-damping": {"F": "force on the block (N)"},
+    "contact-renewal": {
+        "f": "force of the junctions of one age in an element (N)",
+        "a": "age of the junctions, counted in slip (m)",
+        "c": "cap of the element (N)",
+        "k": "stiffness of the element (N/m)",
+        r"\ell": "mean slip that a junction lives (m)",
+    },
+    "curvature": _SHAPE,
+    "roll-off": _SHAPE,
+    "drive-ripple": {"s": "way the drive was told to go (m)"},
+    "flash-heating": {"P": "frictional power, averaged (W)", r"\dot P": "rate of this power (W/s)"},
+    "machine-compliance": _READ
+    | {
+        "F": "tangential force (N), F(u) that of the contact",
+        "u": "slip of the contact (m)",
+        "k_m": "stiffness of the fixture (N/m)",
+    },
+    "nonlinear-spring": {"F": "force of the driving spring (N)", "y": "elongation of the spring (m)"},
+    "rate-and-state": {r"\theta": "state of the contact (s)"},
+    "residual-load": {
+        "q": "mobility of the contacts, 0 at rest and 1 in a fast slip",
+        r"\dot q": "rate of the mobility (1/s)",
+    },
+    "sensor-drift": _READ,
+    "sensor-gain": _READ,
+    "sensor-high-pass": _READ | {"s": "slow part that is lost (m)", r"\dot s": "rate of this part (m/s)"},
+    "sensor-low-pass": _READ | {"e": "lag of the reading (m)", r"\dot e": "rate of the lag (m/s)"},
+    "slip-weakening": {"s_i": "way an element has slid since it last stuck (m)"},
+    "tilt": {"F": "force that tilts (N)"},
+    "unequal-contacts": {"z_{j(i)}": "normal score of the contact that the element belongs to"},
+    "viscoelastic-contact": {
+        "f": "force of an element (N)",
+        "e": "deflection of the element (m)",
+        r"\dot e": "rate of the deflection (m/s)",
+        "k": "stiffness of the element (N/m)",
+        "f_m": "force of the Maxwell branch (N)",
+        r"\dot f_m": "rate of this force (N/s)",
+    },
+    "viscous-drag": {"F": "force on the block (N)", "v_1": "a velocity of reference (m/s)"},
+    "wear": {"s": "path of the block (m)", r"\dot s": "rate of the path (m/s)", "g": "course of the wear, see below"},
+}
+_TOKEN = re.compile(r"(?:\\dot ?)?(?:\\[a-zA-Z]+|[A-Za-z])(?:_\{[^}]*\}|_\w)?")
+_WORDS = re.compile(r"\\(?:mathrm|text)\{[^}]*\}|\\quad|e\^|\\partial(?:_\w)?|dt\b")
+_FUNCTIONS = {
+    r"\to",
+    r"\ln",
+    r"\sin",
+    r"\sinh",
+    r"\max",
+    r"\sum",
+    r"\sum_i",
+    r"\int",
+    r"\left",
+    r"\right",
+    r"\le",
+    r"\sim",
+}
+_FUNCTIONS |= {r"\cdot", r"\pi", r"\propto", r"\frac", r"\tfrac"}
 FAMILIES = {
     "contact": "Contact",
     "friction": "Friction",
@@ -38,17 +129,19 @@ FAMILIES = {
     "drive": "Drive and surroundings",
     "sensor": "Sensor",
 }
+NUMBERS = "numbers.json"
 TOGETHER = 10  # effects that share a compilation, all but one of them absent
 
 
-def page(cls: type[Effect]) -> str:
-    """The page of an effect, in MyST Markdown."""
+def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None = None) -> str:
+    """The page of an effect, in MyST Markdown; ``numbers`` of `measured` without and with it."""
     acting = [ACTS[role] for role in catalogue.roles(cls) if role in ACTS]
     memory = " It has a state of its own." if "Memory" in catalogue.roles(cls) else ""
     parts = [
         f"# {cls.tag}",
         f"{prose(cls.summary[:1].upper() + cls.summary[1:])}.",
         f"```{{math}}\n{cls.equation}\n```",
+        *_symbols(cls),
         *(prose(text) for text in re.split(r"\n\s*\n", inspect.cleandoc(cls.__doc__ or ""))),
         f"**Acts on** {' and '.join(acting)}.{memory}",
         "## Parameters",
@@ -58,6 +151,7 @@ def page(cls: type[Effect]) -> str:
         f"![The demonstration rig with and without {cls.tag}]({cls.tag}.png)",
         f"*The rig of `stickslip effects` with {_shown_amplitude(cls)} and everything else at its default: drawn at "
         "200 µm/s, with a hold of 2 s; made by the program when these pages are built.*",
+        *_numbers(numbers),
         "```toml\n" + _entry(cls) + "\n```",
         f"The same in a fit: `stickslip fit campaign.toml --add {cls.tag}`.",
         "## In a measurement",
@@ -88,6 +182,21 @@ def index(classes: Sequence[type[Effect]]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def symbols(cls: type[Effect]) -> list[str]:
+    """Symbols of an effect's equation that are not parameters of it, in the order they come."""
+    of_parameters = {t for spec in specs(cls).values() for t in _TOKEN.findall(spec.symbol or "")}
+    found = dict.fromkeys(_TOKEN.findall(_WORDS.sub(" ", cls.equation.replace("^*", ""))))
+    of_parameters |= {t.removesuffix("^*") for t in of_parameters}
+    return [t for t in found if t not in _FUNCTIONS and t not in of_parameters]
+
+
+def _symbols(cls: type[Effect]) -> Iterator[str]:
+    known = {**SYMBOLS, **OWN.get(cls.tag, {})}
+    told = [f"${s}$ {known[s]}" for s in symbols(cls) if s in known]
+    if told:
+        yield f"{'; '.join(told)}."
+
+
 def _parameters(cls: type[Effect]) -> Iterator[str]:
     rows = ["| | name | meaning | unit | default | range | absent at |", "|---|---|---|---|---|---|---|"]
     default = cls()
@@ -116,6 +225,51 @@ def _forms(cls: type[Effect]) -> Iterator[str]:
         yield f"`{name}`{doc}. One of {', '.join(f'`{c}`' for c in choices)} (default `{first}`)."
 
 
+# what `measured` gives: name, unit, factor from SI, format
+MEASURED = (
+    ("time from the second slip to the third", "ms", 1e3, ".2f"),
+    ("second slip", "µm", 1e6, ".3f"),
+    ("its largest velocity", "mm/s", 1e3, ".3f"),
+    ("creep in the half of the stick before it", "nm", 1e9, ".1f"),
+    ("displacement in the hold of 2 s", "nm", 1e9, ".1f"),
+)
+
+
+def measured(data: xarray.Dataset) -> list[float | None]:
+    """What a sensor sees of a run of the rig, SI: the quantities of `MEASURED`, None where there is none."""
+    t, y = data["time"].values, data["reading"].values
+    onset, arrest = data["onset"].values, data["arrest"].values
+    if onset.size < 3 or arrest.size < 2:
+        return [None] * len(MEASURED)
+
+    def at(moment: float) -> float:
+        return float(np.interp(moment, t, y))
+
+    part = (t >= onset[1]) & (t <= arrest[1])
+    stick = onset[1] - arrest[0]
+    # the ring-down of the last slip before the hold is over half-way through it
+    return [
+        float(onset[2] - onset[1]),
+        at(arrest[1]) - at(onset[1]),
+        float(np.max(np.gradient(y[part], t[part]))),
+        at(onset[1] - 0.02 * stick) - at(onset[1] - 0.5 * stick),
+        at(4.49) - at(2.51),
+    ]
+
+
+def _numbers(numbers: Mapping[str, Sequence[float | None]] | None) -> Iterator[str]:
+    """The runs in numbers: what is too small for the picture."""
+    if not numbers:
+        return
+    rows = ["| in the sensor's reading | without | with | change |", "|---|---|---|---|"]
+    for (name, unit, factor, form), a, b in zip(MEASURED, numbers["without"], numbers["with"], strict=True):
+        if a is None or b is None:
+            continue
+        share = f"{100 * (b - a) / abs(a):+.2g} %" if abs(a * factor) >= 0.5 and abs(b - a) < abs(a) else ""
+        rows.append(f"| {name} / {unit} | {a * factor:{form}} | {b * factor:{form}} | {share} |")
+    yield "\n".join(rows)
+
+
 def _amplitude(cls: type[Effect]) -> tuple[Spec, float]:
     from stickslip.scenario.demonstration import typical_amplitude
 
@@ -124,7 +278,15 @@ def _amplitude(cls: type[Effect]) -> tuple[Spec, float]:
 
 def _shown_amplitude(cls: type[Effect]) -> str:
     spec, value = _amplitude(cls)
-    return f"`{cls.amplitude}` = {number(value)}{'' if spec.unit == '1' else f' {spec.unit}'}"
+    return f"`{cls.amplitude}` = {_quantity(value, spec.unit)}"
+
+
+def _quantity(value: float, unit: str) -> str:
+    """With a unit between 1 and 1000 where it takes a prefix."""
+    if unit in ("m", "s", "N", "m/s", "m/s^2", "m/N"):
+        factor, unit = scaled(np.array([value]), unit)
+        return f"{value * factor:g} {unit}"
+    return f"{value:g}" + ("" if unit == "1" else f" {unit}")
 
 
 def _entry(cls: type[Effect]) -> str:
@@ -154,12 +316,13 @@ def cell(text: str) -> str:
 
 
 def draw(classes: Sequence[type[Effect]], folder: Path) -> None:
-    """Simulate the demonstration rig without and with every effect, and draw both."""
+    """Simulate the demonstration rig without and with every effect, draw both, and write ``numbers.json``."""
     from stickslip.plots import effect_figure, save
     from stickslip.scenario import make_scenario, simulate
     from stickslip.scenario.demonstration import RIG
 
     without = simulate(make_scenario(RIG))
+    numbers = {}
     for first in range(0, len(classes), TOGETHER):
         group = classes[first : first + TOGETHER]
         for cls in group:
@@ -167,18 +330,23 @@ def draw(classes: Sequence[type[Effect]], folder: Path) -> None:
             spec, value = _amplitude(cls)
             entries = [{"type": c.tag, **({c.amplitude: value} if c is cls else {})} for c in group]
             with_it = simulate(make_scenario({**RIG, "effect": entries}))
-            unit = "" if spec.unit == "1" else f" {spec.unit}"
-            save(
-                effect_figure(without, with_it, cls.tag, f"{cls.amplitude} = {value:g}{unit}"),
-                folder / f"{cls.tag}.png",
-            )
+            shown = f"{cls.amplitude} = {_quantity(value, spec.unit)}"
+            save(effect_figure(without, with_it, cls.tag, shown), folder / f"{cls.tag}.png")
+            numbers[cls.tag] = {"without": measured(without), "with": measured(with_it)}
+    (folder / NUMBERS).write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
 
 
 def write_all(folder: Path) -> None:
     """Pages, index and pictures of every effect; files that would not change are left alone."""
     folder.mkdir(exist_ok=True)
     classes = [catalogue.get(tag) for tag in sorted(catalogue.EFFECTS.names())]
-    wanted = {"index.md": index(classes), **{f"{cls.tag}.md": page(cls) for cls in classes}}
+    stamp, state = folder / "pictures.sha256", _state()
+    drawn = all((folder / f"{cls.tag}.png").exists() for cls in classes) and (folder / NUMBERS).exists()
+    if not drawn or not stamp.exists() or stamp.read_text() != state:
+        draw(classes, folder)
+        stamp.write_text(state)
+    numbers = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
+    wanted = {"index.md": index(classes), **{f"{cls.tag}.md": page(cls, numbers.get(cls.tag)) for cls in classes}}
     for old in folder.glob("*.md"):
         if old.name not in wanted:
             old.unlink()
@@ -186,11 +354,6 @@ def write_all(folder: Path) -> None:
         path = folder / name
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
-    stamp, state = folder / "pictures.sha256", _state()
-    drawn = all((folder / f"{cls.tag}.png").exists() for cls in classes)
-    if not drawn or not stamp.exists() or stamp.read_text() != state:
-        draw(classes, folder)
-        stamp.write_text(state)
 
 
 def _state() -> str:

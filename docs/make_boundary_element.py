@@ -2,6 +2,7 @@
 
     pip install tamaas        # nothing else of this repository needs it
     python docs/make_boundary_element.py
+    python docs/make_boundary_element.py --draw        # the picture alone, from the numbers; without tamaas
 
 Lengths in units of the rms height h (heights, depth) and of the length L (in the plane), forces in E* L h: elastic
 half-spaces have no other scale. Surface and line have the same spectrum, the same longest wave L and the same shortest
@@ -11,12 +12,12 @@ wave 2 L/N. The surface is periodic; depth is the way of its mean plane after th
 from __future__ import annotations
 
 import json
+import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tamaas as tm
 from matplotlib.figure import Figure
 
 from stickslip.contact import Moduli, rough_table, static_contact
@@ -46,6 +47,8 @@ def surface(hurst: float, seed: int) -> np.ndarray:
 
 def approach(heights: np.ndarray, forces: np.ndarray, exact: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Depth after first touch and share of the area in contact, at each force."""
+    import tamaas as tm
+
     model = tm.Model(tm.model_type.basic_2d, [1.0, 1.0], list(heights.shape))
     model.E, model.nu = 1.0, 0.0  # E* = 1
     solver = tm.PolonskyKeerRey(model, heights, 1e-8 if exact else 1e-6)
@@ -63,7 +66,9 @@ def approach(heights: np.ndarray, forces: np.ndarray, exact: bool = False) -> tu
 
 
 def hertz() -> float:
-    """Force over Hertz's for a small sphere in the periodic cell."""
+    """Largest pressure over Hertz's for a small sphere in the periodic cell."""
+    import tamaas as tm
+
     x = (np.arange(N) + 0.5) / N - 0.5
     radius = 1.0
     heights = -(x[:, None] ** 2 + x[None, :] ** 2) / (2 * radius)
@@ -112,7 +117,7 @@ def draw(found: dict[str, Any]) -> Figure:
     middle = np.sqrt(FORCES[1:] * FORCES[:-1])
     for (hurst, part), mark, line in zip(found.items(), "os^D", ("-", "--", "-.", ":"), strict=True):
         axes[0, 0].plot(part["surface"]["depth"], FORCES, mark, color=DARK, ms=5, label=f"H = {hurst}, surface")
-        axes[0, 0].plot(part["line"]["depth"], FORCES, line, color=MIDDLE, label="line")
+        axes[0, 0].plot(part["line"]["depth"], FORCES, line, color=MIDDLE, label=f"H = {hurst}, line")
         axes[0, 1].plot(middle, part["surface"]["stiffness"], mark, color=DARK, ms=5)
         axes[0, 1].plot(middle, part["line"]["stiffness"], line, color=MIDDLE)
     for ax in axes[0]:
@@ -120,12 +125,19 @@ def draw(found: dict[str, Any]) -> Figure:
         logarithmic(ax, "y")
     axes[0, 0].set(xlabel="depth / h_rms", ylabel="force / (E* L h_rms)", title="force against depth")
     axes[0, 1].set(xlabel="force / (E* L h_rms)", ylabel="stiffness / (E* L)", title="stiffness against force")
-    axes[0, 1].axvline(PAPER, color=DARK, ls=":", lw=1)
+    axes[0, 1].axvline(PAPER, color=DARK, ls=":", lw=1, label="force of the paper's contacts")
+    axes[0, 1].legend(fontsize=8, loc="lower right")
     axes[0, 0].legend(fontsize=8)
     return made
 
 
 def main() -> None:
+    if sys.argv[1:] == ["--draw"]:
+        known = json.loads((OUT / "boundary_element.json").read_text(encoding="utf-8"))
+        save(draw(known["by_hurst"]), OUT / "boundary_element.png")
+        return
+    import tamaas as tm
+
     tm.set_log_level(tm.LogLevel.error)
     began = time.perf_counter()
     ratio = hertz()

@@ -28,7 +28,7 @@ from stickslip.fit.creep_process import V_LIM, CreepProcess, creep_processes
 from stickslip.fit.static import CreepFit, StaticFit, fit_static
 from stickslip.fit.static_table import StaticRig, static_table, virtual_curve
 from stickslip.plots import save
-from stickslip.plots.style import DARK, LIGHT, MIDDLE, figure, styled
+from stickslip.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, styled
 from stickslip.scenario import load_scenario, simulate, static_creep
 from stickslip.scenario.load import Scenario
 from stickslip.segment import segment
@@ -89,8 +89,10 @@ def _fig2(curves: dict[float, Any]) -> Figure:
         look: dict[str, Any] = {"ls": line, "color": colour, "label": f"H = {h:g}"}
         axes[0, 0].plot(c.tau, w, **look)
         axes[0, 1].plot(c.tau, 1.0 - (1.0 - c.tau) ** (h / (h + 1.0)), **look)
-    axes[0, 0].set(xlabel="F / (mu F_n)", ylabel="u / u_max", title="mean of 100 lines, N = 4096")
-    axes[0, 1].set(xlabel="F / (mu F_n)", ylabel="u / u_max", title="power law 1 - (1 - tau)^(H/(H+1))")
+    axes[0, 0].set(
+        xlabel="share of full friction, F / (µ F_n)", ylabel="u / u_max", title="mean of 100 lines, N = 4096"
+    )
+    axes[0, 1].set(xlabel="share of full friction, τ", ylabel="u / u_max", title="power law 1 - (1 - τ)^(H/(H+1))")
     axes[0, 0].legend()
     return made
 
@@ -124,7 +126,7 @@ def _fig4(data: xarray.Dataset) -> Figure:
         part = (t >= begin) & (t <= end)
         start = y[part][0]
         ax.plot(t[part] - end, (y[part] - start) * 1e9, color=DARK)
-        ax.set(xlabel="time before the slip / s", ylabel="displacement / nm", title=title)
+        ax.set(xlabel="time from the slip / s", ylabel="displacement / nm", title=title)
         creep = float(np.interp(end - 2e-3, t, y) - start) * 1e9
         ax.set_ylim(-0.08 * creep, 1.25 * creep)
     return made
@@ -155,12 +157,12 @@ def _fig5(fits: dict[str, CreepFit]) -> Figure:
         p = fit.process
         ax.plot(p.time, p.displacement * 1e9, color=LIGHT, lw=4, label="simulated")
         ax.plot(p.time, fit.model * 1e9, color=DARK, label=f"H = {fit.hurst:.2f}, h_rms = {fit.h_rms * 1e6:.2f} µm")
-        ax.set(xlabel="time before 1 µm/s / s", ylabel="displacement / nm", title=f"{name} procedure")
+        ax.set(xlabel="time from the passage of 1 µm/s / s", ylabel="displacement / nm", title=f"{name} procedure")
         ax.legend(loc="upper left")
     for (name, fit), (line, colour) in zip(fits.items(), STYLES, strict=False):
         residual = (fit.model - fit.process.displacement) * 1e9
         axes[0, 2].plot(fit.process.time, residual, ls=line, color=colour, label=name)
-    axes[0, 2].set(xlabel="time before 1 µm/s / s", ylabel="model - data / nm", title="what is left")
+    axes[0, 2].set(xlabel="time from the passage of 1 µm/s / s", ylabel="model - data / nm", title="what is left")
     axes[0, 2].legend()
     return made
 
@@ -278,7 +280,8 @@ def _statistics(scatter: dict[str, StaticFit]) -> Figure:
                 ax.plot([f.hurst for f in chosen], [f.h_rms * 1e6 for f in chosen], marker, color=colour, label=label)
             ax.plot(0.24, 1.87, "*", ms=14, mfc="none", mec=MIDDLE, label="truth")
             lines = {"one": "four times one line", "four": "four lines"}[kind]
-            ax.set(xlim=(0, 1), yscale="log", ylim=(0.2, 30), title=f"{name}: {lines}, {state}")
+            logarithmic(ax, "y")
+            ax.set(xlim=(0, 1), ylim=(0.2, 30), title=f"{name}: {lines}, {state}")
             ax.set(xlabel="fitted H", ylabel="fitted h_rms / µm")
     axes[0, 0].legend()
     return made

@@ -127,6 +127,7 @@ def paper(data: Path, work: Path, rows: list[list[str]]) -> str:
     f, a = arrays["trace0_ripple_frequency"].values, arrays["trace0_ripple_amplitude"].values
     around = float(a[(f > 1 / 0.17) & (f < 1 / 0.13)].max())
     by_phase = dynamic["ladder"][-1]["by_phase"]
+    short_gain = dynamic["traces"][0]["duration"]
     used = dynamic["traces"][0]["events"][: dynamic["fit"]["cycles"]]
     ten = [1e6 * e["slip"] for e in used]
     waits = [e["recurrence"] for e in used if e["recurrence"]]
@@ -149,12 +150,13 @@ Record `k168Nm_v42` of the paper slider, 376 s: {len(slips)} slips, {large} of t
 mean with a standard deviation of {stdev(slips):.0f} um. What `stickslip inspect` says:
 
 {quote(lines)}
-![whole trace, one stick, one slip](figures/real-paper.png)
+![whole trace, one stick, one slip, what follows it](figures/real-paper.png)
 
 **The force's scale.** In {gain["sticks"]:.0f} sticks the force rises {gain["value"]:.3f} (+-{gain["std"]:.3f}) times as fast as
-stiffness times drive. A block cannot move backwards, so the program names it (sensor-gain, {100 * (gain["value"] - 1):+.0f} %) and `fit`
-divides the force by it.
+stiffness times drive. A block cannot move backwards, so the program names it (sensor-gain, {100 * (gain["value"] - 1):+.0f} %). `stickslip fit`
+finds it by itself and says, of the {short_gain:.0f} s used below:
 
+{quote([note for note in dynamic["notes"] if "sensor-gain" in note])}
 **Ripple.** {trace["ripple"]["text"][0].upper() + trace["ripple"]["text"][1:]}. Around a period of 0.15 s, at which the slope was described as modulated,
 {"a line stands out" if near else f"no line stands out: whatever is there is below {1e9 * around:.0f} nm"}.
 
@@ -259,7 +261,7 @@ def fault(data: Path, work: Path, rows: list[list[str]]) -> str:
 {len(events)} slips, one every {mean(recurrence):.2f} s (standard deviation {stdev(recurrence):.2f} s), at {1e6 * trace["drive_velocity"]:.2f} um/s (median of the load point's speed). What `stickslip inspect` says:
 
 {quote([*seen["can"], *seen["cannot"]])}
-![whole record, one stick, one slip](figures/real-fault.png)
+![whole record, one stick, one slip, what follows it](figures/real-fault.png)
 
 The record was made from raw data by moving windows of about a second, and that forbids most conclusions. The slips last
 {median(durations):.2f} s ({min(durations):.2f} to {max(durations):.2f} s, correlation with their size {tied:.2f}), which is the windows' length and says

@@ -31,7 +31,16 @@ from stickslip.contact import (
 from stickslip.plots.style import logarithmic
 from stickslip.solve import Tolerance, integrate
 from tests.contact import test_indentation, test_tangential
-from tests.solve import books, comparison, convergence, derivatives, ringing, slip_events, static_limit
+from tests.solve import (
+    books,
+    comparison,
+    convergence,
+    derivatives,
+    ringing,
+    slip_differences,
+    slip_events,
+    static_limit,
+)
 from tests.solve.rig import STRENGTH, order, rig, tighter
 
 FOLDER = ROOT / "docs" / "verification"
@@ -364,7 +373,17 @@ def derivative() -> plt.Figure:
         right.plot(moves * 100, t, ".-", color=colour, lw=0.6, label=f"default tolerance/{factor:g}")
         near = np.array([-0.004, 0.004])
         right.plot(near * 100, t[20] + slope * near, color=colour, lw=2.5, alpha=0.5)
-    right.set(xlabel="change of spring stiffness (%)", ylabel="recurrence (s)", title="Thick: exact derivative")
+    expected = slip_differences.brute_differences(1e-3)
+    for factor, refine in ((1.0, 1), (10.0, 1), (10.0, 2)):
+        values, columns = slip_differences.solved(factor, refine)
+        slope, at = float(columns["recurrence"][which][0]), float(values["recurrence"][0])
+        print(f"tied steps, tolerance/{factor:g}/{refine}: {slip_differences.errors(columns, expected)}, {slope:.4f} s")
+    right.plot(near * 500, at + slope * 5 * near, "k--", lw=1.2, label="on steps tied to the motion")
+    right.set(
+        xlabel="change of spring stiffness (%)",
+        ylabel="recurrence (s)",
+        title="Thick: derivative through adaptive steps",
+    )
     right.legend()
     return fig
 

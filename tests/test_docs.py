@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import runpy
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -36,7 +37,17 @@ def written(pages: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path
     """The folder as a build makes it, the pictures left out."""
     folder = tmp_path_factory.mktemp("effects")
     draw = pages.draw
-    pages.draw = lambda classes, into: [(into / f"{cls.tag}.png").touch() for cls in classes]
+
+    def touch(classes: list, into: Path) -> None:
+        for cls in classes:
+            (into / f"{cls.tag}.png").touch()
+        numbers = {
+            cls.tag: {"without": [0.3, 6e-5, 3e-3, 9e-8, -1e-8], "with": [0.3, None, 3e-3, 9e-8, 4e-9]}
+            for cls in classes
+        }
+        (into / pages.NUMBERS).write_text(json.dumps(numbers))
+
+    pages.draw = touch
     try:
         pages.write_all(folder)
     finally:
@@ -64,6 +75,24 @@ def test_every_effect_has_its_page(written: Path, tag: str) -> None:
     assert f"({tag}.md)" in (written / "index.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize("tag", catalogue.EFFECTS.names())
+def test_every_symbol_of_an_equation_is_explained(pages: ModuleType, tag: str) -> None:
+    cls = catalogue.get(tag)
+    known = {**pages.SYMBOLS, **pages.OWN.get(tag, {})}
+    missing = [s for s in pages.symbols(cls) if s not in known]
+    assert not missing, f"give them a meaning in docs/effect_pages.py: {missing}"
+    page = pages.page(cls)
+    assert all(f"${s}$ {known[s]}" in page for s in pages.symbols(cls))
+
+
+def test_numbers_of_an_effects_runs(pages: ModuleType) -> None:
+    numbers = {"without": [0.3, 6e-5, 3e-3, 9e-8, -1e-8], "with": [0.33, None, 3e-3, 9e-8, 4e-8]}
+    (table,) = pages._numbers(numbers)
+    assert "| 300.00 | 330.00 | +10 % |" in table  # s to ms
+    assert "| second slip" not in table, "a run without that slip has no number"
+    assert "| -10.0 | 40.0 |  |" in table, "no percentage of what changes sign"
+
+
 def test_pages_of_effects_that_are_gone_are_removed(pages: ModuleType, written: Path) -> None:
     stray = written / "no-such-effect.md"
     stray.write_text("# left over")
@@ -86,6 +115,47 @@ def test_every_page_is_in_a_table_of_contents() -> None:
     assert there <= set(listed), f"not in docs/index.md: {sorted(there - set(listed))}"
     missing = [name for name in listed if name and name[0] != ":" and name not in there | {"effects/index"}]
     assert not missing
+
+
+def test_the_readme_tells_of_the_run_in_its_picture() -> None:
+    story = json.loads((DOCS / "images" / "story.json").read_text(encoding="utf-8"))
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = " ".join(re.search(r"<!-- story -->(.*?)<!-- /story -->", text, re.DOTALL)[1].split())  # type: ignore[index]
+    assert f"version {story['version']}, {story['date']}" in shown
+    assert len(story["fitted"]) == len(story["unseen"]) == len(story["models"])
+    for value in story["fitted"] + story["unseen"]:
+        assert (f"{value:.2g}" if value < 99.5 else f"{value:.0f}") in shown
+    assert all(effect in shown for effect in story["effects"])
+    words = (DOCS / "images" / "diagnosis.txt").read_text(encoding="utf-8")
+    assert all(model in words for model in story["models"]) and story["verdict"] in words
+
+
+def test_every_picture_and_page_that_is_linked_is_there() -> None:
+    for path in [ROOT / "README.md", *DOCS.glob("*.md")]:
+        text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+        for link in re.findall(r"\]\((?!https?:)([^)#]+)[^)]*\)", text):
+            if "effects/" not in link:  # written by the build
+                assert (path.parent / link).exists(), f"{path.name}: {link}"
+
+
+def test_every_picture_has_a_script() -> None:
+    scripts = "\n".join(path.read_text(encoding="utf-8") for path in DOCS.glob("*.py"))
+    pictures = [p for folder in ("images", "paper", "figures", "verification") for p in (DOCS / folder).glob("*.png")]
+    assert pictures
+    for picture in pictures:
+        assert re.search(rf"\b{picture.stem}\b", scripts), f"nothing in docs/*.py makes {picture.name}"
+
+
+@pytest.mark.slow
+def test_the_readmes_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    lines = code.strip().splitlines()
+    assert len(lines) <= 11
+    made = (ROOT / "out" / "demo" / "result.json").exists()
+    script = tmp_path / "example.py"
+    script.write_text("\n".join(line for line in lines if made or "found" not in line))
+    runpy.run_path(str(script))
 
 
 def test_the_tutorials_effect_is_short_and_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
