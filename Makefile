@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: demo test test-slow test-newest lint types layers bench docs clean
+.PHONY: demo test test-slow test-newest fuzz lint types layers bench docs clean
 
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "stickslip needs Python 3.11 or newer: make PYTHON=python3.12 ..."; exit 1; }
@@ -36,9 +36,13 @@ bench: $(STAMP)
 	$(BIN)/python -m tests.benchmark.fit_peers
 
 test-newest:
-	$(PYTHON) -m venv .venv-newest
+	test -x .venv-newest/bin/python || $(PYTHON) -m venv .venv-newest
 	.venv-newest/bin/python -m pip install --quiet --disable-pip-version-check --upgrade -e '.[test]'
-	.venv-newest/bin/python -m pytest -n $(WORKERS)
+	.venv-newest/bin/python -m pip list --disable-pip-version-check
+	.venv-newest/bin/python -m pytest -n $(WORKERS) $(TESTS)
+
+fuzz: $(STAMP)
+	$(BIN)/python -m tests.robust.fuzz --number 100000
 
 docs: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'

@@ -31,6 +31,7 @@ _PUBLIC = {
     "Weakening": "model",
     "LoadPoint": "model",
     "integrate": "solve",
+    "slip_derivatives": "solve",
     "Vibrometer": "sensor",
     "measure": "sensor",
     "make_effect": "effects.catalogue:make",

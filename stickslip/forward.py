@@ -14,6 +14,7 @@ import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from .effects.base import Motion
@@ -21,7 +22,9 @@ from .model import Model, State
 from .solve.integrate import _TERM, step_control
 from .solve.stepper import ContactStepper, Tolerance
 
+LARGEST_STEP = 0.01  # s
 MOST_STEPS = 3072  # of one cycle; ordinary stick-slip takes 300 to 1200, a hold a hundred more each second
+LONGEST = LARGEST_STEP * MOST_STEPS  # s; a longer cycle cannot be integrated to its end
 
 
 class Cycles(NamedTuple):
@@ -75,6 +78,18 @@ class Track(NamedTuple):
     steps: Array
 
 
+def cut_short(tracks: Track, cycles: Cycles) -> np.ndarray:
+    """Which used cycles broke off before the arrest and before the limit, shape (n,).
+
+    They wanted more than MOST_STEPS steps, or a step became too small: what the track says of such a cycle, and of
+    those after it, is not what the model says. Taken from the finished tracks, so that the compiled program stays as
+    it is (another output would change its rounding).
+    """
+    ends, limits = np.asarray(tracks.t)[..., -1], np.asarray(cycles.limit)
+    early = ends < limits - 1e-9 * np.maximum(np.abs(limits), 1.0)
+    return np.asarray(cycles.used) & ~np.asarray(tracks.arrested) & early
+
+
 def _observe(t: Any, y: State, args: Any) -> tuple[Array, Array, Array, Array]:
     model, *_ = args
     lead = model.lead(t)
@@ -123,7 +138,7 @@ def run_cycle(
                 diffrax.SubSaveAt(t1=True, fn=lambda t, y, a: jax.tree.leaves(y)),
             ]
         ),
-        stepsize_controller=step_control(0.01),
+        stepsize_controller=step_control(LARGEST_STEP),
         adjoint=diffrax.ForwardMode(),
         max_steps=most_steps,
         throw=False,

@@ -15,7 +15,7 @@ class Scatter:
     """Share of a feature that varies from one realisation of the contact to the next, besides what is refitted.
 
     Relative parts are shares of the feature; ``size`` of the slip, ``times`` of the slip's duration.
-    Found by simulating one rig with many rough lines; see docs/verification.
+    Found by simulating rigs with many rough lines; checked in tests/fit/test_floors.py, see docs/measuring.
     """
 
     recurrence: float = 0.001

@@ -17,15 +17,19 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, Protocol, TextIO
 
 from .errors import InputError, RunFolderError
 
-if TYPE_CHECKING:
-    import xarray
-
 RESULT = "result.json"
 PACKAGES = ("stickslip", "numpy", "scipy", "jax", "diffrax", "equinox", "xarray")
+
+
+class Arrays(Protocol):
+    """An `xarray.Dataset`, or what writes the same file."""
+
+    def to_netcdf(self, path: Any, *, engine: Any) -> Any:
+        """Write it as NetCDF."""
 
 
 class Run:
@@ -60,7 +64,7 @@ class Run:
             os.fsync(stream.fileno())
         return aside.replace(path)
 
-    def arrays(self, data: xarray.Dataset, name: str = "arrays.nc") -> Path:
+    def arrays(self, data: Arrays, name: str = "arrays.nc") -> Path:
         """Write a data set as NetCDF."""
         path = self.path(name)
         aside = path.with_name(path.name + ".part")
@@ -75,7 +79,7 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
     Args:
         target: the folder.
         force: replace an existing run folder (one with a ``result.json``; nothing else is ever replaced).
-        resume: go on with what an interrupted run left behind instead of removing it, and leave it after an error.
+        resume: go on with what an interrupted run left behind instead of removing it, and leave files after an error.
 
     Raises:
         RunFolderError: it exists, another run is writing it, or the disk is read-only or full.
@@ -88,6 +92,7 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
     refuse_existing(target, force)
     partial = target.with_name(f"{name}.partial")
     with _speaking(target), _locked(target):
+        _recover(target)
         refuse_existing(target, force)
         resumed = resume and partial.is_dir()
         if partial.exists() and not resumed:
@@ -96,7 +101,7 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
         try:
             yield Run(partial, target, resumed)
         except BaseException:
-            if not resume:
+            if not resume or not any(path.is_file() for path in partial.rglob("*")):
                 shutil.rmtree(partial, ignore_errors=True)
             raise
         _rename(partial, target)
@@ -124,10 +129,21 @@ def refuse_existing(target: Path, force: bool) -> None:
         )
 
 
-def _rename(partial: Path, target: Path) -> None:
-    old = target.with_name(f"{target.name}.old")
-    if old.exists():
+def _replaced(target: Path) -> Path:
+    return target.with_name(f".{target.name}.replaced")
+
+
+def _recover(target: Path) -> None:
+    """Bring back the older folder where a run died while it was replacing it."""
+    old = _replaced(target)
+    if old.is_dir() and not target.exists():
+        old.replace(target)
+    elif old.is_dir():
         shutil.rmtree(old)
+
+
+def _rename(partial: Path, target: Path) -> None:
+    old = _replaced(target)
     if target.exists():
         target.replace(old)
     partial.replace(target)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,30 @@ def unit_registry() -> pint.UnitRegistry:
     import pint
 
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=":auto:")
+
+
+_SIMPLE = re.compile(r"([+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?) ?([^\d\s].*)")
+_FIRST = re.compile(r"[a-zA-Z]+(?=[ /]|$)")  # a unit whose first factor stands in the first power
+_PREFIXES = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+
+
+def _simple(text: str, unit: str) -> float | None:
+    """A number with the very unit that is asked for, or that with a prefix; None for all that is left to pint.
+
+    Importing pint takes longer than all else that loading a file does.
+    """
+    found = _SIMPLE.fullmatch(text)
+    if found is None:
+        return None
+    number, written = float(found[1]), found[2]
+    if written == unit:
+        return number
+    if unit == "kg":
+        return number * 1e-3 if written == "g" else None
+    prefix = written.removesuffix(unit)
+    if prefix == written or unit.startswith("kg") or not _FIRST.match(unit) or prefix not in _PREFIXES:
+        return None
+    return number * _PREFIXES[prefix]
 
 
 def to_si(value: float | int | str, unit: str, *, key: str | None = None, file: object = None) -> float:
@@ -40,7 +65,7 @@ def to_si(value: float | int | str, unit: str, *, key: str | None = None, file: 
     else:
         number = float(value)
     if not math.isfinite(number):
-        raise InputError("not a finite number", value=value, **where)
+        raise InputError("not a finite number", value=value, allowed=f"a finite number in {unit}", **where)
     return number
 
 
@@ -53,13 +78,32 @@ def factor_to_si(text: str, unit: str, *, key: str | None = None, file: object =
     return number
 
 
+_POWER = re.compile(r"\*\*|\^|[⁰¹²³⁴⁵⁶⁷⁸⁹]+|\b(?:squared|cubed|square|cubic|sq)\b")
+_EXPONENT = re.compile(r"\s*(?:[-+]?\d{1,2}(?:\.\d+)?|\([-+]?\d{1,2}(?:[./]\d+)?\))(?![\d.eE(])")
+
+
+def _unbounded(text: str) -> bool:
+    """Whether the powers in a text could make a number of unbounded length: pint computes ``9**9**9`` to its end."""
+    of_numbers = 0
+    for power in _POWER.finditer(text):
+        if power[0] in ("**", "^") and not _EXPONENT.match(text, power.end()):
+            return True
+        of_numbers += bool(re.search(r"[\d)]\s*$", text[: power.start()])) or len(power[0]) > 2
+    return of_numbers > 1
+
+
 def _parse(text: str, unit: str, where: dict) -> float:
+    simple = _simple(text, unit)
+    if simple is not None:
+        return simple
     import pint
 
     registry: Any = unit_registry()
     example = f"a number in {unit}, or text such as '1 {unit}'"
     if len(text) > 100:
         raise InputError("not a quantity", value=text[:40] + "...", allowed=example, **where)
+    if _unbounded(text):
+        raise InputError("cannot read the quantity: powers of powers", value=text, allowed=example, **where)
     try:
         quantity = registry.Quantity(text)
     except (pint.UndefinedUnitError, pint.DefinitionSyntaxError) as error:
@@ -75,5 +119,5 @@ def _parse(text: str, unit: str, where: dict) -> float:
         raise InputError(
             f"the unit '{quantity.units:~}' is not one of {unit}", value=text, allowed=example, **where
         ) from None
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError("not a quantity", value=text, allowed=example, **where) from None

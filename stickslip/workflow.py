@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
+import zipfile
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +13,15 @@ from typing import Any
 import numpy as np
 
 from .runstore import Run, file_record, json_text, open_run, refuse_existing, versions
+
+
+def _code(effect_files: Sequence[str | Path]) -> str:
+    """Digest of the package's own modules and of a user's effects: pieces made by other code are not taken up."""
+    own = sorted(Path(__file__).parent.rglob("*.py"))
+    digest = hashlib.sha256()
+    for path in (*own, *map(Path, effect_files)):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
 
 
 class Pieces:
@@ -29,7 +41,7 @@ class Pieces:
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
-        except (OSError, ValueError, EOFError, KeyError):
+        except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error):
             return None
         return arrays if str(arrays.pop("inputs", "")) == self._inputs else None
 
@@ -47,10 +59,11 @@ def diagnose_campaign(
     out: str | Path,
     *,
     candidates: Sequence[str] | None = None,
-    max_effects: int = 3,
+    max_effects: int = 4,
     holdout: Sequence[str] = (),
     effect_files: Sequence[str | Path] = (),
     jobs: int | None = None,
+    learn_residual: bool = False,
     force: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> dict[str, Any]:
@@ -62,6 +75,7 @@ def diagnose_campaign(
         campaign: the TOML file. out: the run folder.
         candidates, max_effects, holdout, jobs, progress: see ``stickslip.diagnose.engine.diagnose``.
         effect_files: Python files with effects of one's own, which are run.
+        learn_residual: fit a smooth force to what is left over, for prediction; it takes no part in the verdict.
         force: replace an existing run folder.
 
     Returns:
@@ -82,6 +96,7 @@ def diagnose_campaign(
     from .fit.problem import Problem
     from .report import write_report
     from .report.inertial_result import fit_sections
+    from .report.missing_force import missing_sections
     from .segment import segment
 
     for path in effect_files:
@@ -92,8 +107,17 @@ def diagnose_campaign(
         catalogue.get(tag)
     inputs = [file_record(campaign), *({"file": t.provenance.file, "sha256": t.provenance.sha256} for t in traces)]
     with open_run(out, force=force, resume=True) as run:
-        key = json_text({"inputs": inputs, "holdout": list(holdout), "versions": versions()})
+        key = json_text(
+            {
+                "inputs": inputs,
+                "holdout": list(holdout),
+                "candidates": candidates,
+                "versions": versions(),
+                "code": _code(effect_files),
+            }
+        )
         segmentations = [segment(t) for t in traces]
+        pieces = Pieces(run, key)
         found = diagnose(
             loaded,
             traces,
@@ -102,7 +126,7 @@ def diagnose_campaign(
             max_effects=max_effects,
             holdout=holdout,
             jobs=jobs,
-            store=Pieces(run, key),
+            store=pieces,
             progress=progress,
         )
         result: dict[str, Any] = {
@@ -119,6 +143,11 @@ def diagnose_campaign(
                 problem, top.fit, traces, segmentations, found.floor, found.train, loaded.rig
             )
             result |= sections
+            sections, more = missing_sections(
+                found, pieces, learn_residual=learn_residual, rig=loaded.rig, progress=progress
+            )
+            result |= sections
+            variables |= more
             coordinates = variables.pop("coordinates")
             run.arrays(xarray.Dataset(variables, coords=coordinates, attrs={"title": loaded.title}))
         result["seconds"] = round(time.perf_counter() - began, 1)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
+import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +93,59 @@ def test_inspect_as_json_holds_the_events(capsys):
     assert all(event["slip"] == pytest.approx(40e-6, rel=0.05) for event in trace["events"])
     assert found["cannot"]
     assert {Path(i["file"]).name for i in found["inputs"]} == {"a.csv", "c.toml"}
+
+
+def test_events_hold_every_feature_or_say_why_not(capsys):
+    assert run(["inspect", write(), "--json"]) == 0
+    (trace,) = json.loads(capsys.readouterr().out)["traces"]
+    event = trace["events"][1]
+    for key in ("t_onset", "t_arrest", "slip", "recurrence", "peak_velocity", "overshoot", "drive_position"):
+        assert isinstance(event[key], float), key
+    assert trace["levels"] == [0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97]
+    # a half cosine of 30 ms passes its 5 and 97 % at known times
+    exact = 0.03 / np.pi * (np.arccos(-0.94) - np.arccos(0.9))
+    assert event["rise_time"] == pytest.approx(exact, rel=0.02)
+    assert event["slip_times"] == sorted(event["slip_times"])
+    assert len(event["creep"]) == len(trace["creep_before"]) == 16
+    assert event["ring_frequency"] is None  # this block does not ring
+    assert trace["features"]["ring_frequency"]["events"] == 0
+    assert trace["features"]["ring_frequency"]["missing"]
+    assert "never stands still" in trace["features"]["hold_motion"]["missing"]
+    assert set(trace["features"]) <= set(trace["units"])
+    assert trace["features"]["slip"]["median"] == pytest.approx(40e-6, rel=0.05)
+
+
+@pytest.mark.parametrize("columns", [40, 80, 100, 200])
+def test_tables_fit_the_terminal_and_break_no_word(capsys, monkeypatch, columns):
+    from stickslip.cli import _inspected
+
+    monkeypatch.setattr(_inspected, "width", lambda: columns)
+    assert run(["inspect", write()]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= columns
+    words = " ".join(lines).split()
+    for word in ("trace", "slips", "event", "onset", "slip", "median", "sensor"):
+        assert word in words
+    assert ("displacement" in words) == (columns >= 80)
+    table = lines[next(i for i, line in enumerate(lines) if line.split()[:2] == ["event", "onset"]) :]
+    assert [line.split()[0] for line in table[2:5]] == ["1", "2", "3"]
+    assert "s" in table[1].split()
+    assert "um" in " ".join(table[:40]).split()
+
+
+def test_inspect_draws_the_trace_with_characters(capsys):
+    from stickslip.cli._sketch import sketch
+
+    t = np.linspace(0, 1, 400)
+    up = sketch(t, t, columns=20, rows=4, encoding="utf-8")
+    assert len(up) == 4
+    starts = [len(line) - len(line.lstrip()) for line in up]
+    assert starts == sorted(starts, reverse=True)  # a rising line: the lowest row begins first
+    assert all(0x2800 < ord(c) < 0x2900 for line in up for c in line.strip())
+    assert set("".join(sketch(t, t, columns=20, rows=4, encoding="ascii"))) == {":", " "}
+    assert sketch(t, 0 * t, columns=20, rows=4, encoding="utf-8")[3]
+    assert run(["inspect", write()]) == 0
+    assert "load point less position" in capsys.readouterr().out
 
 
 def test_inspect_counts_what_was_mended(capsys):
@@ -182,37 +238,64 @@ def test_inertial_fit_of_a_simulated_campaign(capsys):
 
 # what is wrong with the input -> words of the one message
 def no_time_column():
-    return write(header="clock,x"), ("time", "sampling_rate", "a.csv")
+    return write(header="clock,x"), ("c.toml", "trace[1].time.column", "sampling_rate", "a.csv")
 
 
 def time_not_increasing():
     t, x = motion()
     t[4000:] -= 0.5
-    return write(rows=(t, x)), ("time does not increase", "line 4002")
+    return write(rows=(t, x)), ("a.csv", "time does not increase", "line 4002")
 
 
 def unit_wrong_by_a_thousand():
-    return write(TRACE.replace('"um"', '"mm"')), ("outruns the drive", "10^3", "'um' in place of 'mm'")
+    return write(TRACE.replace('"um"', '"mm"')), (
+        "c.toml",
+        "trace[1].displacement",
+        "outruns the drive",
+        "10^3",
+        "'um' in place of 'mm'",
+    )
+
+
+def unit_too_small_by_a_thousand():
+    # with the whole rig known, a block that stays so far behind is as impossible as one that outruns the drive
+    drive = TRACE.replace("50 um/s", "50 mm/s")
+    return write(drive), ("stays behind the drive", "trace[1].displacement", "'mm' in place of 'um'")
+
+
+def a_column_without_a_number():
+    t, x = motion()
+    return write(rows=(t, np.full_like(x, np.nan))), ("column 'x'", "no number", "a.csv", "trace[1].displacement")
+
+
+def a_header_without_units():
+    return write(TRACE.replace('unit = "um", ', "")), ("c.toml", "trace[1].displacement.unit", "column 'x'", "a.csv")
 
 
 def two_traces_of_one_name():
-    return write(TRACE + TRACE), ("same name 'a'", "trace[2].name")
+    return write(TRACE + TRACE), ("c.toml", "same name 'a'", "trace[2].name")
 
 
 def an_empty_file():
     path = write()
     Path("a.csv").write_text("")
-    return path, ("a.csv", "empty")
+    return path, ("a.csv", "trace[1]", "empty")
 
 
 def a_binary_file_called_csv():
     path = write()
     Path("a.csv").write_bytes(bytes(range(256)) * 40)
-    return path, ("a.csv",)
+    return path, ("a.csv", "trace[1]", "binary data", ".npy")
 
 
 def no_such_file():
-    return write(TRACE.replace("a.csv", "b.csv")), ("b.csv", "not there", "did you mean 'a.csv'")
+    return write(TRACE.replace("a.csv", "b.csv")), (
+        "c.toml",
+        "trace[1].file",
+        "b.csv",
+        "not there",
+        "did you mean 'a.csv'",
+    )
 
 
 def not_a_campaign():
@@ -221,12 +304,13 @@ def not_a_campaign():
 
 
 BAD = (
-    no_time_column, time_not_increasing, unit_wrong_by_a_thousand, two_traces_of_one_name, an_empty_file,
-    a_binary_file_called_csv, no_such_file, not_a_campaign,
+    no_time_column, time_not_increasing, unit_wrong_by_a_thousand, unit_too_small_by_a_thousand,
+    two_traces_of_one_name, an_empty_file, a_binary_file_called_csv, a_column_without_a_number,
+    a_header_without_units, no_such_file, not_a_campaign,
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("command", [("inspect",), ("fit", "--model", "static"), ("fit",)], ids=" ".join)
+@pytest.mark.parametrize("command", [("inspect",), ("fit", "--model", "static"), ("fit",), ("diagnose",)], ids=" ".join)
 @pytest.mark.parametrize("case", BAD, ids=lambda case: case.__name__)
 def test_bad_input_is_one_message(capsys, case, command):
     path, words = case()
@@ -239,10 +323,36 @@ def test_bad_input_is_one_message(capsys, case, command):
 def test_a_trace_with_one_event(capsys):
     path = write(rows=motion(slips=1))
     assert run(["inspect", path]) == 0
-    assert "one event" in " ".join(capsys.readouterr().out.split())
-    message = refused(capsys, "fit", path)
-    assert "one slip" in message
-    assert "--model static" in message
+    assert "one event: no recurrence" in " ".join(capsys.readouterr().out.split())
+    for command in ("fit", "diagnose"):
+        message = refused(capsys, command, path, "--out", "never")
+        assert "trace 'a' (a.csv)" in message
+        assert "one slip" in message
+        assert "--model static" in message
+        assert not Path("never").exists()
+
+
+def test_a_trace_of_one_event_among_others_is_named():
+    from stickslip.campaign import load_campaign, load_traces
+    from stickslip.features.measurement import measure
+    from stickslip.segment import segment
+
+    write(TRACE + TRACE.replace("a.csv", "b.csv"), rows=motion(slips=1))
+    t, x = motion(slips=3)
+    np.savetxt("b.csv", np.column_stack([t, x]), delimiter=",", header="time,x", comments="", fmt="%.9g")
+    traces = load_traces(load_campaign("c.toml"))
+    found = measure(traces, [segment(trace) for trace in traces], ring_period=2e-3)
+    (line,) = found.dropped
+    assert line.startswith("a: one slip only")
+
+
+def test_a_unit_that_hides_all_slips_is_doubted_where_it_matters(capsys):
+    """On a run this short a spring could still hold the block, so it is a warning, and a hint in what fails of it."""
+    path = write(TRACE.replace('"um"', '"nm"').replace('"8 nm"', '"8 pm"'))
+    assert run(["inspect", path]) == 0
+    assert "a wrong unit" in " ".join(capsys.readouterr().out.split())
+    for command in (("fit",), ("fit", "--model", "static"), ("diagnose", "--out", "never")):
+        assert "a wrong unit" in refused(capsys, command[0], path, *command[1:])
 
 
 @pytest.mark.parametrize(
@@ -268,3 +378,55 @@ def test_missing_quantities_of_the_rig_are_named(capsys):
     assert "normal_force" in refused(capsys, "fit", path, "--model", "static")
     path = write(rig=RIG.replace('mass = "89.4 g"\n', ""))
     assert "mass" in refused(capsys, "fit", path)
+
+
+def test_the_run_folder_of_an_inspection_holds_slips_in_full_and_creep_in_short():
+    import xarray
+
+    t, x = motion()
+    assert run(["inspect", write(rows=(t, x)), "--out", "seen"]) == 0
+    found = json.loads(Path("seen/result.json").read_text())["traces"][0]
+    with xarray.open_dataset("seen/arrays.nc", engine="h5netcdf") as data:
+        short, kept = data["trace0_reduced_time"].values, data["trace0_reduced_displacement"].values
+        assert data["trace0_reduced_displacement"].attrs["units"] == "m"
+    assert short.size < 0.5 * t.size
+    for event in found["events"]:
+        begin, end = event["t_onset"] + 1e-5, event["t_arrest"] - 1e-5
+        inside = (t > begin) & (t < end)
+        assert short[(short > begin) & (short < end)] == pytest.approx(t[inside], abs=1e-9)
+        assert np.interp(t[inside], short, kept) == pytest.approx(x[inside] * 1e-6, abs=1e-12)
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_progress_of_long_work_shows_what_is_done_and_the_time_left(monkeypatch):
+    from stickslip.cli import working
+
+    monkeypatch.setattr(working, "PATIENCE", -1.0)
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(sys, "stderr", screen := Terminal())
+    with working.working("fitting") as tell:
+        tell("start 1/4, iteration 2, error 3.2", 0.5)
+        time.sleep(0.3)
+    assert "start 1/4, iteration 2, error 3.2" in screen.getvalue()
+    assert re.search(r"\d+ s left", screen.getvalue())
+    monkeypatch.setattr(sys, "stderr", silent := io.StringIO())
+    with working.working("fitting") as tell:
+        tell("start 1", 0.5)
+    assert silent.getvalue() == ""
+
+
+def test_long_lines_of_a_fit_break_between_words_on_a_terminal(monkeypatch):
+    from stickslip.cli.fit import _folded
+
+    text = "a sentence of several words that is longer than the terminal\n  1  2  3 of a table stay as they are"
+    assert _folded(text) == text
+    monkeypatch.setattr(sys, "stdout", Terminal())
+    monkeypatch.setenv("COLUMNS", "24")
+    lines = _folded(text).splitlines()
+    assert max(len(line) for line in lines[:-1]) <= 24
+    assert " ".join(" ".join(lines[:-1]).split()) == text.splitlines()[0]
+    assert lines[-1] == text.splitlines()[1]

@@ -25,7 +25,7 @@ from ..trace import SIGNALS, Drive, Provenance, Repair, Trace
 from ..units import factor_to_si
 from .load import Campaign, trace_file
 from .models import Channel, TimeColumn, TraceEntry
-from .plausible import check_travel
+from .plausible import check_size, check_travel
 
 Array = NDArray[np.float64]
 _CHANNELS = (*SIGNALS, "normal_load", "drive_position")
@@ -81,6 +81,7 @@ class _Assembly:
         del columns
         self._check_order(time, path, first_line)
         time, data = self._rows(time, data)
+        check_size(time, data)
         resolution, noise = self._mend(time, data, channels)
         drive = self._drive(time, data, resolution, noise)
         leading = next(name for name in SIGNALS if name in data)
@@ -223,7 +224,7 @@ class _Assembly:
         if keep is not None:
             time, data = time[keep], {name: values[keep] for name, values in data.items()}
         if time.size < 2:
-            raise InputError("fewer than two samples can be used", hint="is it the right column?")
+            raise self._empty(data, lost)
         time, clock = correct_clock(time, entry.clock_error)
         self.repairs += clock
         keep, double = drop_duplicates(time)
@@ -243,6 +244,19 @@ class _Assembly:
             time, data = time[low:high].copy(), {name: values[low:high].copy() for name, values in data.items()}
         self.repairs += find_gaps(time)[1]
         return time, data
+
+    def _empty(self, data: dict[str, Array], lost: list[Repair]) -> InputError:
+        """What to say where no row has all its values."""
+        blank = [name for name, values in data.items() if not np.isfinite(values).any()]
+        named = ", ".join(f"{name} (column '{getattr(self.entry, name).column}')" for name in blank)
+        what = f"{named} holds no number at all" if blank else "fewer than two samples can be used"
+        seen = "; ".join(f"{r.count} of {r.where.split(',')[0]} are not a number" for r in lost)
+        return InputError(
+            f"{what} in {self.entry.file}",
+            file=self.campaign.path,
+            key=f"{self.place}.{blank[0]}" if blank else self.place,
+            hint=f"is it the right column? {seen}".strip(),
+        )
 
     def _mend(
         self, time: Array, data: dict[str, Array], channels: dict[str, Channel]

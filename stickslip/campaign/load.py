@@ -75,6 +75,8 @@ def load_campaign(path: str | Path) -> Campaign:
         raise InputError(
             f"not valid TOML: {error}", file=path, hint="correct the line; text stands in quotes"
         ) from None
+    except RecursionError:
+        raise InputError("tables and lists are nested too deeply", file=path) from None
     try:
         file = CampaignFile.model_validate(content)
     except ValidationError as error:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..trace import Trace
@@ -19,6 +21,24 @@ _KNOWN = {
 }
 
 
+def check_size(time: NDArray[np.float64], data: Mapping[str, NDArray[np.float64]]) -> None:
+    """Refuse what no instrument measures, such as the 9.9e37 by which some mark an overload.
+
+    Raises:
+        InputError: a time beyond 1e12 s, or a value of a channel (SI) beyond 1e30.
+    """
+    for name, values, most in (("time", time, 1e12), *((name, values, 1e30) for name, values in data.items())):
+        low, high = float(np.min(values)), float(np.max(values))
+        if max(-low, high) > most:
+            worst = low if -low > high else high
+            row = int(np.argmin(values) if -low > high else np.argmax(values)) + 1
+            raise InputError(
+                f"{name} holds an impossible value: {worst:.3g} in SI units",
+                key=f"sample {row}",
+                hint="a mark of an overload? Delete these rows, leave the field empty, or check the unit",
+            )
+
+
 def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str]:
     """Warnings about a trace whose block and drive do not go together.
 
@@ -27,7 +47,8 @@ def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str
     travel.
 
     Raises:
-        InputError: the block outruns the drive by more than a factor 30.
+        InputError: the block outruns the drive by more than a factor 30, or stays behind it by more than 30 times what
+            the spring can be stretched before the block slips.
     """
     drive = trace.drive
     if drive is None:
@@ -52,6 +73,15 @@ def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str
             value=unit,
             hint=_likely(trace.leading, unit, moved / travel),
         )
+    most = _reach(trace, rig, upper=True)
+    if trace.leading != "spring_force" and most is not None and travel - moved > _OUTRUN * most:
+        raise InputError(
+            f"the block stays behind the drive: it moves {moved:.3g} m while the load point moves {travel:.3g} m, and "
+            f"the spring can pull no further than {most:.3g} m before the block slips",
+            key=key,
+            value=unit,
+            hint=_likely(trace.leading, unit, moved / travel) if moved > 0 else "is it the right column?",
+        )
     if trace.leading == "displacement" and moved < travel / _OUTRUN and (reach is None or travel > 10 * reach):
         return [
             f"the block moves {moved:.3g} m while the load point moves {travel:.3g} m: a wrong unit, a counter that "
@@ -72,9 +102,11 @@ def _pulls_backwards(trace: Trace, blocks: int = 2000) -> bool:
     return bool(strong.sum() > 20 and np.mean(rises[strong] * runs[strong] < 0) > 0.7)
 
 
-def _reach(trace: Trace, rig: Rig) -> float | None:
-    """How far the spring can be stretched before the block slips, m."""
-    parts = (rig.friction_coefficient, rig.normal_force, rig.contacts)
+def _reach(trace: Trace, rig: Rig, *, upper: bool = False) -> float | None:
+    """How far the spring can be stretched before the block slips, m; ``upper``: with the bounds of what is guessed."""
+    parts: list[object] = [rig.friction_coefficient, rig.normal_force, rig.contacts]
+    if upper:
+        parts = [getattr(part, "upper", part) for part in parts]
     if trace.spring_stiffness is None or not all(isinstance(part, (int, float)) for part in parts):
         return None
     force = 1.0
@@ -96,12 +128,14 @@ def _moved(trace: Trace) -> float | None:
 
 def _likely(signal: str, unit: str | None, ratio: float) -> str:
     """Names the unit that would make it right."""
-    power = 3 * round(math.log10(ratio) / 3) or 3
     si, names = _KNOWN[signal]
+    if not 1e-30 < ratio < 1e30:
+        return f"check the unit of {signal} and of the drive"
+    power = 3 * round(math.log10(ratio) / 3) or (3 if ratio > 1 else -3)
     hint = f"a unit is probably wrong by 10^{power}"
     if unit is not None:
         factor = factor_to_si(unit, si)
         for name in names:
             if math.isclose(factor_to_si(name, si) * 10**power, abs(factor), rel_tol=1e-6):
-                return f"{hint}: '{name}' in place of '{unit}', or the drive's velocity is 10^{power} times larger"
+                return f"{hint}: '{name}' in place of '{unit}', or the drive's velocity is to be multiplied by as much"
     return f"{hint}: check the unit of {signal} and of the drive"

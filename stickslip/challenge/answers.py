@@ -103,8 +103,8 @@ def is_right(kind: str, truth: tuple[str, ...], answer: Answer) -> bool:
     return (
         kind in ("one", "two")
         and answer.kind == "ambiguous"
-        and len(answer.set) <= LARGEST_SET
-        and set(truth) <= set(answer.set)
+        and len({*answer.named, *answer.set}) <= LARGEST_SET
+        and set(truth) <= {*answer.named, *answer.set}
     )
 
 
@@ -114,4 +114,4 @@ def is_class_right(kind: str, truth: tuple[str, ...], answer: Answer) -> bool:
         return True
     if kind not in ("one", "two") or answer.kind not in ("missing", "ambiguous"):
         return False
-    return {class_of(tag) for tag in answer.set or answer.named} == {class_of(tag) for tag in truth}
+    return {class_of(tag) for tag in (*answer.named, *answer.set)} == {class_of(tag) for tag in truth}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from .detection import amplitude, draw_multiple
+from .detection import amplitude, draw_multiple, visible_forms
 
 if TYPE_CHECKING:
     from .generator import Run
@@ -118,7 +118,7 @@ def plan(cases: int, seed: int) -> list[Case]:
     if seed < 0:
         raise InputError("a seed is not negative", key="--seed", value=seed, allowed="0 or more")
     rng = np.random.default_rng([seed, 0])
-    known = tuple(tag for tag in CATALOGUED if not EFFECTS[tag].decoy)
+    known = tuple(tag for tag in CATALOGUED if not EFFECTS[tag].decoy and visible_forms(EFFECTS[tag]))
     decks = {"one": _deal(known, rng), "two": _deal(known, rng), "outside": _deal(OUTSIDE, rng)}
     circumstances = _circumstances(rng)
     own = _alternate(rng)
@@ -149,11 +149,12 @@ def _hidden(tag: str, rng: np.random.Generator, own: Iterator[bool]) -> Hidden:
     from .generator import EFFECTS
 
     effect = EFFECTS[tag]
-    wanted = next(own) if len({form.own for form in effect.forms}) == 2 else effect.forms[0].own
-    forms = [form.name for form in effect.forms if form.own == wanted]
+    seen = visible_forms(effect)
+    wanted = next(own) if len({form.own for form in seen}) == 2 else seen[0].own
+    forms = [form.name for form in seen if form.own == wanted]
     form = forms[int(rng.integers(len(forms)))]
-    multiple = draw_multiple(effect, rng)
-    return Hidden(tag, multiple, amplitude(effect, multiple, -1.0 if rng.random() < 0.5 else 1.0), form)
+    multiple = draw_multiple(effect, form, rng)
+    return Hidden(tag, multiple, amplitude(effect, form, multiple, -1.0 if rng.random() < 0.5 else 1.0), form)
 
 
 def _deal(cards: Sequence[str], rng: np.random.Generator) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 import uuid
 from collections import Counter
@@ -44,7 +45,7 @@ def run_challenge(
     scheduler: str | None = None,
     workers: int | None = None,
     candidates: Sequence[str] | None = None,
-    max_effects: int = 3,
+    max_effects: int = 4,
     retry: bool = False,
     diagnosis: Diagnosis | None = None,
     tell: Callable[[Progress], None] | None = None,
@@ -94,7 +95,9 @@ def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
     now = {"seal": seal, **options, "thresholds": asdict(THRESHOLDS), "versions": versions()}
     path = runs / PROTOCOL
     if not path.is_file():
-        path.write_text(json_text(now) + "\n", encoding="utf-8")
+        aside = path.with_name(f"{path.name}.{os.getpid()}.part")
+        aside.write_text(json_text(now) + "\n", encoding="utf-8")
+        aside.replace(path)
         return
     before = read_protocol(runs)
     for key in ("seal", "candidates", "max_effects", "thresholds"):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 
 from cyclopts import App, CycloptsError
 
@@ -70,9 +71,21 @@ def run(arguments: Sequence[str]) -> int:
         kept = str(error) or "nothing was written"
         print(f"\nstickslip: interrupted; {kept}", file=sys.stderr)
         return INTERRUPTED
+    except (MemoryError, RecursionError) as error:
+        return _fail(StickslipError(f"this is too much for this machine ({str(error) or type(error).__name__})"))
     except BrokenPipeError:  # such as  stickslip effects | head
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _mute()
         return 1
+    except OSError as error:  # a full disk behind the output, a file that vanished while it was read
+        _mute()
+        where = f"{error.filename}: " if error.filename else ""
+        return _fail(InputError(f"{where}the system refused ({error.strerror or error})"))
+
+
+def _mute() -> None:
+    """What is left in the buffer of stdout cannot be written; its flush at exit would complain once more."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fail(error: StickslipError) -> int:

@@ -62,10 +62,12 @@ def fit_inertial(
             file=loaded.path,
             hint="give drive_velocity (and spring_stiffness where only the force is measured)",
         )
-    _check_events(usable, loaded)
     own, segments = [t for t, _ in usable], [s for _, s in usable]
     period = ring_period(own, segments)
-    m = measure(own, segments, ring_period=period, most_cycles=options.most_events)
+    try:
+        m = measure(own, segments, ring_period=period, most_cycles=options.most_events)
+    except InputError as error:
+        raise error.at(file=loaded.path) from None
     floor = floors(m, factor=options.scatter)
     base = base_composition(loaded, m)
     _check_names(options.profiles, base, effects)
@@ -110,17 +112,6 @@ def _with_displacement(trace: Trace, found: Segmentation, notes: list[str]) -> T
     scale = found.settings.noise
     count = None if trace.resolution is None or gain is None else trace.resolution / gain
     return trace.replace(displacement=np.array(position), noise=scale, resolution=count, drive=drive)
-
-
-def _check_events(usable: list[tuple[Trace, Segmentation]], loaded: Campaign) -> None:
-    events = [len(s.events) for _, s in usable]
-    if sum(events) < 2:
-        raise InputError(
-            f"{'one slip' if sum(events) else 'no slip'} in the whole campaign: the dynamic model needs at least two, "
-            "so that a stick between slips can be compared",
-            file=loaded.path,
-            hint="record longer, drive slower or with a softer spring; --model static fits single creep processes",
-        )
 
 
 def _check_names(names: tuple[str, ...], base: Composition, effects: list[Any]) -> None:

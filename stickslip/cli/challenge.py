@@ -51,7 +51,7 @@ def run(
     scheduler: str | None = None,
     workers: int | None = None,
     candidates: str | None = None,
-    max_effects: int = 3,
+    max_effects: int = 4,
     retry: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Diagnose every case; what is finished is not done again, and a case cut off goes on from its pieces.

@@ -20,10 +20,11 @@ def diagnose(
     *,
     out: Path,
     candidates: str | None = None,
-    max_effects: int = 3,
+    max_effects: int = 4,
     holdout: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     effect: Annotated[tuple[Path, ...], Parameter(negative="")] = (),
     jobs: int | None = None,
+    learn_residual: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -45,6 +46,9 @@ def diagnose(
         A Python file with an effect of your own, which is run and then tried with the others.
     jobs:
         Parallel processes; default one a core.
+    learn_residual:
+        Also fit a smooth force of displacement, velocity and time in contact to what the last model leaves over. It is
+        for prediction and no explanation, and the verdict does not use it.
     json:
         Print result.json.
     force:
@@ -59,6 +63,7 @@ def diagnose(
         holdout=holdout,
         effect_files=effect,
         jobs=jobs,
+        learn_residual=learn_residual,
         force=force,
         progress=_teller(time.perf_counter()),
     )
@@ -84,6 +89,7 @@ def _teller(began: float) -> Any:
 
 def _print(result: dict[str, Any], out: Path) -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     console = Console(width=None if sys.stdout.isatty() else 110)
@@ -100,7 +106,10 @@ def _print(result: dict[str, Any], out: Path) -> None:
         table.add_row(label, *cells)
     console.print(table)
     verdict = result["verdict"]
-    console.print(f"[bold]{verdict['kind']}[/bold]: {verdict['text']}", highlight=False)
+    sure = "" if verdict["confidence"] is None else f" (confidence {100 * verdict['confidence']:.0f} %)"
+    console.print(f"[bold]{verdict['kind']}[/bold]: {escape(verdict['text'])}{sure}", highlight=False)
     if result["next_experiment"]:
-        console.print(f"next experiment: {result['next_experiment']['text']}", highlight=False)
-    console.print(f"report in {out / 'report.html'}", highlight=False)
+        console.print(f"next experiment: {escape(result['next_experiment']['text'])}", highlight=False)
+    if result.get("learned_residual"):
+        console.print(f"learned residual: {result['learned_residual']['text']}", highlight=False)
+    console.print(f"report in {escape(str(out / 'report.html'))}", highlight=False)

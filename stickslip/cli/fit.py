@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+import textwrap
 import time as clock
 from pathlib import Path
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -94,7 +97,7 @@ def fit(
     if out is not None:
         with open_run(out, force=force) as run:
             _write(run, result, variables)
-    print(json_text(result) if json else _text(result, out))
+    print(json_text(result) if json else _folded(_text(result, out)))
     return 0
 
 
@@ -193,6 +196,18 @@ def _quantity(value: float | None, unit: str, digits: int = 4) -> str:
         if unit == "kg"
         else show.quantity(value, unit, digits)
     )
+
+
+def _folded(text: str) -> str:
+    """Long lines broken between words on a terminal; as they are in a file."""
+    if not sys.stdout.isatty():
+        return text
+    most = max(get_terminal_size().columns, 20)
+    lines: list[str] = []
+    for line in text.splitlines():
+        short = len(line) <= most or line.startswith(" ")
+        lines += [line] if short else textwrap.wrap(line, most, subsequent_indent="  ", break_long_words=False)
+    return "\n".join(lines)
 
 
 def _text(result: dict[str, Any], out: Path | None) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ..runstore import file_record, json_text, open_run, refuse_existing, versions
-from . import show
 
 if TYPE_CHECKING:
     from ..campaign import Campaign
@@ -45,11 +43,17 @@ def inspect(
     result, variables = inspection(loaded, traces, found)
     result["seconds"] = round(time.perf_counter() - began, 3)
     if out is not None:
+        from ..report.pieces import reduced_record
+
+        for i, (trace, segmentation) in enumerate(zip(traces, found, strict=True)):
+            variables |= reduced_record(trace, segmentation, i)
         _write(out, force, result, variables)
     if json:
         print(json_text(result))
     else:
-        _print(result, out)
+        from ._inspected import text, width
+
+        print(text(result, variables, out, width()))
     return 0
 
 
@@ -128,59 +132,3 @@ def _write(out: Path, force: bool, result: dict[str, Any], variables: dict[str, 
         for i, row in enumerate(result["traces"]):
             save(trace_picture(data, i, row), run.path(f"trace{i + 1}.png"))
         write_report(run.folder)
-
-
-def _print(result: dict[str, Any], out: Path | None) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    console = Console(highlight=False, width=None if sys.stdout.isatty() else 118)
-    console.print(
-        Text(f"{result['title']}: {len(result['traces'])} trace{'s' * (len(result['traces']) != 1)}"), style="bold"
-    )
-    table = Table(box=box.SIMPLE_HEAD)
-    for name in ("trace", "signal", "drive", "length", "sampling", "motion"):
-        table.add_column(name, overflow="fold")
-    for name in ("slips", "slip", "recurrence", "peak velocity", "holds"):
-        table.add_column(name, justify="right")
-    for row in result["traces"]:
-        table.add_row(*(Text(cell) for cell in _cells(row)))
-    console.print(table)
-    for row in result["traces"]:
-        lines = [*(f"warning: {w}" for w in row["warnings"]), *(f"mended: {w}" for w in row["repairs"])]
-        lines += [f"left out: {w}" for w in row["dropped"]]
-        if row.get("ripple", {}).get("lines"):
-            lines.append(row["ripple"]["text"])
-        for line in lines:
-            console.print(Text(f"{row['name']}: {line}"))
-    console.print()
-    for line in (*result["can"], *result["cannot"]):
-        console.print(Text(line))
-    if out is not None:
-        console.print(Text(f"written to {out}: report.html, result.json, arrays.nc and a picture of every trace"))
-
-
-def _cells(row: dict[str, Any]) -> list[str]:
-    from statistics import median
-
-    q, units, events = show.quantity, row["units"], row["events"]
-
-    def middle(key: str) -> float | None:
-        known = [event[key] for event in events if event[key] == event[key]]
-        return median(known) if known else None
-
-    return [
-        row["name"],
-        ", ".join(s.replace("_", " ") for s in row["signals"]),
-        q(row["drive_velocity"], "m/s", 3),
-        q(row["duration"], "s", 3),
-        q(row["sampling_rate"], "Hz", 3),
-        row["regime"],
-        str(len(events)),
-        q(middle("slip"), units["slip"], 3) if events else "-",
-        q(middle("recurrence"), "s", 3) if events else "-",
-        q(middle("peak_velocity"), units["peak_velocity"], 3) if events else "-",
-        str(sum(event["hold_time"] > 0 for event in events)) if events else "-",
-    ]

@@ -69,6 +69,7 @@ def simulate(
     series = loaded.file.sweep
     with open_run(out, force=force) if out is not None else nullcontext() as run:
         work = _single(loaded, run) if series is None else _series(loaded, series, run)
+        work["warnings"] = [*_outside(loaded), *work["warnings"]]
         result = {**_head(loaded), **work, "seconds": round(time.perf_counter() - began, 3)}
         if run is not None:
             run.json(result)
@@ -127,36 +128,42 @@ def _head(scenario: Scenario) -> dict[str, Any]:
     }
 
 
+def _outside(scenario: Scenario) -> list[str]:
+    """Files that the scenario names and that do not lie in its folder or below: read, but said."""
+    home = scenario.folder.resolve()
+    files = [part for part in (scenario.file.drive.file, getattr(scenario.file.contact, "file", None)) if part]
+    return [
+        f"{part} lies outside the scenario's folder"
+        for part in files
+        if not (scenario.folder / part).resolve().is_relative_to(home)
+    ]
+
+
 def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
     from ..scenario import record
 
     with show.progress_bar() as watch:
         recording = record(scenario, watch)
     if run is not None:
-        data = recording.dataset()
         from ..plots import save, static_against_inertial, trace_figure
 
-        run.arrays(data)
-        save(trace_figure(data), run.path("trace.png"))
-        save(static_against_inertial([data], [scenario.title]), run.path("static_vs_inertial.png"))
+        run.arrays(recording)
+        save(trace_figure(recording), run.path("trace.png"))
+        save(static_against_inertial([recording], [scenario.title]), run.path("static_vs_inertial.png"))
         if scenario.file.output.trace:
             from ..scenario.writers import write_campaign
 
-            write_campaign(run.folder, [scenario], [data])
-    events = {name: part for name, part in recording.variables.items() if part[0] == "event"}
-    columns = {name: (values.tolist(), attributes["units"]) for name, (_, values, attributes) in events.items()}
-    return _numbers(columns, recording.attributes)
+            write_campaign(run.folder, [scenario], [recording])
+    return _numbers(recording.variables, recording.attrs)
 
 
-def _of_dataset(data: xarray.Dataset) -> dict[str, Any]:
-    names = [str(name) for name in data if data[name].dims == ("event",)]
-    return _numbers({name: (data[name].values.tolist(), data[name].attrs["units"]) for name in names}, data.attrs)
-
-
-def _numbers(columns: dict[str, tuple[list[float], str]], attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """What `result.json` says of one run, from the columns of its event table and their units."""
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*(c for c, _ in columns.values()), strict=True)]
-    units = {name: unit for name, (_, unit) in columns.items()}
+def _numbers(variables: Mapping[Any, Any], attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """What `result.json` says of one run: its event table and the facts."""
+    columns = {str(name): v for name, v in variables.items() if v.dims == ("event",)}
+    rows = [
+        dict(zip(columns, row, strict=True)) for row in zip(*(v.values.tolist() for v in columns.values()), strict=True)
+    ]
+    units = {name: v.attrs["units"] for name, v in columns.items()}
     facts = {key: value for key, value in attributes.items() if key not in ("title", "versions", "warnings")}
     return {
         "events": rows,
@@ -192,7 +199,10 @@ def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str,
     result: dict[str, Any] = {
         "kind": "series",
         "key": sweep.key,
-        "runs": [{"value": value, **_of_dataset(data)} for value, data in zip(values[: len(done)], done, strict=True)],
+        "runs": [
+            {"value": value, **_numbers(data.data_vars, data.attrs)}
+            for value, data in zip(values[: len(done)], done, strict=True)
+        ],
         "table": {str(name): table[name].values.tolist() for name in table},
         "units": {str(name): table[name].attrs["units"] for name in table},
         "verdict": f"{sum(1 for d in done if d.sizes['event'])} of {len(done)} runs show slip events",

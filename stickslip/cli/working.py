@@ -26,11 +26,11 @@ def working(title: str) -> Iterator[Tell]:
 
     class Words(bars.ProgressColumn):
         def render(self, task: bars.Task) -> Text:
-            return Text(str(task.fields.get("text", "")))
+            return Text(str(task.fields.get("text", "")), no_wrap=True, overflow="ellipsis")
 
     bar = bars.Progress(
         bars.TextColumn("{task.description}", markup=False),
-        bars.BarColumn(bar_width=20),
+        bars.BarColumn(bar_width=10),
         Words(),
         bars.TimeElapsedColumn(),
         bars.TextColumn("{task.fields[left]}", markup=False),
@@ -46,7 +46,7 @@ def working(title: str) -> Iterator[Tell]:
         if not shown and spent > PATIENCE:
             bar.start()
             shown = True
-        left = f"about {spent / share * (1 - share):.0f} s left" if share and share > 0.02 else ""
+        left = f"{spent / share * (1 - share):.0f} s left" if share and share > 0.02 else ""
         total = 1.0 if share is not None else None
         bar.update(task, text=text, total=total, completed=share or 0.0, left=left)
 

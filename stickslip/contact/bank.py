@@ -106,7 +106,8 @@ def binning_error(backbone: Backbone, u_max: ArrayLike, edges: ArrayLike) -> Arr
     """
     nodes, slopes = _chords(backbone, u_max, edges)
     widths = jnp.diff(nodes, prepend=0.0)
-    fall = slopes - jnp.append(slopes[1:], 0.0)
+    # rounding on a straight piece can make a concave backbone rise
+    fall = jnp.maximum(slopes - jnp.append(slopes[1:], 0.0), 0.0)
     before = jnp.append(jnp.inf, fall[:-1])
     height = widths * jnp.where(jnp.isinf(before), fall, before * fall / jnp.maximum(before + fall, 1e-300))
     return jnp.max(height) / jnp.sum(slopes * widths)

@@ -26,6 +26,7 @@ START = 0.02  # of the amplitude's range; scaled until its effect on the feature
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
 MOST_STARTS = 12
 OTHERS = 2  # further starts that a leader is fitted from
+HOPELESS = 0.5  # of the best share that was to be explained: steps that promise less are not tried with the model
 SHARES = (1.0, 0.4)  # of a linear step that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
@@ -273,6 +274,8 @@ class _Search:
         self.amplitude = next(i for i, f in enumerate(free) if f.amplitude)
         self.null = free[self.amplitude].inward(specs(effect)[effect.amplitude].null or 0.0)
         self.best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.moderate: float | None = None
+        self.most = 0.0  # share of the misfit that the best step should explain
         self.each: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []  # the best from every start
 
     def point(self, values: dict[str, float], amplitude: float, base: np.ndarray | None = None) -> np.ndarray:
@@ -286,7 +289,8 @@ class _Search:
         """Change of the features for a unit of the amplitude, over a step whose effect is moderate; and that step."""
         low, high = self.free[self.amplitude].bounds
         reach = high - self.null if high > self.null else low - self.null
-        size, longest = START * reach, 0.98 * abs(reach)
+        longest = 0.98 * abs(reach)
+        size = START * reach if self.moderate is None else self.moderate
         best = None
         for _ in range(4):
             features = self.problem.features(self.point(values, self.null + size), self.optimum.events)
@@ -296,6 +300,7 @@ class _Search:
             if np.isfinite(features[self.valid]).all():
                 best = change / size, size
             if MODERATE[0] <= rms <= MODERATE[1] or (rms < MODERATE[0] and abs(size) >= longest):
+                self.moderate = size  # about right for the next inner values as well
                 break
             wanted = size * float(np.clip(np.sqrt(MODERATE[0] * MODERATE[1]) / max(rms, 1e-6), 0.02, 20.0))
             size = float(np.sign(wanted) * min(abs(wanted), longest))
@@ -315,6 +320,9 @@ class _Search:
             values = {**values, "phase": float(np.arctan2(step.sizes[1], step.sizes[0]))}
         bounds = np.array([f.bounds for f in self.optimum.free])
         first = self.best is None
+        if not first and step.share < HOPELESS * self.most:
+            return step.share
+        self.most = max(self.most, step.share)
         offers = []
         for share in SHARES:
             moved = np.clip(self.optimum.z + share * np.clip(step.z, -1.0, 1.0), *bounds.T)

@@ -27,7 +27,7 @@ from .pieces import fit_arrays, fit_from
 from .static_rung import static_features
 from .sweep import Ground, Store, Sweep
 from .thresholds import THRESHOLDS, Thresholds
-from .verdict import Judged, Verdict, decide, finished, is_complete, judge, nothing, undecided, worst_phase
+from .verdict import Judged, Verdict, confidence, decide, finished, is_complete, judge, nothing, undecided, worst_phase
 
 MOST_CYCLES = 14
 
@@ -89,7 +89,7 @@ def diagnose(
     segmentations: Sequence[Segmentation] | None = None,
     *,
     candidates: Sequence[str] | None = None,
-    max_effects: int = 3,
+    max_effects: int = 4,
     holdout: Sequence[str] = (),
     jobs: int | None = None,
     store: Store | None = None,
@@ -135,6 +135,7 @@ def diagnose(
     ladder = [_static(data, floor, train, optimum, float(stiffness)), rung]
     rounds: list[Round] = []
     named: list[str] = []
+    sure = 1.0
     while True:
         assert rung.held is not None
         phase, worst = worst_phase(rung.train, rung.held)
@@ -170,13 +171,17 @@ def diagnose(
         assert new.held is not None
         if len(close) > 1 and worst_phase(new.train, new.held)[1] <= limits.adequate:
             verdict = undecided(named, close)
+            sure *= confidence(judged, close)
             break
+        sure *= confidence(judged, [best])
         named.append(best.candidate.tag)
         rung = new
     if verdict.kind == "missing" and len(named) > 1:
         tell("trying to do without each effect", 1.0)
         ladder, named = _without(ladder, named, data, floor, train, limits)
         verdict = replace(finished(named), reasons=verdict.reasons)
+    if verdict.kind in ("missing", "ambiguous"):
+        verdict = replace(verdict, confidence=sure)
     return Diagnosis(verdict, tuple(ladder), tuple(rounds), data, floor, train, (*data.dropped, *dropped))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from ..features.measurement import Measurement
 from ..fit.composition import EVENT_WIDTHS
@@ -62,23 +63,32 @@ class Linear:
         off = [(v - f.inward(f.prior)) / w for v, f, w in zip(optimum.z, optimum.free, widths, strict=True)]
         at = optimum.events[tuple(self.cells.T)] / np.array(EVENT_WIDTHS)
         prior = np.concatenate([1.0 / widths, np.tile(1.0 / np.array(EVENT_WIDTHS), len(self.cells))])
-        self.matrix = np.vstack([np.hstack([shared, blocks]), np.diag(prior)])
+        matrix = np.vstack([np.hstack([shared, blocks]), np.diag(prior)])
         self.target = np.concatenate([(r * weight)[valid], -np.array(off), -at.ravel()])
+        # columns of very different size: scaled, so that what is small beside its own size means something
+        self.size = np.linalg.norm(matrix, axis=0)
+        self.basis, self.triangle = np.linalg.qr(matrix / self.size)
+        self.left = self._without_base(self.target)
+
+    def _without_base(self, v: np.ndarray) -> np.ndarray:
+        """What the base cannot describe of a vector, or of the columns of a matrix."""
+        return v - self.basis @ (self.basis.T @ v)
 
     def step(self, directions: list[np.ndarray]) -> Step:
         """The least-squares step along features' ``directions`` (R, n, F) together with everything in the base."""
-        columns = [np.clip(np.nan_to_num(d * self.scale)[self.valid], -1e6, 1e6) for d in directions]
-        pad = np.zeros(self.target.size - int(self.valid.sum()))
-        matrix = np.hstack([self.matrix, *(np.concatenate([c, pad])[:, None] for c in columns)])
-        before = self.target - self.matrix @ np.linalg.lstsq(self.matrix, self.target, rcond=1e-10)[0]
-        # columns of very different size: scaled, so that the cut on small singular values means something
-        size = np.linalg.norm(matrix, axis=0)
+        columns = np.zeros((self.target.size, len(directions)))
+        for i, d in enumerate(directions):
+            columns[: int(self.valid.sum()), i] = np.clip(np.nan_to_num(d * self.scale)[self.valid], -1e6, 1e6)
+        own = self._without_base(columns)
+        size = np.linalg.norm(columns, axis=0)
         size[size == 0.0] = 1.0
-        found = np.linalg.lstsq(matrix / size, self.target, rcond=1e-9)[0] / size
-        after = self.target - matrix @ found
-        k, d = len(self.optimum.free), len(directions)
+        sizes = np.linalg.lstsq(own / size, self.left, rcond=1e-9)[0] / size
+        after = self.left - own @ sizes
+        rest = self.basis.T @ (self.target - columns @ sizes)
+        found = solve_triangular(self.triangle, rest) / self.size
+        k = len(self.optimum.free)
         events = np.zeros_like(self.optimum.events)
-        events[tuple(self.cells.T)] = found[k : found.size - d].reshape(-1, 2)
-        total = float(before @ before)
+        events[tuple(self.cells.T)] = found[k:].reshape(-1, 2)
+        total = float(self.left @ self.left)
         share = 1.0 - float(after @ after) / total if total > 0 else 0.0
-        return Step(found[:k], events, found[found.size - d :], share)
+        return Step(found[:k], events, sizes, share)

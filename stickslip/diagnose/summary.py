@@ -30,6 +30,7 @@ def summary(diagnosis: Diagnosis, rig: Any = None) -> dict[str, Any]:
             "set": list(d.verdict.set),
             "text": d.verdict.text,
             "reasons": list(d.verdict.reasons),
+            "confidence": d.verdict.confidence,
         },
         "ladder": [_rung(r) for r in d.ladder],
         "ranking": [_ranked(c, d) for c in _order(d)],

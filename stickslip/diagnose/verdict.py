@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..effects import catalogue
+from ..fit.inertial import MODEL_ERROR
 from ..residual import Misfit
 from .candidate import Candidate
 from .heldout import HeldOut
@@ -23,6 +24,8 @@ class Verdict:
         effects: named, in the order added.
         set: effects the data cannot tell apart, the best first.
         text: for a person.
+        confidence: how likely the named effects, or the set, are among the effects of the catalogue, 0 to 1 (see
+            :func:`weights`); None where nothing is named.
     """
 
     kind: str
@@ -30,6 +33,7 @@ class Verdict:
     set: tuple[str, ...] = ()
     text: str = ""
     reasons: tuple[str, ...] = field(default=())
+    confidence: float | None = None
 
 
 def errors(train: Misfit, held: HeldOut | None) -> dict[str, float]:
@@ -117,6 +121,28 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
     return best, seen
 
 
+def weights(judged: Sequence[Judged]) -> dict[str, float]:
+    """How likely each effect is, given that one of these is the missing one: tag -> weight, adding up to 1.
+
+    The likelihood ratio of the refitted candidates, with costs divided by the square of the factor by which the errors
+    of a fit are widened: all events share what a bank of few parameters cannot describe.
+    """
+    best: dict[str, float] = {}
+    for j in judged:
+        best[j.candidate.tag] = min(j.cost, best.get(j.candidate.tag, np.inf))
+    least = min(best.values())
+    raw = {tag: float(np.exp(-0.5 * (cost - least) / MODEL_ERROR**2)) for tag, cost in best.items()}
+    total = sum(raw.values())
+    return {tag: w / total for tag, w in raw.items()}
+
+
+def confidence(judged: Sequence[Judged], said: Sequence[Judged]) -> float:
+    """Weight of the effects said, with that of the laws that contain one of them."""
+    tags = {s.candidate.tag for s in said}
+    tags |= {j.candidate.tag for j in judged if any(_contains(j, s) for s in said)}
+    return float(sum(w for tag, w in weights(judged).items() if tag in tags))
+
+
 def _contains(general: Judged, special: Judged) -> bool:
     return special.candidate.tag in general.candidate.effect.generalises
 
@@ -147,14 +173,14 @@ def nothing(
 ) -> Verdict:
     """The verdict when something is missing and no candidate passes."""
     nearest = min(judged, key=lambda j: j.cost, default=None)
-    text = f"Something is missing ({phase} is off by {worst:.1f} floors) and nothing in the catalogue explains it"
+    text = f"Something is missing ({phase} is off by {worst:.1f} floors) and no effect that was tried explains it"
     if nearest is not None:
         text += f"; nearest is {nearest.candidate.tag}, but {'; '.join(nearest.failures) or 'it does not suffice'}"
     reasons = nearest.failures if nearest is not None else ()
     if not named and worst <= limits.adequate:
         return Verdict(
             "complete",
-            text=f"A small misfit remains ({phase}, {worst:.1f} floors) that no effect of the catalogue takes away; "
+            text=f"A small misfit remains ({phase}, {worst:.1f} floors) that no effect that was tried takes away; "
             "otherwise every phase is described as well as the data allow.",
         )
     if not named:
@@ -163,7 +189,7 @@ def nothing(
         return Verdict(
             "missing", tuple(named), tuple(named),
             f"The base model lacks {_listed(named)}. A small misfit remains ({phase}, {worst:.1f} floors) that "
-            "nothing in the catalogue explains.", reasons,
+            "no other effect that was tried explains.", reasons,
         )  # fmt: skip
     return Verdict("unknown", tuple(named), tuple(named), f"{_listed(named)} helps, but: {text}.", reasons)
 

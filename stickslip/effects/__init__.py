@@ -11,6 +11,7 @@ from . import (  # noqa: F401  (each module registers its effect)
     drive_ripple,
     flash_heating,
     inertia,
+    learned,
     load_modulation,
     machine_compliance,
     nonlinear_spring,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -11,12 +11,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..errors import InputError
-from ..forward import Cycles
+from ..forward import LONGEST, Cycles
 from ..segment import Segmentation
 from ..trace import Trace
 from .curve import SampledCurve
 from .evaluate import Anchors, features
-from .layout import CREEP_POINTS, HOLD, SETTLE, Layout
+from .layout import CREEP_POINTS, HOLD, LEVELS, SETTLE, Layout
+
+RING_COUNTS = 1.0  # rms of the ringing, in counts, below which nothing is said of it
+RING_RATE = 4.0  # samples a period of the ringing below which nothing is said of it
 
 
 @dataclass(frozen=True)
@@ -80,16 +83,33 @@ def measure(
         most_cycles: at most so many cycles of a run are used, the first ones.
 
     Raises:
-        InputError: no run has a slip.
+        InputError: there are fewer than two slips in all runs.
     """
     pairs = [(t, s) for t, s in zip(traces, segmentations, strict=True) if len(s.events) >= 1]
     dropped = [
         f"{t.name}: no slip in it ({s.reason})" for t, s in zip(traces, segmentations, strict=True) if not s.events
     ]
+    dropped += [
+        f"{t.name}: one slip only, so nothing of it that needs a slip before (ring-down, creep in a later stick"
+        f"{'' if t.virgin else ', recurrence'})"
+        for t, s in pairs
+        if len(s.events) == 1
+    ]
+    if sum(len(s.events) for _, s in pairs) < 2:
+        raise InputError(
+            f"{'one slip' if pairs else 'no slip'} in the whole campaign: the dynamic model needs at least two, so "
+            "that a stick between slips can be compared",
+            key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in traces[:4]) + ", ..." * (len(traces) > 4),
+            hint="record longer, drive slower or with a softer spring; --model static fits single creep processes"
+            + doubts(traces),
+        )
+    whole = [_integrable(t, s) for t, s in pairs]
+    dropped += [text for _, text in whole if text]
+    pairs = [(t, s) for (t, s), _ in whole if s.events]
     if not pairs:
         raise InputError(
-            "no run of this campaign holds a slip",
-            hint="drive slower or with a softer spring; `stickslip inspect` shows what was found in each run",
+            f"every run begins with a cycle of more than {LONGEST:.3g} s, for which the dynamic model has no steps",
+            hint="drive faster, or fit single creep processes with --model static",
         )
     durations = np.concatenate([[e.duration for e in s.events] for _, s in pairs])
     settling = float(2.2 * np.median(durations))
@@ -112,6 +132,27 @@ def measure(
         np.array([s.settings.speed for _, s in pairs]),
         tuple(dropped),
     )
+
+
+def doubts(traces: Sequence[Trace]) -> str:
+    """What looked odd when the traces were read, to be added to a hint where nothing was found in them."""
+    said = [f"{t.name}: {w}" for t in traces for w in t.warnings]
+    return "".join(f". {line}" for line in said[:4])
+
+
+def _integrable(trace: Trace, found: Segmentation) -> tuple[tuple[Trace, Segmentation], str]:
+    """A run up to its first cycle that takes more steps than a cycle may have, and what is to be said of the others."""
+    begins = [float(trace.time[0]), *(e.t_arrest for e in found.events)]
+    long = [n for n, e in enumerate(found.events) if e.t_arrest - begins[n] > LONGEST]
+    if not long:
+        return (trace, found), ""
+    first, lasts = long[0], found.events[long[0]].t_arrest - begins[long[0]]
+    text = (
+        f"{trace.name}: slips from number {first + 1} on ({len(found.events) - first} of {len(found.events)}) are left "
+        f"out, because the cycle before lasts {lasts:.3g} s, more than the {LONGEST:.3g} s that the dynamic model can "
+        "be taken through"
+    )
+    return (trace, replace(found, events=found.events[:first])), text
 
 
 def _round_up(n: int) -> int:
@@ -196,8 +237,14 @@ def _cycle(
         valid[s["ring"]] = False
     if virgin and not trace.virgin and first - start < 1.6 * settling:
         valid[:] = False  # the record begins too late to see where this slip started
+    rate = 1.0 / float(np.median(np.diff(t)))
+    if rate * ring_period < RING_RATE:
+        valid[s["ring"]] = valid[s["frequency"]] = False
+    if count > 0 and float(values[s["ring"]][0]) < RING_COUNTS * count:
+        # a reading that rests on its counts: neither how loud it rings nor how fast can be told
+        valid[s["ring"]] = valid[s["frequency"]] = False
     valid &= np.isfinite(values)
-    sensor = _sensor_noise(values, anchors, layout, noise, count, 1.0 / np.median(np.diff(t)))
+    sensor = _sensor_noise(values, anchors, layout, noise, count, rate)
     return {
         "start": start,
         "position": position,
@@ -226,7 +273,9 @@ def _sensor_noise(
     rest = window(0.3 * layout.settling)
     out[s["recurrence"]] = 0.5 / rate / np.sqrt(3.0)
     out[s["size"]] = np.hypot(rest, np.sqrt(white / 4.0))
-    out[s["times"]] = 0.1 / rate
+    out[s["times"]] = np.hypot(
+        0.1 / rate, _passage_noise(values[s["times"]], float(values[s["size"]][0]), np.sqrt(white))
+    )
     out[s["overshoot"]] = np.hypot(rest, np.sqrt(white / 4.0))
     out[s["ring"]] = np.sqrt(white) / 3.0
     ringing = max(float(values[s["ring"]][0]), 1e-12)
@@ -238,6 +287,22 @@ def _sensor_noise(
     length = float(anchors.hold[1] - anchors.hold[0])
     out[s["hold"]] = [np.hypot(window(0.03 * length), window(0.08 * length))] * len(HOLD)
     return out
+
+
+def _passage_noise(times: np.ndarray, size: float, noise: float) -> np.ndarray:
+    """Noise of the time between the passage of a level and that of half the slip (s): noise over velocity at both.
+
+    ``times`` are those of LEVELS counted from half the slip (s), ``size`` is the slip (m), ``noise`` of a sample (m).
+    """
+    middle = int(np.searchsorted(LEVELS, 0.5))
+    levels = np.insert(LEVELS, middle, 0.5)
+    t = np.insert(times, middle, 0.0)
+    span = t[-1] - t[0]
+    if not (np.isfinite(t).all() and span > 0 and size > 0):
+        return np.zeros(times.size)
+    slowness = np.abs(np.gradient(t, levels * size))
+    own = np.minimum(noise * slowness, span)  # no passage can be off by more than the slip lasts
+    return np.hypot(np.delete(own, middle), own[middle])
 
 
 def _stack(run: tuple, number: int, width: int, nodes: int, layout: Layout) -> tuple:

@@ -225,7 +225,7 @@ def fit(
         use: cycles to fit, shape (R, n); default all.
         columns: derivatives at the start if they are known, shape (R, n, F, k).
         anew: whether derivatives may be taken again; if not, those given are only updated.
-        progress: told the error after every evaluation.
+        progress: told the iteration and the error (rms, in floors) after every evaluation.
 
     Raises:
         FitError: the model could not be evaluated at the start.
@@ -261,8 +261,8 @@ def fit(
         def residual(u: np.ndarray, factor: float = factor, begun: np.ndarray = begun) -> np.ndarray:
             r = res.residual(outward(u, begun), factor)
             if progress is not None:
-                done = f"evaluation {res.evaluations} ({res.jacobians} Jacobians)"
-                progress(f"floors x{factor:g}, {done}, cost {robust(r):.1f}")
+                error = factor * float(np.sqrt(robust(r) / max(r.size, 1)))
+                progress(f"iteration {res.jacobians}, error {error:.3g}")
             return r
 
         def jacobian(u: np.ndarray, factor: float = factor, begun: np.ndarray = begun) -> np.ndarray:

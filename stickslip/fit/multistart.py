@@ -50,7 +50,7 @@ def best_of(
         def count(text: str, i: int = i) -> None:
             nonlocal done
             done += 1
-            tell(f"start {i + 1} of at most {starts}, {text}", min((i + done / most) / starts, 0.99))
+            tell(f"start {i + 1}/{starts}, {text}", min((i + done / most) / starts, 0.99))
 
         try:
             found = fit(problem, floor, z=z, use=use, stages=STAGES[:AWAY], progress=count)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from ..forward import Cycles, Track, run_cycles
+from ..forward import Cycles, Track, cut_short, run_cycles
 from .problem import Problem
 
 Array = NDArray[np.float64]
@@ -22,11 +22,13 @@ class ModelledRun:
     Attributes:
         times, readings: one array for each cycle, s and m. Each cycle begins at the measured arrest before it.
         arrests: times at which the model's cycles end (s).
+        cut: numbers (from 0) of the cycles that could not be integrated to their end.
     """
 
     times: tuple[Array, ...]
     readings: tuple[Array, ...]
     arrests: tuple[float, ...]
+    cut: tuple[int, ...] = ()
 
     def reading(self, time: Array, starts: Array) -> Array:
         """Reading (m) at times (s), each taken from the cycle it lies in; NaN beyond the last cycle.
@@ -65,6 +67,7 @@ def modelled_runs(problem: Problem, z: Array, events: Array) -> list[ModelledRun
                 tuple(t[i, :e] for i, e in zip(used, ends, strict=True)),
                 tuple(y[i, :e] for i, e in zip(used, ends, strict=True)),
                 tuple(float(found.arrest[i]) for i in used),
+                tuple(np.flatnonzero(cut_short(found, cycles)).tolist()),
             )
         )
     return out

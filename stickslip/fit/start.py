@@ -19,6 +19,7 @@ from .parameters import Free
 SHAPE = 3.3  # exponent of the backbone of a self-affine line with H about 0.3
 BINS = 96
 DAMPING_SHARE = 0.017  # of the critical damping of the contact resonance
+FALLBACK_STIFFNESS = 1000.0  # N/m, of a spring of which nothing is known
 FALLBACK_FREQUENCY = 500.0  # Hz, contact resonance of the paper's rig
 
 
@@ -94,16 +95,19 @@ def base_composition(
         later = np.asarray(m.cycles.used)
     size = float(np.median(m.values[later][:, s["size"]]))
     own = np.asarray(m.cycles.stiffness)
-    stiffness, stiffness_width, low, high, measured = _known(rig.spring_stiffness, 1000.0, 0.8)
+    stated = own[np.isfinite(own)]  # traces may have springs of their own where the rig has none
+    usual = float(np.median(stated)) if stated.size else FALLBACK_STIFFNESS
+    stiffness, stiffness_width, low, high, measured = _known(rig.spring_stiffness, usual, 0.8)
     times = m.values[later][:, s["times"]]
     # a half-cosine spends 0.75 of its time between the two levels; nucleation and damping lengthen that
     duration = float(np.median(times[:, -1] - times[:, 0])) / 0.83
-    if not measured and not np.isfinite(own).all():
+    if not measured and not stated.size:
         stiffness = float(np.clip(mass * (np.pi / duration) ** 2, low or 1e-3, high or 1e9))
     load = _known(rig.normal_force, np.nan, 0.0)[0]
     friction, friction_width, _, _, _ = _known(rig.friction_coefficient, np.nan, 0.15)
     first = np.asarray(m.cycles.virgin)
-    seen = m.values[:, 0, 0][first] * m.velocities[first] * stiffness if first.any() else np.array([])
+    each = np.where(np.isfinite(own), own, stiffness)
+    seen = (m.values[:, 0, 0] * m.velocities * each)[first]
     nominal = friction * load * contacts
     if not np.isfinite(nominal):
         nominal = float(np.median(seen)) if seen.size else 3.0 * stiffness * size

@@ -14,6 +14,10 @@ from .style import DARK, MIDDLE, figure, remark, scaled, styled, thin
 if TYPE_CHECKING:
     import xarray
 
+    from ..scenario import Recording
+
+    Run = xarray.Dataset | Recording
+
 
 @styled
 def creep_figure(tau: np.ndarray, u: np.ndarray, t: np.ndarray, title: str) -> Figure:
@@ -29,7 +33,7 @@ def creep_figure(tau: np.ndarray, u: np.ndarray, t: np.ndarray, title: str) -> F
 
 
 @styled
-def static_against_inertial(runs: Sequence[xarray.Dataset], labels: Sequence[str]) -> Figure:
+def static_against_inertial(runs: Sequence[Run], labels: Sequence[str]) -> Figure:
     """The first stick of every run: static curve and simulated motion side by side, and their difference below."""
     columns = min(len(runs), 4)
     chosen = np.unique(np.linspace(0, len(runs) - 1, columns).round().astype(int))
@@ -40,11 +44,11 @@ def static_against_inertial(runs: Sequence[xarray.Dataset], labels: Sequence[str
     return made
 
 
-def _pair(top: Axes, low: Axes, data: xarray.Dataset, label: str, *, legend: bool) -> None:
+def _pair(top: Axes, low: Axes, data: Run, label: str, *, legend: bool) -> None:
     top.set_title(label)
     u, moment = data["static_displacement"].values, data["static_time"].values
     t, x = data["time"].values, data["displacement"].values
-    end = float(data["onset"][0]) if data.sizes["event"] else float(t[-1])
+    end = float(data["onset"].values[0]) if data.sizes["event"] else float(t[-1])
     # a block that slides without an event is followed until it has left the static curve
     gone = np.flatnonzero(np.abs(x) > 1.3 * np.max(np.abs(u), initial=0.0))
     part = t <= (min(end, t[gone[0]]) if gone.size else end)

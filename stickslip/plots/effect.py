@@ -13,9 +13,13 @@ from .style import DARK, MIDDLE, figure, remark, scaled, styled, thin
 if TYPE_CHECKING:
     import xarray
 
+    from ..scenario import Recording
+
+    Run = xarray.Dataset | Recording
+
 
 @styled
-def effect_figure(without: xarray.Dataset, with_it: xarray.Dataset, tag: str, values: str) -> Figure:
+def effect_figure(without: Run, with_it: Run, tag: str, values: str) -> Figure:
     """Whole trace, a stick, a slip and the spring's force, without and with an effect.
 
     Args:

@@ -13,9 +13,13 @@ from .style import DARK, LIGHT, MIDDLE, figure, remark, scaled, styled, thin
 if TYPE_CHECKING:
     import xarray
 
+    from ..scenario import Recording
+
+    Run = xarray.Dataset | Recording
+
 
 @styled
-def trace_figure(data: xarray.Dataset) -> Figure:
+def trace_figure(data: Run) -> Figure:
     """Four panels of a data set of `simulate`."""
     made, axes = figure(2, 2, width=11.0, height=7.6)
     made.suptitle(f"{data.attrs['title']}: {data.attrs['verdict']}", fontsize=11, wrap=True)
@@ -26,7 +30,7 @@ def trace_figure(data: xarray.Dataset) -> Figure:
     return made
 
 
-def whole(axes: Axes, data: xarray.Dataset) -> None:
+def whole(axes: Axes, data: Run) -> None:
     """Displacement and load point against time."""
     t, x, drive = (data[name].values for name in ("time", "displacement", "drive_position"))
     k, unit = scaled(np.concatenate([x, drive]), "m")
@@ -36,7 +40,7 @@ def whole(axes: Axes, data: xarray.Dataset) -> None:
     axes.legend(loc=_free_corner(drive))
 
 
-def creep(axes: Axes, data: xarray.Dataset) -> None:
+def creep(axes: Axes, data: Run) -> None:
     """The last stick before a slip, or the whole run where there is none, as the vibrometer shows it."""
     onset, arrest = data["onset"].values, data["arrest"].values
     t, x, reading = (data[name].values for name in ("time", "displacement", "reading"))
@@ -68,13 +72,13 @@ def _free_corner(y: np.ndarray) -> Literal["lower left", "upper left"]:
     return "lower left" if y[-1] < y[0] else "upper left"
 
 
-def slip(axes: Axes, data: xarray.Dataset) -> None:
+def slip(axes: Axes, data: Run) -> None:
     """The last slip and the ring-down after it: displacement, and velocity on a second axis."""
     axes.set_title("slip and ring-down")
     if not data.sizes["event"]:
         remark(axes, "no slip event")
         return
-    onset, arrest = float(data["onset"][-1]), float(data["arrest"][-1])
+    onset, arrest = float(data["onset"].values[-1]), float(data["arrest"].values[-1])
     t = data["time"].values
     part = (t >= onset - 0.3 * (arrest - onset)) & (t <= arrest + 0.8 * (arrest - onset))
     if part.sum() < 3:
@@ -111,7 +115,7 @@ def _ring(axes: Axes, t: np.ndarray, x: np.ndarray) -> None:
     inset.tick_params(labelsize=7)
 
 
-def phase_plane(axes: Axes, data: xarray.Dataset) -> None:
+def phase_plane(axes: Axes, data: Run) -> None:
     """Velocity against the spring's force, with the force of full friction."""
     force, v = data["spring_force"].values, data["velocity"].values
     kf, unit_f = scaled(force, "N")

@@ -5,6 +5,7 @@ Another format is added by a package that offers a `Reader` class in the entry p
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 from ..errors import InputError, nearest
@@ -95,6 +96,9 @@ def read_columns(path: str | Path, name: str | None = None) -> Columns:
     """
     path = Path(path)
     reader = find_reader(path, name)
-    columns = reader.read(path)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        columns = reader.read(path)
+    columns.notes += list(dict.fromkeys(f"warning of the reader: {w.message}" for w in caught))
     columns.reader = reader.name
     return columns

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..errors import InputError
 from .base import Columns, add_array, need_columns
+from .guard import guard
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 _UNIT_KEYS = ("units", "unit", "Units", "Unit", "UNITS")
@@ -31,6 +32,7 @@ def read_hdf(path: Path, skip: tuple[str, ...] = ()) -> Columns:
     import h5py
 
     columns = Columns({})
+    guard(path, "hdf5")
 
     def take(name: str, item: Any) -> None:
         if name.startswith(skip) or not isinstance(item, h5py.Dataset) or item.shape in (None, ()):
@@ -43,7 +45,7 @@ def read_hdf(path: Path, skip: tuple[str, ...] = ()) -> Columns:
     try:
         with h5py.File(path, "r") as file:
             file.visititems(take)
-    except OSError as error:
+    except Exception as error:  # a damaged file makes h5py raise many kinds, and numpy where a size is absurd
         raise InputError(
             f"not a readable HDF5 file ({error})", file=path, hint="was the file closed when written?"
         ) from None

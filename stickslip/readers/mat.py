@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from .base import Columns, add_array, need_columns
+from .guard import guard
 from .hdf import read_hdf
 
 
@@ -28,6 +29,7 @@ class MatReader:
             return read_hdf(path, skip=("#refs#", "#subsystem#"))
         import scipy.io
 
+        guard(path, "mat")
         try:
             content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
         except Exception as error:  # scipy raises many kinds on a damaged file

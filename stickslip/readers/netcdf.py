@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from .base import Columns, add_array, need_columns
+from .guard import guard
 
 
 class NetcdfReader:
@@ -26,9 +27,15 @@ class NetcdfReader:
         with path.open("rb") as stream:
             classic = stream.read(3) == b"CDF"
         columns = Columns({})
+        if not classic:
+            guard(path, "hdf5")
         try:
             # decode_times=False: "seconds since ..." stays a number
-            with xarray.open_dataset(path, engine="scipy" if classic else "h5netcdf", decode_times=False) as data:
+            elsewhere = [] if classic else _elsewhere(path)
+            columns.ignored.update(dict.fromkeys(elsewhere, "its numbers lie in another file"))
+            with xarray.open_dataset(
+                path, engine="scipy" if classic else "h5netcdf", decode_times=False, drop_variables=elsewhere
+            ) as data:
                 for name, variable in data.variables.items():
                     unit = variable.attrs.get("units", variable.attrs.get("unit"))
                     if isinstance(unit, str):
@@ -39,3 +46,20 @@ class NetcdfReader:
         except Exception as error:  # the engines raise many kinds on a damaged file
             raise InputError(f"not a readable NetCDF file ({type(error).__name__}: {error})", file=path) from None
         return need_columns(columns, path)
+
+
+def _elsewhere(path: Path) -> list[str]:
+    """Variables whose numbers lie in another file: linked, external or virtual."""
+    import h5py
+
+    found = []
+    with h5py.File(path, "r") as file:
+        for name in file:
+            item = file.get(name)
+            if (
+                item is None
+                or item.file.filename != file.filename
+                or (isinstance(item, h5py.Dataset) and (item.external or item.is_virtual))
+            ):
+                found.append(name)
+    return found

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from ..errors import InputError
 from ..trace import SIGNALS, Repair
@@ -209,6 +208,8 @@ def find_gaps(time: Array) -> tuple[Array, list[Repair]]:
         return np.zeros(0), []
     reference = np.full(steps.size, usual)
     if np.count_nonzero(steps > 1.5 * usual) > 0.05 * steps.size:
+        from scipy import ndimage  # a fifth of a second that ordinary records do not need
+
         local = ndimage.median_filter(steps, 5, mode="nearest")
         before, after = np.roll(local, 3), np.roll(local, -3)
         before[:3], after[-3:] = local[:3], local[-3:]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ class TdmsReader:
                 hint="pip install 'stickslip[tdms]', or export the file as CSV",
             ) from None
         columns = Columns({})
+        nptdms.log.log_manager.set_level(logging.ERROR)  # what it tells of a file cut short is told below
         try:
             with nptdms.TdmsFile.open(path) as file:
                 for group in file.groups():

@@ -10,12 +10,11 @@ import numpy as np
 
 from ..fit.creep_process import V_LIM, creep_processes
 from ..fit.normalised import is_ramp
-from ..segment import Segmentation
+from ..segment import LAWS, Segmentation, Shapes, event_shapes
 from ..trace import Trace
 from .describe import stick_gain
 
 _RING_RATE = 5000.0  # Hz: a contact resonance of some 500 Hz needs ten samples a period
-_SLIP_SAMPLES = 20
 _NEAR = 1.25  # drive velocities closer than this factor count as one
 
 
@@ -40,8 +39,11 @@ def abilities(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) ->
     slipping = [(t, s) for t, s in pairs if s.events]
     if not slipping:
         cannot.append("No trace holds a slip: nothing but creep or sliding can be looked at, no dynamic model fitted.")
-    for judge in (_velocities, _events, _holds, _virgin, _signals, _slip, _ringing, _creep, _ramps, _unseen):
-        good, bad = judge(pairs, slipping)
+    shapes = [event_shapes(t, s) for t, s in slipping]
+    verdicts = [judge(pairs, slipping) for judge in (_velocities, _events, _holds, _virgin, _signals)]
+    verdicts += [judge(slipping, shapes) for judge in (_slip, _overshoot, _ringing)]
+    verdicts += [judge(pairs, slipping) for judge in (_creep, _ramps, _unseen)]
+    for good, bad in verdicts:
         can += good
         cannot += bad
     return Abilities(tuple(can), tuple(cannot))
@@ -131,27 +133,58 @@ def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
     return good, bad
 
 
-def _slip(pairs: Pairs, slipping: Pairs) -> Verdict:
-    coarse = []
-    for t, s in slipping:
-        samples = float(np.median([e.duration for e in s.events])) * t.sampling_rate
-        if samples < _SLIP_SAMPLES:
-            coarse.append(f"{t.name} ({samples:.0f} samples a slip)")
+def _slip(slipping: Pairs, shapes: list[Shapes]) -> Verdict:
+    coarse = [
+        f"{t.name} ({float(np.median([e.duration for e in s.events])) * t.sampling_rate:.0f} samples a slip)"
+        for (t, s), shape in zip(slipping, shapes, strict=True)
+        if "slip_times" in shape.missing
+    ]
     if coarse:
         return [], [f"Sampled too slowly for the shape of a slip: {_some(coarse)}."]
     return (["The course of the slips is resolved."] if slipping else []), []
 
 
-def _ringing(pairs: Pairs, slipping: Pairs) -> Verdict:
+def _overshoot(slipping: Pairs, shapes: list[Shapes]) -> Verdict:
+    """Overshoot, where it is missing or below what the sensor makes."""
+    missing, hidden = [], []
+    for (t, _), shape in zip(slipping, shapes, strict=True):
+        if "overshoot" in shape.missing:
+            missing.append(f"{t.name} ({shape.missing['overshoot']})")
+            continue
+        known = np.array([e.overshoot for e in shape.events])
+        if abs(float(np.nanmedian(known))) < 2.0 * shape.noise["overshoot"]:
+            hidden.append(t.name)
+    bad = [f"No overshoot: {_some(missing)}."] if missing else []
+    if hidden:
+        bad.append(f"The overshoot is within the noise in {_some(hidden)}.")
+    return [], bad
+
+
+def _ringing(slipping: Pairs, shapes: list[Shapes]) -> Verdict:
     slow = [f"{t.name} ({_rate(t.sampling_rate)})" for t, _ in slipping if t.sampling_rate < _RING_RATE]
-    bad = []
+    found = [(t, shape) for (t, _), shape in zip(slipping, shapes, strict=True) if np.isfinite(shape.frequency)]
+    good, bad = [], []
     if slow:
         text = (
             f"Sampled too slowly for a ring-down of some 500 Hz: {_some(slow)}; contact stiffness and damping are then"
         )
         bad.append(f"{text} known from creep and slip alone.")
-    rest = [t.name for t, s in slipping if t.sampling_rate >= _RING_RATE and t.leading != "spring_force"]
-    return ([f"Ring-down after the slips: contact stiffness and damping ({_some(rest)})."] if rest else []), bad
+    if found:
+        each = _some([f"{t.name} at {_rate(shape.frequency)}" for t, shape in found])
+        good.append(f"Ring-down after the slips (contact stiffness and damping): {each}.")
+        clear = [shape.decay for _, shape in found if shape.decay in LAWS]
+        if len(set(clear)) == 1 and len(clear) >= 0.5 * len(found):
+            good.append(f"The ring-down's {LAWS[clear[0]]}.")
+        else:
+            bad.append("The law by which the ring-down decays is not clear, so kinds of damping cannot be told apart.")
+    quiet = [
+        f"{t.name} ({shape.missing['ring']})"
+        for (t, _), shape in zip(slipping, shapes, strict=True)
+        if "ring" in shape.missing and t.sampling_rate >= _RING_RATE
+    ]
+    if quiet:
+        bad.append(f"No ring-down: {_some(quiet)}.")
+    return good, bad
 
 
 def _creep(pairs: Pairs, slipping: Pairs) -> Verdict:

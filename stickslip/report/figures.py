@@ -31,14 +31,15 @@ def series(data: xarray.Dataset, key: str, name: str) -> np.ndarray | None:
 
 @styled
 def trace_picture(data: xarray.Dataset, number: int, facts: dict[str, Any]) -> Figure:
-    """The whole trace with its events, one stick and one slip; measured and, where there is one, modelled."""
-    made, axes = figure(1, 3, width=11.0, height=3.4)
+    """The whole trace with its events, one stick, one slip and what follows it; measured and, if any, modelled."""
+    made, axes = figure(1, 4, width=14.0, height=3.4)
     slips = len(facts.get("events", ()))
     made.suptitle(plain(f"{facts['name']}: {facts.get('regime', '')}, {slips} slips"), fontsize=11)
     key = f"trace{number}"
     _whole(axes[0, 0], data, key)
     _zoom(axes[0, 1], data, f"{key}_creep", "one stick", clip=True)
-    _zoom(axes[0, 2], data, f"{key}_slip", "one slip and its ring-down", clip=False)
+    _zoom(axes[0, 2], data, f"{key}_slip", "one slip", clip=False)
+    _after(axes[0, 3], data, key)
     return made
 
 
@@ -102,6 +103,32 @@ def _zoom(axes: Axes, data: xarray.Dataset, key: str, title: str, *, clip: bool)
         axes.plot(when * factor, (model - zero) * k, color=MIDDLE, ls="--", lw=1.2, label="model")
         axes.legend(fontsize=8)
     axes.set(xlabel=text, ylabel=f"position / {unit}")
+    axes.locator_params(axis="x", nbins=5)
+
+
+def _after(axes: Axes, data: xarray.Dataset, key: str) -> None:
+    """What follows the same slip: a ring-down is too small to be seen beside it."""
+    axes.set_title("after the slip")
+    t, y, arrests = (
+        series(data, f"{key}_{a}", b) for a, b in (("slip", "time"), ("slip", "position"), ("event", "arrest"))
+    )
+    inside = np.array([]) if t is None or arrests is None else arrests[(arrests > t[0]) & (arrests < t[-1])]
+    if t is None or y is None or not inside.size or np.count_nonzero(t >= inside[0]) < 3:
+        remark(axes, "no slip")
+        return
+    late = t >= inside[0]
+    zero = float(np.median(y[late][late.sum() // 2 :]))
+    k, unit = scaled(y[late] - zero, _unit(data, f"{key}_slip_position"))
+    factor, suffix = (1e3, "ms") if np.ptp(t[late]) < 1 else (1.0, "s")
+    when, model = (t[late] - inside[0]) * factor, series(data, f"{key}_slip", "model")
+    axes.plot(when, (y[late] - zero) * k, color=DARK if model is None else LIGHT, lw=1.0, label="measured")
+    if model is not None:
+        axes.plot(when, (model[late] - zero) * k, color=MIDDLE, ls="--", lw=1.0, label="model")
+        # where the model is set on the next measured arrest it jumps, which is no ring-down
+        low, high = (float(f((y[late] - zero) * k)) for f in (np.min, np.max))
+        axes.set_ylim(low - 0.3 * (high - low), high + 0.3 * (high - low))
+        axes.legend(fontsize=8)
+    axes.set(xlabel=f"time after the arrest / {suffix}", ylabel=f"position / {unit}")
     axes.locator_params(axis="x", nbins=5)
 
 

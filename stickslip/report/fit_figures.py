@@ -143,10 +143,12 @@ def ramp_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: int
 def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
     """Errors of every model: by phase, and on fitted and unseen runs together."""
     made, axes = figure(1, 2, width=10.0, height=3.8)
-    labels = [
-        plain(("+ " if i else "") + str(step.get("added") or "/".join(step.get("model") or ["model"])), 28)
-        for i, step in enumerate(ladder)
-    ]
+    labels, before = [], 0
+    for i, step in enumerate(ladder):
+        parts = step.get("model") or ["model"]
+        name = str(step.get("added") or " + ".join(parts[before:] or parts[-1:]))
+        labels.append(plain(("+ " if i else "") + name, 28))
+        before = len(parts)
     x = np.arange(len(ladder))
     for name, text, style in (("train_error", "fitted runs", "-"), ("heldout_error", "unseen runs", "--")):
         y = np.array([np.nan if step.get(name) is None else step[name] for step in ladder], float)

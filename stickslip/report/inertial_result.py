@@ -14,9 +14,10 @@ from ..features.measurement import Measurement
 from ..fit.composition import Composition
 from ..fit.effective import effective_line
 from ..fit.inertial import Fit
-from ..fit.overlay import modelled_runs
+from ..fit.overlay import ModelledRun, modelled_runs
 from ..fit.problem import Problem
 from ..fit.static_table import StaticRig
+from ..forward import MOST_STEPS
 from ..residual import Misfit, misfit
 from ..segment import Segmentation
 from ..trace import Trace
@@ -118,7 +119,7 @@ def fit_sections(
     m, composition = problem.measurement, problem.composition
     shown = replace(m, valid=m.valid & use[..., None])
     stiffness = float(composition.fixed.get("rig.spring_stiffness", fit.values.get("rig.spring_stiffness", np.nan)))
-    result = {
+    result: dict[str, Any] = {
         "misfit": misfit_part(shown, fit.features, floor, misfit(shown, fit.features, floor)),
         "identifiability": identifiability(fit),
         "effective": effective(fit, rig, composition.contacts),
@@ -127,17 +128,28 @@ def fit_sections(
     variables: dict[str, Any] = {}
     for i, (t, s) in enumerate(zip(traces, segmentations, strict=True)):
         variables |= trace_pieces(t, s, i)
-    variables |= overlay(problem, fit, traces, segmentations)
+    runs = modelled_runs(problem, fit.z, fit.events)
+    variables |= overlay(problem, runs, traces, segmentations)
+    cut = [f"{name}, cycle {n + 1}" for name, run in zip(m.names, runs, strict=True) for n in run.cut]
+    result["misfit"]["cut"] = cut
+    if cut:
+        result["misfit"]["sentence"] += (
+            f" In {len(cut)} cycle{'s' * (len(cut) > 1)} the model could not be integrated to the arrest "
+            f"({'; '.join(cut[:4])}{' ...' if len(cut) > 4 else ''}; at most {MOST_STEPS} steps), so their errors and "
+            "those of the cycles after them say nothing."
+        )
     found = {t.name: s for t, s in zip(traces, segmentations, strict=True)}
     variables |= residual_arrays(shown, fit.features, floor, found, stiffness, {t.name: t for t in traces})
     variables["coordinates"] = {"phase": list(PHASES), "feature": list(m.layout.names), "run": list(m.names)}
     return result, variables
 
 
-def overlay(problem: Problem, fit: Fit, traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> Variables:
+def overlay(
+    problem: Problem, modelled: Sequence[ModelledRun], traces: Sequence[Trace], segmentations: Sequence[Segmentation]
+) -> Variables:
     """The model beside the measured zooms, and through the whole trace; arrays as of `trace_pieces`."""
     m = problem.measurement
-    runs = dict(zip(m.names, modelled_runs(problem, fit.z, fit.events), strict=True))
+    runs = dict(zip(m.names, modelled, strict=True))
     out: Variables = {}
     for i, (trace, found) in enumerate(zip(traces, segmentations, strict=True)):
         if trace.name not in runs or trace.displacement is None:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..segment import Event, Segmentation, block_motion
-from ..trace import Trace
+from ..segment import Event, Segmentation, block_motion, reduce_trace
+from ..trace import SIGNALS, Trace
 
 OVERVIEW, ZOOM = 3000, 1500
 Variables = dict[str, tuple[str, np.ndarray, dict[str, Any]]]
@@ -49,6 +49,20 @@ def trace_pieces(trace: Trace, found: Segmentation, number: int) -> Variables:
         drive = trace.drive.position(at)
         start = out[f"{key}_position"][1][0] - drive[0]
         out[f"{key}_drive"] = (key, drive + start, {"units": unit if unit == "m" else "m"})
+    return out
+
+
+def reduced_record(trace: Trace, found: Segmentation, number: int) -> Variables:
+    """The whole record in short: slips at full rate, creep and holds as means over log-spaced windows.
+
+    Variables are named ``trace0_reduced_time``, ``trace0_reduced_displacement`` and so on, for what was measured.
+    """
+    short, key = reduce_trace(trace, found), f"trace{number}_reduced"
+    out: Variables = {f"{key}_time": (key, np.asarray(short.time), {"units": "s"})}
+    for name, unit in {**SIGNALS, "drive_position": "m", "normal_load": "N"}.items():
+        values = getattr(short, name)
+        if values is not None:
+            out[f"{key}_{name}"] = (key, np.asarray(values), {"units": unit})
     return out
 
 

@@ -14,6 +14,7 @@ from .fit_figures import (
     ramp_grid,
     residual_plots,
 )
+from .missing_figure import missing_picture
 
 if TYPE_CHECKING:
     import xarray
@@ -31,6 +32,13 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
         yield "misfit", "Error by phase of the cycle and drive velocity.", heat_map(misfit["table"])
     if "residual" in data:
         yield "misfit", "Error of every cycle against what might explain it.", residual_plots(data)
+    shown = (result.get("missing_force") or {}).get("shown") or []
+    if shown and "missing0_velocity_at" in data:
+        yield (
+            "missing_force",
+            "Bands: two standard deviations, everything else in the model free. Marks: where the data are.",
+            missing_picture(data, shown),
+        )
     if result.get("static") and "creep0_time" in data:
         yield (
             "static",
@@ -48,7 +56,11 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
     traces = result.get("traces") or []
     for i, facts in enumerate(traces[:MOST_TRACES]):
         if series(data, f"trace{i}_whole", "time") is not None:
-            yield "traces", f"{facts['name']}: the whole, one stick, one slip.", trace_picture(data, i, facts)
+            yield (
+                "traces",
+                f"{facts['name']}: the whole, one stick, one slip and what follows it.",
+                trace_picture(data, i, facts),
+            )
         if (facts.get("ripple") or {}).get("lines") and series(data, f"trace{i}_ripple", "frequency") is not None:
             caption = f"{facts['name']}: {facts['ripple'].get('text', '')}"
             yield "traces", caption, ripple_picture(data, i, {**facts["ripple"], "name": facts["name"]})

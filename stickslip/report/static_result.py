@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..features.measurement import doubts
 from ..fit.creep_process import CreepProcess, creep_processes
 from ..fit.normalised import Ramp, break_away, fit_ramps, is_ramp
 from ..fit.static import SATISFYING, Align, CreepFit, Form, StaticFit, fit_static, tied_quantities
@@ -65,7 +66,7 @@ def static_result(
         raise InputError(
             "nothing here can be compared with the static model",
             value=None,
-            hint=f"{why[:600]}. A coarse sensor needs a larger --v-lim",
+            hint=f"{why[:600]}. A coarse sensor needs a larger --v-lim{doubts(traces)}",
         )
     result: dict[str, Any] = {"dropped": dropped}
     variables: Variables = {}

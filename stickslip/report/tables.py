@@ -11,7 +11,7 @@ _KNOWN: dict[str, Any] = {
     "verdict": {}, "ladder": [], "ranking": [], "parameters": {}, "equations": [], "identifiability": [], "traces": [],
     "dropped": [], "inputs": [], "versions": {}, "static": None, "misfit": None, "next_experiment": None, "can": [],
     "cannot": [], "effective": None, "profiles": [], "ramps": None, "notes": [], "title": "", "kind": "run",
-    "seconds": None, "summary": "",
+    "seconds": None, "summary": "", "missing_force": None, "learned_residual": None,
 }  # fmt: skip
 
 
@@ -19,6 +19,8 @@ def tables(result: Mapping[str, Any]) -> dict[str, Any]:
     """Variables of the template: every key it knows, with an empty value where the result has none."""
     found = {key: _or(result.get(key), empty) for key, empty in _KNOWN.items()}
     found["misfit_rows"] = _misfit_rows(found["misfit"])
+    steps = _or((found["learned_residual"] or {}).get("ladder"), [])
+    found["learned_phases"] = list(dict.fromkeys(p for s in steps for p in _or(s.get("heldout_by_phase"), {})))
     found["ladder_phases"] = list(dict.fromkeys(p for step in found["ladder"] for p in _or(step.get("by_phase"), {})))
     return found
 
@@ -34,11 +36,17 @@ def show(value: Any, unit: str = "1", digits: int = 4) -> str:
     if not math.isfinite(value):
         return "–"
     if value == 0 or unit in ("1", "", None) or " " in unit.split("/")[0]:
-        return f"{value:.{digits}g} {unit if unit not in ('1', None) else ''}".strip()
+        return f"{_digits(value, digits)} {unit if unit not in ('1', None) else ''}".strip()
     if unit == "kg":
         value, unit = 1e3 * value, "g"
     power = max(-12, min(9, 3 * math.floor(math.log10(abs(value) * (1 + 10.0**-digits)) / 3)))
-    return f"{value / 10.0**power:.{digits}g} {_PREFIXES[power]}{unit}"
+    return f"{_digits(value / 10.0**power, digits)} {_PREFIXES[power]}{unit}"
+
+
+def _digits(value: float, digits: int) -> str:
+    """So many significant digits, without a power of ten for numbers below a hundred thousand."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e5 else text
 
 
 def percent(value: Any, digits: int = 2) -> str:

@@ -2,7 +2,8 @@
 
 from .build import Setup, build
 from .load import Scenario, load_scenario, make_scenario
-from .simulation import Progress, Recording, record, simulate
+from .recording import Recording
+from .simulation import Progress, record, simulate
 from .stability import Sliding, steady_sliding
 from .static import StaticCreep, static_creep
 

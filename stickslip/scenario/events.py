@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..solve import Trajectory
+from ..solve import Steps, Trajectory
 from .drive import Motion
 
 LEAST_DROP = 0.01  # of the full friction force; ringing of the contact drops the spring by a thousandth of it
@@ -21,7 +21,7 @@ class Events(NamedTuple):
     """One entry for each slip, shape (n,).
 
     Fields:
-        onset, arrest: when the spring's force begins and ceases to fall (s).
+        onset, arrest: when the spring's force begins and ceases to fall (s), on the solver's dense output.
         slip: displacement between them, in the direction of the pull (m).
         peak_velocity: largest velocity between them, in that direction (m/s).
         recurrence: time since the onset before (s); nan for the first.
@@ -85,18 +85,45 @@ def find_slips(trajectory: Trajectory, motion: Motion, strength: float) -> list[
     edges = edges[force[edges[:, 0] - 1] - force[edges[:, 1]] > 0.5 * LEAST_DROP * strength]
     found = []
     for first, after in edges:
-        onset, arrest = (_zero(s.t, lead, i) for i in (first, after))
-        peak = float(np.max(s.v[first:after] * pull[first:after]))
+        onset, arrest = (_zero(s, pull[i - 1] * speed[i - 1 : i + 1], i) for i in (first, after))
         begin, end = np.interp([onset, arrest], s.t, force)
+        peak = _peak(s, first, after, float(pull[first]))
         if begin - end > LEAST_DROP * strength and peak > LEAST_PEAK * speed[first]:
             found.append(Slip(onset, arrest, peak, float(pull[first])))
     return found
 
 
-def _zero(t: np.ndarray, lead: np.ndarray, i: int) -> float:
-    """Time at which ``lead`` goes through zero just before index ``i``."""
-    share = lead[i - 1] / (lead[i - 1] - lead[i])
-    return float(t[i - 1] + share * (t[i] - t[i - 1]))
+def _velocity(s: Steps, i: int) -> np.ndarray:
+    """Velocity in the step that ends at index ``i``: a polynomial in the share of the step, highest power first.
+
+    It is the derivative of the solver's own cubic for the displacement.
+    """
+    mean = (s.x[i] - s.x[i - 1]) / (s.t[i] - s.t[i - 1])
+    v0, v1 = s.v[i - 1], s.v[i]
+    return np.array([3.0 * (v0 + v1 - 2.0 * mean), 6.0 * mean - 4.0 * v0 - 2.0 * v1, v0])
+
+
+def _zero(s: Steps, level: np.ndarray, i: int) -> float:
+    """Time at which the velocity goes through a level (m/s, at both ends of the step) just before index ``i``."""
+    a, b, c = _velocity(s, i) - [0.0, level[1] - level[0], level[0]]
+    root = np.sqrt(max(b * b - 4.0 * a * c, 0.0))
+    # the ends differ in sign, so one of the two lies within the step; both without cancellation
+    far = -0.5 * (b + np.copysign(root, b))
+    shares = [share for share in (far / a if a else np.inf, c / far if far else np.inf) if 0.0 <= share <= 1.0]
+    share = shares[0] if shares else c / (c - (a + b + c))
+    return float(s.t[i - 1] + share * (s.t[i] - s.t[i - 1]))
+
+
+def _peak(s: Steps, first: int, after: int, pull: float) -> float:
+    """Largest velocity of a slip in the direction of the pull, between the steps as well (m/s)."""
+    top = first + int(np.argmax(s.v[first:after] * pull))
+    best = float(s.v[top] * pull)
+    for i in (top, top + 1):
+        a, b, c = pull * _velocity(s, i)
+        share = -0.5 * b / a if a < 0.0 else -1.0
+        if 0.0 < share < 1.0:
+            best = max(best, float(c + 0.5 * b * share))
+    return best
 
 
 def _settled(trajectory: Trajectory, begin: float, end: float, rings: bool) -> float:

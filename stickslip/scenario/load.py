@@ -75,6 +75,8 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         raise InputError(
             f"not valid TOML: {error}", file=path, hint="correct the line; text stands in quotes"
         ) from None
+    except RecursionError:
+        raise InputError("tables and lists are nested too deeply", file=path) from None
     return _checked(content, path, digest, tuple(changes), changes, text)
 
 

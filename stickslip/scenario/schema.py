@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
@@ -196,10 +197,10 @@ class ScenarioFile(Table):
     sweep: SweepTable | None = None
 
 
-FILES: dict[str, type[ScenarioFile]] = {
-    kind: create_model(f"ScenarioFile_{kind}", __base__=ScenarioFile, contact=(table, ...))
-    for kind, table in CONTACTS.items()
-}
+@cache
+def _file_of(kind: str) -> type[ScenarioFile]:
+    """The model of files with contacts of one kind (made when it is needed: all of them take a tenth of a second)."""
+    return create_model(f"ScenarioFile_{kind}", __base__=ScenarioFile, contact=(CONTACTS[kind], ...))
 
 
 def file_model(content: dict[str, Any]) -> type[ScenarioFile]:
@@ -212,6 +213,6 @@ def file_model(content: dict[str, Any]) -> type[ScenarioFile]:
     if not isinstance(contact, dict) or "kind" not in contact:
         return ScenarioFile
     kind = contact["kind"]
-    if kind not in FILES:
-        raise InputError("unknown kind of contact", key="contact.kind", value=kind, hint=nearest(str(kind), FILES))
-    return FILES[kind]
+    if not isinstance(kind, str) or kind not in CONTACTS:
+        raise InputError("unknown kind of contact", key="contact.kind", value=kind, hint=nearest(str(kind), CONTACTS))
+    return _file_of(kind)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import equinox as eqx
 import jax
@@ -24,6 +24,7 @@ from .build import Setup, build
 from .contact_tables import RoughLineTable
 from .events import UNITS, Events, find_events, find_slips
 from .load import Scenario
+from .recording import Recording, Variable
 from .stability import Sliding, steady_sliding
 from .static import first_stick
 
@@ -47,26 +48,6 @@ class Progress:
     time: float
     end: float
     events: int
-
-
-@dataclass(frozen=True)
-class Recording:
-    """A simulated run as plain arrays; `dataset` makes the data set of it (importing xarray takes half a second).
-
-    Attributes:
-        variables: name -> dimension, values (n,), attributes with ``units``.
-        attributes: facts of the whole run.
-    """
-
-    variables: Mapping[str, tuple[str, np.ndarray, dict[str, str]]]
-    attributes: Mapping[str, Any]
-
-    def dataset(self) -> xarray.Dataset:
-        """As `simulate` gives it."""
-        import xarray
-
-        data = dict(self.variables)
-        return xarray.Dataset(data, coords={"time": data.pop("time")}, attrs=dict(self.attributes))
 
 
 def simulate(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> xarray.Dataset:
@@ -197,14 +178,14 @@ def _recording(
         "reading": (_reading(scenario, trajectory, events, t), "m", "displacement the vibrometer shows"),
     }
     data = {
-        name: ("time", np.asarray(values), {"units": unit, "long_name": text})
+        name: Variable("time", np.asarray(values), {"units": unit, "long_name": text})
         for name, (values, unit, text) in sampled.items()
     }
     for name, column in events._asdict().items():
-        data[name] = ("event", column, {"units": UNITS[name]})
+        data[name] = Variable("event", column, {"units": UNITS[name]})
     u, moment = first_stick(setup)
-    data["static_displacement"] = ("static", u, {"units": "m", "long_name": "static curve of the first stick"})
-    data["static_time"] = ("static", moment, {"units": "s", "long_name": "its virtual time"})
+    data["static_displacement"] = Variable("static", u, {"units": "m", "long_name": "static curve of the first stick"})
+    data["static_time"] = Variable("static", moment, {"units": "s", "long_name": "its virtual time"})
     return Recording(data, _attributes(scenario, setup, trajectory, events, sliding))
 
 

@@ -15,17 +15,25 @@ from .phases import divide
 from .pick import directions, half_of, pick
 from .records import PHASES, Dropped, Event, Phase, Segmentation, Settings
 from .reduce import reduce_trace
+from .ringing import LAWS, Ringing
+from .shape import LEVELS, Shape, Shapes, event_shapes
 
 __all__ = [
+    "LAWS",
+    "LEVELS",
     "PHASES",
     "Dropped",
     "Event",
     "Phase",
+    "Ringing",
     "Segmentation",
     "Settings",
+    "Shape",
+    "Shapes",
     "block_motion",
     "choose_settings",
     "estimate_resolution",
+    "event_shapes",
     "noise_level",
     "position_at",
     "reduce_trace",

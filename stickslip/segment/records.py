@@ -95,7 +95,8 @@ class Dropped:
     reason: str
 
     def __str__(self) -> str:
-        return f"{self.count} {self.what} ({self.where}): {self.reason}"
+        what = "slip" if self.count == 1 and self.what == "slips" else self.what
+        return f"{self.count} {what} ({self.where}): {self.reason}"
 
 
 @dataclass(frozen=True)

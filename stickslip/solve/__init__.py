@@ -1,7 +1,17 @@
 """Integrating the equation of motion with diffrax, the return map inside the step."""
 
+from .derivatives import Slips, slip_derivatives
 from .integrate import integrate
 from .stepper import ContactStepper, Tolerance
 from .trajectory import Stats, Steps, Trajectory
 
-__all__ = ["ContactStepper", "Stats", "Steps", "Tolerance", "Trajectory", "integrate"]
+__all__ = [
+    "ContactStepper",
+    "Slips",
+    "Stats",
+    "Steps",
+    "Tolerance",
+    "Trajectory",
+    "integrate",
+    "slip_derivatives",
+]

@@ -63,9 +63,6 @@ def observe(t: Any, y: State, args: tuple[Model, Bank]) -> Steps:
     )
 
 
-_observe_once = eqx.filter_jit(observe)
-
-
 def _leaves(t: Any, y: State, args: Any) -> list[jax.Array]:
     """The state as a flat list: diffrax cannot buffer a tree with an empty tuple in it."""
     return jax.tree.leaves(y)
@@ -76,7 +73,7 @@ def _piece(model: Model, bank: Bank, tolerance: Tolerance, times: jax.Array, y: 
     """At most PIECE steps; ``times`` are start, end, first and largest step (s)."""
     t0, t1, dt, dtmax = times
     saves = diffrax.SaveAt(
-        subs=[diffrax.SubSaveAt(steps=True, fn=observe), diffrax.SubSaveAt(t1=True, fn=_leaves)],
+        subs=[diffrax.SubSaveAt(t0=True, steps=True, fn=observe), diffrax.SubSaveAt(t1=True, fn=_leaves)],
         solver_state=True,
         controller_state=True,
     )
@@ -140,19 +137,20 @@ def integrate(
     least = LEAST_ADVANCE / PIECE * _refuse_impossible(model, bank)
     state = model.rest(t0) if state is None else state
     kinks = sorted({float(s) for s in stops if t0 < s < t1} | {float(t1)})
-    pieces = [jax.tree.map(lambda a: np.asarray(a)[None], _observe_once(jnp.asarray(float(t0)), state, (model, bank)))]
+    pieces: list[Steps] = []
     accepted = rejected = 0
     now, dt, carried = float(t0), 1e-5, None
     for stop in kinks:
         while now < stop:
-            times = jnp.asarray([now, stop, dt, largest_step])
+            times = jnp.asarray(np.array([now, stop, dt, largest_step]))
             stats, result, carried, steps, last = _piece(model, bank, tolerance, times, state, carried)
-            state = jax.tree.map(lambda a: a[0], last)
+            state = jax.tree.map(lambda a: jnp.asarray(np.asarray(a)[0]), last)
             n = int(stats["num_accepted_steps"])
             accepted, rejected = accepted + n, rejected + int(stats["num_rejected_steps"])
-            piece = jax.tree.map(lambda a, n=n: np.asarray(a)[:n], steps)
-            if n:
-                pieces.append(piece)
+            piece = jax.tree.map(lambda a, n=n: np.asarray(a)[1 : n + 1], steps)
+            if not pieces:
+                pieces.append(jax.tree.map(lambda a: np.asarray(a)[:1], steps))
+            pieces.append(piece)
             reached = float(piece.t[-1]) if n else now
             _refuse_failure(result, reached, state, accepted, most_steps)
             tried = n + int(stats["num_rejected_steps"])
@@ -180,13 +178,14 @@ def _refuse_impossible(model: Model, bank: Bank) -> float:
     mass = float(model.mass())
     if not (np.isfinite(mass) and mass > 0.0):
         raise InputError("the moving mass must be positive", key="block.mass", value=mass, allowed="above 0 kg")
-    for name, values in (("stiffness", bank.stiffness), ("strength", bank.strength)):
-        if not np.all(np.isfinite(values) & (np.asarray(values) >= 0.0)):
+    stiffness, strength = np.asarray(bank.stiffness), np.asarray(bank.strength)
+    for name, values in (("stiffness", stiffness), ("strength", strength)):
+        if not np.all(np.isfinite(values) & (values >= 0.0)):
             worst = float(np.min(values))
             raise InputError(
                 f"{name} of a Jenkins element is impossible", key=f"bank.{name}", value=worst, allowed=">= 0"
             )
-    return float(2.0 * np.pi * np.sqrt(mass / (np.sum(bank.stiffness) + model.block.spring_stiffness)))
+    return float(2.0 * np.pi * np.sqrt(mass / (stiffness.sum() + float(model.block.spring_stiffness))))
 
 
 def _refuse_failure(result: Any, now: float, state: State, accepted: int, most_steps: int) -> None:

@@ -180,6 +180,7 @@ def _path(t: Array, dt: Array, x0: Array, v0: Array, v: Array, dx: Array, lead: 
     return Motion(t, dt, x0 + dx, v, turn, dx, lead)
 
 
+@jax.jit  # traced once, though every step calls it four times and its derivative twice
 def _increment(
     v: Array,
     model: Model,

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.challenge.detection import detection, largest_multiple
+from stickslip.challenge.detection import DETECTION, detection, largest_multiple
 from stickslip.challenge.generator import CATALOGUED, EFFECTS, OUTSIDE
 from stickslip.challenge.make import make_challenge
 from stickslip.challenge.mix import Case, counts, plan
 from stickslip.challenge.seal import CASES, TRUTH, check_seal, digest
+from stickslip.challenge.visibility import SEEN, Reference
 from stickslip.cli import run
 from stickslip.errors import InputError, RunFolderError, StickslipError
 
@@ -77,9 +78,9 @@ def test_amplitudes_are_log_uniform_over_the_multiples_of_detection() -> None:
     shares = []
     for h in hidden:
         effect = EFFECTS[h.tag]
-        top = largest_multiple(effect)
+        top = largest_multiple(effect, h.form)
         assert 1.0 <= h.multiple <= top <= 30.0
-        assert abs(h.amplitude) == pytest.approx(h.multiple * detection(effect))
+        assert abs(h.amplitude) == pytest.approx(h.multiple * detection(effect, h.form))
         assert abs(h.amplitude) <= effect.high * (1 + 1e-12)
         if not effect.signed:
             assert np.sign(h.amplitude) == effect.sign
@@ -91,13 +92,23 @@ def test_amplitudes_are_log_uniform_over_the_multiples_of_detection() -> None:
     assert 0.3 < np.mean(signed) < 0.7
 
 
-def test_detection_is_the_generators_limit_where_it_reaches_the_plausible_range() -> None:
-    assert detection(EFFECTS["contact-ageing"]) == EFFECTS["contact-ageing"].detect
-    assert detection(EFFECTS["base-vibration"]) == EFFECTS["base-vibration"].low / 5
-    assert detection(EFFECTS["sensor-high-pass"]) == EFFECTS["sensor-high-pass"].low / 5
-    for tag, effect in EFFECTS.items():
-        assert largest_multiple(effect) >= 5, tag
-        assert detection(effect) * largest_multiple(effect) > effect.low, tag
+def test_every_effect_has_a_detection_and_what_is_dealt_can_be_seen() -> None:
+    assert set(DETECTION) == {(tag, form.name) for tag, effect in EFFECTS.items() for form in effect.forms}
+    assert all(0 < limit < np.inf for limit in DETECTION.values())
+    dealt = {(hidden.tag, hidden.form) for seed in range(6) for case in plan(100, seed) for hidden in case.hidden}
+    assert all(detection(EFFECTS[tag], form) <= EFFECTS[tag].high for tag, form in dealt)
+
+
+@pytest.mark.slow
+def test_detection_is_what_five_standard_deviations_need() -> None:
+    rig = Reference(1)
+    limit = rig.limit("contact-ageing", EFFECTS["contact-ageing"].forms[0].name)
+    assert limit is not None
+    # twice the amplitude moves the features twice as far
+    form = EFFECTS["contact-ageing"].forms[0].name
+    assert rig.moved("contact-ageing", form, 2 * limit) == pytest.approx(2 * SEEN, rel=0.3)
+    # what another rig does by itself is no effect: it is hidden entirely
+    assert rig.hidden({"mu_s": 0.002, "damping": 0.01}) < 0.2 * SEEN
 
 
 def test_runs_of_a_case() -> None:

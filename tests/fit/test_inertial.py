@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -71,6 +73,14 @@ def test_event_wise_factor_acts_on_its_own_cycle(campaign, problem):
     assert own > 1e-9
     assert np.abs(moved[0, :2]).max() == 0.0  # nothing before it changes
     assert np.abs(moved[1]).max() == 0.0  # nor another run
+
+
+def test_progress_names_iteration_and_error(campaign, problem):
+    told = []
+    fit(problem, floors(campaign), z=synthetic.truth(), stages=((30.0, 1),), progress=told.append)
+    first = re.fullmatch(r"iteration (\d+), error (\S+)", told[0])
+    assert first is not None, told[0]
+    assert float(first[2]) < 2.0  # it starts at the truth
 
 
 @pytest.mark.slow

@@ -7,7 +7,8 @@ import xarray
 from stickslip.cli import run
 from stickslip.report import trace_pieces
 from stickslip.report.figures import trace_picture
-from stickslip.report.fit_figures import creep_grid, heat_map, ramp_grid
+from stickslip.report.fit_figures import creep_grid, heat_map, ladder_picture, ramp_grid
+from stickslip.report.tables import show
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
 
@@ -121,3 +122,33 @@ def test_a_campaign_without_a_creep_process_is_named(call):
     code, _, said = call(1, ["a"], "fit", "--model", "static")
     assert code == 2
     assert "c.toml: nothing here can be compared with the static model" in said
+
+
+def test_steps_of_a_ladder_are_named_by_what_they_add():
+    steps = [
+        {"model": ["static"], "added": None, "train_error": 900.0, "by_phase": {"slip": 900.0}},
+        {"model": ["static", "inertia"], "added": None, "train_error": 9.0, "by_phase": {"slip": 9.0}},
+        {"model": ["static", "inertia", "tilt"], "added": "tilt", "train_error": 1.0, "by_phase": {"slip": 1.0}},
+    ]
+    axes = ladder_picture(steps).axes[0]
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["static", "+ inertia", "+ tilt"]
+
+
+def test_what_follows_a_slip_is_drawn_in_its_own_scale():
+    trace = sawtooth(4)
+    found = segment(trace)
+    data = xarray.Dataset(trace_pieces(trace, found, 0))
+    axes = trace_picture(data, 0, {"name": "run", "events": found.events}).axes[3]
+    assert axes.get_title() == "after the slip" or axes.get_title(loc="left") == "after the slip"
+    (line,) = axes.get_lines()
+    assert np.ptp(line.get_ydata()) < 60  # nm of noise, beside a slip of 50 um
+    assert axes.get_ylabel() == "position / nm"
+    assert 0 <= line.get_xdata()[0] < 2
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "digits", "shown"),
+    [(264e-6, "N", 2, "260 µN"), (1063.0, "1", 3, "1060"), (2.3e7, "1", 3, "2.3e+07"), (0.0042, "1", 2, "0.0042")],
+)
+def test_numbers_of_a_report_have_no_needless_powers(value, unit, digits, shown):
+    assert show(value, unit, digits) == shown

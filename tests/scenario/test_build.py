@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from stickslip.contact import equal_bodies, power_law_backbone, rough_bank
 from stickslip.errors import InputError
-from stickslip.scenario import build, make_scenario, static_creep
+from stickslip.scenario import build, load_scenario, make_scenario, static_creep
 from stickslip.scenario.contacts import build_contact
 
 from .conftest import rig
@@ -53,6 +55,12 @@ def test_unequal_contacts_add_up():
     strength = MU * (0.2 + 0.4) + 0.3 * LOAD
     np.testing.assert_allclose(np.asarray(together.backbone(u)), total, atol=2e-3 * strength)
     assert float(together.total_strength) == pytest.approx(strength, rel=1e-12)
+
+
+def test_the_binning_error_of_a_rough_contact_is_small():
+    """Straight pieces of its backbone, where rounding decides the sign of a bend, do not blow the bound up."""
+    path = Path(__file__).parents[2] / "scenarios" / "grzemba2014.toml"
+    assert 1e-6 < build(load_scenario(path)).contact.binning_error < 1e-3
 
 
 def test_the_number_of_springs_of_the_line_changes_a_rough_contact():

@@ -9,7 +9,7 @@ import pytest
 import xarray
 
 from stickslip.errors import InputError
-from stickslip.scenario import Progress, make_scenario, simulate
+from stickslip.scenario import Progress, make_scenario, record, simulate
 from stickslip.scenario.events import UNITS
 
 from .conftest import rig
@@ -48,6 +48,16 @@ def test_it_survives_netcdf(stick_slip, tmp_path):
     stick_slip.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
     with xarray.open_dataset(tmp_path / "a.nc", engine="h5netcdf", decode_times=False) as back:
         xarray.testing.assert_identical(back.load(), stick_slip)
+
+
+def test_it_is_written_as_xarray_would(tmp_path):
+    """`Recording` writes its file itself, so that the command line need not import xarray."""
+    made = record(make_scenario(rig()))
+    made.to_netcdf(tmp_path / "a.nc")
+    with xarray.open_dataset(tmp_path / "a.nc", engine="h5netcdf", decode_times=False) as back:
+        xarray.testing.assert_identical(back.load(), made.dataset())
+    assert made.sizes == dict(made.dataset().sizes)
+    assert made["slip"].values.size == made.sizes["event"] > 0
 
 
 def test_forces_and_displacements_belong_together(stick_slip):

@@ -1,0 +1,44 @@
+"""Features of measured cycles: their sensor noise is what repeated noise makes, and nothing is claimed of aliases."""
+
+import numpy as np
+import pytest
+
+from stickslip.features.layout import LEVELS
+from stickslip.features.measurement import measure
+from stickslip.segment import segment
+from stickslip.trace import Drive, Trace
+
+
+def measured(model, rate, noise, seed, period=2e-3):
+    t = np.arange(0, model.stop, 1 / rate)
+    x = model.position(t) + np.random.default_rng(seed).normal(0, noise, t.size)
+    trace = Trace("a", t, displacement=x, drive=Drive.constant(model.v0, 0.0, model.stop), noise=noise)
+    return measure([trace], [segment(trace)], ring_period=period)
+
+
+def test_noise_of_slip_times_is_noise_over_velocity(stick_slip):
+    """The scatter of 60 records that differ in their noise alone, against the stated standard deviation."""
+    model = stick_slip(events=3)
+    runs = [measured(model, 1e4, 0.3e-6, seed) for seed in range(60)]
+    times = runs[0].layout.slices()["times"]
+    found = np.array([m.values[0, 1, times] for m in runs])
+    stated = np.median([m.sensor[0, 1, times] for m in runs], axis=0)
+    # at the ends of the slip it takes several samples of noise to pass a level, whence the middle ones
+    middle = [LEVELS.index(q) for q in (0.25, 0.75, 0.9)]
+    ratio = (np.std(found, axis=0, ddof=1) / stated)[middle]
+    assert np.all((ratio > 0.6) & (ratio < 1.7)), ratio
+
+
+def test_without_noise_a_tenth_of_a_sample_is_left(stick_slip):
+    m = measured(stick_slip(events=3), 1e4, 0.0, 0)
+    assert m.sensor[0, 1, m.layout.slices()["times"]] == pytest.approx(1e-5, rel=1e-3)
+
+
+@pytest.mark.parametrize(("rate", "claimed"), [(1e3, False), (1.9e3, False), (4e3, True)])
+def test_ringing_needs_four_samples_a_period(stick_slip, rate, claimed):
+    m = measured(stick_slip(ring=150e-9), rate, 1e-9, 1)
+    s = m.layout.slices()
+    later = m.valid[0, 1:5]
+    assert later[:, s["size"]].all()
+    assert later[:, s["ring"]].any() == claimed
+    assert later[:, s["frequency"]].any() == claimed

@@ -1,0 +1,55 @@
+"""Floors against what fresh rough lines do to the features, in campaigns of an independent simulator."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.campaign import load_campaign, load_traces
+from stickslip.challenge.generator import make_campaign
+from stickslip.features.measurement import measure
+from stickslip.fit.start import ring_period
+from stickslip.residual import floors
+from stickslip.segment import segment
+
+pytestmark = pytest.mark.slow  # eight campaigns
+
+SEEDS = (21, 22, 23, 24)
+
+
+def scatter(folder, new_lines: bool) -> dict[str, float]:
+    """Rms deviation from the mean of a run over its floor, by group of features; without holds and first cycles."""
+    found: dict[str, list[float]] = {}
+    for seed in SEEDS:
+        make_campaign(folder / str(seed), seed, new_lines=new_lines)
+        traces = load_traces(load_campaign(folder / str(seed) / "campaign.toml"))
+        segments = [segment(t) for t in traces]
+        m = measure(traces, segments, ring_period=ring_period(traces, segments), most_cycles=14)
+        floor = floors(m, factor=2.0 if new_lines else 1.0)
+        for r, name in enumerate(m.names):
+            if name == "holds":
+                continue
+            later = np.flatnonzero(np.asarray(m.cycles.used)[r])[2:]  # those before still remember the virgin contact
+            for group, at in m.layout.slices().items():
+                values, valid = m.values[r, later, at], m.valid[r, later, at].all(axis=0)
+                if valid.any():
+                    z = (values - values.mean(axis=0)) / floor[r, later, at] * np.sqrt(later.size / (later.size - 1))
+                    found.setdefault(group, []).append(float(np.mean(z[:, valid] ** 2)))
+    return {group: float(np.sqrt(np.mean(squares))) for group, squares in found.items()}
+
+
+def test_fresh_lines_scatter_the_features_as_the_floors_say(tmp_path):
+    found = scatter(tmp_path, new_lines=True)
+    print({group: round(value, 2) for group, value in found.items()})
+    for group in ("recurrence", "size", "overshoot", "frequency", "creep"):
+        assert 0.6 < found[group] < 1.5, (group, found)
+    # wider than need be
+    for group in ("times", "ring", "settle"):
+        assert found[group] < 1.0, (group, found)
+
+
+def test_with_the_same_lines_only_the_sensor_scatters(tmp_path):
+    found = scatter(tmp_path, new_lines=False)
+    for group in ("recurrence", "size", "times"):
+        assert found[group] < 0.3, (group, found)
+    assert found["overshoot"] == pytest.approx(1.0, abs=0.4)  # a count of the sensor

@@ -1,0 +1,60 @@
+"""Where a dynamic fit starts when springs are stated for single traces."""
+
+import numpy as np
+import pytest
+
+from stickslip.campaign import load_campaign, load_traces
+from stickslip.features.measurement import measure
+from stickslip.fit.start import base_composition
+from stickslip.segment import segment
+
+RIG = 'schema = 1\n[rig]\nmass = "89.4 g"\ncontacts = 4\nnormal_force = "0.31 N"\nfriction_coefficient = 0.2\n'
+TRACE = """[[trace]]
+name = "{name}"
+file = "a.csv"
+time = {{ column = 1, unit = "s" }}
+displacement = {{ column = 2, unit = "um" }}
+drive_velocity = "50 um/s"
+virgin = true
+"""
+
+
+@pytest.fixture
+def start(tmp_path):
+    """The base model of a campaign of two such traces, with what is said of springs in the rig and in the traces."""
+    t = np.arange(0.0, 4.5, 1e-3)
+    x = 0.5 * t
+    for end in (1.0, 2.0, 3.0, 4.0):
+        x += 24.75 * (1 - np.cos(np.pi * np.clip((t - end + 0.03) / 0.03, 0, 1)))
+    np.savetxt(tmp_path / "a.csv", np.column_stack([t, x]), delimiter=",", fmt="%.9g")
+
+    def compose(rig, *traces):
+        path = tmp_path / "c.toml"
+        path.write_text(RIG + rig + "".join(TRACE.format(name=f"t{i}") + extra for i, extra in enumerate(traces)))
+        loaded = load_campaign(path)
+        found = load_traces(loaded)
+        return base_composition(loaded, measure(found, [segment(t) for t in found], ring_period=2e-3))
+
+    return compose
+
+
+SPRING = 'spring_stiffness = "3000 N/m"\n'
+
+
+def test_springs_of_the_traces_are_as_good_as_the_rig_s(start):
+    of_rig, of_traces = start(SPRING, "", ""), start("", SPRING, SPRING)
+    assert of_rig.fixed["rig.spring_stiffness"] == of_traces.fixed["rig.spring_stiffness"] == 3000.0
+    assert of_traces.free == of_rig.free
+
+
+def test_a_trace_without_a_spring_starts_from_the_others(start):
+    found = start("", SPRING, "")
+    (stiffness,) = [f for f in found.free if f.name == "rig.spring_stiffness"]
+    assert stiffness.start == pytest.approx(3000.0)
+
+
+def test_where_no_spring_is_stated_the_slips_tell_it(start):
+    found = start("", "", "")
+    (stiffness,) = [f for f in found.free if f.name == "rig.spring_stiffness"]
+    # half a period of the block on its spring, stretched by how a slip is timed
+    assert stiffness.start == pytest.approx(0.0894 * (np.pi / 0.03) ** 2, rel=0.3)

@@ -1,0 +1,1 @@
+"""What must hold whatever is thrown at the program."""

@@ -1,0 +1,124 @@
+"""A cycle that the fit's integration cannot finish is told, never taken for the model's answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from stickslip.contact import power_law_bank
+from stickslip.errors import InputError
+from stickslip.features.measurement import measure
+from stickslip.forward import LONGEST, Cycles, Track, cut_short, run_cycle
+from stickslip.model import Block, LoadPoint, Model, Weakening
+from stickslip.segment.records import Event, Segmentation
+from stickslip.solve import Tolerance
+from stickslip.trace import Drive, Trace
+
+
+def rig() -> Model:
+    points = LoadPoint(jnp.array([0.0, 1e3]), jnp.array([0.0, 0.1]))
+    return Model(
+        Block(0.0894, 1000.0, 10.0), power_law_bank(0.26, 1e-6, 3.2, n=32), Weakening(0.85, 1e-6, 0.02), points
+    )
+
+
+def cycles(limit: float) -> Cycles:
+    one = np.ones(1, bool)
+    zero = np.zeros(1)
+    return Cycles(zero, zero, np.full(1, limit), zero + 1e-6, one, one, zero, zero, zero, one)
+
+
+@pytest.fixture(scope="module")
+def track():
+    """One cycle with so many steps as are asked for."""
+
+    def run(most: int, limit: float) -> Track:
+        model = rig()
+        found, _, _ = run_cycle(model, model.rest(), jnp.asarray(0.0), jnp.asarray(limit), jnp.asarray(1e-5),
+                                Tolerance(5e-3, 2e-11, 2e-7), most)  # fmt: skip
+        return jax.tree.map(lambda a: np.asarray(a)[None], found)
+
+    return run
+
+
+def test_a_cycle_that_ends_with_its_slip_is_whole(track):
+    found = track(3072, 6.0)
+    assert found.arrested[0]
+    assert not cut_short(found, cycles(6.0)).any()
+
+
+def test_a_cycle_that_is_given_up_at_its_limit_is_whole(track):
+    found = track(3072, 1.0)
+    assert not found.arrested[0]
+    assert found.t[0, -1] == 1.0
+    assert not cut_short(found, cycles(1.0)).any()
+
+
+def test_a_cycle_with_too_few_steps_is_cut(track):
+    found = track(200, 6.0)
+    assert not found.arrested[0]
+    assert cut_short(found, cycles(6.0)).all()
+    # padding is no cycle
+    unused = cycles(6.0)._replace(used=np.zeros(1, bool))
+    assert not cut_short(found, unused).any()
+
+
+def recorded(stick: float) -> tuple[Trace, Segmentation]:
+    """Three slips; before the third the block rests for ``stick`` s."""
+    from stickslip.segment import segment
+
+    ends = [1.0, 2.0, 2.0 + stick]
+    t = np.arange(0.0, ends[-1] + 0.5, 1e-3)
+    x = sum(50e-6 * 0.5 * (1 - np.cos(np.pi * np.clip((t - e + 0.03) / 0.03, 0, 1))) for e in ends)
+    x = x + 1e-6 * np.clip(t / ends[-1], 0, 1)
+    pieces = Drive.from_pieces([2.0, 1.0 + stick, ends[-1] + 1.0], [50e-6, 1e-12, 50e-6])
+    trace = Trace("run", t, displacement=x, drive=pieces, noise=1e-9, virgin=True, minimum_slip=2e-5)
+    return trace, segment(trace)
+
+
+def test_a_run_is_used_up_to_a_cycle_that_is_too_long_and_says_so():
+    short, long = recorded(5.0), recorded(LONGEST + 5.0)
+    assert len(short[1].events) == len(long[1].events) == 3
+    whole = measure([short[0]], [short[1]], ring_period=2e-3)
+    assert np.asarray(whole.cycles.used).sum() == 3
+    assert whole.dropped == ()
+    part = measure([long[0]], [long[1]], ring_period=2e-3)
+    assert np.asarray(part.cycles.used).sum() == 2
+    (said,) = part.dropped
+    assert said.startswith("run: slips from number 3 on (1 of 3) are left out")
+
+
+def test_a_campaign_of_such_cycles_only_is_refused():
+    trace, found = recorded(LONGEST + 5.0)
+    late = [e for e in found.events if e.t_arrest > LONGEST]
+    assert all(isinstance(e, Event) for e in late)
+    with pytest.raises(InputError, match=r"begins with a cycle of more than 30\.7 s"):
+        measure([trace], [replace(found, events=tuple(late))], ring_period=2e-3)
+
+
+def test_a_report_names_cut_cycles(monkeypatch):
+    """The sentence of the misfit carries it into report.html, result.json and the command line."""
+    from stickslip.fit.inertial import fit
+    from stickslip.fit.problem import Problem
+    from stickslip.report import inertial_result
+    from stickslip.residual import floors
+    from stickslip.segment import segment
+    from tests.fit import synthetic
+
+    traces = synthetic.traces((2e-4,), slips=2.6)
+    m = synthetic.measured(traces)
+    problem = Problem(synthetic.composition(), m)
+    floor = floors(m)
+    found = fit(problem, floor, z=synthetic.truth(), stages=((30.0, 1),))
+    use = np.asarray(m.cycles.used)
+    real = inertial_result.modelled_runs
+    monkeypatch.setattr(inertial_result, "modelled_runs", lambda *a: [replace(r, cut=(1,)) for r in real(*a)])
+    rig = type("Rig", (), dict.fromkeys(("friction_coefficient", "normal_force", "spring_stiffness"), None))()
+    monkeypatch.setattr(inertial_result, "effective", lambda *a: None)
+    result, _ = inertial_result.fit_sections(problem, found, traces, [segment(t) for t in traces], floor, use, rig)
+    assert result["misfit"]["cut"] == ["v200, cycle 2"]
+    assert "In 1 cycle the model could not be integrated to the arrest (v200, cycle 2" in result["misfit"]["sentence"]

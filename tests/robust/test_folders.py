@@ -1,0 +1,227 @@
+"""Results and the disk: never overwritten unasked, never two at once, never half written."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip.cli import run
+from stickslip.runstore import RESULT, open_run, read_result
+
+from .challenges import challenge
+from .seeds import beside
+
+SCENARIO = """\
+schema = 1
+[block]
+mass = 0.1
+spring_stiffness = 1e3
+[drive]
+velocity = "100 um/s"
+duration = "0.5 s"
+[contact]
+kind = "power-law"
+normal_force = 0.3
+friction_coefficient = 0.2
+u_max = "1 um"
+p = 3.2
+bins = 16
+[output]
+trace = "trace.csv"
+"""
+CAMPAIGN = """\
+schema = 1
+[rig]
+mass = 0.1
+[[trace]]
+file = "a.csv"
+time = { column = "time", unit = "s" }
+displacement = { column = "x", unit = "um" }
+drive_velocity = "50 um/s"
+"""
+
+
+@pytest.fixture
+def files(tmp_path):
+    folder = tmp_path / "in"
+    folder.mkdir()
+    (folder / "s.toml").write_text(SCENARIO)
+    (folder / "c.toml").write_text(CAMPAIGN)
+    for name, content in beside().items():
+        (folder / name).write_bytes(content)
+    return folder
+
+
+def commands(files: Path) -> dict[str, list[str]]:
+    """Every command that writes a run folder."""
+    return {
+        "simulate": ["simulate", str(files / "s.toml")],
+        "series": ["simulate", str(files / "s.toml"), "--sweep", "drive.velocity=50um/s,100um/s"],
+        "creep": ["creep", str(files / "s.toml"), "--points", "20"],
+        "inspect": ["inspect", str(files / "c.toml")],
+        "fit": ["fit", str(files / "c.toml"), "--model", "static"],
+        "fit-inertial": ["fit", str(files / "c.toml"), "--model", "inertial"],
+        "diagnose": ["diagnose", str(files / "c.toml")],
+        "compare": ["compare", str(files / "one"), str(files / "two")],
+    }
+
+
+NAMES = list(commands(Path()))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_existing_result_is_never_overwritten(files, tmp_path, capsys, name):
+    out = tmp_path / "out"
+    with open_run(out) as folder:
+        folder.json({"value": 1})
+        folder.text("mine", "notes.txt")
+    assert run([*commands(files)[name], "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert "exists already" in error
+    assert "--force" in error
+    assert read_result(out) == {"value": 1}
+    assert (out / "notes.txt").read_text() == "mine"
+    # what is no run folder is not replaced with --force either
+    (out / RESULT).unlink()
+    assert run([*commands(files)[name], "--out", str(out), "--force"]) == 2
+    assert (out / "notes.txt").read_text() == "mine"
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("name", ["simulate", "series", "creep", "inspect"])
+def test_force_replaces_the_whole(files, tmp_path, capsys, name):
+    out = tmp_path / "out"
+    with open_run(out) as folder:
+        folder.json({"value": 1})
+        folder.text("old", "old.txt")
+    assert run([*commands(files)[name], "--out", str(out), "--force"]) == 0
+    assert "value" not in read_result(out)
+    assert not (out / "old.txt").exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["in", "out"]
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("name", ["simulate", "creep", "inspect"])
+def test_the_second_run_into_a_folder_is_refused_while_the_first_is_at_work(files, tmp_path, capsys, name):
+    with open_run(tmp_path / "out") as first:
+        first.json({"value": 1})
+        assert run([*commands(files)[name], "--out", str(tmp_path / "out")]) == 2
+        assert "another run is writing this folder" in capsys.readouterr().err
+    assert read_result(tmp_path / "out") == {"value": 1}
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [RESULT]
+
+
+def test_of_many_at_once_exactly_one_writes(tmp_path):
+    program = (
+        "import sys, time\nfrom stickslip.runstore import open_run\nfrom stickslip.errors import RunFolderError\n"
+        "try:\n  with open_run(sys.argv[1]) as run:\n    run.json({'by': sys.argv[2]}); time.sleep(0.5)\n"
+        "except RunFolderError: sys.exit(2)\n"
+    )
+    many = [subprocess.Popen([sys.executable, "-c", program, str(tmp_path / "out"), str(n)]) for n in range(6)]
+    codes = [process.wait() for process in many]
+    assert sorted(codes) == [0, 2, 2, 2, 2, 2]
+    assert read_result(tmp_path / "out")["by"] == str(codes.index(0))
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_challenge_is_not_made_twice_and_its_answers_stay(tmp_path, capsys):
+    folder = challenge(tmp_path / "c")
+    before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    assert run(["challenge", "make", str(folder), "--cases", "2"]) == 2
+    assert {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()} == before
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("name", ["simulate", "creep", "inspect"])
+def test_no_place_to_write(files, tmp_path, capsys, name):
+    """A file where the folder's parent should be: nobody can write there, not even root."""
+    (tmp_path / "file").write_text("")
+    assert run([*commands(files)[name], "--out", str(tmp_path / "file" / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("stickslip: ")
+    assert "Traceback" not in error
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "in"]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_read_only_folder(files, tmp_path, capsys):
+    (tmp_path / "shut").mkdir(mode=0o555)
+    assert run([*commands(files)["creep"], "--out", str(tmp_path / "shut" / "out")]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_a_read_only_disk(files, tmp_path, capsys, monkeypatch):
+    real = Path.mkdir
+
+    def refuse(self, *a, **k):
+        if "out" in self.name:
+            raise OSError(30, "Read-only file system", str(self))
+        return real(self, *a, **k)
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    assert run([*commands(files)["creep"], "--out", str(tmp_path / "out")]) == 2
+    assert "Read-only file system" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "limit"), [("creep", 100), ("creep", 3000), ("inspect", 100), ("inspect", 3000), ("simulate", 60_000)]
+)
+def test_a_full_disk(files, tmp_path, name, limit):
+    """No file may grow beyond a limit: every kind of file is the first that does not fit, at one of the limits."""
+    command = [sys.executable, "-m", "stickslip.cli", *commands(files)[name], "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        command, capture_output=True, text=True, env={**os.environ, "STICKSLIP_NO_CACHE": "1"},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+    if done.returncode == 0:  # everything fitted
+        assert max(p.stat().st_size for p in (tmp_path / "out").rglob("*")) <= limit
+        return
+    assert done.returncode == 2
+    assert "stickslip: " in done.stderr
+    assert "File too large" in done.stderr or "written" in done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["in"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("name", ["creep", "inspect"])
+def test_a_full_disk_behind_the_standard_output(files, name):
+    with open("/dev/full", "w") as full:  # noqa: PTH123
+        command = [sys.executable, "-m", "stickslip.cli", *commands(files)[name], *["--json"] * (name == "inspect")]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2
+    assert "No space left on device" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+
+
+def test_a_disk_that_fills_while_pieces_are_kept(tmp_path):
+    """What was kept before stays, is whole, and is gone on from."""
+    program = (
+        "import sys, numpy as np\nfrom stickslip.runstore import open_run\nfrom stickslip.workflow import Pieces\n"
+        "with open_run(sys.argv[1], resume=True) as run:\n  store = Pieces(run, 'i')\n  kept = 0\n"
+        "  for n in range(6):\n    if store.load(f'p{n}') is None:\n"
+        "      store.save(f'p{n}', {'z': np.arange(10_000.0 * (n + 1))})\n    else: kept += 1\n"
+        "  run.json({'kept': kept})\n"
+    )
+    command = [sys.executable, "-c", program, str(tmp_path / "out")]
+    first = subprocess.run(
+        command, capture_output=True, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (250_000, 250_000)),
+    )  # fmt: skip
+    assert "RunFolderError" in first.stderr
+    assert "File too large" in first.stderr
+    assert not (tmp_path / "out").exists()
+    for path in (tmp_path / "out.partial").rglob("*.npz"):
+        with np.load(path) as file:
+            assert file["z"].size
+    subprocess.run(command, check=True)
+    assert json.loads((tmp_path / "out" / RESULT).read_text()) == {"kept": 3}

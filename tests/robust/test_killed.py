@@ -1,0 +1,233 @@
+"""Killed at any moment and started again: the same result, and nothing that is half written."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip.runstore import RESULT, open_run, read_result
+
+from .challenges import challenge
+
+SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect"
+
+# writes pieces as a diagnosis does, each of them worth a moment of work, and a result that depends on all of them
+PIECEWISE = """
+import sys, time
+import numpy as np
+from stickslip.runstore import open_run
+from stickslip.workflow import Pieces
+with open_run(sys.argv[1], resume=True, force="--force" in sys.argv) as run:
+    store, total = Pieces(run, "inputs"), np.zeros(40_000)
+    for n in range(12):
+        kept = store.load(f"piece{n}")
+        if kept is None:
+            time.sleep(0.02)
+            store.save(f"piece{n}", {"z": np.random.default_rng(n).normal(size=40_000)})
+            kept = store.load(f"piece{n}")
+        total += kept["z"]
+    run.json({"total": total, "seconds": time.time()})
+    run.text("x" * 300_000, "report.html")
+"""
+
+
+def without_time(result: Any) -> Any:
+    """A result less what depends on the clock."""
+    if isinstance(result, dict):
+        return {k: without_time(v) for k, v in result.items() if k not in ("seconds", "date", "started")}
+    return [without_time(v) for v in result] if isinstance(result, list) else result
+
+
+def killed(command: list[str], moment: float, **options: Any) -> bool:
+    """Start a process and kill it after so many seconds; whether it was still at work."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **options)
+    try:
+        process.wait(moment)
+        return False
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+        return True
+
+
+def all_sound(folder: Path) -> None:
+    """Whatever stands under its own name can be read; half-written files are called ``.part``."""
+    for path in folder.rglob("*"):
+        if path.suffix == ".json":
+            json.loads(path.read_text(encoding="utf-8"))
+        elif path.suffix == ".npz":
+            with np.load(path, allow_pickle=False) as file:
+                assert all(np.size(file[name]) for name in file.files)
+
+
+@pytest.mark.parametrize("force", [False, True], ids=["new", "replacing"])
+def test_piecewise_work_killed_again_and_again(tmp_path, force):
+    """Kills at seeded moments, until it comes to its end."""
+    command = [sys.executable, "-c", PIECEWISE]
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    began = time.monotonic()
+    subprocess.run([*command, str(whole)], check=True)
+    length = time.monotonic() - began
+    if force:
+        with open_run(out) as run:
+            run.json({"total": "of an older run"})
+    rng, kills = random.Random(6), 0
+    more = ["--force"] if force else []
+    for _ in range(8):
+        kills += killed([*command, str(out), *more], rng.uniform(0.3, 0.95) * length)
+        if (out / RESULT).exists():
+            found = read_result(out)["total"]
+            assert found in ("of an older run", read_result(whole)["total"])
+        elif force:  # died between the two renames: the next run brings it back
+            assert (tmp_path / ".out.replaced" / RESULT).exists()
+        if (tmp_path / "out.partial").exists():
+            all_sound(tmp_path / "out.partial")
+    assert kills >= 2
+    if not out.exists() or force:
+        subprocess.run([*command, str(out), *more], check=True)
+    assert without_time(read_result(out)) == without_time(read_result(whole))
+    assert sorted(p.name for p in tmp_path.iterdir() if not p.name.endswith(".lock")) == ["out", "whole"]
+
+
+def test_a_run_that_died_while_replacing_gives_the_older_one_back(tmp_path):
+    with open_run(tmp_path / "run") as run:
+        run.json({"value": 1})
+    (tmp_path / "run").rename(tmp_path / ".run.replaced")
+    with pytest.raises(Exception, match="exists already"), open_run(tmp_path / "run"):
+        pass
+    assert read_result(tmp_path / "run") == {"value": 1}
+
+
+def test_a_folder_of_the_users_with_a_like_name_is_left_alone(tmp_path):
+    for value in (1, 2):
+        with open_run(tmp_path / "run", force=True) as run:
+            run.json({"value": value})
+        if value == 1:
+            (tmp_path / "run.old").mkdir()
+            (tmp_path / "run.old" / "result.json").write_text("{}")
+    assert (tmp_path / "run.old" / "result.json").read_text() == "{}"
+
+
+@pytest.mark.parametrize("damage", ["cut", "zeroed", "empty"])
+def test_a_damaged_piece_is_made_again(tmp_path, damage):
+    """As a power failure may leave it, which writing aside does not help against."""
+    command = [sys.executable, "-c", PIECEWISE, str(tmp_path / "out")]
+    subprocess.run([*command[:-1], str(tmp_path / "whole")], check=True)
+    shutil.copytree(tmp_path / "whole", tmp_path / "out.partial")
+    (tmp_path / "out.partial" / RESULT).unlink()
+    for n, path in enumerate(sorted((tmp_path / "out.partial" / "pieces").glob("*.npz"))):
+        content = path.read_bytes()
+        if n % 2:
+            half = content[: len(content) // 2]
+            path.write_bytes({"cut": half, "zeroed": half + bytes(len(content) - len(half)), "empty": b""}[damage])
+    subprocess.run(command, check=True)
+    assert without_time(read_result(tmp_path / "out")) == without_time(read_result(tmp_path / "whole"))
+
+
+def small_campaign(folder: Path) -> Path:
+    """The two fast runs of the shipped campaign."""
+    head, *traces = (SHIPPED / "campaign.toml").read_text(encoding="utf-8").split("[[trace]]")
+    kept = [t for t in traces if "v200.csv" in t or "v400.csv" in t]
+    for name in ("v200.csv", "v400.csv"):
+        shutil.copy(SHIPPED / name, folder / name)
+    (folder / "campaign.toml").write_text("[[trace]]".join([head, *kept]), encoding="utf-8")
+    return folder / "campaign.toml"
+
+
+def diagnosis(folder: Path, out: Path) -> list[str]:
+    return [
+        sys.executable, "-m", "stickslip.cli", "diagnose", str(folder / "campaign.toml"), "--out", str(out),
+        "--jobs", "1", "--candidates", "contact-ageing,viscous-drag", "--max-effects", "1",
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_a_diagnosis_killed_at_twenty_random_moments(tmp_path):
+    """`stickslip diagnose` of two runs; it ends between kills where all is done, and is begun anew then."""
+    small_campaign(tmp_path)
+    began = time.monotonic()
+    assert subprocess.run(diagnosis(tmp_path, tmp_path / "whole")).returncode in (0, 3)
+    length = time.monotonic() - began
+    whole = without_time(read_result(tmp_path / "whole"))
+    rng, kills = random.Random(20), 0
+    while kills < 20:
+        kills += killed(diagnosis(tmp_path, tmp_path / "out"), rng.uniform(0.05, 0.6) * length)
+        if (tmp_path / "out.partial").exists():
+            all_sound(tmp_path / "out.partial")
+        if (tmp_path / "out").exists():
+            assert without_time(read_result(tmp_path / "out")) == whole
+            shutil.rmtree(tmp_path / "out")
+    assert subprocess.run(diagnosis(tmp_path, tmp_path / "out")).returncode in (0, 3)
+    assert without_time(read_result(tmp_path / "out")) == whole
+    assert (tmp_path / "out" / "report.html").stat().st_size > 10_000
+
+
+CHALLENGE = """
+import sys
+from stickslip.challenge.run import run_challenge
+from tests.robust.challenges import piecewise
+if __name__ == "__main__":
+    found = run_challenge(sys.argv[1], workers=1, diagnosis=piecewise)
+    sys.exit(found["done"] != 4)
+"""
+
+
+def _challenge_killed(folder: Path, kills: int, seed: int) -> int:
+    """Kill ``challenge run`` and all its workers at random moments, then let it come to its end."""
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    rng, done = random.Random(seed), 0
+    for n in range(kills):
+        process = subprocess.Popen(
+            [sys.executable, "-c", CHALLENGE, str(folder)], env=environment, start_new_session=True,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        try:
+            process.wait(rng.uniform(1.0, 7.0))
+        except subprocess.TimeoutExpired:
+            process.kill()
+            if n % 2:  # the workers are left to find out by themselves, every second time
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            done += 1
+        for name in folder.glob("runs/*.json"):
+            json.loads(name.read_text(encoding="utf-8"))
+    last = subprocess.run(
+        [sys.executable, "-c", CHALLENGE, str(folder)], env=environment, capture_output=True, text=True
+    )
+    assert last.returncode == 0, last.stderr
+    return done
+
+
+def _check_challenge(tmp_path: Path, kills: int) -> None:
+    whole, cut = challenge(tmp_path / "whole"), challenge(tmp_path / "cut")
+    _challenge_killed(whole, 0, 0)
+    done = _challenge_killed(cut, kills, 3)
+    assert done >= min(kills, 2)
+    for case in sorted(p.name for p in (whole / "runs").iterdir() if p.is_dir()):
+        found, want = (without_time(read_result(f / "runs" / case)) for f in (cut, whole))
+        assert found["total"] == want["total"]
+        assert found["verdict"] == want["verdict"]
+    assert not list((cut / "runs").glob("*.failures.json"))
+    assert not list((cut / "runs").glob("*.partial"))
+
+
+def test_a_challenge_killed_with_its_workers_goes_on(tmp_path):
+    _check_challenge(tmp_path, 2)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_a_challenge_killed_at_twenty_random_moments(tmp_path):
+    _check_challenge(tmp_path, 20)

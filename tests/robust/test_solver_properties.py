@@ -1,0 +1,158 @@
+"""The solver over the whole allowed range of parameters: it holds to the laws, or says that it cannot go on.
+
+One compiled program for all examples: everything that hypothesis draws is an array of a fixed shape.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stickslip.contact import Bank
+from stickslip.errors import SolveError
+from stickslip.model import Block, LoadPoint, Model, Weakening
+from stickslip.params import specs
+from stickslip.solve import Tolerance, integrate
+
+N = 16
+MOST = 30_000  # steps of one example
+EXAMPLES = {"deadline": None, "derandomize": True, "database": None}
+
+
+def _spec(cls: type, name: str) -> tuple[float, float]:
+    found = specs(cls)[name]
+    return found.lower, found.upper
+
+
+def decades(low: float, high: float) -> st.SearchStrategy[float]:
+    """Evenly over the logarithm, both ends included."""
+    return st.one_of(
+        st.floats(np.log10(low), np.log10(high)).map(lambda e: float(np.clip(10.0**e, low, high))),
+        st.sampled_from([low, high]),
+    )
+
+
+def above_zero(low: float, high: float, least: float) -> st.SearchStrategy[float]:
+    return st.one_of(st.just(low), decades(least, high)) if low == 0.0 else decades(low, high)
+
+
+@st.composite
+def rigs(draw) -> tuple[Model, float, float]:
+    """A model anywhere in the allowed range, the time to simulate, and the scale of its forces.
+
+    The time is so long that the drive loads the contact a few times over, as far as the steps go.
+    """
+    mass = draw(decades(*_spec(Block, "mass")))
+    spring = draw(decades(*_spec(Block, "spring_stiffness")))
+    damping = draw(above_zero(*_spec(Block, "damping"), 1e-6))
+    ratio = draw(st.floats(*_spec(Weakening, "ratio")))
+    slip_distance = draw(decades(*_spec(Weakening, "slip_distance")))
+    healing_time = draw(decades(*_spec(Weakening, "healing_time")))
+    strength = draw(decades(1e-6, 1e6))
+    u_max = draw(decades(1e-10, 1e-3))
+    velocity = draw(decades(1e-9, 10.0)) * draw(st.sampled_from([1.0, -1.0]))
+    share = np.array(draw(st.lists(st.floats(0.0, 1.0), min_size=N, max_size=N)))
+    share[0] = max(share[0], 1e-3)
+    caps = strength * share / share.sum()
+    bank = Bank(jnp.asarray(caps / (u_max * (np.arange(N) + 1) / N)), jnp.asarray(caps))
+    period = 2.0 * np.pi * np.sqrt(mass / (float(np.sum(bank.stiffness)) + spring))
+    loading = max((strength / spring + u_max) / abs(velocity), 2.0 * period)
+    end = 3.0 * loading
+    times = jnp.asarray([0.0, 2.0 * loading, 2.5 * loading, 1e3 * loading])
+    positions = velocity * jnp.asarray([0.0, 2.0, 1.0, 999.5]) * loading  # forwards, back, forwards
+    model = Model(
+        Block(mass, spring, damping), bank, Weakening(ratio, slip_distance, healing_time), LoadPoint(times, positions)
+    )
+    return model, end, strength
+
+
+def run(model: Model, end: float, tighter: float = 1.0):
+    """Integrate with tolerances that fit the rig's own scale."""
+    u = float(np.max(np.asarray(model.bank.strength) / np.maximum(np.asarray(model.bank.stiffness), 1e-300)))
+    mass, k = float(model.block.mass), float(np.sum(model.bank.stiffness) + model.block.spring_stiffness)
+    tolerance = Tolerance(*(part / tighter for part in (3e-3, 3e-6 * u, 3e-6 * u * np.sqrt(k / mass))))
+    return integrate(model, end, tolerance=tolerance, stops=tuple(np.asarray(model.load_point.times[1:3])),
+                     largest_step=end / 50, most_steps=MOST)  # fmt: skip
+
+
+finished: list[bool] = []
+
+
+@settings(max_examples=150, **EXAMPLES)
+@given(rigs())
+def test_the_laws_hold_wherever_the_solver_gets(rig):
+    model, end, strength = rig
+    try:
+        trajectory, state = run(model, end)
+    except SolveError as error:
+        # refused steps end in words: when, how fast, and what to change
+        finished.append(False)
+        assert "the integration stopped at t = " in str(error)
+        assert "loosen the tolerance" in str(error) or "parameter" in str(error)
+        return
+    finished.append(True)
+    s = trajectory.steps
+    assert all(np.isfinite(part).all() for part in s)
+    assert s.t[-1] == end
+    assert np.all(np.diff(s.t) > 0)
+    # |f_i| <= cap of every element, at most its full strength
+    force, cap = np.abs(state.force), np.asarray(state.cap)
+    assert np.all(force <= cap * (1 + 1e-12))
+    assert np.all(cap <= np.asarray(model.bank.strength) * (1 + 1e-12))
+    assert np.all(np.abs(s.contact_force) <= strength * (1 + 1e-9))
+    assert np.all((s.psi >= 0.0) & (s.psi <= 1.0))
+    # friction and damping only take energy
+    scale = np.max(np.abs(s.spring_work)) + np.max(np.abs(s.stored))
+    assert np.all(np.diff(s.friction_work) >= -1e-9 * scale)
+    assert np.all(np.diff(s.viscous_work) >= -1e-9 * scale)
+    # the balance is kept, and where hundreds of undamped oscillations add up errors, a tighter tolerance keeps it
+    if trajectory.stats.energy_error > 0.02:
+        try:
+            finer, _ = run(model, end, 30.0)
+        except SolveError:  # of too many steps
+            return
+        assert finer.stats.energy_error < 0.3 * trajectory.stats.energy_error
+
+
+def test_most_of_the_range_is_integrated_to_the_end():
+    """Else the laws above would hold of nothing (runs after the examples)."""
+    assert len(finished) > 100
+    assert np.mean(finished) > 0.5
+
+
+@settings(max_examples=40, **EXAMPLES)
+@given(spring=decades(1e2, 1e5), strength=decades(1e-2, 1e2), u_max=decades(1e-7, 1e-5), seconds=st.floats(1.0, 100.0))
+def test_creep_is_monotone_under_a_load_that_grows(spring, strength, u_max, seconds):
+    """Quasi-static: constant friction, critical damping of the contact, up to 95 % of full friction."""
+    i = np.arange(N) + 1
+    caps = jnp.asarray(np.full(N, strength / N))
+    bank = Bank(caps / jnp.asarray(u_max * i / N), caps)
+    k, mass = float(np.sum(bank.stiffness)) + spring, 0.1
+    damping = min(2.0 * np.sqrt(k * mass), 1e6)
+    velocity = (strength / spring + u_max) / seconds
+    points = LoadPoint(jnp.asarray([0.0, 1.0, 2.0, 3.0]), velocity * jnp.asarray([0.0, 1.0, 2.0, 3.0]))
+    model = Model(Block(mass, spring, damping), bank, Weakening(1.0), points)
+    trajectory, _ = run(model, 0.9 * seconds)
+    s = trajectory.steps
+    inside = s.t > 20.0 * damping / k
+    assert inside.sum() > 20
+    assert np.all(np.diff(s.x[inside]) > 0)
+    assert np.all(np.diff(s.contact_force[inside]) > 0)
+
+
+class _Never(Weakening):
+    """A law that is no number as soon as anything moves."""
+
+    def strength(self, psi):
+        return super().strength(psi) + jnp.where(psi < 1.0, jnp.nan, 0.0)
+
+
+def test_steps_that_are_refused_for_ever_end_in_words_at_once():
+    times = jnp.asarray([0.0, 1.0, 2.0, 3.0])
+    bank = Bank(jnp.full(N, 1e5), jnp.full(N, 0.02))
+    model = Model(Block(), bank, _Never(0.5, 1e-6, 0.02), LoadPoint(times, 1e-4 * times))
+    with pytest.raises(SolveError, match=r"stopped at t = .*(step size fell|no longer|advanced it by only)"):
+        integrate(model, 1.0)

@@ -1,0 +1,76 @@
+"""Derivatives of every slip's time and size, against differences over a ladder of steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.errors import SolveError
+from stickslip.solve import slip_derivatives
+
+from .derivatives import BASE, NAMES, build
+from .rig import tighter
+from .slip_differences import END, SHOWN, brute_differences, brute_slips, errors, on_tied_steps, solved, table
+
+
+def test_brute_force_gives_smooth_differences():
+    """The reference: two rungs agree although each event moves by milliseconds between them."""
+    assert all(error < 3e-3 for error in errors(brute_differences(3e-3), brute_differences(1e-3)).values())
+
+
+def test_slips_are_those_of_brute_force():
+    seen, expected = solved()[0], table(brute_slips(np.zeros(len(BASE))))
+    assert seen["slip"].shape == expected["slip"].shape == (3,)
+    for name in SHOWN:
+        assert seen[name] == pytest.approx(expected[name], rel=3e-4)
+
+
+def test_derivatives_of_every_slip_in_every_parameter_agree_with_differences_by_brute_force():
+    """First onset, recurrences, slips and peak velocities, of which the later ones follow two slips."""
+    seen = solved()[1]
+    assert seen["slip"].shape == (len(NAMES), 3)
+    for step in (3e-3, 1e-3):
+        assert all(error < 4e-3 for error in errors(seen, brute_differences(step)).values())
+    # the derivative by which the plain discrete solution was wrong in sign
+    stiffness = NAMES.index("spring_stiffness")
+    expected = brute_differences(3e-3)["recurrence"][stiffness]
+    assert np.all(expected < -0.7)
+    assert seen["recurrence"][stiffness] == pytest.approx(expected, rel=0.01)
+
+
+def test_derivatives_are_those_of_the_tied_steps():
+    """The same discrete solution on the same steps; coarser rungs average what ripple is left."""
+    slips, seen = on_tied_steps(), solved()[1]
+    for k in (NAMES.index("spring_stiffness"), NAMES.index("ratio")):
+        for step, within in ((3e-4, 0.03), (1e-5, 0.01), (1e-6, 3e-3), (1e-7, 3e-3)):
+            move = step * np.eye(len(BASE))[k]
+            there, back = table(slips(move)), table(slips(-move))
+            for name in SHOWN:
+                difference = (there[name] - back[name]) / (2.0 * step)
+                assert difference == pytest.approx(seen[name][k], abs=within * np.max(np.abs(seen[name][k])))
+
+
+@pytest.mark.slow
+def test_derivatives_converge_with_the_steps():
+    expected = brute_differences(1e-3)
+    coarse, fine = errors(solved(10.0, 1)[1], expected), errors(solved(10.0, 2)[1], expected)
+    assert all(fine[name] < 0.6 * coarse[name] for name in SHOWN)
+
+
+@pytest.mark.slow
+def test_pulling_the_other_way_gives_the_same_derivatives():
+    def mirrored(theta):
+        model = build(theta)
+        point = model.load_point
+        return type(model)(model.block, model.bank, model.weakening, type(point)(point.times, -point.positions))
+
+    values, columns = slip_derivatives(mirrored, np.zeros(len(BASE)), END, tolerance=tighter(10.0), refine=2)
+    expected, derivatives = solved()
+    assert np.asarray(values.onset[:1]) == pytest.approx(expected["onset"], rel=1e-9)
+    assert -np.asarray(values.slip) == pytest.approx(expected["slip"], rel=1e-9)
+    assert np.diff(columns.onset) == pytest.approx(derivatives["recurrence"], rel=1e-6, abs=1e-9)
+
+
+def test_a_run_without_a_slip_is_refused():
+    with pytest.raises(SolveError, match="no slip is complete within the run"):
+        slip_derivatives(build, np.zeros(len(BASE)), 2.0)

@@ -1,0 +1,47 @@
+"""Quantities at the border: the short way for plain units and pint's for all others give the same numbers."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+
+import pytest
+
+from stickslip.errors import InputError
+from stickslip.units import _simple, to_si, unit_registry
+
+UNITS = ("m", "s", "kg", "N", "Pa", "Hz", "m/s", "N/m", "N s/m", "m/Hz**0.5", "m/s**0.5", "1/m", "m**2", "kg/s", "K")
+PREFIXES = ("", "p", "n", "u", "m", "k", "M", "G", "d", "c", "µ", "T")
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_plain_units_are_read_as_pint_reads_them(unit):
+    for prefix, number, gap in itertools.product(PREFIXES, ("50", "89.4", "0.31", "1e-3", "-2.5e+2"), (" ", "")):
+        text = f"{number}{gap}{prefix}{unit}"
+        found = _simple(text, unit)
+        if found is not None:
+            assert found == pytest.approx(unit_registry().Quantity(text).to(unit).magnitude, rel=1e-15)
+    assert to_si(f"3 {unit}", unit) == 3.0
+    assert (_simple(f"3 {unit}", unit) == 3.0) == unit[0].isalpha()
+
+
+def test_a_prefix_is_not_taken_out_of_a_power_or_a_quotient():
+    assert to_si("2 mm**2", "m**2") == pytest.approx(2e-6, rel=1e-12)
+    assert to_si("90 g", "kg") == pytest.approx(0.09, rel=1e-15)
+    assert to_si("0.05 mm/ms", "m/s") == pytest.approx(0.05, rel=1e-12)
+    with pytest.raises(InputError, match="the unit is missing"):
+        to_si("5", "m")
+    with pytest.raises(InputError, match="not one of m"):
+        to_si("5 s", "m")
+
+
+def test_a_scenario_of_plain_units_needs_neither_pint_nor_xarray():
+    """What makes the command line start quickly."""
+    code = (
+        "import sys; from stickslip.scenario import load_scenario; load_scenario('scenarios/grzemba2014.toml'); "
+        "print(sorted({'pint', 'xarray', 'pandas', 'dask', 'scipy.ndimage', 'matplotlib'} & set(sys.modules)))"
+    )
+    root = __file__.rsplit("tests", 1)[0]
+    seen = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    assert seen.stdout.strip() == "[]"
