@@ -14,6 +14,7 @@ from ..units import factor_to_si
 from .models import Rig
 
 _OUTRUN = 30.0
+_ODD = 2.0  # from which a warning is due
 _KNOWN = {
     "displacement": ("m", ["m", "cm", "mm", "um", "nm", "pm"]),
     "velocity": ("m/s", ["m/s", "cm/s", "mm/s", "um/s", "nm/s"]),
@@ -82,6 +83,12 @@ def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str
             value=unit,
             hint=_likely(trace.leading, unit, moved / travel) if moved > 0 else "is it the right column?",
         )
+    behind = trace.leading != "spring_force" and most is not None and travel - moved > _ODD * most
+    if ratio * (1 if reach is not None else 3) > _ODD or behind:
+        return [
+            f"the block moves {moved:.3g} m while the load point moves {travel:.3g} m, which no spring allows: is the "
+            "velocity of the drive that of another run, or a unit wrong?"
+        ]
     if trace.leading == "displacement" and moved < travel / _OUTRUN and (reach is None or travel > 10 * reach):
         return [
             f"the block moves {moved:.3g} m while the load point moves {travel:.3g} m: a wrong unit, a counter that "

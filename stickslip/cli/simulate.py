@@ -297,6 +297,8 @@ def _stick_slip_range(facts: dict[str, Any]) -> str:
     fastest, stiffest = facts["critical_velocity"], facts["critical_stiffness"]
     slow = f"below {show.quantity(fastest, 'm/s')}" if fastest > 0 else "at no velocity with this spring"
     soft = (
-        f"with springs softer than {show.quantity(stiffest, 'N/m')}" if stiffest > 0 else "at this one with no spring"
+        f"at this velocity with springs softer than {show.quantity(stiffest, 'N/m')}"
+        if stiffest > 0
+        else "at this velocity with no spring, however soft"
     )
     return f"stick-slip {slow} and {soft}"

@@ -35,6 +35,7 @@ BEFORE = 0.2  # of the shortest stick: time in contact from which friction is fo
 SCALE = {"x": 20.0, "v": 100.0, "a": 20.0, "f": 20.0}  # of a weight: a hundredth is a good step of a difference
 LEAST = 0.02  # a weight that may not be negative and would be smaller is left out
 EVALUATIONS = 14
+MOST, ARRIVED = 3, 0.9  # the fit goes on until that takes less than a tenth off its cost
 POINTS = 121
 PARTS = ("displacement", "velocity", "time in contact")
 
@@ -191,6 +192,15 @@ def learn(
     problem = Problem(base.with_effect(blank(seen(measurement, train), optimum), free), measurement)
     stages = ((wide, evaluations // 2), (1.0, evaluations)) if wide > 1.5 else ((1.0, evaluations),)
     found = fit(problem, floor, z=z, events=events, stages=stages, use=train, columns=columns, progress=progress)
+    for _ in range(MOST):
+        more = fit(
+            problem, floor, z=found.z, events=found.events, stages=((1.0, evaluations),), use=train,
+            columns=found.columns, progress=progress,
+        )  # fmt: skip
+        arrived = more.cost > ARRIVED * found.cost
+        found = more if more.cost < found.cost else found
+        if arrived:
+            break
     return again(base, optimum, measurement, floor, train, found)
 
 

@@ -12,7 +12,7 @@ from ..diagnose.missing_force import Curve, MissingForce, again, curves, learn, 
 from ..diagnose.pieces import fit_arrays, fit_from
 from ..diagnose.sweep import Store
 from ..diagnose.thresholds import THRESHOLDS
-from ..errors import StickslipError
+from ..errors import FitError, StickslipError
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
 from .pieces import Variables
@@ -50,12 +50,6 @@ def missing_sections(
     d, tell = diagnosis, progress or (lambda text, share: None)
     fitted_rungs = [r for r in d.ladder if r.fit is not None]
     base, top = fitted_rungs[0], fitted_rungs[-1]
-    failed = max(base.train.by_phase.values(), default=0.0) > THRESHOLDS.failed
-    if failed:
-        why = "Not drawn: the base model could not be fitted, so what it leaves over is no force."
-        return {"missing_force": {"label": LABEL, "text": why, "shown": []}} | (
-            {"learned_residual": {"text": f"Nothing was learned. {why}"}} if learn_residual else {}
-        ), {}
     shown: list[dict[str, Any]] = []
     variables: Variables = {}
     found: MissingForce | None = None
@@ -63,12 +57,17 @@ def missing_sections(
         for r in (base, top) if top is not base else (base,):
             tell(f"force missing from {' + '.join(r.model)}", 1.0)
             found = _piece(f"missing-{len(r.model)}", r, d, store, None)
+            worst = max(rung(found, r, d.measurement, d.floor, d.train).train.by_phase.values())
+            if worst > THRESHOLDS.failed:
+                what = f"the fit failed ({worst:.0f} floors), and no smooth force mends that"
+                raise FitError(f"what {' + '.join(r.model)} leaves over is no force: {what}")
             parts = curves(found)
             variables |= _variables(parts, len(shown))
             shown.append({"model": list(r.model), "parts": {name: _largest(name, c) for name, c in parts.items()}})
     except StickslipError as error:
         text = f"Not drawn: {error}"
-        return {"missing_force": {"label": LABEL, "text": text, "shown": []}}, {}
+        nothing = {"learned_residual": {"text": f"Nothing was learned: {error}"}} if learn_residual else {}
+        return {"missing_force": {"label": LABEL, "text": text, "shown": []}, **nothing}, {}
     out: dict[str, Any] = {"missing_force": {"label": LABEL, "text": _text(shown), "shown": shown}}
     if learn_residual:
         tell("learning the residual force", 1.0)

@@ -127,7 +127,7 @@ def _counter(sensor: Any, run: Run) -> list[str]:
 def _drive(scenario: Scenario, run: Run) -> str:
     drive = scenario.file.drive
     if drive.velocity is not None:
-        return f"drive_velocity = {drive.velocity!r}"
+        return f"drive_velocity = {drive.velocity:.10g}"
     from .drive import load_point
 
     motion = load_point(drive, scenario.folder)

@@ -203,6 +203,14 @@ def test_a_block_that_hardly_moves_is_a_warning(campaign, run):
     assert "a wrong unit, a counter that wraps" in trace.warnings[0]
 
 
+def test_the_velocity_of_another_run_is_a_warning(campaign, run):
+    t, x = run
+    rows = np.column_stack([t, x])
+    assert only(campaign(TIME + X + DRIVE, rows=rows)).warnings == ()
+    trace = only(campaign(TIME + X + DRIVE.replace("50", "5"), rows=rows))
+    assert "the velocity of the drive that of another run" in trace.warnings[0]
+
+
 def test_spring_force_of_the_wrong_sign_is_a_warning(campaign, run):
     t, x = run
     force = -1000 * (50e-6 * t - x * 1e-6)
