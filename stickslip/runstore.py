@@ -6,6 +6,7 @@ crash leaves the partial folder; the next run into the same name continues it (`
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import math
@@ -27,6 +28,10 @@ PACKAGES = ("stickslip", "numpy", "scipy", "jax", "diffrax", "equinox", "xarray"
 
 class Arrays(Protocol):
     """An `xarray.Dataset`, or what writes the same file."""
+
+    @property
+    def variables(self) -> Mapping[Any, Any]:
+        """Name -> what has the ``values``."""
 
     def to_netcdf(self, path: Any, *, engine: Any) -> Any:
         """Write it as NetCDF."""
@@ -68,8 +73,21 @@ class Run:
         """Write a data set as NetCDF."""
         path = self.path(name)
         aside = path.with_name(path.name + ".part")
+        values = [variable.values for variable in data.variables.values()]
+        _reserve(aside, sum(v.nbytes for v in values) + 8192 * (len(values) + 4))
         data.to_netcdf(aside, engine="h5netcdf")
         return aside.replace(path)
+
+
+def _reserve(path: Path, size: int) -> None:
+    """Ask for the room before HDF5 does: on a full disk its library speaks through tracebacks of its own."""
+    with path.open("wb") as stream:
+        if hasattr(os, "posix_fallocate"):
+            try:
+                os.posix_fallocate(stream.fileno(), 0, size)
+            except OSError as error:
+                if error.errno in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+                    raise OSError(error.errno, error.strerror, str(path)) from None
 
 
 @contextmanager

@@ -152,7 +152,7 @@ class TraceEntry(RigKeys):
     reader: str | None = None
     outside: bool = False
     time: TimeColumn | None = None
-    sampling_rate: Annotated[float | None, quantity("Hz", above=0)] = None
+    sampling_rate: Annotated[float | None, quantity("Hz", least=1e-9)] = None
     clock_error: Annotated[float, quantity("1", above=-0.01, below=0.01)] = 0.0
     start: Annotated[float | None, quantity("s")] = None
     stop: Annotated[float | None, quantity("s")] = None

@@ -60,11 +60,17 @@ def is_complete(train: Misfit, held: HeldOut | None, limits: Thresholds = THRESH
 
 @dataclass(frozen=True)
 class Judged:
-    """A candidate and which of the conditions for a name it meets."""
+    """A candidate and which of the conditions for a name it meets.
+
+    Attributes:
+        failures: conditions it does not meet.
+        plausible: whether its parameters are inside their ranges.
+    """
 
     candidate: Candidate
     cost: float
     failures: tuple[str, ...]
+    plausible: bool = True
 
     @property
     def passed(self) -> bool:
@@ -73,7 +79,7 @@ class Judged:
 
 def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Thresholds = THRESHOLDS) -> Judged:
     """Check one refitted candidate against the conditions for naming it."""
-    fails = []
+    fails, plausible = [], True
     assert candidate.fit is not None
     assert candidate.train is not None
     assert candidate.held is not None
@@ -99,7 +105,8 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
             low, high = f.bounds
             if min(z - low, high - z) < 0.004 * (high - low) and abs(f.outward(float(z)) - null) > 0:
                 fails.append(f"{f.name.split('.', 1)[1]} ends at the border of its plausible range")
-    return Judged(candidate, cost, tuple(fails))
+                plausible = False
+    return Judged(candidate, cost, tuple(fails), plausible)
 
 
 def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[Judged | None, list[Judged]]:
@@ -112,13 +119,31 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
     # a special case within reach of the law that contains it: nothing speaks for the rest of that law
     simpler = [j for j in passed[1:] if j.cost < limits.rival * best.cost and _contains(best, j)]
     best = simpler[0] if simpler else best
-    # a rival counts even where it failed a condition of its own: it explains the data as well
-    close = [j for j in ranked if j.cost < limits.rival * best.cost and not _contains(j, best)]
+    # a rival counts even where it gains too little by itself, unless it needs what is not plausible or is clearly worse
+    # on cycles that no fit has seen
+    close = [
+        j
+        for j in ranked
+        if j.cost < limits.rival * best.cost
+        and not _contains(j, best)
+        and j.plausible
+        and not _worse(j.candidate, best.candidate, limits)
+    ]
     seen: list[Judged] = [best]
     for j in close:
         if all(j.candidate.tag != s.candidate.tag for s in seen):
             seen.append(j)
     return best, seen
+
+
+def _worse(one: Candidate, other: Candidate, limits: Thresholds) -> bool:
+    """Whether ``one`` describes the unseen cycles worse than ``other``, cycle by cycle and significantly."""
+    if one.held is None or other.held is None or one.held.per_cycle.size != other.held.per_cycle.size:
+        return False
+    more = one.held.per_cycle - other.held.per_cycle
+    if more.size < 2:
+        return False
+    return bool(np.mean(more) > limits.standard_errors * np.std(more, ddof=1) / np.sqrt(more.size))
 
 
 def weights(judged: Sequence[Judged]) -> dict[str, float]:

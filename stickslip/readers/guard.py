@@ -12,10 +12,19 @@ from pathlib import Path
 
 from ..errors import InputError
 
-PATIENCE = 20.0  # s, and one more for every 10 MB
+PATIENCE = 10.0  # s of processor time, and one more for every 10 MB
+WALL = 60.0  # times as long by the clock: the machine may be busy
 ENABLED = True
 _LATE, _DIED = "does not end", "fails"
 
+_LIMIT = """
+import sys
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[2]), int(sys.argv[2]) + 1))
+except (ImportError, OSError, ValueError):
+    pass
+"""
 _PROGRAMS = {
     "hdf5": """
 import sys, h5py
@@ -33,6 +42,7 @@ import sys, scipy.io
 scipy.io.loadmat(sys.argv[1], squeeze_me=True, struct_as_record=False)
 """,
 }
+_XCPU, _KILL = 24, 9
 _sound: set[tuple[str, int, int]] = set()
 
 
@@ -50,13 +60,17 @@ def guard(path: Path, library: str) -> None:
     key = (str(path.resolve()), facts.st_mtime_ns, facts.st_size)
     if not ENABLED or key in _sound or not sys.executable:
         return
-    command = [sys.executable, "-I", "-W", "ignore", "-c", _PROGRAMS[library], str(path)]
+    patience = max(int(PATIENCE + facts.st_size / 1e7), 1)
+    command = [sys.executable, "-I", "-W", "ignore", "-c", _LIMIT + _PROGRAMS[library], str(path), str(patience)]
     try:
         done = subprocess.run(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            timeout=PATIENCE + facts.st_size / 1e7,
+            timeout=WALL * patience,
         )  # fmt: skip
-        fault = _DIED if done.returncode < 0 or done.returncode > 2 else ""
+        if done.returncode in (-_XCPU, -_KILL):
+            fault = _LATE
+        else:
+            fault = _DIED if done.returncode < 0 or done.returncode > 2 else ""
     except subprocess.TimeoutExpired:
         fault = _LATE
     except OSError:  # no other process can be had: then without this precaution

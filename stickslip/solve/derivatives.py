@@ -4,7 +4,7 @@ The error of a step depends on where in it the block arrests or begins to slip. 
 against the steps (by seconds per unit of its logarithm) turns that ripple, however small, into a slope: the exact
 derivative of a discrete solution then says nothing about the curve the solution follows. So the steps are tied to the
 motion. Each cycle is cut where the spring has reached a fixed share of full strength, late in the stick, and where the
-block comes to rest; the first steps after a cut have fixed lengths, the last few are stretched alike so that the next
+block all but rests; the first steps after a cut have fixed lengths, the last few are stretched alike so that the next
 cut is met. What the parameters move is then the cuts, by the implicit function theorem, and hardly any step's error.
 """
 
@@ -14,7 +14,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -32,6 +31,7 @@ NEWTON = 5  # iterations for their length; it is known to a few per cent before 
 LATE = 0.9  # of the stick's quiet part: where it is cut; the ringing is over, the slip has not begun
 QUIET = 0.02  # of the drive's speed: what the block creeps with before a slip begins
 GIVE = (0.1, 0.015)  # share of a stick's piece and of a slip's piece that is stretched
+REST = 1e-3  # of the drive's speed: what the block has left at the cut of an arrest, so that it has not turned yet
 LEAST_DROP = 0.01  # of full strength, by which a slip lowers the spring's force at least
 EXACT = 1e-3  # of the tolerance: to this the steps' equations are solved, so that they are smooth functions
 
@@ -184,8 +184,10 @@ def slips_on(model: Model, state: State, grid: Grid, tolerance: Tolerance, refin
 
         def landed(model: Model, bank: Bank, seen: _Seen, h: Array) -> tuple[_Seen, Array]:
             seen = jax.lax.fori_loop(0, STRETCHED * refine, lambda i, c: _step(model, bank, stepper, c, h), seen)
-            share = model.pull(model.lead(seen.t) - seen.y.x) / model.bank.total_strength
-            return seen, jnp.where(jnp.isnan(item.level), seen.y.v, share - item.level)
+            lead = model.lead(seen.t)
+            share = model.pull(lead - seen.y.x) / model.bank.total_strength
+            rest = REST * (lead - model.lead(seen.t - h)) / h
+            return seen, jnp.where(jnp.isnan(item.level), seen.y.v - rest, share - item.level)
 
         frozen = constant((model, bank, seen))
 
@@ -200,9 +202,8 @@ def slips_on(model: Model, state: State, grid: Grid, tolerance: Tolerance, refin
         # the length follows the gap by the implicit function theorem; the gap itself is zero
         more = -(gap - constant(gap)) / slope
         end = jax.tree.map(lambda a, b: a + b * more, end, change)
-        y = eqx.tree_at(lambda y: y.v, end.y, jnp.where(jnp.isnan(item.level), 0.0, end.y.v))
         found = Slips(end.onset, end.arrest, end.end - end.position, end.peak, end.position)
-        return (y, end.acceleration, end.t), found
+        return (end.y, end.acceleration, end.t), found
 
     _, found = jax.lax.scan(piece, (state, acceleration, zero), grid)
     return Slips(*(a[1::2] for a in found))

@@ -13,12 +13,12 @@ from stickslip.diagnose.heldout import HeldOut
 from stickslip.diagnose.holdout import training_cycles
 from stickslip.diagnose.pieces import fit_arrays, fit_from
 from stickslip.diagnose.thresholds import THRESHOLDS
-from stickslip.diagnose.verdict import decide, is_complete, judge, nothing
+from stickslip.diagnose.verdict import confidence, decide, is_complete, judge, nothing, weights
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
 from stickslip.features.layout import Layout
 from stickslip.features.measurement import Measurement
-from stickslip.fit.inertial import Fit, robust
+from stickslip.fit.inertial import MODEL_ERROR, Fit, robust
 from stickslip.fit.parameters import effect_parameters
 from stickslip.forward import Cycles
 from stickslip.residual import Misfit
@@ -95,10 +95,30 @@ def test_a_clear_winner_is_named():
 
 def test_two_that_explain_as_well_are_a_set():
     base = held(9.0)
-    tried = [candidate("sensor-drift", 300, 0.8), candidate("thermal-creep", 320, 0.9)]
+    tried = [candidate("sensor-drift", 300, 0.8), candidate("thermal-creep", 320, 0.8)]
     best, close = decide([judge(c, 1000.0, base) for c in tried])
     assert best is not None
     assert [j.candidate.tag for j in close] == ["sensor-drift", "thermal-creep"]
+
+
+@pytest.mark.parametrize(
+    "rival", [candidate("thermal-creep", 310, 1.2), candidate("thermal-creep", 310, 0.8, at_bound=True)]
+)
+def test_no_rival_is_what_fails_on_unseen_cycles_or_needs_the_implausible(rival):
+    judged = [judge(c, 1000.0, held(9.0)) for c in (candidate("sensor-drift", 300, 0.8), rival)]
+    _, close = decide(judged)
+    assert [j.candidate.tag for j in close] == ["sensor-drift"]
+
+
+def test_weights_follow_the_costs_and_the_widened_errors():
+    judged = [judge(candidate(t, c, 0.8), 1000.0, held(9.0)) for t, c in (("tilt", 300), ("wear", 332), ("tilt", 350))]
+    found = weights(judged)
+    assert found["tilt"] / found["wear"] == pytest.approx(np.exp(32 / (2 * MODEL_ERROR**2)))
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert confidence(judged, judged[:1]) == pytest.approx(found["tilt"])
+    # the law that contains the one that was said counts with it
+    pair = [judge(candidate(t, 300, 0.8), 1000.0, held(9.0)) for t in ("contact-ageing", "rate-and-state")]
+    assert confidence(pair, pair[:1]) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ import numpy as np
 
 from .seeds import beside, seeds, tables
 
-PATIENCE = 10  # s for one input; the slowest valid one takes a tenth of a second
+PATIENCE = 10  # s of processor time for one input; the slowest valid one takes a tenth of a second
 MEMORY = 6 << 30  # bytes of address space of a child
 CHUNK = 2000  # inputs of a child
 MOST_CRASHES = 200
@@ -145,14 +145,14 @@ def patience(seconds: int) -> Iterator[None]:
     def late(signal: int, frame: Any) -> None:
         raise Hang(f"more than {seconds} s")
 
-    before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(seconds)
-    faulthandler.dump_traceback_later(seconds + 5, exit=True)
+    before = signal.signal(signal.SIGVTALRM, late)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    faulthandler.dump_traceback_later(20 * seconds, exit=True)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
         faulthandler.cancel_dump_traceback_later()
 
 
@@ -196,7 +196,7 @@ def child(seed: int, first: int, number: int, state: Path, guarded: bool) -> Non
 
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    guard.ENABLED, guard.PATIENCE = guarded, 5.0
+    guard.ENABLED, guard.PATIENCE = guarded, 4.0
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))

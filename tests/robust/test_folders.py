@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -46,6 +45,9 @@ time = { column = "time", unit = "s" }
 displacement = { column = "x", unit = "um" }
 drive_velocity = "50 um/s"
 """
+
+
+MAIN = "import sys\nfrom stickslip.cli import main\nsys.exit(main())"
 
 
 @pytest.fixture
@@ -176,12 +178,13 @@ def test_a_read_only_disk(files, tmp_path, capsys, monkeypatch):
 )
 def test_a_full_disk(files, tmp_path, name, limit):
     """No file may grow beyond a limit: every kind of file is the first that does not fit, at one of the limits."""
-    command = [sys.executable, "-m", "stickslip.cli", *commands(files)[name], "--out", str(tmp_path / "out")]
+    program = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit},) * 2)\n{MAIN}"
     done = subprocess.run(
-        command, capture_output=True, text=True, env={**os.environ, "STICKSLIP_NO_CACHE": "1"},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+        [sys.executable, "-c", program, *commands(files)[name], "--out", str(tmp_path / "out")],
+        capture_output=True, text=True, env={**os.environ, "STICKSLIP_NO_CACHE": "1"},
     )  # fmt: skip
     assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
     if done.returncode == 0:  # everything fitted
         assert max(p.stat().st_size for p in (tmp_path / "out").rglob("*")) <= limit
         return
@@ -213,10 +216,9 @@ def test_a_disk_that_fills_while_pieces_are_kept(tmp_path):
         "  run.json({'kept': kept})\n"
     )
     command = [sys.executable, "-c", program, str(tmp_path / "out")]
-    first = subprocess.run(
-        command, capture_output=True, text=True,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (250_000, 250_000)),
-    )  # fmt: skip
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (250_000, 250_000))\n"
+    limited = [sys.executable, "-c", limit + program, str(tmp_path / "out")]
+    first = subprocess.run(limited, capture_output=True, text=True)
     assert "RunFolderError" in first.stderr
     assert "File too large" in first.stderr
     assert not (tmp_path / "out").exists()
