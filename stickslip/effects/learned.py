@@ -112,7 +112,10 @@ class LearnedForce(Memory, Threshold, BodyForce):
     def along(self, x: Array) -> Array:
         """Splines of the displacement ``x`` (m), shape of x + (10,)."""
         n = len(PLACES) - 3
-        return spline((x - self.x_low) / (self.x_high - self.x_low) * n, np.arange(-1, n + 2))
+        s = (x - self.x_low) / (self.x_high - self.x_low) * n
+        inside = jnp.clip(s, 0.0, n)
+        fade = jnp.maximum(1.0 - (0.5 * (s - inside)) ** 2, 0.0) ** 2  # over two distances of the splines
+        return spline(inside, np.arange(-1, n + 2)) * jnp.asarray(fade)[..., None]
 
     def against(self, speed: Array) -> Array:
         """Splines of the ``speed`` (m/s, not negative), even on its logarithm, shape of speed + (6,)."""
@@ -147,5 +150,5 @@ class LearnedForce(Memory, Threshold, BodyForce):
     def force(self, state: tuple[Array, Array], motion: Motion, contact: Contact) -> Array:
         drag = jnp.sign(motion.v) * (self.against(abs(motion.v)) @ self.weights(SPEEDS))
         places = self.weights(PLACES)
-        # a constant is strength, and would be a step where the data end
-        return self.size * (self.along(motion.x) @ (places - jnp.mean(places)) - drag)
+        # a constant is strength, and would be a step where the data end; the first and the last spline lie beyond them
+        return self.size * (self.along(motion.x) @ (places - jnp.mean(places[1:-1])) - drag)
