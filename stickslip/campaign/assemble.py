@@ -156,7 +156,10 @@ class _Assembly:
             self._compare(name, column, spec, factor, stated)
         self.used[name] = f"'{column}' [{spec.unit or stated}]"
         values = columns.data[column]
-        return values if factor == 1.0 else values * factor
+        if factor == 1.0:
+            return values
+        with np.errstate(invalid="ignore", over="ignore"):  # what is no finite number is met later
+            return values * factor
 
     def _compare(self, name: str, column: str, spec: TimeColumn | Channel, factor: float, stated: str) -> None:
         try:

@@ -146,14 +146,14 @@ def patience(seconds: int) -> Iterator[None]:
         raise Hang(f"more than {seconds} s")
 
     before = signal.signal(signal.SIGVTALRM, late)
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
-    faulthandler.dump_traceback_later(20 * seconds, exit=True)
     try:
+        signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+        faulthandler.dump_traceback_later(20 * seconds, exit=True, file=sys.__stderr__)
         yield
     finally:
+        faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
         signal.signal(signal.SIGVTALRM, before)
-        faulthandler.cancel_dump_traceback_later()
 
 
 def try_one(folder: Path, name: str, content: bytes) -> tuple[str, str]:
