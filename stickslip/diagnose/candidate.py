@@ -26,7 +26,6 @@ START = 0.02  # of the amplitude's range; scaled until its effect on the feature
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
 MOST_STARTS = 12
 OTHERS = 2  # further starts that a leader is fitted from
-HOPELESS = 0.5  # of the best share that was to be explained: steps that promise less are not tried with the model
 SHARES = (1.0, 0.4)  # of a linear step that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
@@ -275,7 +274,6 @@ class _Search:
         self.null = free[self.amplitude].inward(specs(effect)[effect.amplitude].null or 0.0)
         self.best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
         self.moderate: float | None = None
-        self.most = 0.0  # share of the misfit that the best step should explain
         self.each: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []  # the best from every start
 
     def point(self, values: dict[str, float], amplitude: float, base: np.ndarray | None = None) -> np.ndarray:
@@ -320,9 +318,6 @@ class _Search:
             values = {**values, "phase": float(np.arctan2(step.sizes[1], step.sizes[0]))}
         bounds = np.array([f.bounds for f in self.optimum.free])
         first = self.best is None
-        if not first and step.share < HOPELESS * self.most:
-            return step.share
-        self.most = max(self.most, step.share)
         offers = []
         for share in SHARES:
             moved = np.clip(self.optimum.z + share * np.clip(step.z, -1.0, 1.0), *bounds.T)

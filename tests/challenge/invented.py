@@ -67,7 +67,7 @@ def answer(folder: Path, results: dict[str, dict[str, Any]]) -> None:
     """Write results as a run would; the protocol too."""
     runs = folder / RUNS
     runs.mkdir(exist_ok=True)
-    _protocol(runs, digest(folder), {"candidates": None, "max_effects": 3})
+    _protocol(runs, digest(folder), {"candidates": None, "max_effects": 4})
     for name, content in results.items():
         (runs / name).mkdir()
         inputs = [file_record(folder / CASES / name / "campaign.toml")]
