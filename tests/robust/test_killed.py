@@ -184,43 +184,46 @@ if __name__ == "__main__":
 """
 
 
-def _challenge_killed(folder: Path, kills: int, seed: int) -> int:
-    """Kill ``challenge run`` and all its workers at random moments, then let it come to its end."""
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    rng, done = random.Random(seed), 0
-    for n in range(kills):
-        process = subprocess.Popen(
-            [sys.executable, "-c", CHALLENGE, str(folder)], env=environment, start_new_session=True,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        try:
-            process.wait(rng.uniform(1.0, 7.0))
-        except subprocess.TimeoutExpired:
-            process.kill()
-            if n % 2:  # the workers are left to find out by themselves, every second time
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-            done += 1
-        for name in folder.glob("runs/*.json"):
-            json.loads(name.read_text(encoding="utf-8"))
-    last = subprocess.run(
-        [sys.executable, "-c", CHALLENGE, str(folder)], env=environment, capture_output=True, text=True
-    )
-    assert last.returncode == 0, last.stderr
-    return done
+def _start(folder: Path) -> subprocess.Popen:
+    return subprocess.Popen(
+        [sys.executable, "-c", CHALLENGE, str(folder)], start_new_session=True, stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )  # fmt: skip
+
+
+def _answers(folder: Path) -> dict[str, Any]:
+    assert not list((folder / "runs").glob("*.failures.json"))
+    assert not list((folder / "runs").glob("*.partial"))
+    found = {p.name: read_result(p) for p in sorted((folder / "runs").iterdir()) if p.is_dir()}
+    return {name: (result["total"], result["verdict"]) for name, result in found.items()}
 
 
 def _check_challenge(tmp_path: Path, kills: int) -> None:
+    """Kill ``challenge run`` at random moments; where it came to its end before, it is begun anew."""
     whole, cut = challenge(tmp_path / "whole"), challenge(tmp_path / "cut")
-    _challenge_killed(whole, 0, 0)
-    done = _challenge_killed(cut, kills, 3)
-    assert done >= min(kills, 2)
-    for case in sorted(p.name for p in (whole / "runs").iterdir() if p.is_dir()):
-        found, want = (without_time(read_result(f / "runs" / case)) for f in (cut, whole))
-        assert found["total"] == want["total"]
-        assert found["verdict"] == want["verdict"]
-    assert not list((cut / "runs").glob("*.failures.json"))
-    assert not list((cut / "runs").glob("*.partial"))
+    began = time.monotonic()
+    assert _start(whole).wait() == 0
+    length, want = time.monotonic() - began, _answers(whole)
+    assert len(want) == 4
+    rng, done = random.Random(3), 0
+    while done < kills:
+        process = _start(cut)
+        try:
+            process.wait(rng.uniform(0.2, 0.9) * length)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            if done % 2:  # every second time the workers are left to find out by themselves
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            done += 1
+        else:
+            assert process.returncode == 0
+            assert _answers(cut) == want
+            shutil.rmtree(cut / "runs")
+        for name in cut.glob("runs/*.json"):
+            json.loads(name.read_text(encoding="utf-8"))
+    assert _start(cut).wait() == 0
+    assert _answers(cut) == want
 
 
 def test_a_challenge_killed_with_its_workers_goes_on(tmp_path):
