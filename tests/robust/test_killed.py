@@ -93,7 +93,7 @@ def test_piecewise_work_killed_again_and_again(tmp_path, force):
             assert (tmp_path / ".out.replaced" / RESULT).exists()
         if (tmp_path / "out.partial").exists():
             all_sound(tmp_path / "out.partial")
-    assert kills >= 2
+    assert kills >= 1
     if not out.exists() or force:
         subprocess.run([*command, str(out), *more], check=True)
     assert without_time(read_result(out)) == without_time(read_result(whole))
