@@ -54,8 +54,9 @@ def worst_phase(train: Misfit, held: HeldOut | None) -> tuple[str, float]:
 
 
 def is_complete(train: Misfit, held: HeldOut | None, limits: Thresholds = THRESHOLDS) -> bool:
-    """Whether every phase is at its floor, also where no fit has looked."""
-    return all(error <= limits.complete[phase] for phase, error in errors(train, held).items())
+    """Whether every phase, and all of them together, are at their floor, also where no fit has looked."""
+    overall = max(train.total, held.error if held is not None else 0.0)
+    return overall <= limits.overall and all(e <= limits.complete[phase] for phase, e in errors(train, held).items())
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ class FlashHeating(Memory, Threshold):
     """The rise in temperature is the frictional power, averaged over a thermal time; strength falls with it.
 
     The thermal resistance of four contacts of 10 um is some 250 K/W, steel loses about 0.1 % of its shear strength per
-    kelvin, and a slip at 5 mm/s heats with 1 mW: a softening above 10/W is not plausible, and nothing is expected here.
+    kelvin: 0.25/W. A softening above 1/W is not plausible; a slip at 5 mm/s heats with 1 mW, and nothing is expected here.
     """
 
     tag = "flash-heating"
@@ -34,8 +34,8 @@ class FlashHeating(Memory, Threshold):
     softening: Array = parameter(
         0.0,
         unit="1/W",
-        lower=-10.0,
-        upper=10.0,
+        lower=-1.0,
+        upper=1.0,
         null=0.0,
         symbol=r"\chi",
         doc="relative loss of strength per watt: softening per kelvin times thermal resistance",

@@ -169,14 +169,24 @@ def test_a_gain_too_small_for_its_parameters_is_refused():
 
 
 def test_complete_means_every_phase_also_where_no_fit_looked():
-    good = Misfit(0.9, {"creep": 0.8, "slip": 1.0}, {})
+    top = THRESHOLDS.overall
+    good = Misfit(top, {"creep": 0.8, "slip": 1.0}, {})
     limit = THRESHOLDS.complete
-    assert is_complete(good, HeldOut(1.0, 1.0, {"creep": limit["creep"]}, np.array([1.0])))
-    bad = HeldOut(2.0, 4.0, {"creep": limit["creep"] + 0.1}, np.array([4.0]))
-    assert not is_complete(good, bad)
+    unseen = HeldOut(top, top**2, {"creep": limit["creep"]}, np.array([1.0]))
+    assert is_complete(good, unseen)
+    assert not is_complete(good, replace(unseen, by_phase={"creep": limit["creep"] + 0.1}))
     for phase in limit:
-        assert is_complete(replace(good, by_phase={phase: limit[phase]}), held(1.0))
-        assert not is_complete(replace(good, by_phase={phase: limit[phase] + 0.1}), held(1.0))
+        assert is_complete(replace(good, by_phase={phase: limit[phase]}), unseen)
+        assert not is_complete(replace(good, by_phase={phase: limit[phase] + 0.1}), unseen)
+
+
+def test_complete_means_all_phases_together_too():
+    """What no phase shows by itself, fitted or unseen."""
+    top = THRESHOLDS.overall
+    thin, unseen = Misfit(top, {"creep": 0.9}, {}), HeldOut(top, top**2, {"creep": 0.9}, np.array([0.8]))
+    assert is_complete(thin, unseen)
+    assert not is_complete(replace(thin, total=top + 0.05), unseen)
+    assert not is_complete(thin, replace(unseen, error=top + 0.05))
 
 
 def test_a_fit_survives_being_kept():
