@@ -64,6 +64,7 @@ def diagnose_campaign(
     effect_files: Sequence[str | Path] = (),
     jobs: int | None = None,
     learn_residual: bool = False,
+    missing_force: bool = True,
     force: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> dict[str, Any]:
@@ -76,6 +77,7 @@ def diagnose_campaign(
         candidates, max_effects, holdout, jobs, progress: see ``stickslip.diagnose.engine.diagnose``.
         effect_files: Python files with effects of one's own, which are run.
         learn_residual: fit a smooth force to what is left over, for prediction; it takes no part in the verdict.
+        missing_force: estimate and draw what force is missing (a minute of a processor), also without part in it.
         force: replace an existing run folder.
 
     Returns:
@@ -143,11 +145,12 @@ def diagnose_campaign(
                 problem, top.fit, traces, segmentations, found.floor, found.train, loaded.rig
             )
             result |= sections
-            sections, more = missing_sections(
-                found, pieces, learn_residual=learn_residual, rig=loaded.rig, progress=progress
-            )
-            result |= sections
-            variables |= more
+            if missing_force:
+                sections, more = missing_sections(
+                    found, pieces, learn_residual=learn_residual, rig=loaded.rig, progress=progress
+                )
+                result |= sections
+                variables |= more
             coordinates = variables.pop("coordinates")
             run.arrays(xarray.Dataset(variables, coords=coordinates, attrs={"title": loaded.title}))
         result["seconds"] = round(time.perf_counter() - began, 1)

@@ -80,7 +80,9 @@ def run_challenge(
     waiting = [c for c in cases if not is_done(runs, c) and (retry or not failures(runs, c))]
     if waiting:
         if diagnosis is None:
-            diagnosis = partial(diagnose_campaign, jobs=1, candidates=tags, max_effects=max_effects)
+            diagnosis = partial(
+                diagnose_campaign, jobs=1, candidates=tags, max_effects=max_effects, missing_force=False
+            )
         with cluster(scheduler, workers) as client:
             _work(client, folder, waiting, len(cases), diagnosis, tell)
     done = sum(is_done(runs, c) for c in cases)

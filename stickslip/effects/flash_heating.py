@@ -16,7 +16,7 @@ class FlashHeating(Memory, Threshold):
     """The rise in temperature is the frictional power, averaged over a thermal time; strength falls with it.
 
     The thermal resistance of four contacts of 10 um is some 250 K/W, steel loses about 0.1 % of its shear strength per
-    kelvin: 0.25/W. A softening above 1/W is not plausible; a slip at 5 mm/s heats with 1 mW, and nothing is expected here.
+    kelvin: 0.25/W. A softening above 1/W is not plausible; a slip at 5 mm/s heats with 1 mW, so nothing is expected.
     """
 
     tag = "flash-heating"
