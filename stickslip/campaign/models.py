@@ -47,7 +47,13 @@ class RigKeys(Model):
 
 
 class Rig(RigKeys):
-    """The apparatus: mass of the block (kg), spring (N/m), contacts, normal force of one contact (N), material."""
+    """The apparatus: mass of the block (kg), spring (N/m), contacts, normal force of one contact (N), material.
+
+    ``H`` and ``h_rms`` are the roughness of the line of ``line_length`` and ``springs``, where somebody measured it.
+    """
+
+    H: Annotated[Measured | None, quantity("1", above=0, below=1, unmeasured=True)] = None
+    h_rms: Annotated[Measured | None, quantity("m", above=0, unmeasured=True)] = None
 
 
 class _Scaled(Model):

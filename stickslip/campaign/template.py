@@ -22,6 +22,8 @@ youngs_modulus = "210 GPa"
 poisson_ratio = 0.3
 line_length = "20 um"                  # of the rough line
 # springs = 4096                       # of the rough line
+# H = 0.3                              # its Hurst exponent and
+# h_rms = "2.5 um"                     # rms height, where measured: the prior of the contact
 # temperature = "20 degC"
 
 [[trace]]

@@ -15,8 +15,11 @@ from ..segment import Segmentation
 from ..trace import Trace
 from .composition import START, Composition
 from .parameters import Free
+from .surface import Guess, surface_prior
 
 SHAPE = 3.3  # exponent of the backbone of a self-affine line with H about 0.3
+SHAPE_WIDTH = 0.2  # of its logarithm, where the roughness is not known
+SPREAD = Guess(0.15, 0.6)  # of ln(u_max) over the contacts, where the roughness is not known
 BINS = 96
 DAMPING_SHARE = 0.017  # of the critical damping of the contact resonance
 FALLBACK_STIFFNESS = 1000.0  # N/m, of a spring of which nothing is known
@@ -78,7 +81,7 @@ def base_composition(
         ring: period of the contact resonance (s); default the one the features were taken with.
 
     Raises:
-        InputError: the mass is not given.
+        InputError: the mass is not given; the roughness is given by halves, or without load and friction.
     """
     rig, m, s = campaign.rig, measurement, measurement.layout.slices()
     mass, _, _, _, _ = _known(rig.mass, np.nan, 0.0)
@@ -113,7 +116,12 @@ def base_composition(
         nominal = float(np.median(seen)) if seen.size else 3.0 * stiffness * size
     strength = float(np.median(seen)) if seen.size else nominal
     drop = float(np.clip(0.8 * stiffness * size / strength, 0.02, 0.8))
-    u_max = SHAPE * strength / (mass * (2 * np.pi / period) ** 2)
+    surface = surface_prior(rig)
+    shape = Guess(SHAPE, SHAPE_WIDTH) if surface is None else surface.p
+    spread = SPREAD if surface is None or surface.spread is None else surface.spread
+    # the ringing tells the stiffness of the unloaded contact, p/u_max of its strength
+    u_max = shape.value * strength / (mass * (2 * np.pi / period) ** 2)
+    reach = Guess(u_max, 0.5) if surface is None else surface.u_max
 
     def log(
         name: str,
@@ -135,9 +143,11 @@ def base_composition(
         log("weakening.slip_distance", "m", 1e-6, 1.0, 1e-8, 1e-4, "slip over which strength is lost"),
         log("weakening.healing_time", "s", 0.01, 1.2, 1e-4, 10.0, "time over which strength returns"),
         log("rig.damping", "N s/m", DAMPING_SHARE * 4 * np.pi * mass / period, 1.0, 0.005, 500.0, "viscous damping"),
-        log("contact.u_max", "m", u_max, 0.5, u_max / 30, u_max * 30, "displacement at which the last element slides"),
-        log("contact.p", "1", SHAPE, 0.2, 1.2, 9.0, "exponent of the backbone"),
-        log("contact.spread", "1", 0.15, 0.6, 0.01, 0.8, "rms of ln(u_max) over the contacts"),
+        log("contact.u_max", "m", u_max, reach.width, min(u_max, reach.value) / 30, max(u_max, reach.value) * 30,
+            "displacement at which the last element slides", reach.value),
+        log("contact.p", "1", shape.value, shape.width, 1.2, 9.0, "exponent of the backbone", shape.value),
+        log("contact.spread", "1", spread.value, spread.width, 0.01, 0.8, "rms of ln(u_max) over the contacts",
+            spread.value),
     ]  # fmt: skip
     fixed = {"rig.spring_stiffness": stiffness}
     if not measured and not np.isfinite(own).all():
@@ -150,6 +160,6 @@ def base_composition(
     for r in np.flatnonzero(~np.asarray(m.cycles.virgin)).tolist():
         doc = f"how far beyond full strength the load point is at the first slip of run {m.names[r]}"
         # the model slips a little before its full strength; a tenth of the elongation is far more than that
-        reach = 0.1 * nominal / stiffness
-        free.append(Free(f"{START}{r}", "m", 0.1 * reach, 0.0, 0.0, 3.0, -reach, reach, doc))
+        beyond = 0.1 * nominal / stiffness
+        free.append(Free(f"{START}{r}", "m", 0.1 * beyond, 0.0, 0.0, 3.0, -beyond, beyond, doc))
     return Composition(mass, contacts, bins, tuple(free), fixed)

@@ -17,6 +17,7 @@ from ..fit.inertial import Fit
 from ..fit.overlay import ModelledRun, modelled_runs
 from ..fit.problem import Problem
 from ..fit.static_table import StaticRig
+from ..fit.surface import surface_prior
 from ..forward import MOST_STEPS
 from ..residual import Misfit, misfit
 from ..segment import Segmentation
@@ -75,8 +76,9 @@ def effective(fit: Fit, rig: Any, contacts: int) -> dict[str, Any] | None:
         f"{known.normal_force:.3g} N and friction {known.friction:.3g}"
         f"{' (guessed)' if known.guessed else ''}; {line.note}."
     )
+    prior = surface_prior(rig)
     return {
-        "text": text,
+        "text": text if prior is None else f"{text} {prior.text}",
         "H": line.hurst,
         "h_rms": line.h_rms,
         "N": line.n_springs,

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from stickslip.campaign import load_campaign, load_traces
+from stickslip.campaign import Rig, load_campaign, load_traces
 from stickslip.features.measurement import measure
 from stickslip.fit.start import base_composition
+from stickslip.fit.surface import surface_prior
 from stickslip.segment import segment
 
 RIG = 'schema = 1\n[rig]\nmass = "89.4 g"\ncontacts = 4\nnormal_force = "0.31 N"\nfriction_coefficient = 0.2\n'
@@ -58,3 +59,17 @@ def test_where_no_spring_is_stated_the_slips_tell_it(start):
     (stiffness,) = [f for f in found.free if f.name == "rig.spring_stiffness"]
     # half a period of the block on its spring, stretched by how a slip is timed
     assert stiffness.start == pytest.approx(0.0894 * (np.pi / 0.03) ** 2, rel=0.3)
+
+
+def test_the_roughness_is_the_prior_of_the_contact(start):
+    rough = 'H = 0.3\nh_rms = "2.46 um"\n'
+    before = {f.name: f for f in start(SPRING, "").free}
+    after = {f.name: f for f in start(SPRING + rough, "").free}
+    prior = surface_prior(Rig(contacts=4, normal_force=0.31, friction_coefficient=0.2, H=0.3, h_rms=2.46e-6))
+    for name, guess in (("u_max", prior.u_max), ("p", prior.p), ("spread", prior.spread)):
+        assert after[f"contact.{name}"].prior == pytest.approx(guess.value)
+        assert after[f"contact.{name}"].width == pytest.approx(guess.width)
+        assert before[f"contact.{name}"].prior != pytest.approx(guess.value, rel=1e-3)
+    # the ringing still tells where to begin, with the shape of the lines
+    stiffness = [f["contact.p"].start / f["contact.u_max"].start for f in (before, after)]
+    assert stiffness[0] == pytest.approx(stiffness[1])

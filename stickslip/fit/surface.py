@@ -1,0 +1,122 @@
+"""What is known of a contact from its roughness: the effective contact that rough lines (H, h_rms) would make."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..campaign import Rig, Unmeasured
+from ..contact import rough_table, static_contact
+from ..errors import InputError
+from .static_table import StaticRig
+
+LINES = 60
+LOADS = np.linspace(0.02, 0.98, 49)
+
+
+class Guess(NamedTuple):
+    """Median and the standard deviation of the logarithm."""
+
+    value: float
+    width: float
+
+
+class SurfacePrior(NamedTuple):
+    """The power-law contact of a rig with rough lines.
+
+    Attributes:
+        u_max: displacement at full sliding of the typical contact (m). p: exponent of the backbone.
+        spread: rms of ln(u_max) over the contacts; None for a single one.
+        text: for a person.
+    """
+
+    u_max: Guess
+    p: Guess
+    spread: Guess | None
+    text: str
+
+
+class _Lines(NamedTuple):
+    """Of many lines: ln(u_max), ln(p), and how far they are from a power law (share of u_max)."""
+
+    u: np.ndarray
+    p: np.ndarray
+    mismatch: float
+
+
+def surface_prior(rig: Rig) -> SurfacePrior | None:
+    """Prior of the contact from the roughness in ``[rig]``, or None where it is not stated.
+
+    One rig has a few lines of its own, so the widths are the scatter of single lines over the root of the number of
+    contacts, together with how badly a power law stands for a line, and with what the bounds of H, h_rms, load and
+    friction leave open where these are guesses.
+
+    Raises:
+        InputError: H without h_rms or the reverse; load or friction are neither measured nor guessed.
+    """
+    if rig.H is None and rig.h_rms is None:
+        return None
+    for name, other in (("H", "h_rms"), ("h_rms", "H")):
+        if getattr(rig, name) is None:
+            raise InputError(
+                f"'{other}' says nothing without '{name}'", key=f"rig.{name}", hint=f"give both, or remove '{other}'"
+            )
+    contacts = int(rig.contacts or 1)
+    middle = _lines(rig)
+    variance = np.array([v.var(ddof=1) / contacts + middle.mismatch**2 for v in (middle.u, middle.p)])
+    open_ones = [n for n in ("H", "h_rms", "normal_force", "friction_coefficient") if _open(getattr(rig, n))]
+    for name in open_ones:
+        value = getattr(rig, name)
+        low, high = (_lines(rig.model_copy(update={name: v})) for v in (value.lower, value.upper))
+        # bounds are taken for four standard deviations, as everywhere in a campaign
+        variance += (np.array([high.u.mean() - low.u.mean(), high.p.mean() - low.p.mean()]) / 4.0) ** 2
+    width = np.sqrt(variance)
+    u = Guess(float(np.exp(middle.u.mean())), float(width[0]))
+    p = Guess(float(np.exp(middle.p.mean())), float(width[1]))
+    spread = None
+    if contacts > 1:
+        share = np.sqrt((contacts - 1) / contacts)
+        spread = Guess(float(middle.u.std(ddof=1) * share), float(1.0 / np.sqrt(2.0 * (contacts - 1))))
+    guessed = " (guessed)" if {"H", "h_rms"} & set(open_ones) else ""
+    text = (
+        f"Prior of the contact from the rig's H and h_rms{guessed}: u_max = {u.value * 1e6:.3g} um within a factor of "
+        f"{np.exp(u.width):.2f}, p = {p.value:.3g} within {np.exp(p.width):.2f}."
+    )
+    return SurfacePrior(u, p, spread, text)
+
+
+def _open(value: object) -> bool:
+    return isinstance(value, Unmeasured)
+
+
+def _known(value: float | Unmeasured) -> float:
+    return float(value.guess if isinstance(value, Unmeasured) else value)
+
+
+def _lines(rig: Rig) -> _Lines:
+    """The power law nearest to the creep curve of each of many lines."""
+    static = StaticRig.of(rig, spring_stiffness=1.0)
+    assert rig.H is not None
+    assert rig.h_rms is not None
+    table = rough_table(_known(rig.H), static.length, static.n_springs, LINES, static.seed).scaled(_known(rig.h_rms))
+    contact = static_contact(table, static.normal_force, static.friction, static.elastic)
+    curves = np.asarray(contact.displacement(np.append(LOADS, 1.0)[:, None])).T
+    reach = curves[:, -1]
+    found = np.array([nearest_exponent(LOADS, u[:-1] / u[-1]) for u in curves])
+    return _Lines(np.log(reach), found[:, 0], float(np.sqrt(np.mean(found[:, 1] ** 2))))
+
+
+def nearest_exponent(tau: np.ndarray, share: np.ndarray) -> tuple[float, float]:
+    """ln(p) of the backbone tau = 1 - (1 - u/u_max)^p nearest to a creep curve, and their rms distance in u/u_max.
+
+    Args:
+        tau: loads, shape (T,), inside (0, 1). share: displacements at them over u_max, shape (T,).
+    """
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        return -np.expm1(np.log1p(-tau) / np.exp(x[0])) - share
+
+    best = least_squares(residual, [1.0])
+    return float(best.x[0]), float(np.sqrt(np.mean(best.fun**2)))

@@ -1,0 +1,69 @@
+"""The prior of a contact that follows from the roughness of a rig."""
+
+import numpy as np
+import pytest
+
+from stickslip.campaign import Rig
+from stickslip.challenge.generator.lines import Surface, press, rough_line
+from stickslip.errors import InputError
+from stickslip.fit.surface import nearest_exponent, surface_prior
+
+KNOWN = {"contacts": 4, "normal_force": 0.31, "friction_coefficient": 0.21, "H": 0.3, "h_rms": 2.46e-6}
+
+
+def rig(**more) -> Rig:
+    return Rig(**{k: v for k, v in (KNOWN | more).items() if v is not None})
+
+
+def test_a_power_law_is_found_exactly():
+    tau = np.linspace(0.05, 0.95, 19)
+    p, mismatch = nearest_exponent(tau, 1 - (1 - tau) ** (1 / 2.7))
+    assert np.exp(p) == pytest.approx(2.7, rel=1e-6)
+    assert mismatch < 1e-7
+
+
+def test_the_prior_is_what_real_lines_do():
+    """200 lines of the challenge's generator, pressed and pulled spring by spring, by code that shares nothing."""
+    surface, rng = Surface(hurst=0.3, h_rms=2.46e-6), np.random.default_rng(5)
+    tau = np.linspace(0.02, 0.98, 25)
+    found = []
+    for _ in range(200):
+        normal = press(surface, rough_line(surface, rng), 0.31)
+        slide = 0.21 * normal / surface.tangential_spring  # displacement at which each spring slides, ascending
+        force = np.array([np.minimum(surface.tangential_spring * u, 0.21 * normal).sum() for u in slide])
+        u = np.interp(tau, force / (0.21 * 0.31), slide)
+        found.append((np.log(slide[-1]), nearest_exponent(tau, u / slide[-1])[0]))
+    lines = np.array(found)
+    prior = surface_prior(rig())
+    for guess, ln in zip((prior.u_max, prior.p), lines.T, strict=True):
+        error = ln.std() * np.sqrt(1 / 200 + 1 / 60)
+        assert np.log(guess.value) == pytest.approx(ln.mean(), abs=4 * error)
+        # four contacts have half the scatter of one line, but a power law is not quite their curve
+        assert ln.std() / 2 * 0.7 < guess.width < ln.std()
+    assert prior.spread.value == pytest.approx(lines[:, 0].std() * np.sqrt(3 / 4), rel=0.35)
+
+
+def test_what_is_guessed_widens_it_and_contacts_narrow_it():
+    known = surface_prior(rig())
+    vague = surface_prior(rig(h_rms={"guess": 2.46e-6, "lower": 1e-6, "upper": 5e-6}))
+    assert vague.u_max.value == known.u_max.value
+    assert vague.u_max.width > 1.5 * known.u_max.width
+    assert "(guessed)" in vague.text
+    assert "(guessed)" not in known.text
+    single = surface_prior(rig(contacts=1))
+    assert single.u_max.width > 1.5 * known.u_max.width
+    assert single.spread is None
+    load = surface_prior(rig(normal_force={"guess": 0.31, "lower": 0.1, "upper": 0.9}))
+    assert load.u_max.width > known.u_max.width
+
+
+def test_no_roughness_no_prior():
+    assert surface_prior(rig(H=None, h_rms=None)) is None
+
+
+@pytest.mark.parametrize("missing", ["H", "h_rms", "normal_force", "friction_coefficient"])
+def test_half_of_it_is_refused(missing):
+    with pytest.raises(InputError) as error:
+        surface_prior(rig(**{missing: None}))
+    assert missing in str(error.value)
+    assert error.value.key == f"rig.{missing}"
