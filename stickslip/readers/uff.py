@@ -26,7 +26,7 @@ _KINDS = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13:
 _SINGLE, _DOUBLE = 4, 8
 
 
-@dataclass
+@dataclass(eq=False)  # arrays have no single truth value
 class _Set:
     header: dict[str, Any]
     x: np.ndarray

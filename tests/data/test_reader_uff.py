@@ -123,3 +123,47 @@ def test_vax_format_is_refused(tmp_path, refuses):
     payload = struct.pack(f"<{X.size}d", *X)
     path = write(tmp_path / "a.uff", header(1, 4, 1, X.size, total=320, fmt=1), payload)
     refuses(lambda: read_columns(path), "VAX or IBM", "IEEE")
+
+
+def test_two_sets_under_one_header(tmp_path):
+    """Two channels an instrument did not name apart."""
+    path = tmp_path / "a.uff"
+    file = pyuff.UFF(str(path))
+    file.write_sets(data_set(binary=1))
+    file.write_sets(data_set(binary=1, data=2 * X), "add")
+    columns = read_columns(path)
+    assert np.array_equal(columns.data["Vib Displacement"], X)
+    assert np.array_equal(columns.data["Vib Displacement (2)"], 2 * X)
+
+
+def _spaces_at_the_end(lines):  # SignalStar: the last line of the numbers is filled up (pyuff issue 20)
+    closing = max(i for i, line in enumerate(lines) if line.strip() == "-1")
+    return [line.ljust(80) if i == closing - 1 else line for i, line in enumerate(lines)]
+
+
+def _short_records(lines):  # records not filled with blanks
+    return [line.rstrip() if 2 <= i < 13 else line for i, line in enumerate(lines)]
+
+
+def _small_exponents(lines):
+    return [line if i < 13 else line.replace("E", "e") for i, line in enumerate(lines)]
+
+
+@pytest.mark.parametrize("edit", [_spaces_at_the_end, _short_records, _small_exponents])
+@pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
+def test_text_as_other_writers_have_it(tmp_path, edit, newline):
+    path = tmp_path / "a.uff"
+    pyuff.UFF(str(path)).write_sets(data_set(binary=0))
+    path.write_bytes(newline.join(line.encode() for line in edit(path.read_text().split("\n"))))
+    columns = read_columns(path)
+    assert columns.data["Vib Displacement"] == pytest.approx(X, rel=1e-11, abs=1e-18)
+    assert columns.units == {"time": "s", "Vib Displacement": "um"}
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8"])
+@pytest.mark.parametrize("binary", [0, 1])
+def test_letters_beyond_ascii_in_the_header(tmp_path, encoding, binary):
+    path = tmp_path / "a.uff"
+    pyuff.UFF(str(path)).write_sets(data_set(binary=binary, id2="note"))
+    path.write_bytes(path.read_bytes().replace(b"note", "20 °C, µm".encode(encoding), 1))
+    assert read_columns(path).data["Vib Displacement"] == pytest.approx(X, rel=1e-11, abs=1e-18)
