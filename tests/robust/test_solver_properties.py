@@ -70,15 +70,30 @@ def rigs(draw) -> tuple[Model, float, float]:
 
 
 def run(model: Model, end: float, tighter: float = 1.0):
-    """Integrate with tolerances that fit the rig's own scale."""
-    u = float(np.max(np.asarray(model.bank.strength) / np.maximum(np.asarray(model.bank.stiffness), 1e-300)))
+    """Integrate with tolerances that fit the rig's own scale: how far all springs together carry the full strength."""
     mass, k = float(model.block.mass), float(np.sum(model.bank.stiffness) + model.block.spring_stiffness)
+    u = float(np.sum(model.bank.strength)) / k
     tolerance = Tolerance(*(part / tighter for part in (3e-3, 3e-6 * u, 3e-6 * u * np.sqrt(k / mass))))
     return integrate(model, end, tolerance=tolerance, stops=tuple(np.asarray(model.load_point.times[1:3])),
                      largest_step=end / 50, most_steps=MOST)  # fmt: skip
 
 
+def imbalance(model: Model, s) -> float:
+    """Largest energy that is missing or too much, over the work of the spring.
+
+    Left out are single steps that go over a whole stick and slip: longer than the contact takes to answer, and farther
+    than it holds. What happens within such a step has no balance.
+    """
+    strength, k = float(np.sum(model.bank.strength)), float(np.sum(model.bank.stiffness) + model.block.spring_stiffness)
+    answer = max(2.0 * np.pi * np.sqrt(float(model.block.mass) / k), float(model.block.damping) / k)
+    leap = (np.diff(s.t) > answer) & (np.abs(np.diff(s.x)) > strength / k)
+    gap = np.diff(s.spring_work + s.body_work - s.stored - s.friction_work - s.viscous_work)
+    scale = np.max(np.abs(s.spring_work)) + np.max(np.abs(s.stored))
+    return float(np.max(np.abs(np.cumsum(np.where(leap, 0.0, gap)))) / scale) if scale > 0 else 0.0
+
+
 finished: list[bool] = []
+excused: list[bool] = []
 
 
 @settings(max_examples=150, **EXAMPLES)
@@ -108,23 +123,22 @@ def test_the_laws_hold_wherever_the_solver_gets(rig):
     scale = np.max(np.abs(s.spring_work)) + np.max(np.abs(s.stored))
     assert np.all(np.diff(s.friction_work) >= -1e-9 * scale)
     assert np.all(np.diff(s.viscous_work) >= -1e-9 * scale)
-    # the balance is kept to a tenth, or a tighter tolerance brings it nearer; a slip that lasts less than a
-    # hundred-millionth of the run is jumped over, and its energy is lost to the balance
-    k = float(np.sum(model.bank.stiffness) + model.block.spring_stiffness)
-    jumped = end > 1e8 * 2.0 * np.pi * np.sqrt(float(model.block.mass) / k)
-    damped = float(model.block.damping) > 0.0  # errors of undamped oscillations add up, see docs/robustness.md
-    if trajectory.stats.energy_error > 0.1 and damped and not jumped:
+    # the balance is kept, or a tighter tolerance keeps it
+    off = imbalance(model, s)
+    excused.append(off <= 0.02 < trajectory.stats.energy_error)
+    if off > 0.02:
         try:
             finer, _ = run(model, end, 30.0)
         except SolveError:  # of too many steps
             return
-        assert finer.stats.energy_error < 0.3 * trajectory.stats.energy_error
+        assert imbalance(model, finer.steps) < 0.3 * off
 
 
 def test_most_of_the_range_is_integrated_to_the_end():
     """Else the laws above would hold of nothing (runs after the examples)."""
     assert len(finished) > 100
     assert np.mean(finished) > 0.5
+    assert np.mean(excused) < 0.1
 
 
 @settings(max_examples=40, **EXAMPLES)
