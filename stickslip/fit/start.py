@@ -24,12 +24,13 @@ BINS = 96
 DAMPING_SHARE = 0.017  # of the critical damping of the contact resonance
 FALLBACK_STIFFNESS = 1000.0  # N/m, of a spring of which nothing is known
 FALLBACK_FREQUENCY = 500.0  # Hz, contact resonance of the paper's rig
+STANDS_OUT = 10.0  # times the median of the spectrum; of noise alone, the peak is about twice, its slow end five times
 
 
 def ring_period(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float:
     """Period (s) of the ringing after the arrests: the highest peak of their mean spectrum above 60 Hz.
 
-    Falls back on 2 ms where the sampling is too slow or nothing rings.
+    Falls back on 2 ms where the sampling is too slow or nothing rings, that is where no peak stands out of the noise.
     """
     found = []
     for trace, segments in zip(traces, segmentations, strict=True):
@@ -54,7 +55,7 @@ def ring_period(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) 
     size = min(f[1][1].size for f in found)
     power = np.mean([f[1][1][:size] for f in found], axis=0)
     band = (frequency[:size] > 60.0) & (frequency[:size] < found[0][0] / 5.0)
-    if not band.any():
+    if not band.any() or power[band].max() < STANDS_OUT * np.median(power[band]):
         return 1.0 / FALLBACK_FREQUENCY
     return float(1.0 / frequency[:size][band][np.argmax(power[band])])
 

@@ -5,7 +5,7 @@ import pytest
 
 from stickslip.campaign import Rig, load_campaign, load_traces
 from stickslip.features.measurement import measure
-from stickslip.fit.start import base_composition
+from stickslip.fit.start import FALLBACK_FREQUENCY, base_composition, ring_period
 from stickslip.fit.surface import surface_prior
 from stickslip.segment import segment
 
@@ -73,3 +73,29 @@ def test_the_roughness_is_the_prior_of_the_contact(start):
     # the ringing still tells where to begin, with the shape of the lines
     stiffness = [f["contact.p"].start / f["contact.u_max"].start for f in (before, after)]
     assert stiffness[0] == pytest.approx(stiffness[1])
+
+
+def slips(folder, ring):
+    """Five slips at 10 kHz read in counts of 8 nm, each followed by ringing of the given size (m) at 430 Hz."""
+    t = np.arange(0.0, 4.5, 1e-4)
+    rng = np.random.default_rng(2)
+    x = 0.5e-6 * t + 5e-9 * rng.standard_normal(t.size)
+    for end in (0.8, 1.6, 2.4, 3.2, 4.0):
+        x += 19.6e-6 * (1 - np.cos(np.pi * np.clip((t - end + 0.03) / 0.03, 0, 1)))
+        after = np.clip(t - end, 0, None)
+        x += ring * np.sin(2 * np.pi * 430 * after) * np.exp(-after / 0.01)
+    np.savetxt(folder / "a.csv", np.column_stack([t, np.round(x / 8e-9) * 8e-3]), delimiter=",", fmt="%.9g")
+    (folder / "c.toml").write_text(RIG + SPRING + TRACE.format(name="a"))
+    traces = load_traces(load_campaign(folder / "c.toml"))
+    found = [segment(t) for t in traces]
+    assert len(found[0].events) == 5
+    return traces, found
+
+
+def test_the_ringing_tells_the_contact_s_resonance(tmp_path):
+    assert 1.0 / ring_period(*slips(tmp_path, 1e-7)) == pytest.approx(430.0, rel=0.05)
+
+
+def test_noise_is_no_ringing(tmp_path):
+    """The highest peak of noise is somewhere, often at the slow end; a contact a hundred times as soft would follow."""
+    assert ring_period(*slips(tmp_path, 0.0)) == 1.0 / FALLBACK_FREQUENCY
