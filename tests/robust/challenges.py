@@ -1,9 +1,10 @@
-"""A sealed challenge of four cases, and an invented diagnosis that works piece by piece as the real one does."""
+"""Sealed challenges of a few cases, and an invented diagnosis that works piece by piece as the real one does."""
 
 from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +14,19 @@ from stickslip.runstore import file_record, open_run
 from stickslip.workflow import Pieces
 
 
-def challenge(folder: Path) -> Path:
-    """A challenge whose campaigns are one line each."""
-    names = [f"case-{i:03d}" for i in range(1, 5)]
+def _line(folder: Path) -> None:
+    """A campaign that is one line."""
+    (folder / "campaign.toml").write_text(f"# {folder.name}\n")
+
+
+def challenge(folder: Path, number: int = 4, campaign: Callable[[Path], object] = _line) -> Path:
+    """A sealed challenge; ``campaign`` writes the files of a case into its folder."""
+    names = [f"case-{i:03d}" for i in range(1, number + 1)]
     files = [folder / TRUTH]
     for name in names:
-        path = folder / CASES / name / "campaign.toml"
-        path.parent.mkdir(parents=True)
-        path.write_text(f"# {name}\n")
-        files.append(path)
+        (folder / CASES / name).mkdir(parents=True)
+        campaign(folder / CASES / name)
+        files += sorted((folder / CASES / name).iterdir())
     (folder / TRUTH).parent.mkdir()
     cases = [{"name": name, "kind": "none", "effects": []} for name in names]
     (folder / TRUTH).write_text(json.dumps({"schema": 1, "seed": 5, "cases": cases}))

@@ -16,6 +16,7 @@ from stickslip.runstore import RESULT, open_run, read_result
 
 from .challenges import challenge
 from .seeds import beside
+from .test_killed import small_campaign
 
 SCENARIO = """\
 schema = 1
@@ -173,25 +174,52 @@ def test_a_read_only_disk(files, tmp_path, capsys, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    ("name", "limit"), [("creep", 100), ("creep", 3000), ("inspect", 100), ("inspect", 3000), ("simulate", 60_000)]
-)
-def test_a_full_disk(files, tmp_path, name, limit):
-    """No file may grow beyond a limit: every kind of file is the first that does not fit, at one of the limits."""
+def on_a_full_disk(arguments: list[str], out: Path, limit: int) -> bool:
+    """Run where no file may grow beyond ``limit``; whether it was refused, in words and with nothing left behind."""
+    before = sorted(p.name for p in out.parent.iterdir())
     program = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit},) * 2)\n{MAIN}"
     done = subprocess.run(
-        [sys.executable, "-c", program, *commands(files)[name], "--out", str(tmp_path / "out")],
+        [sys.executable, "-c", program, *arguments, "--out", str(out)],
         capture_output=True, text=True, env={**os.environ, "STICKSLIP_NO_CACHE": "1"},
     )  # fmt: skip
     assert "Traceback" not in done.stderr
     assert "Exception ignored" not in done.stderr
-    if done.returncode == 0:  # everything fitted
-        assert max(p.stat().st_size for p in (tmp_path / "out").rglob("*")) <= limit
-        return
+    if done.returncode in (0, 3):  # everything fitted
+        assert max(p.stat().st_size for p in out.rglob("*")) <= limit
+        return False
     assert done.returncode == 2
     assert "stickslip: " in done.stderr
     assert "File too large" in done.stderr or "written" in done.stderr
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["in"]
+    left = {p.name for p in out.parent.iterdir()} - set(before)
+    assert left <= {f"{out.name}.partial"}  # the finished pieces of a diagnosis
+    return True
+
+
+@pytest.mark.parametrize(
+    ("name", "limit"), [("creep", 100), ("creep", 3000), ("inspect", 100), ("inspect", 3000), ("simulate", 60_000)]
+)
+def test_a_full_disk(files, tmp_path, name, limit):
+    """Every kind of file is the first that does not fit, at one of the limits."""
+    on_a_full_disk(commands(files)[name], tmp_path / "out", limit)
+    assert sorted(p.name for p in tmp_path.iterdir()) in (["in"], ["in", "out"])
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_a_full_disk_under_long_work(tmp_path):
+    """Fits, a diagnosis and a comparison of the shipped campaign: refused in words, and done once there is room."""
+    campaign = str(small_campaign(tmp_path))
+    tasks = {
+        "static": ["fit", campaign, "--model", "static"],
+        "inertial": ["fit", campaign, "--model", "inertial"],
+        "diagnosis": ["diagnose", campaign, "--jobs", "1", "--candidates", "sensor-drift", "--max-effects", "1"],
+        "compared": ["compare", str(tmp_path / "static"), str(tmp_path / "inertial")],
+    }
+    for name, arguments in tasks.items():
+        for limit in (100, 20_000):
+            assert on_a_full_disk(arguments, tmp_path / name, limit)
+        assert run([*arguments, "--out", str(tmp_path / name)]) in (0, 3)
+        assert (tmp_path / name / RESULT).is_file()
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")

@@ -180,14 +180,17 @@ import sys
 from stickslip.challenge.run import run_challenge
 from tests.robust.challenges import piecewise
 if __name__ == "__main__":
-    found = run_challenge(sys.argv[1], workers=1, diagnosis=piecewise)
-    sys.exit(found["done"] != 4)
+    if sys.argv[2] == "real":
+        found = run_challenge(sys.argv[1], workers=1, candidates=["sensor-drift"], max_effects=1)
+    else:
+        found = run_challenge(sys.argv[1], workers=1, diagnosis=piecewise)
+    sys.exit(found["open"] + found["failed"] != 0)
 """
 
 
-def _start(folder: Path) -> subprocess.Popen:
+def _start(folder: Path, diagnosis: str) -> subprocess.Popen:
     return subprocess.Popen(
-        [sys.executable, "-c", CHALLENGE, str(folder)], start_new_session=True, stdout=subprocess.DEVNULL,
+        [sys.executable, "-c", CHALLENGE, str(folder), diagnosis], start_new_session=True, stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
     )  # fmt: skip
 
@@ -195,20 +198,18 @@ def _start(folder: Path) -> subprocess.Popen:
 def _answers(folder: Path) -> dict[str, Any]:
     assert not list((folder / "runs").glob("*.failures.json"))
     assert not list((folder / "runs").glob("*.partial"))
-    found = {p.name: read_result(p) for p in sorted((folder / "runs").iterdir()) if p.is_dir()}
-    return {name: (result["total"], result["verdict"]) for name, result in found.items()}
+    return {p.name: without_time(read_result(p)) for p in sorted((folder / "runs").iterdir()) if p.is_dir()}
 
 
-def _check_challenge(tmp_path: Path, kills: int) -> None:
+def _check_challenge(whole: Path, cut: Path, cases: int, diagnosis: str, kills: int) -> None:
     """Kill ``challenge run`` at random moments; where it came to its end before, it is begun anew."""
-    whole, cut = challenge(tmp_path / "whole"), challenge(tmp_path / "cut")
     began = time.monotonic()
-    assert _start(whole).wait() == 0
+    assert _start(whole, diagnosis).wait() == 0
     length, want = time.monotonic() - began, _answers(whole)
-    assert len(want) == 4
+    assert len(want) == cases
     rng, done = random.Random(3), 0
     while done < kills:
-        process = _start(cut)
+        process = _start(cut, diagnosis)
         try:
             process.wait(rng.uniform(0.2, 0.9) * length)
         except subprocess.TimeoutExpired:
@@ -223,15 +224,22 @@ def _check_challenge(tmp_path: Path, kills: int) -> None:
             shutil.rmtree(cut / "runs")
         for name in cut.glob("runs/*.json"):
             json.loads(name.read_text(encoding="utf-8"))
-    assert _start(cut).wait() == 0
+    assert _start(cut, diagnosis).wait() == 0
     assert _answers(cut) == want
 
 
 def test_a_challenge_killed_with_its_workers_goes_on(tmp_path):
-    _check_challenge(tmp_path, 2)
+    _check_challenge(challenge(tmp_path / "whole"), challenge(tmp_path / "cut"), 4, "invented", 2)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_a_challenge_killed_at_twenty_random_moments(tmp_path):
-    _check_challenge(tmp_path, 20)
+    _check_challenge(challenge(tmp_path / "whole"), challenge(tmp_path / "cut"), 4, "invented", 20)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_a_challenge_of_real_diagnoses_killed_at_twenty_random_moments(tmp_path):
+    whole, cut = (challenge(tmp_path / name, 2, small_campaign) for name in ("whole", "cut"))
+    _check_challenge(whole, cut, 2, "real", 20)
