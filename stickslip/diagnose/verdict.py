@@ -116,9 +116,10 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
     passed = [j for j in ranked if j.passed]
     if not passed:
         return None, []
-    best = passed[0]
+    # what the fitted cycles cannot tell apart, the unseen ones may
+    best = min((j for j in passed if j.cost < limits.rival * passed[0].cost), key=_unseen)
     # a special case within reach of the law that contains it: nothing speaks for the rest of that law
-    simpler = [j for j in passed[1:] if j.cost < limits.rival * best.cost and _contains(best, j)]
+    simpler = [j for j in passed if j.cost < limits.rival * best.cost and _contains(best, j)]
     best = simpler[0] if simpler else best
     # a rival counts even where it gains too little by itself, unless it needs what is not plausible or is clearly worse
     # on cycles that no fit has seen
@@ -135,6 +136,12 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
         if all(j.candidate.tag != s.candidate.tag for s in seen):
             seen.append(j)
     return best, seen
+
+
+def _unseen(judged: Judged) -> float:
+    """Score on unseen cycles; infinite where there are none."""
+    held = judged.candidate.held
+    return np.inf if held is None else held.score
 
 
 def _worse(one: Candidate, other: Candidate, limits: Thresholds) -> bool:

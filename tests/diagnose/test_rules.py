@@ -101,6 +101,19 @@ def test_two_that_explain_as_well_are_a_set():
     assert [j.candidate.tag for j in close] == ["sensor-drift", "thermal-creep"]
 
 
+def test_what_fitted_cycles_cannot_tell_apart_unseen_ones_may():
+    """One wave longer than the track fits as well as wear, and goes on wrongly where no fit looked."""
+    wave, wear = candidate("position-dependent-friction", 175, 4.8), candidate("wear", 179, 0.85)
+    best, close = decide([judge(c, 6000.0, held(81.0)) for c in (wave, wear)])
+    assert best is not None
+    assert best.candidate.tag == "wear"
+    assert [j.candidate.tag for j in close] == ["wear"]
+    # beyond the rivals of the cheapest, unseen cycles do not make a leader
+    best, _ = decide([judge(c, 6000.0, held(81.0)) for c in (wave, replace(wear, fit=replace(wear.fit, cost=230)))])
+    assert best is not None
+    assert best.candidate.tag == "position-dependent-friction"
+
+
 @pytest.mark.parametrize(
     "rival", [candidate("thermal-creep", 310, 1.2), candidate("thermal-creep", 310, 0.8, at_bound=True)]
 )
