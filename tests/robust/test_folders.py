@@ -214,7 +214,7 @@ def test_a_full_disk_under_long_work(tmp_path):
         "static": ["fit", campaign, "--model", "static"],
         "inertial": ["fit", campaign, "--model", "inertial"],
         "diagnosis": ["diagnose", campaign, "--jobs", "1", "--candidates", "sensor-drift", "--max-effects", "1"],
-        "compared": ["compare", str(tmp_path / "static"), str(tmp_path / "inertial")],
+        "compared": ["compare", str(tmp_path / "inertial"), str(tmp_path / "diagnosis")],
     }
     for name, arguments in tasks.items():
         assert on_a_full_disk(arguments, tmp_path / name, 100)
