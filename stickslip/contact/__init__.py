@@ -32,6 +32,7 @@ from .profiles import (
 from .rough_bank import bank_from_contact, rough_bank, spring_bank
 from .roughness import cut_to_line_factor, line_phasors, lines_from_phasors, rough_lines
 from .tangential import StaticContact
+from .touching import touching
 
 __all__ = [
     "Arrest",
@@ -85,6 +86,7 @@ __all__ = [
     "sphere",
     "spring_bank",
     "static_contact",
+    "touching",
     "two_bodies",
     "virtual_time",
 ]

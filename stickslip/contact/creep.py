@@ -18,6 +18,7 @@ from .indentation import Indentation, check_saturation, indentation
 from .profiles import Profile, from_heights
 from .roughness import check_line, line_phasors, lines_from_phasors
 from .tangential import StaticContact
+from .touching import touching
 
 Average = Literal["displacement", "force"]
 TimeForm = Literal["exact", "paper"]
@@ -146,19 +147,22 @@ def creep_curve(
     loads = default_loads() if tau is None else tau
     check_within("the load", loads, least=0.0, to=1.0, key="tau")
     check_within("the number of contacts", contacts, least=1.0, key="contacts")
+    elastic = moduli or equal_bodies()
     if profile is None:
         waves = {k: None if w is None else w / length for k, w in (("roll_off", roll_off), ("cut_off", cut_off))}
-        table = rough_table(H, length, n_springs, lines, seed, **waves).scaled(_height(h_rms))
+        _check_load(normal_force, friction)
+        load = n_springs * jnp.asarray(normal_force) / (elastic.normal * length * jnp.asarray(_height(h_rms)))
+        table = rough_table(H, length, n_springs, lines, seed, load=load, **waves).scaled(h_rms)
     else:
         table = indentation(profile)
-    contact = static_contact(table, normal_force, friction, moduli)
+    contact = static_contact(table, normal_force, friction, elastic)
     tau_out, u, u_max, stiffness, share = _evaluate(contact, jnp.asarray(loads), average)
     if concrete(share) and (profile is None or jnp.any(profile.gaps > 0.0)):  # a flat punch is meant to touch all over
         check_saturation(share, key="contact")
     force = tau_out * contact.strength * contacts
     t = virtual_time(force, u, spring_stiffness, velocity, time)
     reach, spread = jnp.mean(u_max), jnp.std(u_max)
-    return CreepCurve(tau_out, u, t, force, reach, spread, jnp.mean(stiffness), jnp.mean(share), table.gaps.shape[-1])
+    return CreepCurve(tau_out, u, t, force, reach, spread, jnp.mean(stiffness), jnp.mean(share), table.n_springs)
 
 
 def creep_displacements(
@@ -173,7 +177,7 @@ def creep_displacements(
     n_springs: int = 4096,
     lines: int = 100,
     seed: int = 0,
-    memory: float = 2.0e8,
+    memory: float = 2.0e7,
 ) -> np.ndarray:
     """Displacements at given loads for many parameter sets, mean over the lines. For derivatives: `creep_curve`.
 
@@ -182,7 +186,7 @@ def creep_displacements(
 
     Args:
         tau: (T,) loads.
-        memory: bytes that one chunk may take, about.
+        memory: bytes that one chunk may take, about; more than the caches hold costs twice the time.
 
     Returns:
         (P, T) in m. No check of saturation.
@@ -213,15 +217,21 @@ def rough_table(
     n_springs: int = 4096,
     lines: int = 100,
     seed: int = 0,
+    *,
+    load: ArrayLike | None = None,
     **waves: ArrayLike | None,
 ) -> Indentation:
     """Sorted table of rough lines with an rms height of 1 m; give it the real one with `Indentation.scaled`.
 
-    Args: as of `creep_curve`, but ``roll_off`` and ``cut_off`` as shares of the length.
+    Args: as of `creep_curve`, but ``roll_off`` and ``cut_off`` as shares of the length. ``load``: largest
+    F_n/(E* dx h_rms) that will be asked for, if it is known (see `touching`).
     """
     check_within("the length of the line", length, above=0.0, key="line_length", unit="m")
     check_line(H, lines, n_springs)
-    return _table(H, line_phasors(lines, n_springs, seed), length / n_springs, waves)
+    phasors, dx = line_phasors(lines, n_springs, seed), length / n_springs
+    if load is None:
+        return _table(H, phasors, dx, waves)
+    return touching(Profile(_gaps(H, phasors, waves), dx), load)
 
 
 def static_contact(
@@ -235,6 +245,11 @@ def static_contact(
 @jax.jit
 def _table(H: ArrayLike, phasors: ArrayLike, dx: ArrayLike, waves: dict[str, ArrayLike | None]) -> Indentation:
     return indentation(from_heights(lines_from_phasors(H, phasors, **waves), dx))
+
+
+@jax.jit
+def _gaps(H: ArrayLike, phasors: ArrayLike, waves: dict[str, ArrayLike | None]) -> Array:
+    return from_heights(lines_from_phasors(H, phasors, **waves), 1.0).gaps
 
 
 @partial(jax.jit, static_argnames="average")

@@ -36,12 +36,19 @@ class Indentation(eqx.Module):
         dx: spacing of the springs, m.
         height: length in m that the gaps are counted in; broadcasts against the leading axes. Scaling a rough line
             keeps the order of its springs, so lines of unit rms are sorted once for every rms height.
+        springs: of a line, where the table leaves out those that do not touch (see `touching`).
     """
 
     gaps: Array
     sums: Array
     dx: ArrayLike
     height: ArrayLike = 1.0
+    springs: int | None = eqx.field(default=None, static=True)
+
+    @property
+    def n_springs(self) -> int:
+        """Springs of a line, touching or not."""
+        return self.gaps.shape[-1] if self.springs is None else self.springs
 
     def scaled(self, height: ArrayLike) -> Indentation:
         """The same lines with heights multiplied by ``height``; costs nothing."""
@@ -61,13 +68,13 @@ class Indentation(eqx.Module):
 
     def contact_length(self, depth: ArrayLike) -> Array:
         """Length in m of the springs that touch; dF_n/d(depth) is E* times it."""
-        return self.contact_share(depth) * (self.gaps.shape[-1] * self.dx)
+        return self.contact_share(depth) * (self.n_springs * self.dx)
 
     def contact_share(self, depth: ArrayLike) -> Array:
         """Share of the springs that touch, 0 to 1."""
         level = jnp.asarray(depth) / self.height
         count, gap, _ = self._search(self.gaps, level)
-        return jnp.where(level > gap, count, count - 1.0) / self.gaps.shape[-1]
+        return jnp.where(level > gap, count, count - 1.0) / self.n_springs
 
     def _search(self, table: Array, query: ArrayLike) -> tuple[Array, Array, Array]:
         """How many entries of ``table`` are at or below each query (at least one), and the gap and sum at the last."""

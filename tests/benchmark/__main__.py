@@ -1,102 +1,30 @@
-"""Print the benchmark's tables: solvers at equal accuracy, cost of a Jacobian, start-up of the command line."""
+"""Print the benchmark's tables: static curve, solvers at equal accuracy, cost against size, Jacobian, batches."""
 
 from __future__ import annotations
 
 import argparse
-import functools
 import os
 import resource
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+
+from .measuring import head, row, timed
 
 ROOT = Path(__file__).resolve().parents[2]
+PARTS = ("static", "solvers", "sizes", "springs", "drive", "events", "jacobian", "batches", "command-line")
+FACTOR = 3.0  # of tolerance, accurate enough at 256 springs (table of solvers)
 
 
-def timed(work: Callable[[], Any], repeats: int = 3) -> tuple[Any, float, float]:
-    """Result, and the least processor and wall time (s) of some repeats."""
-    cpu, wall, result = [], [], None
-    for _ in range(repeats):
-        c, w = time.process_time(), time.perf_counter()
-        result = work()
-        cpu.append(time.process_time() - c)
-        wall.append(time.perf_counter() - w)
-        if wall[-1] > 5.0:
-            break
-    return result, min(cpu), min(wall)
-
-
-def row(*cells: object) -> None:
-    print("| " + " | ".join(str(c) for c in cells) + " |", flush=True)
-
-
-def head(*cells: str) -> None:
-    print()
-    row(*cells)
-    row(*("---" for _ in cells))
-
-
-def solvers(limit: float) -> float:
-    """The table of solvers; the own solver's factor of tolerance that is accurate enough comes back."""
-    from . import case, own, peers
-
-    case.leapfrog(5e-5)  # compiles
-    reference, cpu, wall = timed(lambda: case.leapfrog(2e-7), 1)
-    events = case.measure(reference, reference).events
-    print(
-        f"{case.SPRINGS} elements, {case.DURATION:g} s of drive, {events} events. Accurate enough: recurrence to "
-        f"{case.RECURRENCE:g} of the period, creep to {case.CREEP * 1e9:g} nm, against leapfrog with 0.2 us "
-        f"({cpu:.1f} s). Times: least of three; runs above 5 s once."
-    )
-    head("solver", "setting", "processor s", "wall s", "steps", "recurrence", "creep nm", "accurate enough")
-
-    def report(name: str, setting: str, answer: case.Answer, cpu: float, wall: float, steps: object) -> bool:
-        found = case.measure(answer, reference)
-        good = found.enough(events)
-        row(
-            name, setting, f"{cpu:.3f}", f"{wall:.3f}", steps, f"{found.recurrence:.1e}", f"{found.creep * 1e9:.2g}",
-            "yes" if good else "no",
-        )  # fmt: skip
-        return good
-
-    chosen = 10.0
-    for factor in (0.3, 1.0, 3.0, 10.0):
-        _, cold, _ = timed(lambda f=factor: own.own_answer(f), 1)
-        (answer, stats), cpu, wall = timed(lambda f=factor: own.own_answer(f))
-        name = f"own solver (first call {cold:.1f} s)" if factor == 0.3 else "own solver"
-        if report(name, f"default tolerance/{factor:g}", answer, cpu, wall, stats.steps):
-            chosen = factor
-            break
-    for dt in (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1e-5, 5e-6, 2.5e-6, 1e-6, 5e-7):
-        answer, cpu, wall = timed(lambda dt=dt: case.leapfrog(dt))
-        if report("leapfrog, numba", f"{dt * 1e6:g} us", answer, cpu, wall, round(case.DURATION / dt)):
-            break
-    for method in ("LSODA", "RK45", "Radau"):
-        spent = time.process_time()
-        for rtol in (1e-4, 1e-6, 1e-8):
-            left = limit - (time.process_time() - spent)
-            start = time.process_time()
-            try:
-                work = functools.partial(peers.scipy_answer, method, rtol, start + left)
-                (answer, calls), cpu, wall = timed(work, 1)
-            except peers.OverTime as why:
-                row(f"scipy {method}", f"rtol {rtol:g}", f"over {limit:g} s in all", "", "", "", "", f"no: {why}")
-                break
-            if report(f"scipy {method}", f"rtol {rtol:g}", answer, cpu, wall, f"{calls} calls"):
-                break
-    return chosen
-
-
-def jacobian(factor: float) -> None:
+def jacobian() -> None:
+    from .case import Case
     from .own import jacobian_runs
 
     head("Jacobian in 8 parameters", "processor s", "wall s", "in plain runs (processor)")
     plain = 0.0
-    for name, work in jacobian_runs(factor).items():
+    for name, work in jacobian_runs(Case(), FACTOR).items():
         work()
         _, cpu, wall = timed(work)
         plain = plain or cpu
@@ -126,17 +54,37 @@ def command_line() -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.benchmark", description=__doc__)
-    parser.add_argument("--limit", type=float, default=60.0, help="processor seconds for each solver of scipy")
-    parser.add_argument("--only", choices=("solvers", "jacobian", "command-line"))
+    parser.add_argument(
+        "--limit", type=float, default=60.0, help="processor seconds for each run of a peer among the solvers"
+    )
+    parser.add_argument("--sets", type=int, default=1000, help="parameter sets of the batches")
+    parser.add_argument("--small", action="store_true", help="small sizes, to see that it runs; writes no files")
+    parser.add_argument("--only", choices=PARTS, help="sizes: springs, drive and events")
     arguments = parser.parse_args()
+    only, small = arguments.only, arguments.small
     load = ", ".join(f"{x:.1f}" for x in os.getloadavg())
     print(f"{os.cpu_count()} processors, load {load} (processor time tells more than wall time where others work too)")
-    factor = 1.0
-    if arguments.only in (None, "solvers"):
-        factor = solvers(arguments.limit)
-    if arguments.only in (None, "jacobian"):
-        jacobian(factor)
-    if arguments.only in (None, "command-line"):
+    # first, before anything else has taken memory
+    if only in (None, "static"):
+        from . import static
+
+        static.report(small)
+    if only in (None, "solvers"):
+        from . import solvers
+
+        solvers.report(arguments.limit, small)
+    sizes_wanted = [part for part in ("springs", "drive", "events") if only in (None, "sizes", part)]
+    if sizes_wanted:
+        from . import sizes
+
+        sizes.report(small, sizes_wanted)
+    if only in (None, "jacobian"):
+        jacobian()
+    if only in (None, "batches"):
+        from . import batches
+
+        batches.report(FACTOR, 8 if small else arguments.sets)
+    if only in (None, "command-line"):
         command_line()
 
 

@@ -2,28 +2,81 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from tests.solve import brute_force
-from tests.solve.rig import Slips, slips
 
-SPRINGS = 256
-DURATION, MASS, C_S, DAMPING, VELOCITY = 5.0, 0.09, 3000.0, 10.0, 5e-5  # s, kg, N/m, N s/m, m/s
+MASS, C_S, DAMPING = 0.09, 3000.0, 10.0  # kg, N/m, N s/m
 RATIO, D_C, T_H = 0.7, 1e-6, 0.02  # 1, m, s
-STIFFNESS = np.full(SPRINGS, 7e5 / SPRINGS)  # N/m
-_SPREAD = np.linspace(0.05, 1.0, SPRINGS)
-CAP = 0.26 * _SPREAD / _SPREAD.sum()  # N
-RECURRENCE, CREEP = 1e-3, 1e-9  # share of the period; m
-GRID = np.linspace(0.0, DURATION, 100_001)[1:]  # s; where traces are compared, 50 us apart
+STIFFNESS, STRENGTH = 7e5, 0.26  # of all elements together: N/m, N
+RECURRENCE, CREEP = 1e-3, 1e-9  # what is accurate enough: share of the period; m
+REFERENCE = 2e-7  # s, step of the leapfrog that others are measured against
+STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1e-5, 5e-6, 2.5e-6, 1e-6, 5e-7)  # s, that the leapfrog may choose from
+
+
+@dataclass(frozen=True)
+class Case:
+    """The rig with equally stiff elements whose caps lie evenly between 1/20 of the largest one and that.
+
+    Attributes:
+        springs: number of elements.
+        duration: of the drive (s), from rest.
+        velocity: of the drive (m/s).
+    """
+
+    springs: int = 256
+    duration: float = 5.0
+    velocity: float = 5e-5
+
+    @cached_property
+    def stiffness(self) -> np.ndarray:
+        """(springs,) in N/m."""
+        return np.full(self.springs, STIFFNESS / self.springs)
+
+    @cached_property
+    def cap(self) -> np.ndarray:
+        """(springs,) in N."""
+        spread = np.linspace(0.05, 1.0, self.springs)
+        return STRENGTH * spread / spread.sum()
+
+    @cached_property
+    def grid(self) -> np.ndarray:
+        """Times (s) at which traces are compared, 50 us apart and closer where the drive is faster than 0.1 mm/s."""
+        n = round(self.duration / (5e-5 * min(1.0, 1e-4 / self.velocity)))
+        return np.linspace(0.0, self.duration, n + 1)[1:]
+
+    def lasting(self, events: int) -> Case:
+        """The same until half-way between the arrest of the last of so many events and the next onset."""
+        guess = 1.3 * self.duration * (5e-5 / self.velocity) * (events + 2) / 6
+        long = replace(self, duration=float(np.ceil(guess / 1e-3) * 1e-3))
+        found = events_of(long, leapfrog(long, 2.5e-5))
+        end = 0.5 * (found.arrest[events - 1] + found.onset[events])
+        return replace(self, duration=float(np.round(end / 1e-3) * 1e-3))
 
 
 class Answer(NamedTuple):
-    """A trace on GRID (displacement m, velocity m/s)."""
+    """A trace on the case's grid (displacement m, velocity m/s)."""
 
     x: np.ndarray
     v: np.ndarray
+
+
+def on_grid(case: Case, t: np.ndarray, x: np.ndarray, v: np.ndarray) -> Answer:
+    """From the ends of steps: cubic in the displacement, its derivative in the velocity."""
+    curve = CubicHermiteSpline(t, x, v)
+    return Answer(curve(case.grid), curve(case.grid, 1))
+
+
+class Events(NamedTuple):
+    """Times (s) of complete slips: velocity rises through a threshold, falls to zero."""
+
+    onset: np.ndarray
+    arrest: np.ndarray
 
 
 class Accuracy(NamedTuple):
@@ -37,34 +90,50 @@ class Accuracy(NamedTuple):
         return self.events == events and self.recurrence <= RECURRENCE and self.creep <= CREEP
 
 
-def leapfrog(dt: float) -> Answer:
+def leapfrog(case: Case, dt: float) -> Answer:
     """By brute force with a fixed step."""
-    every = max(1, round(GRID[0] / dt))
+    every = max(1, round(case.grid[0] / dt))
     path = brute_force.simulate(
-        STIFFNESS, CAP, duration=DURATION, mass=MASS, spring_stiffness=C_S, damping=DAMPING, ratio=RATIO,
-        slip_distance=D_C, healing_time=T_H, times=[0.0, 1.0], positions=[0.0, VELOCITY], dt=dt, every=every,
+        case.stiffness, case.cap, duration=case.duration, mass=MASS, spring_stiffness=C_S, damping=DAMPING,
+        ratio=RATIO, slip_distance=D_C, healing_time=T_H, times=[0.0, 1.0], positions=[0.0, case.velocity], dt=dt,
+        every=every,
     )  # fmt: skip
-    if len(path.t) == len(GRID):
+    if len(path.t) == len(case.grid):
         return Answer(path.x, path.v)
-    return Answer(np.interp(GRID, path.t, path.x), np.interp(GRID, path.t, path.v))
+    return Answer(np.interp(case.grid, path.t, path.x), np.interp(case.grid, path.t, path.v))
 
 
-def measure(answer: Answer, reference: Answer) -> Accuracy:
+def measure(case: Case, answer: Answer, reference: Answer) -> Accuracy:
     """Error against the reference; creep curves are laid on each other at each arrest, as a measured one is."""
-    seen, exact = _events(answer), _events(reference)
+    seen, exact = events_of(case, answer), events_of(case, reference)
     if len(seen.onset) != len(exact.onset):
         return Accuracy(len(seen.onset), np.inf, np.inf)
-    recurrence = np.max(np.abs(seen.recurrence / exact.recurrence - 1.0))
-    creep = 0.0
+    recurrence = np.max(np.abs(np.diff(seen.onset) / np.diff(exact.onset) - 1.0), initial=0.0)
+    creep, grid = 0.0, case.grid
     for i, onset in enumerate(exact.onset):
         start, own = (exact.arrest[i - 1], seen.arrest[i - 1]) if i else (0.0, 0.0)
-        slow = GRID[(onset > GRID) & (reference.v < 1e-6)][-1]
+        first, last = np.searchsorted(grid, (start, onset))
+        # until the block moves at a fiftieth of the drive's velocity
+        slow = grid[first + np.flatnonzero(reference.v[first:last] < 0.02 * case.velocity)[-1]]
         t = np.linspace(0.0, slow - start, 4000)
-        gap = np.interp(own + t, GRID, answer.x) - np.interp(start + t, GRID, reference.x)
+        gap = np.interp(own + t, grid, answer.x) - np.interp(start + t, grid, reference.x)
         settled = (t > 0.2 * t[-1]) & (t < 0.4 * t[-1])
         creep = max(creep, float(np.max(np.abs(gap - (gap[settled].mean() if i else 0.0)))))
     return Accuracy(len(seen.onset), float(recurrence), creep)
 
 
-def _events(answer: Answer) -> Slips:
-    return slips(GRID, answer.x, answer.v)
+def events_of(case: Case, answer: Answer) -> Events:
+    """Slips, onset at 0.5 mm/s (fast drives: at twice the drive's velocity)."""
+    v, threshold = answer.v, max(5e-4, 2.0 * case.velocity)
+    rises = np.flatnonzero((v[1:] > threshold) & (v[:-1] <= threshold)) + 1
+    falls = np.flatnonzero((v[1:] <= 0.0) & (v[:-1] > 0.0)) + 1
+    found, now = [], 0
+    while (i := np.searchsorted(rises, now)) < rises.size and (j := np.searchsorted(falls, rises[i])) < falls.size:
+        found.append((_cross(case, v, rises[i], threshold), _cross(case, v, falls[j], 0.0)))
+        now = falls[j]
+    return Events(*np.array(found).reshape(-1, 2).T)
+
+
+def _cross(case: Case, v: np.ndarray, i: int, level: float) -> float:
+    t = case.grid
+    return float(t[i - 1] + (t[i] - t[i - 1]) * (level - v[i - 1]) / (v[i] - v[i - 1]))

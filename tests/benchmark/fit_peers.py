@@ -24,7 +24,7 @@ import numba
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from .__main__ import head, row
+from .measuring import head, row
 
 ELEMENTS, DURATION, DT, EVERY = 64, 5.0, 2e-5, 50  # 1, s, s, steps a sample
 MASS, DAMPING, VELOCITY, WEAKENING_VELOCITY = 0.09, 10.0, 5e-5, 1e-3  # kg, N s/m, m/s, m/s

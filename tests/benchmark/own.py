@@ -11,53 +11,61 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from stickslip.contact import Bank
+from stickslip.contact import Bank, bank_from_backbone, binning_error, default_edges
 from stickslip.model import Block, LoadPoint, Model, Weakening
 from stickslip.solve import ContactStepper, Stats, Tolerance, integrate
 from stickslip.solve.integrate import step_control
 from tests.solve.rig import tighter
 
-from .case import C_S, CAP, D_C, DAMPING, DURATION, GRID, MASS, RATIO, STIFFNESS, T_H, VELOCITY, Answer
+from .case import C_S, D_C, DAMPING, MASS, RATIO, T_H, Answer, Case, on_grid
 
 _TERM = diffrax.ODETerm(lambda t, y, args: y)
 
 
-def model(theta: Array | None = None) -> Model:
+def model(case: Case, theta: Array | None = None, bank: Bank | None = None) -> Model:
     """The rig; eight of its parameters multiplied by ``exp(theta)``."""
     factor = jnp.ones(8) if theta is None else jnp.exp(theta)
-    m, c_s, c, d_c, t_h, v0, k, cap = factor * jnp.array([MASS, C_S, DAMPING, D_C, T_H, VELOCITY, 1.0, 1.0])
+    m, c_s, c, d_c, t_h, v0, k, cap = factor * jnp.array([MASS, C_S, DAMPING, D_C, T_H, case.velocity, 1.0, 1.0])
+    bank = Bank(case.stiffness, case.cap) if bank is None else bank
     return Model(
         Block(m, c_s, c),
-        Bank(k * STIFFNESS, cap * CAP),
+        Bank(k * bank.stiffness, cap * bank.strength),
         Weakening(RATIO, d_c, t_h),
         LoadPoint(jnp.array([0.0, 1.0]), jnp.stack([0.0 * v0, v0])),
     )
 
 
-def own_answer(factor: float) -> tuple[Answer, Stats]:
+def binned(case: Case, n: int) -> tuple[Bank, float]:
+    """The case's bank in n elements, and the bound of its error as a share of the strength."""
+    every = Bank(jnp.asarray(case.stiffness), jnp.asarray(case.cap))
+    far = jnp.max(every.threshold)
+    edges = default_edges(n)
+    return bank_from_backbone(every.backbone, far, edges), float(binning_error(every.backbone, far, edges))
+
+
+def own_answer(case: Case, factor: float, bank: Bank | None = None) -> tuple[Answer, Stats]:
     """By `integrate`, at the default tolerance divided by ``factor``."""
-    trajectory, _ = integrate(model(), DURATION, tolerance=tighter(factor))
-    at = trajectory.at(GRID)
-    return Answer(at.x, at.v), trajectory.stats
+    trajectory, _ = integrate(model(case, bank=bank), case.duration, tolerance=tighter(factor))
+    steps = trajectory.steps
+    return on_grid(case, steps.t, steps.x, steps.v), trajectory.stats
 
 
-def _displacement(theta: Array, tolerance: Tolerance) -> Array:
-    rig = model(theta)
-    ts = jnp.linspace(0.0, DURATION, 2001)
+def displacement(theta: Array, case: Case, tolerance: Tolerance) -> Array:
+    """Displacement (m) at 2001 times of the rig whose eight parameters are multiplied by ``exp(theta)``."""
+    rig = model(case, theta)
+    ts = jnp.linspace(0.0, case.duration, 2001)
     return diffrax.diffeqsolve(
-        _TERM, ContactStepper(tolerance), 0.0, DURATION, 1e-5, rig.rest(), args=(rig, rig.shaped()),
+        _TERM, ContactStepper(tolerance), 0.0, case.duration, 1e-5, rig.rest(), args=(rig, rig.shaped()),
         saveat=diffrax.SaveAt(ts=ts, fn=lambda t, y, args: y.x), stepsize_controller=step_control(0.02),
         adjoint=diffrax.ForwardMode(), max_steps=16384, throw=False,
     ).ys  # fmt: skip
 
 
-def jacobian_runs(factor: float) -> dict[str, Callable[[], np.ndarray]]:
+def jacobian_runs(case: Case, factor: float) -> dict[str, Callable[[], np.ndarray]]:
     """One plain run, and three ways to its Jacobian in eight parameters: displacement at 2001 times."""
     zero = jnp.zeros(8)
-    tolerance = tighter(factor)
-    plain = jax.jit(functools.partial(_displacement, tolerance=tolerance))
-    forward = jax.jit(jax.jacfwd(functools.partial(_displacement, tolerance=tolerance)))
-    many = jax.jit(jax.vmap(functools.partial(_displacement, tolerance=tolerance)))
+    run = functools.partial(displacement, case=case, tolerance=tighter(factor))
+    plain, forward, many = jax.jit(run), jax.jit(jax.jacfwd(run)), jax.jit(jax.vmap(run))
     moved = jnp.concatenate([zero[None], 0.02 * jnp.eye(8)])
     return {
         "plain run": lambda: np.asarray(plain(zero)),

@@ -1,0 +1,108 @@
+"""The tables of solvers at equal accuracy, and the search for the coarsest setting that is accurate enough."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+from stickslip.contact import Bank
+
+from . import own, peers
+from .case import CREEP, RECURRENCE, REFERENCE, STEPS, Accuracy, Answer, Case, events_of, leapfrog, measure
+from .measuring import head, row, timed
+
+FACTORS = (0.3, 1.0, 3.0, 10.0, 30.0)  # the default tolerance is divided by
+
+
+class Found(NamedTuple):
+    """A setting, its processor time (s) and steps, its accuracy and whether that is enough."""
+
+    setting: float
+    cpu: float
+    steps: int
+    accuracy: Accuracy
+    good: bool
+
+
+def coarsest_own(
+    case: Case, reference: Answer, bank: Bank | None = None, tell: Callable[[Found], object] = lambda found: None
+) -> Found:
+    """The own solver with the loosest tolerance that is accurate enough; the tightest tried if none is."""
+    events = len(events_of(case, reference).onset)
+    own.own_answer(case, FACTORS[0], bank)  # compiles
+    for factor in FACTORS:
+        (answer, stats), cpu, _ = timed(lambda f=factor: own.own_answer(case, f, bank))
+        accuracy = measure(case, answer, reference)
+        found = Found(factor, cpu, stats.steps, accuracy, accuracy.enough(events))
+        tell(found)
+        if found.good:
+            break
+    return found
+
+
+def coarsest_leapfrog(case: Case, reference: Answer, tell: Callable[[Found], object] = lambda found: None) -> Found:
+    """The leapfrog of all springs with the longest step that is accurate enough."""
+    events = len(events_of(case, reference).onset)
+    for dt in STEPS:
+        answer, cpu, _ = timed(lambda dt=dt: leapfrog(case, dt))
+        accuracy = measure(case, answer, reference)
+        found = Found(dt, cpu, round(case.duration / dt), accuracy, accuracy.enough(events))
+        tell(found)
+        if found.good:
+            break
+    return found
+
+
+def table(case: Case, limit: float) -> float:
+    """Print the table of one case; the own solver's factor of tolerance that is accurate enough comes back."""
+    leapfrog(Case(springs=8, duration=0.1), 5e-5)  # compiles
+    reference, cpu, _ = timed(lambda: leapfrog(case, REFERENCE), 1)
+    events = len(events_of(case, reference).onset)
+    print(
+        f"\n{case.springs} elements, {case.duration:g} s of drive at {case.velocity * 1e6:g} um/s, {events} events. "
+        f"Accurate enough: recurrence to {RECURRENCE:g} of the period, creep to {CREEP * 1e9:g} nm, against leapfrog "
+        f"with {REFERENCE * 1e6:g} us ({cpu:.1f} s). Times: least of three; runs above 5 s once."
+    )
+    head("solver", "setting", "processor s", "steps", "recurrence", "creep nm", "accurate enough")
+    spent: dict[str, float] = {}
+
+    def tell(name: str, setting: str, steps: object, found: Found) -> None:
+        row(
+            name, setting, f"{found.cpu:.3f}", steps, f"{found.accuracy.recurrence:.1e}",
+            f"{found.accuracy.creep * 1e9:.2g}", "yes" if found.good else "no",
+        )  # fmt: skip
+        if found.good:
+            spent[name] = found.cpu
+
+    chosen = coarsest_own(
+        case, reference, tell=lambda f: tell("own solver", f"default tolerance/{f.setting:g}", f.steps, f)
+    )
+    coarsest_leapfrog(case, reference, lambda f: tell("leapfrog, numba", f"{f.setting * 1e6:g} us", f.steps, f))
+    for name in (*(f"scipy {m}" for m in peers.SCIPY), *(f"diffrax {m}" for m in peers.DIFFRAX)):
+        library, method = name.split()
+        if library == "scipy":
+            work = lambda rtol, until, m=method: peers.scipy_answer(case, m, rtol, until)  # noqa: E731
+        else:
+            work = peers.diffrax_solver(case, method)
+        for rtol in (1e-3, 1e-4, 1e-6, 1e-8):
+            until = time.process_time() + limit
+            try:
+                (answer, count), cpu, _ = timed(lambda rtol=rtol, work=work, until=until: work(rtol, until), 1)
+            except peers.OverTime as why:
+                row(name, f"rtol {rtol:g}", f"over {limit:g}", "", "", "", f"no: {why}")
+                if rtol < 1e-3:  # an implicit solver may be slower where it is coarser
+                    break
+                continue
+            accuracy = measure(case, answer, reference)
+            found = Found(rtol, cpu, count, accuracy, accuracy.enough(events))
+            tell(name, f"rtol {rtol:g}", f"{count} {'calls' if library == 'scipy' else 'steps'}", found)
+            if found.good:
+                break
+    if own_cpu := spent.get("own solver"):
+        print("\nin times of the own solver: " + ", ".join(f"{n} {c / own_cpu:.3g}" for n, c in spent.items()))
+    return chosen.setting
+
+
+def report(limit: float, small: bool = False) -> dict:
+    return {n: table(Case(springs=n, duration=2.0 if small else 5.0), limit) for n in ((64,) if small else (64, 256))}
