@@ -180,7 +180,18 @@ def profile(
         text = f"{name} is bounded on one side only"
     else:
         text = f"{name} is determined on both sides"
+    if _ragged(rise):
+        text += (
+            ", but the refits do not follow one valley: more starts, or fewer free parameters, before this is believed"
+        )
     return Profile(name, z, rise, (low, high), text)
+
+
+def _ragged(rise: Array, noise: float = 1.0) -> bool:
+    """Whether the profile falls again on its way out, by more than ``noise``."""
+    i = int(np.argmin(rise))
+    left, right = rise[i::-1], rise[i:]
+    return any(bool(np.any(np.maximum.accumulate(side) - side > noise)) for side in (left, right))
 
 
 def _crossing(z: Array, rise: Array, side: int, level: float = 3.84) -> float:

@@ -106,10 +106,14 @@ def _print(result: dict[str, Any], out: Path) -> None:
         table.add_row(label, *cells)
     console.print(table)
     verdict = result["verdict"]
-    sure = "" if verdict["confidence"] is None else f" (confidence {100 * verdict['confidence']:.0f} %)"
+    sure = "" if verdict["confidence"] is None else f" ({100 * verdict['confidence']:.0f} % if it is in the catalogue)"
     console.print(f"[bold]{verdict['kind']}[/bold]: {escape(verdict['text'])}{sure}", highlight=False)
     if result["next_experiment"]:
         console.print(f"next experiment: {escape(result['next_experiment']['text'])}", highlight=False)
+    mended = [f"mended: {t['name']}: {text}" for t in result.get("traces", ()) for text in t["repairs"]]
+    lost = [f"left out: {text}" for text in result["dropped"]]
+    for text in [*mended, *lost[:8], *([f"... and {len(lost) - 8} more"] if len(lost) > 8 else [])]:
+        console.print(escape(text), highlight=False)
     if result.get("learned_residual"):
         console.print(f"learned residual: {result['learned_residual']['text']}", highlight=False)
     console.print(f"report in {escape(str(out / 'report.html'))}", highlight=False)

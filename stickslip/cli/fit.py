@@ -240,6 +240,7 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
         lines += ["", result["effective"]["text"]]
     lines += [f"- {text}" for text in result.get("identifiability", ())]
     lines += [p["text"] for p in result.get("profiles", ())]
+    lines += ["", *(f"mended: {t['name']}: {text}" for t in result.get("traces", ()) for text in t["repairs"])]
     lost = result.get("dropped", ())
     lines += ["", *(f"left out: {text}" for text in lost[:8])]
     if len(lost) > 8:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import periodogram
 
-from ..campaign import Campaign, Unmeasured
+from ..campaign import Campaign, Rig, Unmeasured
 from ..errors import InputError
 from ..features.measurement import Measurement
 from ..segment import Segmentation
@@ -17,6 +17,8 @@ from .composition import START, Composition
 from .parameters import Free
 from .surface import Guess, surface_prior
 
+SHARED = ("mass", "contacts", "normal_force", "friction_coefficient", "youngs_modulus", "poisson_ratio", "line_length",
+          "springs")  # fmt: skip
 SHAPE = 3.3  # exponent of the backbone of a self-affine line with H about 0.3
 SHAPE_WIDTH = 0.2  # of its logarithm, where the roughness is not known
 SPREAD = Guess(0.15, 0.6)  # of ln(u_max) over the contacts, where the roughness is not known
@@ -70,6 +72,29 @@ def _known(value: Any, default: float, width: float) -> tuple[float, float, floa
     return float(value), 0.0, None, None, True
 
 
+def _shared_rig(campaign: Campaign, names: Sequence[str]) -> Rig:
+    """The rig of all runs. What a trace gives anew counts where all agree; springs may differ from run to run.
+
+    Raises:
+        InputError: the runs differ in what the dynamic model takes as one.
+    """
+    rigs = [campaign.rig_of(name) for name in names]
+    shared = {}
+    for key in SHARED:
+        found = [getattr(rig, key) for rig in rigs]
+        if any(value != found[0] for value in found):
+            raise InputError(
+                f"the runs differ in '{key}', which the dynamic model takes as one for all",
+                file=campaign.path,
+                key=f"trace.{key}",
+                value=", ".join(f"{n}: {v}" for n, v in zip(names, found, strict=True)),
+                hint="fit runs that share it as a campaign of their own",
+            )
+        if found:
+            shared[key] = found[0]
+    return campaign.rig.model_copy(update=shared)
+
+
 def base_composition(
     campaign: Campaign, measurement: Measurement, *, bins: int = BINS, ring: float | None = None
 ) -> Composition:
@@ -84,11 +109,12 @@ def base_composition(
     Raises:
         InputError: the mass is not given; the roughness is given by halves, or without load and friction.
     """
-    rig, m, s = campaign.rig, measurement, measurement.layout.slices()
+    rig, m, s = _shared_rig(campaign, measurement.names), measurement, measurement.layout.slices()
     mass, _, _, _, _ = _known(rig.mass, np.nan, 0.0)
     if not np.isfinite(mass):
         raise InputError(
             "the dynamic model needs the mass of the block",
+            file=campaign.path,
             key="rig.mass",
             hint='write mass = "0.0894 kg", or weigh it',
         )
@@ -117,7 +143,10 @@ def base_composition(
         nominal = float(np.median(seen)) if seen.size else 3.0 * stiffness * size
     strength = float(np.median(seen)) if seen.size else nominal
     drop = float(np.clip(0.8 * stiffness * size / strength, 0.02, 0.8))
-    surface = surface_prior(rig)
+    try:
+        surface = surface_prior(rig)
+    except InputError as error:
+        raise error.at(file=campaign.path) from None
     shape = Guess(SHAPE, SHAPE_WIDTH) if surface is None else surface.p
     spread = SPREAD if surface is None or surface.spread is None else surface.spread
     # the ringing tells the stiffness of the unloaded contact, p/u_max of its strength

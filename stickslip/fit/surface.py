@@ -8,11 +8,12 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..campaign import Rig, Unmeasured
-from ..contact import rough_table, static_contact
+from ..contact import check_saturation, rough_table, static_contact
 from ..errors import InputError
 from .static_table import StaticRig
 
 LINES = 60
+GUESSES = ("H", "h_rms", "normal_force", "friction_coefficient", "youngs_modulus", "poisson_ratio", "line_length")
 LOADS = np.linspace(0.02, 0.98, 49)
 
 
@@ -50,11 +51,15 @@ def surface_prior(rig: Rig) -> SurfacePrior | None:
     """Prior of the contact from the roughness in ``[rig]``, or None where it is not stated.
 
     One rig has a few lines of its own, so the widths are the scatter of single lines over the root of the number of
-    contacts, together with how badly a power law stands for a line, and with what the bounds of H, h_rms, load and
-    friction leave open where these are guesses.
+    contacts, together with how badly a power law stands for a line, and with what the bounds of H, h_rms, load,
+    friction, elasticity and length leave open where these are guesses.
 
     Raises:
-        InputError: H without h_rms or the reverse; load or friction are neither measured nor guessed.
+        InputError: H without h_rms or the reverse; load or friction are neither measured nor guessed; lines in contact
+            over their whole length.
+
+    Warns:
+        SaturationWarning: lines in contact over more than half of their length.
     """
     if rig.H is None and rig.h_rms is None:
         return None
@@ -66,7 +71,7 @@ def surface_prior(rig: Rig) -> SurfacePrior | None:
     contacts = int(rig.contacts or 1)
     middle = _lines(rig)
     variance = np.array([v.var(ddof=1) / contacts + middle.mismatch**2 for v in (middle.u, middle.p)])
-    open_ones = [n for n in ("H", "h_rms", "normal_force", "friction_coefficient") if _open(getattr(rig, n))]
+    open_ones = [n for n in GUESSES if _open(getattr(rig, n))]
     for name in open_ones:
         value = getattr(rig, name)
         low, high = (_lines(rig.model_copy(update={name: v})) for v in (value.lower, value.upper))
@@ -102,6 +107,7 @@ def _lines(rig: Rig) -> _Lines:
     assert rig.h_rms is not None
     table = rough_table(_known(rig.H), static.length, static.n_springs, LINES, static.seed).scaled(_known(rig.h_rms))
     contact = static_contact(table, static.normal_force, static.friction, static.elastic)
+    check_saturation(contact.contact_share, key="rig.h_rms")
     curves = np.asarray(contact.displacement(np.append(LOADS, 1.0)[:, None])).T
     reach = curves[:, -1]
     found = np.array([nearest_exponent(LOADS, u[:-1] / u[-1]) for u in curves])

@@ -21,6 +21,7 @@ from .base import Columns, add_array, need_columns, unique
 
 _MARK = re.compile(rb"(?:^|(?<=\n)|(?<=\r))    -1[ \t]*(?:\r\n|\n|\r)[ ]*(\d+)([bB]?)[^\r\n]*(?:\r\n|\n|\r)")
 _CLOSE = re.compile(rb"(?:\r\n|\n|\r)?    -1[ \t]*(?:\r\n|\n|\r|\Z)")
+_NOTHING = re.compile(rb"[\s\0]*\Z")  # some writers leave the closing mark out
 _HEADER_LINES = 11  # records 1 to 11, after the line with the data set's number
 _KINDS = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}
 _SINGLE, _DOUBLE = 4, 8
@@ -72,8 +73,8 @@ def _sets(path: Path) -> Iterator[_Set]:
         if kind != 58:
             position = close.end() if close else len(raw)
             continue
-        start = _skip_lines(raw, mark.end(), _HEADER_LINES)
         try:
+            start = _skip_lines(raw, mark.end(), _HEADER_LINES)
             if binary:
                 header = _pyuff(raw[mark.start() : start] + b"    -1\n", header_only=True)
                 x, y, notes, position = _binary(raw, start, header)
@@ -112,7 +113,7 @@ def _skip_lines(raw: bytes, position: int, count: int) -> int:
     for _ in range(count):
         end = re.compile(rb"\r\n|\n|\r").search(raw, position)
         if end is None:
-            raise InputError("the header of a data set is cut short")
+            raise InputError("the header of a data set is cut short", hint="export the file again")
         position = end.end()
     return position
 
@@ -134,9 +135,11 @@ def _binary(raw: bytes, start: int, header: dict[str, Any]) -> tuple[np.ndarray,
         fields += [(part, f"{order}f{y_size}") for part in (("re", "im") if cplx else ("re",))]
         layout = np.dtype(fields)
         end = start + count * layout.itemsize
-        close = _CLOSE.match(raw, end)
-        if close is None:
+        close = _CLOSE.match(raw, end) or _NOTHING.match(raw, end)
+        if close is None or end > len(raw):
             continue
+        if _CLOSE.match(raw, end) is None:
+            notes.append("the mark that closes the data set is missing")
         table = np.frombuffer(raw, layout, count, start)
         if not _sane(table["re"]) and _sane(table["re"].astype(table["re"].dtype).byteswap()):
             table = table.byteswap()

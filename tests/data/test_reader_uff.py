@@ -167,3 +167,17 @@ def test_letters_beyond_ascii_in_the_header(tmp_path, encoding, binary):
     pyuff.UFF(str(path)).write_sets(data_set(binary=binary, id2="note"))
     path.write_bytes(path.read_bytes().replace(b"note", "20 °C, µm".encode(encoding), 1))
     assert read_columns(path).data["Vib Displacement"] == pytest.approx(X, rel=1e-11, abs=1e-18)
+
+
+@pytest.mark.parametrize("rest", [b"", b"\n", b" " * 80, b"\0" * 12])
+def test_no_closing_mark(tmp_path, rest):
+    payload = struct.pack(f"<{X.size}d", *X)
+    columns = read_columns(write(tmp_path / "a.uff", header(1, 4, 1, X.size, total=320), payload, rest))
+    assert np.array_equal(columns.data["Vib Displacement"], X)
+    assert any("closes the data set is missing" in note for note in columns.notes)
+
+
+def test_a_header_cut_short_names_the_file(tmp_path, refuses):
+    path = tmp_path / "a.uff"
+    path.write_text("\n".join(header(1, 4, 1, X.size, total=320)[:6]))
+    refuses(lambda: read_columns(path), "a.uff", "data set 1", "header", "export")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from stickslip.campaign import Rig, load_campaign, load_traces
+from stickslip.errors import InputError
 from stickslip.features.measurement import measure
 from stickslip.fit.start import FALLBACK_FREQUENCY, base_composition, ring_period
 from stickslip.fit.surface import surface_prior
@@ -99,3 +100,21 @@ def test_the_ringing_tells_the_contact_s_resonance(tmp_path):
 def test_noise_is_no_ringing(tmp_path):
     """The highest peak of noise is somewhere, often at the slow end; a contact a hundred times as soft would follow."""
     assert ring_period(*slips(tmp_path, 0.0)) == 1.0 / FALLBACK_FREQUENCY
+
+
+def test_what_every_trace_gives_anew_is_the_rig_s(start):
+    anew = SPRING + 'mass = "300 g"\nnormal_force = "0.9 N"\n'
+    assert start("", anew, anew).mass == 0.3
+
+
+def test_runs_of_different_rigs_are_refused(start):
+    with pytest.raises(InputError, match="differ in 'mass'") as error:
+        start(SPRING, "", 'mass = "300 g"\n')
+    assert error.value.file is not None
+    assert "t1: 0.3" in str(error.value)
+
+
+def test_half_a_roughness_is_refused_with_its_place(start):
+    with pytest.raises(InputError, match="says nothing without") as error:
+        start(SPRING + "H = 0.3\n", "")
+    assert str(error.value.file).endswith("c.toml")

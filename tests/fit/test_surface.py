@@ -67,3 +67,14 @@ def test_half_of_it_is_refused(missing):
         surface_prior(rig(**{missing: None}))
     assert missing in str(error.value)
     assert error.value.key == f"rig.{missing}"
+
+
+@pytest.mark.parametrize("more", [{"youngs_modulus": {"guess": 2e11, "lower": 5e10, "upper": 8e11}},
+                                  {"line_length": {"guess": 2e-5, "lower": 5e-6, "upper": 8e-5}}])  # fmt: skip
+def test_elasticity_and_length_that_are_guessed_widen_it(more):
+    assert surface_prior(rig(**more)).u_max.width > 1.1 * surface_prior(rig()).u_max.width
+
+
+def test_lines_pressed_flat_are_no_prior():
+    with pytest.raises(InputError, match="touch over their whole length"):
+        surface_prior(rig(h_rms=1e-9))
