@@ -158,7 +158,7 @@ finds it by itself and says, of the {short_gain:.0f} s used below:
 
 {quote([note for note in dynamic["notes"] if "sensor-gain" in note])}
 **Ripple.** {trace["ripple"]["text"][0].upper() + trace["ripple"]["text"][1:]}. Around a period of 0.15 s, at which the slope was described as modulated,
-{"a line stands out" if near else f"no line stands out: whatever is there is below {1e9 * around:.0f} nm"}.
+{"a line stands out" if near else f"no line stands out: what keeps its phase over the whole record is below {1e9 * around:.0f} nm; a ripple whose phase wanders may be larger"}.
 
 ![spectrum of the position in the sticks](figures/real-paper-ripple.png)
 
