@@ -22,7 +22,7 @@ from ..fit.multistart import best_of
 from ..fit.problem import Problem
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
-from ..fit.start import base_composition, ring_period
+from ..fit.start import UNHEARD, base_composition, ring_period, ringing
 from ..report.inertial_result import fit_sections, parameters
 from ..residual import floors, misfit
 from ..segment import Segmentation, block_motion
@@ -64,6 +64,8 @@ def fit_inertial(
         )
     own, segments = [t for t, _ in usable], [s for _, s in usable]
     period = ring_period(own, segments)
+    if ringing(own, segments) is None:
+        notes.append(UNHEARD)
     try:
         m = measure(own, segments, ring_period=period, most_cycles=options.most_events)
     except InputError as error:

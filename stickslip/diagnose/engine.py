@@ -16,7 +16,7 @@ from ..fit.composition import Composition
 from ..fit.inertial import Fit, fit
 from ..fit.multistart import best_of
 from ..fit.problem import Problem
-from ..fit.start import base_composition, ring_period
+from ..fit.start import UNHEARD, base_composition, ring_period, ringing
 from ..residual import Misfit, floors, misfit, scatter_factor
 from ..segment import Segmentation, segment
 from ..trace import Trace
@@ -121,6 +121,8 @@ def diagnose(
             hint="traces of spring force alone can be inspected and fitted with --model static",
         )  # fmt: skip
     traces, segmentations = zip(*usable, strict=True)
+    if ringing(traces, segmentations) is None:
+        dropped.append(UNHEARD)
     data = measure(traces, segmentations, ring_period=ring_period(traces, segmentations), most_cycles=MOST_CYCLES)
     train = training_cycles(data, holdout)
     floor = floors(data, factor=scatter_factor(data))

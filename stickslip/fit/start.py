@@ -26,13 +26,22 @@ BINS = 96
 DAMPING_SHARE = 0.017  # of the critical damping of the contact resonance
 FALLBACK_STIFFNESS = 1000.0  # N/m, of a spring of which nothing is known
 FALLBACK_FREQUENCY = 500.0  # Hz, contact resonance of the paper's rig
+UNHEARD = (
+    f"no ringing is heard after the slips, so the contact's resonance was taken to be {FALLBACK_FREQUENCY:g} Hz, and, unless the roughness is given, "
+    "contact.u_max is sought around what follows from that (within a factor of 1.6, one standard deviation)"
+)
 STANDS_OUT = 10.0  # times the median of the spectrum; of noise alone, the peak is about twice, its slow end five times
 
 
 def ring_period(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float:
+    """Period (s) of the contact's resonance: that of the ringing, or 2 ms where none is heard (say so: `UNHEARD`)."""
+    return ringing(traces, segmentations) or 1.0 / FALLBACK_FREQUENCY
+
+
+def ringing(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float | None:
     """Period (s) of the ringing after the arrests: the highest peak of their mean spectrum above 60 Hz.
 
-    Falls back on 2 ms where the sampling is too slow or nothing rings, that is where no peak stands out of the noise.
+    None where the sampling is too slow or nothing rings, that is where no peak stands out of the noise.
     """
     found = []
     for trace, segments in zip(traces, segmentations, strict=True):
@@ -49,7 +58,7 @@ def ring_period(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) 
             y = y - np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyfit(s, y, 3))
             found.append((rate, periodogram(y, rate, window="hann", nfft=8 * y.size)))
     if not found:
-        return 1.0 / FALLBACK_FREQUENCY
+        return None
     rates = {round(r) for r, _ in found}
     if len(rates) > 1:
         found = [f for f in found if round(f[0]) == max(rates)]
@@ -58,7 +67,7 @@ def ring_period(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) 
     power = np.mean([f[1][1][:size] for f in found], axis=0)
     band = (frequency[:size] > 60.0) & (frequency[:size] < found[0][0] / 5.0)
     if not band.any() or power[band].max() < STANDS_OUT * np.median(power[band]):
-        return 1.0 / FALLBACK_FREQUENCY
+        return None
     return float(1.0 / frequency[:size][band][np.argmax(power[band])])
 
 

@@ -6,7 +6,7 @@ import pytest
 from stickslip.campaign import Rig, load_campaign, load_traces
 from stickslip.errors import InputError
 from stickslip.features.measurement import measure
-from stickslip.fit.start import FALLBACK_FREQUENCY, base_composition, ring_period
+from stickslip.fit.start import FALLBACK_FREQUENCY, base_composition, ring_period, ringing
 from stickslip.fit.surface import surface_prior
 from stickslip.segment import segment
 
@@ -99,7 +99,9 @@ def test_the_ringing_tells_the_contact_s_resonance(tmp_path):
 
 def test_noise_is_no_ringing(tmp_path):
     """The highest peak of noise is somewhere, often at the slow end; a contact a hundred times as soft would follow."""
-    assert ring_period(*slips(tmp_path, 0.0)) == 1.0 / FALLBACK_FREQUENCY
+    record = slips(tmp_path, 0.0)
+    assert ringing(*record) is None
+    assert ring_period(*record) == 1.0 / FALLBACK_FREQUENCY
 
 
 def test_what_every_trace_gives_anew_is_the_rig_s(start):
