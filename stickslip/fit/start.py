@@ -27,8 +27,9 @@ DAMPING_SHARE = 0.017  # of the critical damping of the contact resonance
 FALLBACK_STIFFNESS = 1000.0  # N/m, of a spring of which nothing is known
 FALLBACK_FREQUENCY = 500.0  # Hz, contact resonance of the paper's rig
 UNHEARD = (
-    f"no ringing is heard after the slips, so the contact's resonance was taken to be {FALLBACK_FREQUENCY:g} Hz, and, unless the roughness is given, "
-    "contact.u_max is sought around what follows from that (within a factor of 1.6, one standard deviation)"
+    f"no ringing is heard after the slips, so the contact's resonance was taken to be {FALLBACK_FREQUENCY:g} Hz, and, "
+    "unless the roughness is given, contact.u_max is sought around what follows from that (within a factor of 1.6, one "
+    "standard deviation)"
 )
 STANDS_OUT = 10.0  # times the median of the spectrum; of noise alone, the peak is about twice, its slow end five times
 
