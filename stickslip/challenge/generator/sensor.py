@@ -1,4 +1,4 @@
-"""The vibrometer: a heterodyne fringe counter with its filters, noise, drift, dropouts, counts and clock."""
+"""The vibrometer: a heterodyne fringe counter with its filters, noise, drift, counts and clock."""
 
 from __future__ import annotations
 
