@@ -22,7 +22,7 @@ from ..fit.multistart import best_of
 from ..fit.problem import Problem
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
-from ..fit.start import UNHEARD, base_composition, ring_period, ringing
+from ..fit.start import FALLBACK_PERIOD, UNHEARD, base_composition, ringing
 from ..report.inertial_result import fit_sections, parameters
 from ..residual import floors, misfit
 from ..segment import Segmentation, block_motion
@@ -63,9 +63,10 @@ def fit_inertial(
             hint="give drive_velocity (and spring_stiffness where only the force is measured)",
         )
     own, segments = [t for t, _ in usable], [s for _, s in usable]
-    period = ring_period(own, segments)
-    if ringing(own, segments) is None:
+    heard = ringing(own, segments)
+    if heard is None:
         notes.append(UNHEARD)
+    period = heard or FALLBACK_PERIOD
     try:
         m = measure(own, segments, ring_period=period, most_cycles=options.most_events)
     except InputError as error:

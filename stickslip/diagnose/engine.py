@@ -16,7 +16,7 @@ from ..fit.composition import Composition
 from ..fit.inertial import Fit, fit
 from ..fit.multistart import best_of
 from ..fit.problem import Problem
-from ..fit.start import UNHEARD, base_composition, ring_period, ringing
+from ..fit.start import FALLBACK_PERIOD, UNHEARD, base_composition, ringing
 from ..residual import Misfit, floors, misfit, scatter_factor
 from ..segment import Segmentation, segment
 from ..trace import Trace
@@ -121,9 +121,10 @@ def diagnose(
             hint="traces of spring force alone can be inspected and fitted with --model static",
         )  # fmt: skip
     traces, segmentations = zip(*usable, strict=True)
-    if ringing(traces, segmentations) is None:
+    heard = ringing(traces, segmentations)
+    if heard is None:
         dropped.append(UNHEARD)
-    data = measure(traces, segmentations, ring_period=ring_period(traces, segmentations), most_cycles=MOST_CYCLES)
+    data = measure(traces, segmentations, ring_period=heard or FALLBACK_PERIOD, most_cycles=MOST_CYCLES)
     train = training_cycles(data, holdout)
     floor = floors(data, factor=scatter_factor(data))
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]

@@ -26,6 +26,7 @@ BINS = 96
 DAMPING_SHARE = 0.017  # of the critical damping of the contact resonance
 FALLBACK_STIFFNESS = 1000.0  # N/m, of a spring of which nothing is known
 FALLBACK_FREQUENCY = 500.0  # Hz, contact resonance of the paper's rig
+FALLBACK_PERIOD = 1.0 / FALLBACK_FREQUENCY
 UNHEARD = (
     f"no ringing is heard after the slips, so the contact's resonance was taken to be {FALLBACK_FREQUENCY:g} Hz, and, "
     "unless the roughness is given, contact.u_max is sought around what follows from that (within a factor of 1.6, one "
@@ -36,7 +37,7 @@ STANDS_OUT = 10.0  # times the median of the spectrum; of noise alone, the peak 
 
 def ring_period(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float:
     """Period (s) of the contact's resonance: that of the ringing, or 2 ms where none is heard (say so: `UNHEARD`)."""
-    return ringing(traces, segmentations) or 1.0 / FALLBACK_FREQUENCY
+    return ringing(traces, segmentations) or FALLBACK_PERIOD
 
 
 def ringing(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float | None:
