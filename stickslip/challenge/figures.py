@@ -15,6 +15,9 @@ from .marks import Marked, rate
 from .sizes import Size
 
 KINDS = ("nothing", "one", "two", "outside")
+VERDICTS = (
+    "complete", "named", "set with it", "named wrongly", "set without it", "unknown", "failed", "not run",
+)  # fmt: skip
 BINS = (1.0, 2.0, 5.0, 10.0, 30.0)  # multiples of detection
 VISIBLE = 5.0  # multiples of detection from which the aim holds
 WITHIN = 1.5  # floors
@@ -86,15 +89,24 @@ def _quartiles(values: Sequence[float]) -> list[float] | None:
     return [float(q) for q in np.quantile(values, (0.25, 0.5, 0.75))] if values else None
 
 
+def _confidence(cases: Sequence[Marked]) -> dict[str, Any]:
+    """Confidences stated in these cases: their mean, how many of them are right, and the Brier score."""
+    stated = [(m.answer.confidence, m.right) for m in cases if m.answer.confidence is not None]
+    return {
+        "stated": float(np.mean([c for c, _ in stated])) if stated else None,
+        "right": rate(ok for _, ok in stated),
+        "brier": float(np.mean([(c - ok) ** 2 for c, ok in stated])) if stated else None,
+    }
+
+
 def _calibration(marked: Sequence[Marked]) -> dict[str, Any]:
     """How often each kind of verdict is right, how often stated intervals hold, and the same of stated confidences."""
     sizes = [s for m in marked for s in m.sizes]
-    stated = [(m.answer.confidence, m.right) for m in marked if m.answer.confidence is not None]
+    stated = [(m.answer.confidence, m) for m in marked if m.answer.confidence is not None]
     reliability = []
     for low, high in ((0.0, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.0)):
-        here = [(c, ok) for c, ok in stated if low <= c < high or (high == 1.0 and c == 1.0)]
-        mean = float(np.mean([c for c, _ in here])) if here else None
-        reliability.append({"from": low, "to": high, "stated": mean, "right": rate(ok for _, ok in here)})
+        here = [m for c, m in stated if low <= c < high or (high == 1.0 and c == 1.0)]
+        reliability.append({"from": low, "to": high, **_confidence(here)})
     return {
         "by_verdict": {
             kind: rate(m.right for m in marked if m.answer.kind == kind)
@@ -102,7 +114,8 @@ def _calibration(marked: Sequence[Marked]) -> dict[str, Any]:
         },
         "within_1_std": {"expected": 0.683, **rate(ok for s in sizes if (ok := s.within(1.0)) is not None)},
         "within_2_std": {"expected": 0.954, **rate(ok for s in sizes if (ok := s.within(2.0)) is not None)},
-        "brier": float(np.mean([(c - ok) ** 2 for c, ok in stated])) if stated else None,
+        "brier": _confidence(marked)["brier"],
+        "nothing": _confidence([m for m in marked if m.kind == "nothing"]),
         "reliability": reliability,
     }
 
@@ -130,6 +143,8 @@ def _bin(low: float, high: float, hidden: Sequence[Marked], outside: Sequence[Ma
         "within_2_std": rate(ok for s in sizes if (ok := s.within(2.0)) is not None),
         "heldout": _heldout(here),
         "named_right": rate(m.right for m in here if m.answer.kind in ("missing", "ambiguous")),
+        "confidence": _confidence([*here, *out]),
+        "confusion": _confusion([*here, *out]),
     }
 
 

@@ -129,6 +129,7 @@ def make_case(root: str, case: Case, seed: int, number: int) -> dict[str, Any]:
                 runs=tried.runs(),
                 virgin=tried.virgin,
                 spring_known=tried.spring_known,
+                recorder=tried.recorder,
             )
         except StickslipError as error:
             reason = str(error)

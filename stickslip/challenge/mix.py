@@ -27,6 +27,7 @@ VELOCITIES = (
 HOLDS = ((1.0, 5.0), (0.5, 3.0), (2.0, 8.0), (1.0, 3.0, 6.0))  # s
 STRETCHES = (430e-6, 230e-6, 230e-6, 260e-6)  # m driven before, between and after holds
 EVENTS = 7
+DEALT_RECORDERS = ("wrap", "cleared", "drop-outs", *("plain",) * 7)  # of ten cases
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class Case:
         spring_known, virgin, new_lines: whether the file gives the spring's stiffness, the runs start from a contact
             never loaded, and the rough lines are new after every slip.
         velocities: of the steady runs, m/s. holds: of the run with holds, s.
+        recorder: what happens to the counts: ``plain``, ``wrap``, ``cleared`` or ``drop-outs``.
         seed: of rig, lines and noise.
     """
 
@@ -61,6 +63,7 @@ class Case:
     new_lines: bool
     velocities: tuple[float, ...]
     holds: tuple[float, ...]
+    recorder: str
     seed: int
 
     def runs(self) -> tuple[Run, ...]:
@@ -122,6 +125,7 @@ def plan(cases: int, seed: int) -> list[Case]:
     decks = {"one": _deal(known, rng), "two": _deal(known, rng), "outside": _deal(OUTSIDE, rng)}
     circumstances = _circumstances(rng)
     own = _alternate(rng)
+    recorders = _deal(DEALT_RECORDERS, np.random.default_rng([seed, 1]))
     out = []
     for kind, number in counts(cases).items():
         for _ in range(number):
@@ -132,7 +136,8 @@ def plan(cases: int, seed: int) -> list[Case]:
             out.append(
                 Case(
                     "", kind, tuple(_hidden(tag, rng, own) for tag in tags), spring_known, virgin, new_lines,
-                    VELOCITIES[int(rng.integers(len(VELOCITIES)))], HOLDS[int(rng.integers(len(HOLDS)))], 0,
+                    VELOCITIES[int(rng.integers(len(VELOCITIES)))], HOLDS[int(rng.integers(len(HOLDS)))],
+                    next(recorders), 0,
                 )
             )  # fmt: skip
     digits = max(3, len(str(cases)))

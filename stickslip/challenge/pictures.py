@@ -11,10 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, styled
+from .figures import VERDICTS
 
-KIND_COLUMNS = (
-    "complete", "named", "set with it", "named wrongly", "set without it", "unknown", "failed", "not run",
-)  # fmt: skip
+ANSWERED = "answered (number of cases, right ones in red; grey: share of the row)"
 LAST = ("a set", "several", "unknown", "failed", "not run")
 
 
@@ -22,13 +21,7 @@ LAST = ("a set", "several", "unknown", "failed", "not run")
 def confusion_figure(score: Mapping[str, Any]) -> Figure:
     """Confusion matrix of names (one effect, nothing, outside), and of kinds of case against kinds of answer."""
     names = score["confusion"]["names"]
-    given = {column for row in names.values() for column in row}
-    rows = sorted(names, key=lambda name: (name != "nothing", name))
-    # the same order in both directions, so that right names lie on the diagonal
-    tags = [name for name in rows if name in given]
-    columns = [*tags, *sorted(given - set(tags) - set(LAST)), *(name for name in LAST if name in given)]
-    rows = [*tags, *(name for name in rows if name not in tags)]
-    outside = {h["tag"] for case in score["list"] if case["kind"] == "outside" for h in case["hidden"]}
+    rows, columns = _order(names)
     size = 2.6 + 0.27 * len(rows)
     made = Figure(figsize=(4.0 + 0.3 * max(len(columns), 12), 3.4 + size), layout="constrained")
     upper, lower = made.subplots(2, 1, height_ratios=(size, 2.0))
@@ -37,12 +30,46 @@ def confusion_figure(score: Mapping[str, Any]) -> Figure:
         names,
         rows,
         columns,
-        partial(_right_name, outside),
+        partial(_right_name, _outside(score)),
         "What was hidden (one effect, or none) and what was named",
     )
     kinds = score["confusion"]["kinds"]
-    _matrix(lower, kinds, list(kinds), list(KIND_COLUMNS), _right_kind, "What was hidden and what was answered")
+    _matrix(lower, kinds, list(kinds), list(VERDICTS), _right_kind, "What was hidden and what was answered")
     return made
+
+
+@styled
+def confusion_by_amplitude_figure(score: Mapping[str, Any]) -> Figure:
+    """The same two matrices for every bin of amplitude, one below the other; only names that occur in a bin."""
+    bins = score["by_amplitude"]
+    orders = [_order(b["confusion"]["names"]) for b in bins]
+    heights = [2.2 + 0.25 * max(len(rows), 3) for rows, _ in orders]
+    made = Figure(figsize=(13.0, sum(heights)), layout="constrained")
+    panels = made.subplots(len(bins), 2, squeeze=False, height_ratios=heights, width_ratios=(3, 2))
+    for (left, right), b, (rows, columns) in zip(panels, bins, orders, strict=True):
+        where = f"{b['from']:g} to {b['to']:g} times detection"
+        table = b["confusion"]
+        is_right = partial(_right_name, _outside(score))
+        _matrix(left, table["names"], rows, columns, is_right, f"{where}: what was named (one effect hidden)")
+        kinds = [kind for kind in table["kinds"] if kind != "nothing"]
+        _matrix(right, table["kinds"], kinds, list(VERDICTS), _right_kind, f"{where}: what was answered")
+    for axes in panels.flat:
+        axes.set_xlabel("")
+    made.supxlabel(ANSWERED)
+    return made
+
+
+def _order(names: Mapping[str, Mapping[str, int]]) -> tuple[list[str], list[str]]:
+    """Rows and columns in the same order, so that right names lie on the diagonal."""
+    given = {column for row in names.values() for column in row}
+    rows = sorted(names, key=lambda name: (name != "nothing", name))
+    tags = [name for name in rows if name in given]
+    columns = [*tags, *sorted(given - set(tags) - set(LAST)), *(name for name in LAST if name in given)]
+    return [*tags, *(name for name in rows if name not in tags)], columns
+
+
+def _outside(score: Mapping[str, Any]) -> set[str]:
+    return {h["tag"] for case in score["list"] if case["kind"] == "outside" for h in case["hidden"]}
 
 
 def _right_name(outside: set[str], row: str, column: str) -> bool:
@@ -61,6 +88,10 @@ def _matrix(
     is_right: Callable[[str, str], bool],
     title: str,
 ) -> None:
+    if not rows or not columns:
+        axes.set_axis_off()
+        axes.set_title(f"{title}: no case")
+        return
     values = np.array([[table[row].get(column, 0) for column in columns] for row in rows], dtype=float)
     whole = values.sum(axis=1, keepdims=True)
     shares = np.divide(values, whole, out=np.zeros_like(values), where=whole > 0)
@@ -72,16 +103,16 @@ def _matrix(
     axes.set_xticks(range(len(columns)), columns, rotation=60, ha="right", rotation_mode="anchor")
     axes.set_yticks(range(len(rows)), rows)
     axes.set_ylabel("hidden")
-    axes.set_xlabel("answered (number of cases, right ones in red; grey: share of the row)")
+    axes.set_xlabel(ANSWERED)
     axes.grid(False)
     axes.set_title(title)
 
 
 @styled
 def amplitude_figure(score: Mapping[str, Any]) -> Figure:
-    """Share of right answers against the amplitude, with 95 % intervals, and the fall of the held-out error."""
-    made, panels = figure(1, 2, width=9.0, height=3.8)
-    left, right = panels[0]
+    """Share of right answers, fall of the held-out error and stated confidence against the amplitude."""
+    made, panels = figure(1, 3, width=13.0, height=3.8)
+    left, right, last = panels[0]
     bins = score["by_amplitude"]
     for number, (name, colour, marker) in enumerate(
         (("right", DARK, "o"), ("exact", MIDDLE, "s"), ("class", LIGHT, "^"))
@@ -106,11 +137,26 @@ def amplitude_figure(score: Mapping[str, Any]) -> Figure:
     right.set_ylabel("held-out error, last model / base model")
     logarithmic(right, "y")
     right.set_title("Fall of the held-out error")
-    for axes in (left, right):
+    _confidence(last, bins)
+    for axes in (left, right, last):
         logarithmic(axes, "x")
         axes.set_xlim(bins[0]["from"] * 0.9, bins[-1]["to"] * 1.1)
         axes.set_xlabel("weakest hidden effect (times detection)")
     return made
+
+
+def _confidence(axes: Axes, bins: Sequence[Mapping[str, Any]]) -> None:
+    """Stated confidence beside the share of right answers among those that state one, in every bin."""
+    stated = [b for b in bins if b["confidence"]["stated"] is not None]
+    x, y, low, high = _points([{**b, "stated": b["confidence"]["right"]} for b in stated], "stated")
+    axes.plot(np.array(x) / 1.06, [b["confidence"]["stated"] for b in stated], "D", color=MIDDLE, label="stated, mean")
+    axes.errorbar(np.array(x) * 1.06, y, [low, high], color=DARK, marker="o", linestyle="", capsize=3, label="right")
+    for b, at in zip(stated, x, strict=True):
+        axes.annotate(f"{b['confidence']['right']['of']}", (at, 1.0), ha="center", va="bottom", color=DARK)
+    axes.set_ylim(0, 1.1)
+    axes.set_ylabel("share of the answers with a confidence")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
+    axes.set_title("Stated confidence" if stated else "Stated confidence: none")
 
 
 def _points(bins: Sequence[Mapping[str, Any]], name: str) -> tuple[list[float], list[float], list[float], list[float]]:

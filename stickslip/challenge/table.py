@@ -6,6 +6,8 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .figures import VERDICTS
+
 WIDTH = 110
 _KINDS = {"nothing": "nothing missing", "one": "one effect", "two": "two effects", "outside": "outside the catalogue"}
 
@@ -46,6 +48,8 @@ def score_text(score: Mapping[str, Any]) -> str:
             [(_edge(b), [share(b["amplitude"]), share(b["within_2_std"]), share(b["named_right"]),
                          _middle(b["heldout"]["ratio"])]) for b in s["by_amplitude"]],
         ),
+        *_confusion(s),
+        *_confidence(s),
         *_block("Nothing missing, and outside", ("share",), [
             ("false alarms (not called complete)", [share(s["false_alarms"])]),
             ("effects named where nothing is missing", [share(s["false_names"])]),
@@ -77,11 +81,11 @@ def _middle(quartiles: Sequence[float] | None) -> str:
     return f"{middle:.3g} ({low:.3g}-{high:.3g})"
 
 
-def _block(title: str, heads: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> list[str]:
+def _block(title: str, heads: Sequence[str], rows: Sequence[tuple[str, list[str]]], width: int = 20) -> list[str]:
     first = max(len(title), *(len(name) for name, _ in rows)) + 2
-    width = max(20, *(len(head) + 2 for head in heads))
-    out = [title.ljust(first) + "".join(head.rjust(width) for head in heads)]
-    return [*out, *(name.ljust(first) + "".join(cell.rjust(width) for cell in cells) for name, cells in rows), ""]
+    widths = [max(width, len(head) + 2) for head in heads]
+    lines = [(title, heads), *rows]
+    return [*(name.ljust(first) + "".join(map(str.rjust, cells, widths)) for name, cells in lines), ""]
 
 
 def _aims(aims: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -92,6 +96,31 @@ def _aims(aims: Sequence[Mapping[str, Any]]) -> list[str]:
         bound = bound or f"at most {100 * aim['at_most']:.0f} %"
         out.append(f"aim {met}: {aim['text']}: {share(aim).strip()}, {bound}")
     return [*out, ""]
+
+
+def _confusion(s: Mapping[str, Any]) -> list[str]:
+    """What was hidden against what was answered, by amplitude."""
+    parts = [("", {"nothing": s["confusion"]["kinds"]["nothing"]})]
+    parts += [(f", {_edge(b)} times", b["confusion"]["kinds"]) for b in s["by_amplitude"]]
+    rows = [
+        (f"{_KINDS[kind]}{where}", [str(row[column]) if row.get(column) else "." for column in VERDICTS])
+        for where, table in parts
+        for kind, row in table.items()
+        if row
+    ]
+    return _block("Hidden, and answered", VERDICTS, rows, 0) if rows else []
+
+
+def _confidence(s: Mapping[str, Any]) -> list[str]:
+    """Stated confidence against right answers, by amplitude; nothing where no verdict states one."""
+    parts = [(_KINDS["nothing"], s["calibration"]["nothing"])]
+    parts += [(f"{_edge(b)} times detection", b["confidence"]) for b in s["by_amplitude"]]
+    rows = [
+        (name, [f"{100 * c['stated']:.0f} %", share(c["right"]), f"{c['brier']:.3f}"])
+        for name, c in parts
+        if c["stated"] is not None
+    ]
+    return _block("Confidence", ("stated, mean", "right", "Brier score"), rows) if rows else []
 
 
 def _calibration(found: Mapping[str, Any]) -> list[str]:

@@ -21,7 +21,7 @@ from ..features.curve import SampledCurve
 from ..features.evaluate import features
 from ..features.measurement import Measurement, measure
 from ..fit.start import ring_period
-from ..residual import floors
+from ..floors import floors_alone
 from ..segment import segment
 from .generator import EFFECTS, Setup, draw_setup, make_campaign
 from .generator.sensor import SILENT
@@ -65,7 +65,7 @@ class Reference:
     def __init__(self, seed: int) -> None:
         self.seed = seed
         real, _ = self._measured(draw_setup(np.random.default_rng(seed)), [])
-        self.floor = floors(real, factor=SCATTER)
+        self.floor = floors_alone(real, factor=SCATTER)
         self.base, _ = self._measured(self._setup(), [])
         columns = {name: self._column(name) for name in (*RIG, *SURFACE)}
         self.white = self._whitening([columns[name] * share for name, share in EVENTS.items()])

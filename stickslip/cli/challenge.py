@@ -105,12 +105,28 @@ def _time(seconds: float) -> str:
 
 
 @challenge.command
+def seal(folder: Path) -> int:
+    """Print the seal again: the digest that fixes cases and truth once it is published.
+
+    Parameters
+    ----------
+    folder:
+        Of the challenge. Its campaigns must be as sealed; the truth is not read.
+    """
+    from ..challenge.seal import case_names, check_seal, digest
+
+    number = len(case_names(check_seal(folder, truth=False)))
+    print(f"{number} campaigns in {folder}\nseal {digest(folder)}")
+    return 0
+
+
+@challenge.command
 def score(
     folder: Path, *, seal: str | None = None, json: Annotated[bool, Parameter(negative="")] = False
 ) -> int:  # fmt: skip
     """Compare the answers with the truth; refuses a folder whose seal does not match.
 
-    Writes score.json, score.txt, confusion.png and amplitude.png into FOLDER/score.
+    Writes score.json, score.txt, confusion.png, confusion-by-amplitude.png and amplitude.png into FOLDER/score.
 
     Parameters
     ----------
@@ -131,7 +147,7 @@ def score(
 
 
 def _write(out: Path, found: dict[str, Any]) -> str:
-    from ..challenge.pictures import amplitude_figure, confusion_figure
+    from ..challenge.pictures import amplitude_figure, confusion_by_amplitude_figure, confusion_figure
     from ..challenge.table import score_text
     from ..errors import RunFolderError
     from ..plots import save
@@ -143,6 +159,7 @@ def _write(out: Path, found: dict[str, Any]) -> str:
         (out / "score.json").write_text(json_text(found) + "\n", encoding="utf-8")
         (out / "score.txt").write_text(text, encoding="utf-8")
         save(confusion_figure(found), out / "confusion.png")
+        save(confusion_by_amplitude_figure(found), out / "confusion-by-amplitude.png")
         save(amplitude_figure(found), out / "amplitude.png")
     except OSError as error:
         raise RunFolderError(f"the score cannot be written ({error.strerror})", file=out) from None

@@ -45,6 +45,15 @@ def test_every_circumstance_holds_in_half_of_the_cases_and_of_each_kind() -> Non
     assert len({(case.spring_known, case.virgin, case.new_lines) for case in cases}) == 8
 
 
+def test_recorders_are_a_minority_and_say_nothing_of_what_is_hidden() -> None:
+    cases = plan(100, 2)
+    assert Counter(case.recorder for case in cases) == {"plain": 70, "wrap": 10, "cleared": 10, "drop-outs": 10}
+    for kind, number in counts(100).items():
+        found = sum(case.recorder != "plain" for case in cases if case.kind == kind)
+        assert abs(found - 0.3 * number) <= 3
+    assert [case.recorder for case in cases] != [case.recorder for case in plan(100, 3)]
+
+
 def test_kinds_do_not_follow_the_numbers() -> None:
     cases = plan(100, 1)
     numbers = [int(case.name.split("-")[1]) for case in cases]
@@ -165,6 +174,7 @@ def test_making_is_deterministic_sealed_and_resumed(tmp_path: Path, monkeypatch:
     planned = {case.name: case for case in plan(3, 11)}
     for case in truth["cases"]:
         assert case["kind"] == planned[case["name"]].kind
+        assert case["recorder"] == planned[case["name"]].recorder
         assert [e["multiple"] for e in case["effects"]] == [h.multiple for h in planned[case["name"]].hidden]
         rig = tomllib.loads((first / CASES / case["name"] / "campaign.toml").read_text())
         assert isinstance(rig["rig"]["spring_stiffness"], str) == planned[case["name"]].spring_known

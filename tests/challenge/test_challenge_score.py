@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from invented import answer, effect, make, result
 
+from stickslip.challenge.figures import VERDICTS
 from stickslip.challenge.marks import rate
 from stickslip.challenge.one_case import record_failure
+from stickslip.challenge.pictures import amplitude_figure, confusion_by_amplitude_figure
 from stickslip.challenge.score import score_challenge
 from stickslip.challenge.seal import RUNS, SealError
 from stickslip.challenge.table import score_text
@@ -153,6 +156,61 @@ def test_stated_confidence_is_judged(tmp_path: Path) -> None:
     assert of(high["right"]) == (1, 2)
 
 
+def test_confusion_and_confidence_by_amplitude(folder: Path) -> None:
+    for name, confidence in (("n1", 0.9), ("a1", 0.6), ("a3", 0.95), ("a4", 0.8), ("o1", 0.7)):
+        path = folder / RUNS / name / "result.json"
+        content = json.loads(path.read_text())
+        content["verdict"]["confidence"] = confidence
+        path.write_text(json.dumps(content))
+    s = score_challenge(folder)
+    bins = {b["from"]: b for b in s["by_amplitude"]}
+    kinds = {low: {kind: row for kind, row in b["confusion"]["kinds"].items() if row} for low, b in bins.items()}
+    assert kinds == {
+        1: {"one": {"complete": 1}},
+        2: {"one": {"named": 1}, "outside": {"unknown": 2}},
+        5: {"one": {"named": 1, "named wrongly": 1}, "two": {"named": 1, "named wrongly": 1}},
+        10: {"one": {"set with it": 1, "set without it": 1}},
+    }
+    # the bins and what hides nothing are the whole
+    for kind, row in s["confusion"]["kinds"].items():
+        parts = sum((Counter(b["confusion"]["kinds"][kind]) for b in bins.values()), Counter())
+        assert kind == "nothing" or parts == row
+    assert bins[5]["confusion"]["names"] == {
+        "contact-ageing": {"contact-ageing": 1}, "sensor-low-pass": {"residual-load": 1},
+    }  # fmt: skip
+    confidence = {low: b["confidence"] for low, b in bins.items()}
+    assert {low: c["stated"] for low, c in confidence.items()} == pytest.approx({1: 0.95, 2: 0.7, 5: 0.7, 10: None})
+    assert {low: of(c["right"]) for low, c in confidence.items()} == {1: (0, 1), 2: (1, 1), 5: (1, 2), 10: (0, 0)}
+    assert confidence[5]["brier"] == pytest.approx((0.4**2 + 0.8**2) / 2)
+    assert of(s["calibration"]["nothing"]["right"]) == (1, 1)
+    assert s["calibration"]["brier"] == pytest.approx((0.1**2 + 0.4**2 + 0.95**2 + 0.8**2 + 0.3**2) / 5)
+    text = score_text({**s, "list": []})
+    table = text[text.index("Hidden, and answered") :].splitlines()
+    columns = table[0].replace("Hidden, and answered", "").split("  ")
+    assert [c.strip() for c in columns if c.strip()] == list(VERDICTS)
+    assert table[1].split() == ["nothing", "missing", "2", ".", ".", "1", ".", ".", "1", "."]
+    assert " ".join(table[4].split()) == "outside the catalogue, 2 to 5 times . . . . . 2 . ."
+    rows = [" ".join(row.split()) for row in table[table.index("") + 1 :]]
+    assert rows[0] == "Confidence stated, mean right Brier score"
+    assert rows[4].startswith("5 to 10 times detection 70 % 1/2 50 % (")
+    assert rows[4].endswith(" 0.400")
+
+
+def test_pictures_by_amplitude_say_what_the_bins_hold(folder: Path) -> None:
+    s = score_challenge(folder)
+    made = confusion_by_amplitude_figure(s)
+    titles = [axes.get_title(loc) for axes in made.axes for loc in ("left", "center")]
+    assert sum("10 to 30 times detection" in title for title in titles) == 2
+    for axes, b in zip(made.axes[1::2], s["by_amplitude"], strict=True):
+        shown = sum(int(text.get_text()) for text in axes.texts)
+        assert shown == sum(sum(row.values()) for row in b["confusion"]["kinds"].values())
+    # a bin without cases
+    empty = [{**b, "confusion": {"names": {}, "kinds": {}}} for b in s["by_amplitude"]]
+    assert all("no case" in "".join(a.get_title(loc) for loc in ("left", "center"))
+               for a in confusion_by_amplitude_figure({**s, "by_amplitude": empty}).axes)  # fmt: skip
+    assert [a.get_title("left") or a.get_title() for a in amplitude_figure(s).axes][-1] == "Stated confidence: none"
+
+
 def test_a_set_of_four_says_too_much_for_two_effects_as_well(tmp_path: Path) -> None:
     two = [effect("wear", 20.0), effect("tilt", 9.0)]
     folder = make(tmp_path / "c", {"b1": ("two", two), "b2": ("two", two), "b3": ("two", two)})
@@ -188,7 +246,7 @@ def test_command_writes_text_json_and_pictures(folder: Path, capsys: pytest.Capt
     assert "n4" in text
     assert "ValueError: out of range" in text
     assert max(map(len, text.splitlines())) <= 150
-    for name in ("confusion.png", "amplitude.png"):
+    for name in ("confusion.png", "confusion-by-amplitude.png", "amplitude.png"):
         assert (folder / "score" / name).read_bytes().startswith(b"\x89PNG")
     assert run(["challenge", "score", str(folder), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == found

@@ -66,6 +66,16 @@ def test_a_new_seal_over_another_truth_is_refused(folder: Path) -> None:
         score_challenge(folder)
 
 
+def test_the_seal_is_printed_again_without_the_truth(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    (folder / TRUTH).unlink()
+    assert run(["challenge", "seal", str(folder)]) == 0
+    assert capsys.readouterr().out == f"2 campaigns in {folder}\nseal {digest(folder)}\n"
+    (folder / CASES / "case-1" / "campaign.toml").write_text("other")
+    assert run(["challenge", "seal", str(folder)]) == 2
+    assert "seal is broken" in capsys.readouterr().err
+    assert run(["challenge", "seal", str(folder / CASES)]) == 2
+
+
 def test_a_damaged_seal_is_refused(folder: Path) -> None:
     (folder / SEAL).write_text("{}")
     with pytest.raises(SealError, match="damaged"):

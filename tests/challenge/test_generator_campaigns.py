@@ -12,7 +12,7 @@ import pytest
 
 from stickslip.campaign import load_campaign, load_traces
 from stickslip.challenge import generator
-from stickslip.challenge.generator import Run, draw_setup, make_campaign
+from stickslip.challenge.generator import Run, campaigns, draw_setup, make_campaign
 from stickslip.challenge.generator.__main__ import main
 from stickslip.challenge.generator.rigs import unstable
 from stickslip.challenge.generator.sensor import COUNT
@@ -112,6 +112,31 @@ def test_new_lines_change_from_event_to_event(tmp_path: Path) -> None:
         run = truth["runs"][0]
         sizes[flag] = (np.array(run["arrest_position"]) - np.array(run["onset_position"]))[1:]
     assert np.ptp(sizes[True]) > 5 * np.ptp(sizes[False])
+
+
+def test_no_line_comes_twice_however_many_slips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pools: list[int] = []
+    real = campaigns.make_bank
+
+    def counting(*given: object, **options: int) -> campaigns.Bank:
+        pools.append(options["pool"])
+        return real(*given, **options)
+
+    monkeypatch.setattr(campaigns, "make_bank", counting)
+    plenty = make_campaign(tmp_path / "plenty", 4, [], runs=SHORT, new_lines=True, virgin=False)
+    slips = [len(run["onset"]) + 2 for run in plenty["runs"]]
+    assert all(pool > n for pool, n in zip(pools, slips, strict=True))
+    pools.clear()
+    monkeypatch.setattr(campaigns, "MOST_SLIPS", -1)
+    scarce = make_campaign(tmp_path / "scarce", 4, [], runs=SHORT, new_lines=True, virgin=False)
+    assert len(pools) > 3  # the run with holds was made again with more lines
+    assert pools[-2] <= slips[-1] < pools[-1]
+    for a, b in zip(plenty["runs"], scarce["runs"], strict=True):
+        assert a["onset"] == pytest.approx(b["onset"], abs=1e-6)
+    # other lines in every run, too
+    first, second = (make_campaign(tmp_path / str(n), 4, [], runs=[SHORT[1]] * n, new_lines=True) for n in (1, 2))
+    assert second["runs"][0]["onset"] == first["runs"][0]["onset"]
+    assert second["runs"][1]["onset"] != first["runs"][0]["onset"]
 
 
 def test_drawn_rigs_stick_and_slip_at_every_velocity() -> None:

@@ -113,14 +113,6 @@ def test_counts_are_whole_and_nearest() -> None:
     assert np.abs(error).max() > 0.45 * COUNT
 
 
-def test_counter_wraps_and_can_be_unwrapped() -> None:
-    x = np.linspace(0, 1e-4, 40_001)
-    plain = counts(SILENT, x, 4e4, RATE, rng())
-    wrapped = counts(replace(SILENT, wrap=4096), x, 4e4, RATE, rng())
-    assert np.ptp(wrapped) < 4096 < np.ptp(plain)
-    assert np.array_equal(np.unwrap(wrapped.astype(float), period=4096), plain)
-
-
 def test_clock_and_delay_shift_the_samples() -> None:
     x = 1e-3 * np.arange(80_001) / 4e4
     fast = counts(replace(SILENT, clock=1e-3), x, 4e4, RATE, rng())

@@ -11,6 +11,7 @@ from stickslip.errors import StickslipError
 
 from .campaigns import make_campaign
 from .forms import EFFECTS
+from .recorder import RECORDERS
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -24,6 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--new-lines", action="store_true", help="new rough lines after every slip")
     parser.add_argument("--not-virgin", action="store_true", help="records start after two slips")
     parser.add_argument("--spring", choices=("known", "unknown"), help="default: drawn")
+    parser.add_argument("--recorder", choices=RECORDERS, default="plain", help="what happens to the counts")
     parser.add_argument("--dt", type=float, default=2e-5, help="small step, s")
     parser.add_argument("--truth", type=Path, help="where to write the truth (kept apart from the campaign)")
     given = parser.parse_args(arguments)
@@ -36,6 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
             virgin=not given.not_virgin,
             spring_known=None if given.spring is None else given.spring == "known",
             dt=given.dt,
+            recorder=given.recorder,
         )
     except StickslipError as error:
         print(error, file=sys.stderr)

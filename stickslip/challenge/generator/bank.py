@@ -33,7 +33,7 @@ class Bank:
 def make_bank(
     surface: Surface,
     loads: Array,
-    seed: int,
+    seed: int | list[int],
     *,
     pool: int = 1,
     groups: int | None = 128,

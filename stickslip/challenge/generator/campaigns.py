@@ -15,12 +15,14 @@ from stickslip.errors import InputError
 from .bank import Bank, make_bank
 from .dynamics import Drive, Result, simulate
 from .forms import Setup, hide
+from .recorder import record
 from .rigs import draw_setup
 from .sensor import counts, spot
 from .write import write_campaign
 
 OVERSAMPLING = 4
 LONGEST = 16.0  # s
+MOST_SLIPS = 25  # of a run with holds, at first
 OTHER_CASE = "a smaller amplitude, or another seed"
 
 
@@ -56,6 +58,7 @@ def make_campaign(
     rate: float = 1e4,
     quiet: bool = True,
     setup: Setup | None = None,
+    recorder: str = "plain",
     title: str = "Steel block on V-grooves",
 ) -> dict[str, Any]:
     """Simulate a campaign with hidden effects and write ``campaign.toml`` and one CSV of counts per run.
@@ -68,6 +71,7 @@ def make_campaign(
         virgin: whether runs start from a contact never loaded; else the record starts after two slips.
         spring_known: whether the file gives the spring's stiffness; None: in every other case.
         setup: the apparatus; None draws one.
+        recorder: what happens to the counts of every run; see ``recorder.record``.
 
     Returns:
         The truth, ready for JSON: rig, surface, sensor, effects with their inner parameters, events of every run.
@@ -87,18 +91,20 @@ def make_campaign(
     base_mass = setup.rig.mass
     seeds = rng.integers(2**31, size=3)  # lines and noise do not change with what is hidden
     hidden = [hide(setup, tag, amplitude, rng, *form) for tag, amplitude, *form in effects]
-    bank = _bank(setup, int(seeds[0]), new_lines)
     noise = np.random.default_rng(seeds[1])
-    traces, record = [], []
+    faults = np.random.default_rng([seed, 1])  # so that counts do not change with what the recorder makes of them
+    traces, listed = [], []
     for number, run in enumerate(runs):
-        result, start, drive = _run(setup, bank, run, new_lines, virgin, dt, rate, quiet, int(seeds[2]) + number)
+        lines = [int(seeds[0]), number] if new_lines else int(seeds[0])
+        result, start, drive = _run(setup, lines, run, new_lines, virgin, dt, rate, quiet, int(seeds[2]) + number)
         read, events = _read(setup, result, start, rate, noise)
         if events["onset"].size < 3:
             raise InputError(f"run '{run.name}' shows {events['onset'].size} slips", key="effects", hint=OTHER_CASE)
-        traces.append((run, read, drive))
-        record.append(
-            {"name": run.name, "start": start, **{key: [float(x) for x in col] for key, col in events.items()}}
-        )
+        sticks = list(zip(events["arrest"][:-1], events["onset"][1:], strict=True))
+        recorded = record(recorder, read, sticks, rate, faults)
+        traces.append((run, recorded, drive))
+        columns = {key: [float(x) for x in col] for key, col in events.items()}
+        listed.append({"name": run.name, "start": start, **columns, **recorded.truth})
     folder.mkdir(parents=True, exist_ok=True)
     shown_spring: float | tuple[float, float, float] = base_stiffness
     if not spring_known:
@@ -114,29 +120,33 @@ def make_campaign(
         "rig": asdict(setup.rig),
         "surface": asdict(setup.surface),
         "sensor": asdict(setup.sensor),
-        "runs": record,
+        "recorder": recorder,
+        "runs": listed,
     }
     plain: dict[str, Any] = json.loads(json.dumps(truth))  # as it will be read again
     return plain
 
 
-def _bank(setup: Setup, seed: int, new_lines: bool) -> Bank:
-    return make_bank(
-        setup.surface, np.asarray(setup.rig.loads), seed,
-        pool=12 if new_lines else 1, groups=setup.groups, roughness_spread=setup.roughness_spread,
-    )  # fmt: skip
-
-
 def _run(
-    setup: Setup, bank: Bank, run: Run, new_lines: bool, virgin: bool, dt: float, rate: float, quiet: bool, seed: int
-) -> tuple[Result, float, list[tuple[float, float]]]:
+    setup: Setup, lines: int | list[int], run: Run, new_lines: bool, virgin: bool, dt: float, rate: float, quiet: bool,
+    seed: int,
+) -> tuple[Result, float, list[tuple[float, float]]]:  # fmt: skip
     """The run, the time at which its record starts, and its drive as the file gives it."""
-    if new_lines:
-        turn = seed % bank.normal.shape[0]
-        bank = Bank(
-            np.roll(bank.normal, turn, 0), np.roll(bank.stiffness, turn, 0), bank.start, np.roll(bank.count, turn, 0)
-        )
+    pool = (MOST_SLIPS if run.pieces else run.events) + 3 if new_lines else 1
+    while True:
+        bank = make_bank(
+            setup.surface, np.asarray(setup.rig.loads), lines,
+            pool=pool, groups=setup.groups, roughness_spread=setup.roughness_spread,
+        )  # fmt: skip
+        made = _with(bank, setup, run, new_lines, virgin, dt, rate, quiet, seed)
+        if not new_lines or made[0].event_columns["onset"].size < pool:
+            return made
+        pool *= 2  # no line comes twice
 
+
+def _with(
+    bank: Bank, setup: Setup, run: Run, new_lines: bool, virgin: bool, dt: float, rate: float, quiet: bool, seed: int
+) -> tuple[Result, float, list[tuple[float, float]]]:
     def go(pieces: list[tuple[float, float]], duration: float, sampling: float, stop: tuple[int, float]) -> Result:
         return simulate(
             setup.rig, Drive.pieces(pieces), bank, setup.effects, duration=duration, dt=dt, rate=sampling, quiet=quiet,

@@ -123,8 +123,9 @@ def simulate(
 
     Leapfrog of step ``dt``. With ``quiet``, creep (slower than 0.7 um/s for 8 ms, most springs sticking) is followed
     with implicit steps of 1 ms, which shifts the first event by up to 0.1 ms and the intervals after it by 25 us at
-    most, 5 us as a rule (six drawn rigs at 50 and 200 um/s). ``quiet=False`` keeps the small step throughout:
-    the reference, whose events move by 2 us between dt = 2e-5 s and 2.5e-6 s.
+    most, 5 us as a rule (six drawn rigs at 50 and 200 um/s); in one of three further rigs, whose weakening all but
+    lets creep run away, the first event at 50 um/s by 0.4 ms and the next interval by 0.2 ms. ``quiet=False`` keeps
+    the small step throughout: the reference, whose events move by 2 us between dt = 2e-5 s and 2.5e-6 s.
 
     Args:
         bank: the contact springs; row 0 at the start, the next row after every slip if ``new_lines``.

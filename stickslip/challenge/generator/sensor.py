@@ -26,7 +26,7 @@ class Sensor:
         hum: amplitude at the mains frequency, m.
         interpolation: amplitude of the error periodic in half a wavelength, m.
         speckle: jumps per metre of travel, each of 10 to 60 nm of either sign.
-        count: m. wrap: counts after which the counter starts again, or 0.
+        count: m.
         clock: relative error of the sampling clock.
         compliance: between the contact and the laser's spot, m/N. yaw_arm: share of the yaw that the spot sees.
     """
@@ -47,7 +47,6 @@ class Sensor:
     interpolation: float = 8e-10
     speckle: float = 300.0
     count: float = COUNT
-    wrap: int = 0
     clock: float = 0.0
     compliance: float = 0.0
     yaw_arm: float = 0.0
@@ -130,8 +129,4 @@ def counts(sensor: Sensor, x: Array, rate_in: float, rate_out: float, rng: np.ra
     n = int(duration * rate_out / (1 + abs(sensor.clock)) + 1e-9) + 1
     moments = np.arange(n) / rate_out * (1 + sensor.clock) - sensor.delay
     sampled = np.interp(moments, np.arange(x.size) / rate_in, y)
-    read = np.floor((sampled + noise(sensor, sampled, rate_out, rng)) / sensor.count + 0.5).astype(np.int64)
-    if sensor.wrap > 0:
-        half = sensor.wrap // 2
-        read = (read + half) % sensor.wrap - half
-    return read
+    return np.floor((sampled + noise(sensor, sampled, rate_out, rng)) / sensor.count + 0.5).astype(np.int64)

@@ -10,6 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from .campaigns import Run
     from .forms import Setup
+    from .recorder import Recorded
 
 
 def write_campaign(
@@ -17,7 +18,7 @@ def write_campaign(
     title: str,
     setup: Setup,
     shown: dict[str, Any],
-    traces: list[tuple[Run, np.ndarray, list[tuple[float, float]]]],
+    traces: list[tuple[Run, Recorded, list[tuple[float, float]]]],
     rate: float,
     virgin: bool,
 ) -> None:
@@ -39,15 +40,18 @@ def write_campaign(
         f'line_length = "{surface.length * 1e6:.6g} um"',
     ]
     count = f"{setup.sensor.count * 1e9:.6g} nm"
-    for run, read, pieces in traces:
-        np.savetxt(folder / f"{run.name}.csv", read, fmt="%d", header="counts", comments="")
-        wrap = f', wrap = "{setup.sensor.wrap * setup.sensor.count * 1e9:.8g} nm"' if setup.sensor.wrap else ""
+    for run, recorded, pieces in traces:
+        read = recorded.counts
+        np.savetxt(
+            folder / f"{run.name}.csv", read, fmt="%d" if read.dtype == int else "%.0f", header="counts", comments=""
+        )
+        more = _recorder(recorded.keys, setup.sensor.count)
         lines += [
             "",
             "[[trace]]",
             f'file = "{run.name}.csv"',
             f'sampling_rate = "{rate / 1e3:g} kHz"',
-            f'displacement = {{ column = "counts", unit = "{count}", resolution = "{count}"{wrap} }}',
+            f'displacement = {{ column = "counts", unit = "{count}", resolution = "{count}"{more} }}',
         ]
         if pieces:
             told = ", ".join(
@@ -59,6 +63,15 @@ def write_campaign(
         if virgin:
             lines.append("virgin = true")
     (folder / "campaign.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _recorder(keys: dict[str, Any], count: float) -> str:
+    if "wrap" in keys:
+        return f', wrap = "{keys["wrap"] * count * 1e9:.8g} nm"'
+    if "resets" in keys:
+        told = keys["resets"]
+        return f", resets = {'true' if told is True else [f'{moment:.4f} s' for moment in told]}".replace("'", '"')
+    return ""
 
 
 def _spring(value: float | tuple[float, float, float]) -> str:
