@@ -12,6 +12,8 @@ Array = NDArray[np.float64]
 FLAT = 0.3  # standard deviation on the search scale (of a logarithm: 30 %) beyond which a direction is not known
 TIED = 0.95  # correlation beyond which two parameters act as one
 _PART = 0.3  # share of a direction's largest weight that makes a parameter part of it
+_SMALL = 0.1  # power below which a factor is left out of a product
+_MEMBER = 0.1  # share of a quantity's axis that is unknown, from which it belongs to what acts together
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,27 @@ class Direction:
     text: str
 
 
+def relative(
+    names: Sequence[str], z: Sequence[float], covariance: Array, logs: Sequence[bool]
+) -> tuple[list[int], Array, list[str]]:
+    """Covariance of the logarithms of all parameters, those among them that are not sought as one carried over.
+
+    Args:
+        names, z, covariance: of k parameters, on the search scale.
+        logs: whether that scale is the logarithm.
+
+    Returns:
+        Which parameters have one (a value that may as well be zero has none), their covariance, and, in words, of the
+        others that they may be zero.
+    """
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    kept = [i for i in range(len(names)) if logs[i] or abs(z[i]) > 2.0 * sd[i]]
+    scale = np.array([1.0 if logs[i] else 1.0 / z[i] for i in kept])
+    part = np.asarray(covariance, float)[np.ix_(kept, kept)] * np.outer(scale, scale)
+    lost = [f"{names[i]} is not told from zero" for i in range(len(names)) if i not in kept]
+    return kept, part, lost
+
+
 def flat_directions(
     names: Sequence[str], covariance: Array, *, limit: float = FLAT, widths: Sequence[float] | None = None
 ) -> list[Direction]:
@@ -38,84 +61,151 @@ def flat_directions(
 
     Args:
         names: of the k parameters.
-        covariance: on the search scale (of logarithms where a parameter is sought as one), shape (k, k).
+        covariance: of their logarithms, shape (k, k).
         limit: standard deviation from which a direction counts as not known.
         widths: of the priors on the same scale (inf for none): a direction as wide as its prior is the prior's.
     """
     covariance = np.asarray(covariance, float)
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    found = []
+    found: list[Direction] = []
     for value, vector in sorted(zip(values, vectors.T, strict=True), key=lambda pair: -float(pair[0])):
         std = float(np.sqrt(max(value, 0.0)))
         if std <= limit:
             break
-        found.append(_direction(names, vector, std, widths))
-    listed = {frozenset(d.names) for d in found}
-    return found + [d for d in _tied(names, covariance) if not any(set(d.names) <= other for other in listed)]
+        direction = _direction(names, vector, std, covariance, widths)
+        if not any(set(direction.names) <= set(d.names) for d in found):
+            found.append(direction)
+    flat, told = [set(d.names) for d in found], set[str]()
+    for pair in _tied(names, covariance):
+        # of three that are all tied to each other, two pairs say it
+        if set(pair.names) <= told or any(set(pair.names) <= other for other in flat):
+            continue
+        found.append(pair)
+        told |= set(pair.names)
+    return found
 
 
-def null_directions(names: Sequence[str], jacobian: Array, tolerance: float = 1e-3) -> list[Direction]:
-    """Directions along which the prediction does not change at all: what a model can never tell, whatever the noise.
+def null_directions(
+    names: Sequence[str], jacobian: Array, covariance: Array, *, limit: float = FLAT
+) -> list[Direction]:
+    """Groups of quantities that act only together on what a fit knows, and the combination of each that it does know.
 
     Args:
-        names: of the k parameters.
-        jacobian: derivatives of the prediction in their logarithms, shape (n, k).
-        tolerance: singular values below this share of the largest count as none.
+        names: of k quantities behind the parameters of the fit.
+        jacobian: derivatives of the logarithms of n parameters of the fit in those of the quantities, shape (n, k).
+        covariance: of the logarithms of the parameters, shape (n, n).
+        limit: standard deviation of the logarithm from which a direction counts as not known.
     """
-    _, s, vt = np.linalg.svd(np.asarray(jacobian, float), full_matrices=True)
-    s = np.concatenate([s, np.zeros(vt.shape[0] - s.size)])
-    return [
-        _direction(names, _sparse(v), float("inf"), None)
-        for v, size in zip(vt, s, strict=True)
-        if size < tolerance * s[0]
-    ]
+    jacobian = np.asarray(jacobian, float)
+    information = jacobian.T @ np.linalg.pinv(np.asarray(covariance, float), hermitian=True) @ jacobian
+    values, vectors = np.linalg.eigh(0.5 * (information + information.T))
+    flat = vectors[:, values < limit**-2]
+    shared = flat @ flat.T
+    members = [i for i in range(len(names)) if shared[i, i] > _MEMBER]
+    found = []
+    while members:
+        group = [members.pop(0)]
+        for i in group:  # grows while it is gone through
+            tied = [j for j in members if abs(shared[i, j]) > 0.5 * _MEMBER]
+            group += tied
+            members = [j for j in members if j not in tied]
+        group.sort()
+        found.append(_group([names[i] for i in group], _marginal(information, group), limit))
+    return found
 
 
-def _sparse(vector: Array) -> Array:
-    return np.where(np.abs(vector) < 0.02 * np.abs(vector).max(), 0.0, vector)
+def _marginal(information: Array, group: list[int]) -> Array:
+    """What is known of some quantities when nothing is known of the others."""
+    rest = [i for i in range(len(information)) if i not in group]
+    across = information[np.ix_(group, rest)]
+    inner = np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True)
+    return np.asarray(information[np.ix_(group, group)] - across @ inner @ across.T, float)
 
 
-def _direction(names: Sequence[str], vector: Array, std: float, widths: Sequence[float] | None) -> Direction:
+def _group(names: list[str], information: Array, limit: float) -> Direction:
+    values, vectors = np.linalg.eigh(0.5 * (information + information.T))
+    only = "only" if values[0] < 1e-6 * max(values[-1], 1.0) else "almost only"
+    weights = vectors[:, -1] / vectors[int(np.argmax(np.abs(vectors[:, -1]))), -1]
+    if len(names) == 1:
+        return Direction((names[0],), (1.0,), float("inf"), f"{names[0]} is not determined")
+    if values[-1] < limit**-2:
+        return Direction(tuple(names), tuple(weights.tolist()), float("inf"), f"{_join(names)} are not determined")
+    std = float(np.linalg.norm(weights) / np.sqrt(values[-1]))
+    more = int(np.sum(values >= limit**-2)) - 1
+    text = f"{_join(names)} act {only} together: {_product(names, weights)} is known {_size(std)}"
+    text += f", and {more} more of their combinations, none of them alone" if more else ", none of them alone"
+    return Direction(tuple(names), tuple(weights.tolist()), float("inf"), text)
+
+
+def _direction(
+    names: Sequence[str], vector: Array, std: float, covariance: Array, widths: Sequence[float] | None
+) -> Direction:
     top = int(np.argmax(np.abs(vector)))
     vector = vector / vector[top]
     parts = [int(i) for i in np.argsort(-np.abs(vector), kind="stable") if abs(vector[i]) >= _PART]
     who = [names[i] for i in parts]
     weights = tuple(float(vector[i]) for i in parts)
     if len(who) == 1:
-        size = f"to a factor {np.exp(min(std, 50.0)):.2g} either way" if np.isfinite(std) else "at all"
-        text = f"{who[0]} is not determined {size}" if np.isfinite(std) else f"{who[0]} has no influence"
+        text = f"{who[0]} is not determined to a factor {np.exp(min(std, 50.0)):.2g} either way"
         if widths is not None and np.isfinite(widths[parts[0]]) and std > 0.7 * widths[parts[0]]:
             text += " (what is reported is its prior)"
     else:
-        held = "not at all" if not np.isfinite(std) else f"to a factor {np.exp(min(std, 50.0)):.2g}"
-        text = f"{_join(who)} act only together: {_ratio(who, weights)} matters, each alone {held}"
-        if np.isfinite(std):
-            text = f"{_join(who)} act together: each alone is known only {held}, {_ratio(who, weights)} much better"
+        own = covariance[np.ix_(parts, parts)]
+        known = np.linalg.eigh(own)[1][:, 0]
+        known = known / known[int(np.argmax(np.abs(known)))]
+        known = np.where(np.abs(known) < _SMALL, 0.0, known)
+        best = float(np.sqrt(max(known @ own @ known, 0.0)))
+        each = np.sqrt(np.diag(own))
+        text = f"{_join(who)} are not determined, neither alone nor together: "
+        if best < FLAT:
+            text = f"{_join(who)} act almost only together: {_product(who, known)} is known {_size(best)}, "
+        text += _each(who, each)
     return Direction(tuple(who), weights, std, text)
 
 
-def _ratio(names: Sequence[str], weights: Sequence[float]) -> str:
-    """A combination of two or more parameters that the direction leaves unchanged."""
-    first, second = weights[0], weights[1]
-    power = -first / second
-    if len(names) > 2:
-        return "their combination"
-    exponent = "" if abs(abs(power) - 1) < 0.15 else f"^{abs(power):.2g}"
-    return f"{names[0]} {'*' if power > 0 else '/'} {names[1]}{exponent}"
+def _product(names: Sequence[str], powers: Sequence[float] | Array) -> str:
+    """``"a * b^0.3 / c"``; the first factor is one that is not divided by."""
+    powers = np.asarray(powers, float)
+    powers = powers if powers.max() >= 1.0 - 1e-9 else -powers
+    order = sorted(range(len(names)), key=lambda i: powers[i] < 0)
+    text = ""
+    for i in order:
+        size = abs(float(powers[i]))
+        if size < _SMALL:
+            continue
+        factor = names[i] if abs(size - 1.0) < 0.05 else f"{names[i]}^{size:.2g}"
+        text += factor if not text else f" {'*' if powers[i] > 0 else '/'} {factor}"
+    return text
+
+
+def _size(std: float) -> str:
+    """Standard deviation of a logarithm in words."""
+    return f"to {100 * std:.2g} %" if std <= FLAT else f"to a factor {np.exp(min(std, 50.0)):.2g}"
+
+
+def _each(names: Sequence[str], std: Sequence[float] | Array) -> str:
+    if max(std) < 1.5 * min(std):
+        return f"each {_size(float(max(std)))}"
+    return _join([f"{name} {_size(float(s))}" for name, s in zip(names, std, strict=True)])
 
 
 def _tied(names: Sequence[str], covariance: Array) -> list[Direction]:
     sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = covariance / np.outer(sd, sd)
-    pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > TIED]
+    pairs = [(j, i) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > TIED]
     out = []
-    for i, j in sorted(pairs, key=lambda p: -abs(correlation[p])):
-        way = "the same way" if correlation[i, j] > 0 else "against each other"
-        text = f"{names[j]} and {names[i]} move {way} (correlation {correlation[i, j]:.2f}): "
-        text += "an error of one is taken up by the other"
-        out.append(
-            Direction((names[j], names[i]), (1.0, float(np.sign(correlation[i, j]))), float(max(sd[i], sd[j])), text)
-        )
+    for pair in sorted(pairs, key=lambda p: -abs(correlation[p])):
+        own = covariance[np.ix_(pair, pair)]
+        who = [names[k] for k in pair]
+        ratio = sd[pair[0]] / sd[pair[1]]
+        ratio = 1.0 if abs(np.log(ratio)) < 0.15 else ratio
+        known = np.array([1.0, -np.sign(own[0, 1]) * ratio])
+        known /= np.abs(known).max()
+        best = float(np.sqrt(max(known @ own @ known, 0.0)))
+        text = f"{_join(who)} act almost only together: {_product(who, known)} is known {_size(best)}, "
+        text += f"{_each(who, sd[list(pair)])} (correlation {correlation[pair]:.2f})"
+        weights = (1.0, float(np.sign(own[0, 1])))
+        out.append(Direction(tuple(who), weights, float(sd[list(pair)].max()), text))
     return out
 
 

@@ -23,8 +23,9 @@ from ..fit.problem import Problem
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
 from ..fit.start import FALLBACK_PERIOD, UNHEARD, base_composition, ringing
+from ..floors import floors, scatter_factor
 from ..report.inertial_result import fit_sections, parameters
-from ..residual import floors, misfit
+from ..residual import misfit
 from ..segment import Segmentation, block_motion
 from ..trace import Trace
 from ..uncertainty import profile
@@ -42,7 +43,7 @@ class Options:
     files: tuple[Path, ...]
     profiles: tuple[str, ...]
     starts: int
-    scatter: float
+    scatter: float | None
     most_events: int
 
 
@@ -71,7 +72,8 @@ def fit_inertial(
         m = measure(own, segments, ring_period=period, most_cycles=options.most_events)
     except InputError as error:
         raise error.at(file=loaded.path) from None
-    floor = floors(m, factor=options.scatter)
+    scatter = scatter_factor(m) if options.scatter is None else options.scatter
+    floor = floors(m, factor=scatter)
     base = base_composition(loaded, m)
     _check_names(options.profiles, base, effects)
     train = _training(m, traces)
@@ -95,7 +97,7 @@ def fit_inertial(
             "jacobians": optimum.jacobians,
             "covariance": optimum.covariance,
             "ring_period": period,
-            "scatter_factor": options.scatter,
+            "scatter_factor": scatter,
             "cycles": int(train.sum()),
         },
         "notes": notes,

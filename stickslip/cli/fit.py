@@ -68,7 +68,7 @@ def fit(
     sampling:
         Static: windows even in the logarithm of the time left, or even in time as in the paper.
     new_lines:
-        Dynamic: the surfaces meet anew at every event, so that features scatter twice as much.
+        Dynamic: the surfaces meet anew at every event; default is what the scatter of the events says.
     most_events:
         Dynamic: so many events of a run are used, the first ones.
     json:
@@ -76,6 +76,7 @@ def fit(
     force:
         Replace an existing run folder.
     """
+    from ..report.describe import unused_channels
     from ..units import to_si
 
     speed = to_si(v_lim, "m/s", key="--v-lim")
@@ -90,10 +91,12 @@ def fit(
     else:
         from ._inertial import Options, fit_inertial
 
-        options = Options(add, effect, profile, starts, 2.0 if new_lines else 1.0, most_events)
+        options = Options(add, effect, profile, starts, 1.0 if new_lines else None, most_events)
         result, variables = fit_inertial(loaded, traces, found, options)
     result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
     result["notes"] = [*notes, *result.get("notes", ())]
+    # ahead of the events: of these only the first few are printed
+    result["dropped"] = [*(f"{t.name}: {c}" for t in traces for c in unused_channels(t)), *result["dropped"]]
     if out is not None:
         with open_run(out, force=force) as run:
             _write(run, result, variables)

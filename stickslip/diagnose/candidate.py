@@ -12,19 +12,26 @@ from ..effects import catalogue
 from ..effects.base import Effect
 from ..errors import StickslipError
 from ..features.measurement import Measurement
-from ..fit.composition import EVENT_WIDTHS, Composition
-from ..fit.inertial import Fit, fit, robust
+from ..fit.common import Common
+from ..fit.composition import Composition
+from ..fit.inertial import Fit, errors, fit, robust
 from ..fit.parameters import Free, effect_parameters
 from ..fit.problem import Problem
+from ..floors import event_widths
 from ..params import specs
-from ..residual import Misfit, misfit
+from ..residual import Misfit
 from .heldout import HeldOut, held_out
 from .linear import Linear
 from .periods import periods
 
 START = 0.02  # of the amplitude's range; scaled until its effect on the features is moderate
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
-MOST_STARTS = 12
+MOST_STARTS = 8
+PLAUSIBLE = (
+    30.0,
+    150.0,
+)  # floors, rms: by how much an amplitude moves the features at which everything else is refitted
+CARRIED = ((30.0, 7), (7.0, 7), (2.5, 7))  # stages of that refit, with the base's derivatives carried on
 OTHERS = 2  # further starts that a leader is fitted from
 SHARES = (1.0, 0.4)  # of a linear step that are tried
 FEW = 9  # evaluations for those that promise something
@@ -209,11 +216,10 @@ def _silent(text: str) -> None:
 def _with_fit(candidate: Candidate, found: Fit, problem: Problem, floor: np.ndarray, train: np.ndarray) -> Candidate:
     m = problem.measurement
     used = np.asarray(m.cycles.used)
-    shown = replace(m, valid=m.valid & (train & used)[..., None])
     return replace(
         candidate,
         fit=found,
-        train=misfit(shown, found.features, floor),
+        train=errors(m, found, floor),
         held=held_out(problem, found, floor, used & ~train, found.features),
     )
 
@@ -243,21 +249,27 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
         residual = (measurement.values - optimum.features) / floor
         hints = periods(effect.periodic[1], measurement, np.nan_to_num(residual), use, bounds)
     search = _Search(problem, optimum, floor, valid, factor, free, k, effect)
-    explained = 0.0
+    explained, likely = 0.0, {}
     for values in starts(effect, hints):
         share = search.along(values, linear)
-        explained = max(explained, share)
+        if share >= explained:
+            explained, likely = share, values
         tell(f"{effect.tag}: start {values}, explains {100 * share:.0f} %")
+    if effect.periodic is None and search.best is not None:
+        for rms in PLAUSIBLE:
+            search.push(likely, rms, use)
+            tell(f"{effect.tag}: everything else refitted around {rms:g} floors of it")
     if search.best is None:
         return Candidate(effect.tag, form, effect, explained, composition=composition, note="cannot be evaluated")
     cost, z, events, features = search.best
     others = tuple((o[1], o[2]) for o in sorted(search.each, key=lambda o: o[0])[1 : 1 + OTHERS])
-    promise = 1.0 - cost / search.cost(optimum.z, optimum.events, optimum.features)
+    promise = 1.0 - cost / search.cost(optimum.z, optimum.events, search.bare)
     columns = np.concatenate([optimum.columns, np.zeros((*features.shape, len(free)))], axis=-1)
-    r = np.nan_to_num(((features - measurement.values) / floor)[valid], nan=1e4)
-    begun = Fit(
-        z, events, robust(r), robust(r), features, np.zeros((z.size, z.size)), composition.free, columns, use, 0, 0
-    )
+    common = Common(measurement, floor, use)
+    off = search.off(features)
+    offsets, r = -common.offsets(off), robust(common(off[valid]))
+    unknown = np.zeros((z.size, z.size))
+    begun = Fit(z, events, r, r, features + offsets, offsets, unknown, composition.free, columns, use, 0, 0)
     candidate = Candidate(
         effect.tag, form, effect, explained, promise, factor, composition, note="not refitted", others=others
     )
@@ -271,6 +283,9 @@ class _Search:
         self.problem, self.optimum, self.floor, self.valid, self.factor = problem, optimum, floor, valid, factor
         self.free, self.k, self.effect = free, k, effect
         self.amplitude = next(i for i, f in enumerate(free) if f.amplitude)
+        self.bare = optimum.features - optimum.offsets
+        self.common = Common(problem.measurement, floor, valid.any(axis=-1), factor)
+        self.widths = event_widths(problem.measurement)[valid.any(axis=-1)]
         self.null = free[self.amplitude].inward(specs(effect)[effect.amplitude].null or 0.0)
         self.best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
         self.moderate: float | None = None
@@ -292,7 +307,7 @@ class _Search:
         best = None
         for _ in range(4):
             features = self.problem.features(self.point(values, self.null + size), self.optimum.events)
-            change = features - self.optimum.features
+            change = features - self.bare
             moved = np.abs(np.nan_to_num(change / self.floor, nan=1e3))[self.valid]
             rms = float(np.sqrt(np.mean(np.minimum(moved, 100.0) ** 2)))
             if np.isfinite(features[self.valid]).all():
@@ -332,15 +347,48 @@ class _Search:
         self.each.append(min(offers, key=lambda o: o[0]))
         return step.share
 
+    def push(self, values: dict[str, float], rms: float, use: np.ndarray) -> None:
+        """Refit everything from an amplitude that moves the features by ``rms`` floors, however little that promises.
+
+        What the base has bent itself to imitate shows no slope at an amplitude of zero.
+        """
+        low, high = self.free[self.amplitude].bounds
+        reach = high - self.null if high > self.null else low - self.null
+        share = 0.1
+        for _ in range(5):
+            z = self.point(values, self.null + share * reach)
+            features = self.problem.features(z, self.optimum.events)
+            moved = np.abs(np.nan_to_num((features - self.bare) / self.floor, nan=1e3))[self.valid]
+            now = float(np.sqrt(np.mean(np.minimum(moved, 1e3) ** 2)))
+            if 0.6 * rms < now < 1.6 * rms or (now < rms and share >= 0.5):
+                break
+            share = float(np.clip(share * np.clip(rms / max(now, 1e-6), 0.02, 10.0), 1e-6, 0.5))
+        own = self.problem.columns(z, self.optimum.events, range(self.k, z.size), features)
+        columns = np.concatenate([self.optimum.columns, own], axis=-1)
+        found = fit(
+            self.problem, self.floor, z=z, events=self.optimum.events, stages=CARRIED, use=use, columns=columns,
+            anew=False,
+        )  # fmt: skip
+        offer = self._keep(found.z, found.events, found.features - found.offsets)
+        self.each.append(offer)
+
     def cost(self, z: np.ndarray, events: np.ndarray, features: np.ndarray) -> float:
-        """Robust chi-square at the widened floors, with the priors of the base."""
-        r = (features - self.problem.measurement.values) / (self.factor * self.floor)
-        off = [(v - f.inward(f.prior)) / min(f.width, 1e3) for v, f in zip(z, self.optimum.free, strict=False)]
-        at = events[self.valid.any(axis=-1)] / np.array(EVENT_WIDTHS)
-        return robust(np.nan_to_num(r[self.valid], nan=1e4)) + float(np.sum(np.square(off)) + np.sum(at**2))
+        """Robust chi-square at the widened floors, with the priors of the base; ``features`` of the model alone."""
+        away = [(v - f.inward(f.prior)) / min(f.width, 1e3) for v, f in zip(z, self.optimum.free, strict=False)]
+        at = events[self.valid.any(axis=-1)] / self.widths
+        return robust(self.common(self.off(features)[self.valid])) + float(np.sum(np.square(away)) + np.sum(at**2))
+
+    def off(self, features: np.ndarray) -> np.ndarray:
+        """Model less data (SI), limited to 1e4 floors."""
+        r = (features - self.problem.measurement.values) / self.floor
+        return np.clip(np.nan_to_num(r, nan=1e4), -1e4, 1e4) * self.floor
 
     def _offer(self, z: np.ndarray, events: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        features = self.problem.features(z, events)
+        return self._keep(z, events, self.problem.features(z, events))
+
+    def _keep(
+        self, z: np.ndarray, events: np.ndarray, features: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         offer = self.cost(z, events, features), z, events, features
         if self.best is None or offer[0] < self.best[0]:
             self.best = offer

@@ -13,11 +13,12 @@ from ..effects import catalogue
 from ..errors import InputError
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
-from ..fit.inertial import Fit, fit
+from ..fit.inertial import Fit, errors, fit
 from ..fit.multistart import best_of
 from ..fit.problem import Problem
 from ..fit.start import FALLBACK_PERIOD, UNHEARD, base_composition, ringing
-from ..residual import Misfit, floors, misfit, scatter_factor
+from ..floors import floors
+from ..residual import Misfit, misfit
 from ..segment import Segmentation, segment
 from ..trace import Trace
 from .candidate import MORE, MOST, Candidate
@@ -27,7 +28,19 @@ from .pieces import fit_arrays, fit_from
 from .static_rung import static_features
 from .sweep import Ground, Store, Sweep
 from .thresholds import THRESHOLDS, Thresholds
-from .verdict import Judged, Verdict, confidence, decide, finished, is_complete, judge, nothing, undecided, worst_phase
+from .verdict import (
+    Judged,
+    Verdict,
+    confidence,
+    decide,
+    finished,
+    is_adequate,
+    is_complete,
+    judge,
+    nothing,
+    undecided,
+    worst_phase,
+)
 
 MOST_CYCLES = 14
 
@@ -126,7 +139,7 @@ def diagnose(
         dropped.append(UNHEARD)
     data = measure(traces, segmentations, ring_period=heard or FALLBACK_PERIOD, most_cycles=MOST_CYCLES)
     train = training_cycles(data, holdout)
-    floor = floors(data, factor=scatter_factor(data))
+    floor = floors(data)
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
 
@@ -141,7 +154,7 @@ def diagnose(
     sure = 1.0
     while True:
         assert rung.held is not None
-        phase, worst = worst_phase(rung.train, rung.held)
+        phase, worst = worst_phase(rung.train, rung.held, limits)
         if is_complete(rung.train, rung.held, limits):
             verdict = finished(named)
             break
@@ -167,12 +180,12 @@ def diagnose(
         rounds.append(Round(tuple(done[0]), tuple(done[1]), tuple(judged), rung))
         best, close = decide(judged, limits)
         if best is None:
-            verdict = nothing(named, judged, phase, worst, limits)
+            verdict = nothing(named, judged, rung, limits)
             break
         new = _add(rung, best.candidate, data, floor, train)
         ladder.append(new)
         assert new.held is not None
-        if len(close) > 1 and worst_phase(new.train, new.held)[1] <= limits.adequate:
+        if len(close) > 1 and is_adequate(new.train, new.held, limits):
             verdict = undecided(named, close)
             sure *= confidence(judged, close)
             break
@@ -273,9 +286,8 @@ def _rung(
     train: np.ndarray,
 ) -> Rung:
     unseen = np.asarray(data.cycles.used) & ~train
-    shown = replace(data, valid=data.valid & (train & np.asarray(data.cycles.used))[..., None])
     held = held_out(Problem(composition, data), optimum, floor, unseen, optimum.features)
-    return Rung(model, added, misfit(shown, optimum.features, floor), held, composition, optimum, optimum.features)
+    return Rung(model, added, errors(data, optimum, floor), held, composition, optimum, optimum.features)
 
 
 def _static(data: Measurement, floor: np.ndarray, train: np.ndarray, optimum: Fit, stiffness: float) -> Rung:

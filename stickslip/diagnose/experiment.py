@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import StickslipError
 from ..fit.composition import Composition
 from ..fit.inertial import Fit
-from ..residual import Scatter
+from ..floors import Scatter
 from .bench import estimates, prepared, until_slips
 from .menu import BACK, MENU, Conditions, Experiment, quantity
 from .outcome import FEATURES, Outcome, floor_of, outcome

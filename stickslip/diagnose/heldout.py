@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..features.layout import PHASES
-from ..fit.composition import EVENT_WIDTHS, START
+from ..fit.common import Common
+from ..fit.composition import START
 from ..fit.inertial import HUBER, Fit
 from ..fit.problem import Problem
+from ..floors import event_widths
 
 ITERATIONS = 3
 
@@ -37,31 +39,43 @@ def held_out(
     """Evaluate a fit on ``cycles`` (R, n) with its event-wise factors there at their prior mean.
 
     In each cycle the two factors are then set to their most probable values, to first order. The elongation that a
-    run begins with is set by its recurrence, where no cycle of that run was fitted.
+    run begins with is set by its recurrence, where no cycle of that run was fitted. What the unseen events have in
+    common is taken from them alone and counts: it is as much a misfit there as where the fit has looked.
     """
     m = problem.measurement
-    model = problem.features(fit.z, fit.events) if features is None else features
-    event = problem.event_columns(fit.columns, fit.z, fit.events)
-    widths = np.array(EVENT_WIDTHS)
+    cycles = cycles & np.asarray(m.cycles.used)
     phase = m.layout.phase_index()
-    cells, scores = [], []
+    model = problem.features(fit.z, fit.events) + fit.offsets if features is None else features
+    event = problem.event_columns(fit.columns, fit.z, fit.events)
+    widths = event_widths(m)
+    left = np.zeros_like(m.values)
     model = _starts(problem, fit, cycles, model)
-    for r, n in np.argwhere(cycles & np.asarray(m.cycles.used)):
+    for r, n in np.argwhere(cycles):
         ok = m.valid[r, n]
         res = np.nan_to_num((model[r, n] - m.values[r, n]) / floor[r, n], nan=1e4, posinf=1e4, neginf=-1e4)
         jac = np.nan_to_num(event[r, n] / floor[r, n][:, None])
         weight = np.where(np.abs(res) > HUBER, HUBER / np.maximum(np.abs(res), HUBER), 1.0) * ok
-        normal = jac.T @ (weight[:, None] * jac) + np.diag(1.0 / widths**2)
+        normal = jac.T @ (weight[:, None] * jac) + np.diag(1.0 / widths[r, n] ** 2)
         shift = -np.linalg.solve(normal, jac.T @ (weight * res))
-        left = res + jac @ shift
-        loss = np.where(np.abs(left) <= HUBER, left**2, 2 * HUBER * np.abs(left) - HUBER**2)
-        row = [np.mean(loss[ok & (phase == i)]) if (ok & (phase == i)).any() else np.nan for i in range(len(PHASES))]
-        cells.append(row)
-        scores.append(np.nanmean(row))
-    table = np.array(cells).reshape(-1, len(PHASES))
-    seen = ~np.isnan(table).all(axis=0) if table.size else np.zeros(len(PHASES), bool)
-    by_phase = {p: float(np.sqrt(np.nanmean(table[:, i]))) for i, p in enumerate(PHASES) if seen[i]}
+        left[r, n] = (res + jac @ shift) * floor[r, n] - fit.offsets[r, n]
+    common = Common(m, floor, cycles)
+    found = np.abs(common(left[common.valid]))
+    loss = np.where(found <= HUBER, found**2, 2 * HUBER * found - HUBER**2)
+    count = int(common.valid.sum())
+    each = np.zeros(m.values.shape)
+    each[common.valid] = loss[:count]
+    alike = loss[count:].reshape(phase.size, -1).sum(axis=1)
+    counts = np.array([common.valid[..., phase == i].sum() for i in range(len(PHASES))])
+    share = np.array([alike[phase == i].sum() for i in range(len(PHASES))]) / np.maximum(counts, 1)
+    by_phase = {
+        p: float(np.sqrt(each[..., phase == i].sum() / counts[i] + share[i])) for i, p in enumerate(PHASES) if counts[i]
+    }
     score = float(np.mean(np.square(list(by_phase.values())))) if by_phase else float("nan")
+    scores = []
+    for r, n in np.argwhere(cycles):
+        own = {i: common.valid[r, n, phase == i] for i in range(len(PHASES))}
+        rows = [each[r, n, phase == i][ok].mean() + share[i] for i, ok in own.items() if ok.any()]
+        scores.append(float(np.mean(rows)) if rows else np.nan)
     return HeldOut(float(np.sqrt(score)), score, by_phase, np.array(scores))
 
 
@@ -83,4 +97,5 @@ def _starts(problem: Problem, fit: Fit, cycles: np.ndarray, model: np.ndarray) -
             late = (m.values[r, ok, at] - model[r, ok, at]) / fit.columns[r, ok, at, i]
             z[i] = np.clip(z[i] + np.median(late), *f.bounds)
             model = problem.again(z, fit.events, r, model)
+            model[r] += fit.offsets[r]
     return model

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from ..features.measurement import Measurement
-from ..fit.composition import EVENT_WIDTHS
+from ..fit.common import Common
 from ..fit.inertial import HUBER, Fit
 from ..fit.problem import Problem
+from ..floors import event_widths
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Linear:
     Args:
         problem, optimum: the base and its fit.
         measurement, floor: the data.
-        valid: features that count, shape (R, n, F).
+        valid: features that count, shape (R, n, F): those of some cycles.
         factor: on the floors.
     """
 
@@ -45,30 +46,37 @@ class Linear:
         factor: float = 1.0,
     ) -> None:  # fmt: skip
         self.valid, self.optimum = valid, optimum
-        r = np.nan_to_num((measurement.values - optimum.features) / (factor * floor))
-        r = np.clip(r, -1e4, 1e4)
-        weight = np.where(np.abs(r) > HUBER, np.sqrt(HUBER / np.maximum(np.abs(r), HUBER)), 1.0)
-        self.scale = weight / (factor * floor)
+        self.common = Common(measurement, floor, np.asarray(valid.any(axis=-1)), factor)
+        raw = optimum.features - optimum.offsets
+        off = np.clip(np.nan_to_num((measurement.values - raw) / floor, nan=1e4), -1e4, 1e4) * floor
+        r = self.common(off[valid])
+        self.weight = np.where(np.abs(r) > HUBER, np.sqrt(HUBER / np.maximum(np.abs(r), HUBER)), 1.0)
         event = problem.event_columns(optimum.columns, optimum.z, optimum.events)
         self.cells = np.argwhere(valid.any(axis=-1))
         index = np.full(valid.shape[:2], -1)
         index[valid.any(axis=-1)] = np.arange(len(self.cells))
         owner = np.broadcast_to(index[..., None], valid.shape)[valid]
         rows = np.arange(owner.size)
-        shared = np.nan_to_num(optimum.columns * self.scale[..., None])[valid]
-        own = np.nan_to_num(event * self.scale[..., None])[valid]
+        own = np.nan_to_num(event)[valid]
         blocks = np.zeros((owner.size, 2 * len(self.cells)))
         blocks[rows, 2 * owner], blocks[rows, 2 * owner + 1] = own[:, 0], own[:, 1]
         widths = np.array([min(f.width, 1e3) for f in optimum.free])
-        off = [(v - f.inward(f.prior)) / w for v, f, w in zip(optimum.z, optimum.free, widths, strict=True)]
-        at = optimum.events[tuple(self.cells.T)] / np.array(EVENT_WIDTHS)
-        prior = np.concatenate([1.0 / widths, np.tile(1.0 / np.array(EVENT_WIDTHS), len(self.cells))])
-        matrix = np.vstack([np.hstack([shared, blocks]), np.diag(prior)])
-        self.target = np.concatenate([(r * weight)[valid], -np.array(off), -at.ravel()])
+        away = [(v - f.inward(f.prior)) / w for v, f, w in zip(optimum.z, optimum.free, widths, strict=True)]
+        each = event_widths(measurement)[tuple(self.cells.T)]
+        at = optimum.events[tuple(self.cells.T)] / each
+        prior = np.concatenate([1.0 / widths, 1.0 / each.ravel()])
+        slopes = self._weighed(np.hstack([np.nan_to_num(optimum.columns)[valid], blocks]))
+        self.rows = len(slopes)
+        matrix = np.vstack([slopes, np.diag(prior)])
+        self.target = np.concatenate([r * self.weight, -np.array(away), -at.ravel()])
         # columns of very different size: scaled, so that what is small beside its own size means something
         self.size = np.linalg.norm(matrix, axis=0)
         self.basis, self.triangle = np.linalg.qr(matrix / self.size)
         self.left = self._without_base(self.target)
+
+    def _weighed(self, columns: np.ndarray) -> np.ndarray:
+        """Changes of the features used (SI, shape (N, k)) as changes of the whitened residuals."""
+        return np.clip(self.common(columns) * self.weight[:, None], -1e6, 1e6)
 
     def _without_base(self, v: np.ndarray) -> np.ndarray:
         """What the base cannot describe of a vector, or of the columns of a matrix."""
@@ -77,8 +85,7 @@ class Linear:
     def step(self, directions: list[np.ndarray]) -> Step:
         """The least-squares step along features' ``directions`` (R, n, F) together with everything in the base."""
         columns = np.zeros((self.target.size, len(directions)))
-        for i, d in enumerate(directions):
-            columns[: int(self.valid.sum()), i] = np.clip(np.nan_to_num(d * self.scale)[self.valid], -1e6, 1e6)
+        columns[: self.rows] = self._weighed(np.nan_to_num(np.stack([d[self.valid] for d in directions], axis=-1)))
         own = self._without_base(columns)
         size = np.linalg.norm(columns, axis=0)
         size[size == 0.0] = 1.0

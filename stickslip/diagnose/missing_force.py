@@ -18,11 +18,10 @@ from ..effects.learned import AGES, PLACES, REACH, SPEEDS, LearnedForce
 from ..features.layout import LEVELS
 from ..features.measurement import Measurement
 from ..fit.composition import Composition
-from ..fit.inertial import MODEL_ERROR, Fit, fit
+from ..fit.inertial import MODEL_ERROR, Fit, errors, fit
 from ..fit.parameters import Free
 from ..fit.problem import Problem
 from ..params import specs
-from ..residual import misfit
 from .candidate import ease
 from .engine import Rung
 from .heldout import held_out
@@ -217,10 +216,9 @@ def again(
 def rung(missing: MissingForce, below: Rung, measurement: Measurement, floor: np.ndarray, train: np.ndarray) -> Rung:
     """The model with the force as a step of the ladder above the model it was learned from."""
     tag, found, used = LearnedForce.tag, missing.fit, np.asarray(measurement.cycles.used)
-    fitted = replace(measurement, valid=measurement.valid & (train & used)[..., None])
     held = held_out(Problem(missing.composition, measurement), found, floor, used & ~train, found.features)
-    errors = misfit(fitted, found.features, floor)
-    return Rung((*below.model, tag), tag, errors, held, missing.composition, found, found.features)
+    train_errors = errors(measurement, found, floor)
+    return Rung((*below.model, tag), tag, train_errors, held, missing.composition, found, found.features)
 
 
 def _covariance(problem: Problem, found: Fit, measurement: Measurement, floor: np.ndarray) -> np.ndarray:
@@ -228,10 +226,9 @@ def _covariance(problem: Problem, found: Fit, measurement: Measurement, floor: n
 
     A weight that was left out has none.
     """
-    valid = measurement.valid & found.use[..., None]
-    linear = Linear(problem, found, measurement, floor, valid)
+    linear = Linear(problem, found, measurement, floor, measurement.valid & found.use[..., None])
     matrix = linear.basis @ linear.triangle * linear.size
-    matrix[: int(valid.sum())] /= MODEL_ERROR
+    matrix[: linear.rows] /= MODEL_ERROR
     at = {f.name: i for i, f in enumerate(found.free)}
     own = [at.get(f"{LearnedForce.tag}.{name}") for name in names()]
     whole = np.linalg.pinv(matrix.T @ matrix)

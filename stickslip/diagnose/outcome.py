@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..residual import Scatter
+from ..floors import Scatter
 from ..solve import Trajectory
 from .bench import Run, Slip
 from .menu import Conditions, Experiment
@@ -104,7 +104,7 @@ def _frequency(whole: Trajectory, arrest: float, period: float) -> float:
 def floor_of(
     name: str, a: Outcome, b: Outcome, experiment: Experiment, conditions: Conditions, k: Scatter, factor: float
 ) -> float:
-    """Standard deviation of a feature around a perfect model (SI), as of `stickslip.residual.floors`."""
+    """Standard deviation of a feature around a perfect model (SI), as of `stickslip.floors`."""
     size = 0.5 * (abs(getattr(a, name)) + abs(getattr(b, name)))
     noise = conditions.noise
     if name == "recurrence":
@@ -123,4 +123,4 @@ def floor_of(
         real, sensor = math.hypot(k.hold * size, k.resolution), noise
     else:
         real, sensor = k.frequency * size, 0.0
-    return math.hypot(sensor, factor * real * (k.virgin if experiment.reversed else 1.0))
+    return math.hypot(sensor, factor * real * (k.first if experiment.reversed else 1.0))

@@ -11,14 +11,13 @@ import numpy as np
 from ..effects import catalogue
 from ..features.measurement import Measurement
 from ..fit.composition import Composition
-from ..fit.inertial import Fit
+from ..fit.inertial import Fit, errors
 from ..fit.parameters import Free, effect_parameters
 from ..fit.problem import Problem
-from ..residual import misfit
 from .candidate import Candidate
 from .heldout import held_out
 
-_ARRAYS = ("z", "events", "features", "covariance", "columns", "use")
+_ARRAYS = ("z", "events", "features", "offsets", "covariance", "columns", "use")
 
 
 def fit_arrays(fit: Fit) -> dict[str, np.ndarray]:
@@ -32,13 +31,14 @@ def fit_from(arrays: Mapping[str, np.ndarray]) -> Fit:
     """The inverse of :func:`fit_arrays`."""
     cost, data_cost, evaluations, jacobians = arrays["numbers"].tolist()
     free = tuple(Free(**f) for f in json.loads(str(arrays["free"])))
-    z, events, features, covariance, columns, use = (np.asarray(arrays[name]) for name in _ARRAYS)
+    z, events, features, offsets, covariance, columns, use = (np.asarray(arrays[name]) for name in _ARRAYS)
     return Fit(
         z,
         events,
         cost,
         data_cost,
         features,
+        offsets,
         covariance,
         free,
         columns,
@@ -73,10 +73,9 @@ def candidate_from(
         return candidate
     fit = fit_from(arrays)
     used = np.asarray(measurement.cycles.used)
-    shown = replace(measurement, valid=measurement.valid & (train & used)[..., None])
     return replace(
         candidate,
         fit=fit,
-        train=misfit(shown, fit.features, floor),
+        train=errors(measurement, fit, floor),
         held=held_out(Problem(composition, measurement), fit, floor, used & ~train, fit.features),
     )

@@ -7,8 +7,9 @@ from typing import Any
 from ..effects import catalogue
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
+from ..floors import scatter_factor
 from .candidate import Candidate
-from .engine import Diagnosis, Rung, scatter_factor
+from .engine import Diagnosis, Rung
 from .experiment import TELLING, recommend
 from .menu import Conditions
 
@@ -119,7 +120,8 @@ def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
     known = a.confused_with.get(pair[1]) or b.confused_with.get(pair[0])
     rivals = [c for t in pair for c in d.rounds[-1].candidates if c.tag == t and c.fit is not None] if d.rounds else []
     if len(rivals) == 2:
-        found = recommend(rivals[0], rivals[1], Conditions.of(d.measurement), factor=scatter_factor(d.measurement))
+        factor = 1.0 + min(scatter_factor(d.measurement), 1.0)
+        found = recommend(rivals[0], rivals[1], Conditions.of(d.measurement), factor=factor)
         if found["floors"] < TELLING and known is not None:
             found["text"] = f"{known} ({found['text']})"
         return found

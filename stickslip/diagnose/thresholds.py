@@ -16,10 +16,13 @@ class Thresholds:
     Attributes:
         complete: phase -> largest error (floors), training and held-out, at which the model is complete. Set to what
             nearly all of the development campaigns without a missing effect stay below (docs/diagnosis).
+        alike: largest that events may have in common, in any phase (standard deviations of what is expected of that).
         overall: largest error over all phases together, training and held-out, at which it is: an effect may be spread
             so thinly that no single phase shows it. 55 of the 58 campaigns above stay below.
         gain: an effect must take off at least this share of the training cost, and of the held-out score.
-        adequate: largest error of any phase (floors) with the named effect; above it something else is missing.
+        adequate: factor on the limits of ``complete`` and ``alike`` that the model with the named effect must meet;
+            above it something else is missing.
+        remainder: factor on them up to which a misfit that no effect explains is called a small one.
         significant: an effect must lower the training cost by at least the square of this for each of its parameters.
         rival: the runner-up must cost at least this factor more; otherwise the data cannot tell them apart.
         failed: a base fit with a larger error (floors) is not ranked.
@@ -29,12 +32,14 @@ class Thresholds:
     complete: Mapping[str, float] = field(
         default_factory=lambda: {"creep": 1.1, "slip": 1.1, "ring-down": 1.5, "recurrence": 1.2, "hold": 1.3}
     )
-    overall: float = 0.8
+    alike: float = 2.2
+    overall: float = 0.95
     gain: float = 0.25
     adequate: float = 2.0
+    remainder: float = 1.3
     significant: float = 3.0
     rival: float = 1.15
-    failed: float = 50.0
+    failed: float = 300.0
     standard_errors: float = 2.0
 
 

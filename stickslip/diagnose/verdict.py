@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -13,6 +14,18 @@ from ..residual import Misfit
 from .candidate import Candidate
 from .heldout import HeldOut
 from .thresholds import THRESHOLDS, Thresholds
+
+
+class _Errors(Protocol):
+    """What a step of the ladder leaves."""
+
+    @property
+    def train(self) -> Misfit:
+        """On the cycles fitted."""
+
+    @property
+    def held(self) -> HeldOut | None:
+        """On the others."""
 
 
 @dataclass(frozen=True)
@@ -44,19 +57,29 @@ def errors(train: Misfit, held: HeldOut | None) -> dict[str, float]:
     return found
 
 
-def worst_phase(train: Misfit, held: HeldOut | None) -> tuple[str, float]:
-    """The phase with the largest error, training or held out."""
-    found = errors(train, held)
-    if not found:
-        return "", 0.0
-    name = max(found, key=lambda k: found[k])
-    return name, found[name]
+def worst_phase(train: Misfit, held: HeldOut | None, limits: Thresholds = THRESHOLDS) -> tuple[str, float]:
+    """The phase that is furthest beyond its limit, and its error (floors): training, held out, or in all events."""
+    found = [(e / limits.complete[p], p, e) for p, e in errors(train, held).items()]
+    found += [(e / limits.alike, f"{p} in all events", e) for p, e in train.alike.items()]
+    _, name, error = max(found, default=(0.0, "", 0.0))
+    return name, error
 
 
 def is_complete(train: Misfit, held: HeldOut | None, limits: Thresholds = THRESHOLDS) -> bool:
-    """Whether every phase, and all of them together, are at their floor, also where no fit has looked."""
+    """Whether every phase, and all of them together, are at their floor, also where no fit has looked, and what all
+    events have in common is no more than a bank of few parameters leaves."""
     overall = max(train.total, held.error if held is not None else 0.0)
-    return overall <= limits.overall and all(e <= limits.complete[phase] for phase, e in errors(train, held).items())
+    phases = all(e <= limits.complete[phase] for phase, e in errors(train, held).items())
+    return overall <= limits.overall and phases and all(e <= limits.alike for e in train.alike.values())
+
+
+def is_adequate(
+    train: Misfit, held: HeldOut | None, limits: Thresholds = THRESHOLDS, factor: float | None = None
+) -> bool:
+    """Whether what is left is small enough to trust the name of what was added: ``factor`` times the limits."""
+    factor = limits.adequate if factor is None else factor
+    own = all(e <= factor * limits.complete[phase] for phase, e in errors(train, held).items())
+    return own and all(e <= factor * limits.alike for e in train.alike.values())
 
 
 @dataclass(frozen=True)
@@ -201,16 +224,15 @@ def undecided(named: Sequence[str], close: Sequence[Judged]) -> Verdict:
     return Verdict("ambiguous", tuple(named), tags, text)
 
 
-def nothing(
-    named: Sequence[str], judged: Sequence[Judged], phase: str, worst: float, limits: Thresholds = THRESHOLDS
-) -> Verdict:
+def nothing(named: Sequence[str], judged: Sequence[Judged], rung: _Errors, limits: Thresholds = THRESHOLDS) -> Verdict:
     """The verdict when something is missing and no candidate passes."""
+    phase, worst = worst_phase(rung.train, rung.held, limits)
     nearest = min(judged, key=lambda j: j.cost, default=None)
     text = f"Something is missing ({phase} is off by {worst:.1f} floors) and no effect that was tried explains it"
     if nearest is not None:
         text += f"; nearest is {nearest.candidate.tag}, but {'; '.join(nearest.failures) or 'it does not suffice'}"
     reasons = nearest.failures if nearest is not None else ()
-    if not named and worst <= limits.adequate:
+    if not named and is_adequate(rung.train, rung.held, limits, limits.remainder):
         return Verdict(
             "complete",
             text=f"A small misfit remains ({phase}, {worst:.1f} floors) that no effect that was tried takes away; "
@@ -218,7 +240,7 @@ def nothing(
         )
     if not named:
         return Verdict("unknown", (), (), text + ".", reasons)
-    if worst <= limits.adequate:
+    if is_adequate(rung.train, rung.held, limits):
         return Verdict(
             "missing", tuple(named), tuple(named),
             f"The base model lacks {_listed(named)}. A small misfit remains ({phase}, {worst:.1f} floors) that "

@@ -268,16 +268,16 @@ def _sensor_noise(
 
     def window(length: float) -> float:
         # a count is a bias of up to half its size while the reading rests on it; motion dithers it
-        return float(np.sqrt(noise**2 / max(rate * length, 1.0) + count**2 / 12.0 / 4.0))
+        return float(np.sqrt(noise**2 / max(rate * length, 1.0) + count**2 / 12.0 / 10.0))
 
     rest = window(0.3 * layout.settling)
     out[s["recurrence"]] = 0.5 / rate / np.sqrt(3.0)
     out[s["size"]] = np.hypot(rest, np.sqrt(white / 4.0))
     out[s["times"]] = np.hypot(
-        0.1 / rate, _passage_noise(values[s["times"]], float(values[s["size"]][0]), np.sqrt(white))
+        0.02 / rate, _passage_noise(values[s["times"]], float(values[s["size"]][0]), np.sqrt(white))
     )
     out[s["overshoot"]] = np.hypot(rest, np.sqrt(white / 4.0))
-    out[s["ring"]] = np.sqrt(white) / 3.0
+    out[s["ring"]] = np.sqrt(white) / 5.0
     ringing = max(float(values[s["ring"]][0]), 1e-12)
     period = float(anchors.ring_period)
     out[s["frequency"]] = np.sqrt(white) / ringing / (2 * np.pi * period) / np.sqrt(max(rate * 3 * period, 1.0))

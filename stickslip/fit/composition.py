@@ -17,8 +17,6 @@ from ..effects.base import Effect
 from ..model import Block, LoadPoint, Model, Weakening
 from .parameters import Free
 
-EVENT_WIDTHS = (0.12, 0.08)  # prior s.d. of ln(u_max) and ln(p) from event to event where lines are new every time
-
 START = "start."  # with the number of a run: when its first slip comes, where the record does not begin virgin
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from ..errors import FitError
-from ..residual import shared_cycles
-from .composition import EVENT_WIDTHS
+from ..features.measurement import Measurement
+from ..floors import event_widths
+from ..residual import Misfit, misfit
+from .common import Common
 from .parameters import Free, to_si, vector
 from .problem import STEP, Problem
 
@@ -20,6 +22,7 @@ TRUST = 0.1  # share of a step's change that Broyden's update may have missed
 MODERATE = 4.0  # floors, rms, by which the step of a difference should move the features
 LEAST, LARGEST = 1e-3, (0.05, 0.5)  # such a step on the search scale; the largest of a logarithm, of another scale
 MODEL_ERROR = 4.0  # on standard deviations: a bank of three parameters is no rough line (tests/fit/test_recovery.py)
+WIDE = 2.4  # factor on the floors from which a coarser tolerance of the solver does
 STAGES = ((30.0, 6), (7.0, 8), (2.5, 8), (1.0, 20))  # factor on the floors, most evaluations at it
 
 
@@ -32,7 +35,8 @@ class Fit:
         events: event-wise ln factors, shape (R, n, 2).
         cost: robust chi-square, priors included.
         data_cost: of the data alone.
-        features: of the model at the optimum, shape (R, n, F).
+        features: of the model at the optimum and what all events have in common, shape (R, n, F).
+        offsets: what all events, or all of a run, have in common, as far as it is in ``features``, shape (R, n, F).
         covariance: of z, event-wise factors marginalised, shape (k, k); widened by MODEL_ERROR, which development
             campaigns asked for.
         free: what z means.
@@ -46,6 +50,7 @@ class Fit:
     cost: float
     data_cost: float
     features: np.ndarray
+    offsets: np.ndarray
     covariance: np.ndarray
     free: tuple[Free, ...]
     columns: np.ndarray
@@ -72,7 +77,8 @@ class _Residuals:
         m = problem.measurement
         self.used = np.asarray(m.cycles.used) & (True if use is None else use)
         self.valid = m.valid & self.used[..., None]
-        self.widths = np.array(EVENT_WIDTHS) * event_scale
+        self.widths = event_widths(m)[self.used].ravel() * event_scale
+        self._common: dict[float, Common] = {}
         self.free = problem.composition.free
         self.k = len(self.free)
         self._at: np.ndarray | None = None
@@ -86,6 +92,11 @@ class _Residuals:
         out = np.zeros((*self.used.shape, 2))
         out[self.used] = x[self.k :].reshape(-1, 2)
         return out
+
+    def solve(self, problem: Problem) -> None:
+        """Go on with ``problem``, the same at another tolerance."""
+        if problem is not self.problem:
+            self.problem, self._at = problem, None
 
     def evaluate(self, x: np.ndarray) -> np.ndarray:
         """Features at ``x``, kept for the Jacobian that may follow."""
@@ -144,15 +155,24 @@ class _Residuals:
         """Take ``columns`` for the derivatives at ``x``."""
         self._columns = (x.copy(), self.evaluate(x), columns)
 
+    def common(self, factor: float) -> Common:
+        """What events have in common, with the floors times ``factor``."""
+        if factor not in self._common:
+            self._common[factor] = Common(self.problem.measurement, self.floor, self.used, factor)
+        return self._common[factor]
+
+    def misfit(self, x: np.ndarray) -> np.ndarray:
+        """Model less data (SI), shape (R, n, F), limited to 1e4 floors; that where the model has no such feature."""
+        r = self.evaluate(x) - self.problem.measurement.values
+        return np.clip(np.nan_to_num(r / self.floor, nan=1e4), -1e4, 1e4) * self.floor
+
     def data(self, x: np.ndarray, factor: float) -> np.ndarray:
-        model = self.evaluate(x)
-        r = (model - self.problem.measurement.values) / (factor * self.floor)
-        return np.nan_to_num(np.clip(r[self.valid], -1e4, 1e4), nan=1e4)
+        return self.common(factor)(self.misfit(x)[self.valid])
 
     def priors(self, x: np.ndarray) -> np.ndarray:
         z = x[: self.k]
         p = [(v - f.inward(f.prior)) / f.width for v, f in zip(z, self.free, strict=True) if np.isfinite(f.width)]
-        return np.concatenate([p, (x[self.k :].reshape(-1, 2) / self.widths).ravel()])
+        return np.concatenate([p, x[self.k :] / self.widths])
 
     def residual(self, x: np.ndarray, factor: float) -> np.ndarray:
         return np.concatenate([self.data(x, factor), self.priors(x)])
@@ -160,38 +180,34 @@ class _Residuals:
     def jacobian(self, x: np.ndarray, factor: float) -> np.ndarray:
         columns = self.columns(x)
         de = self.problem.event_columns(columns, x[: self.k], self.events(x))
-        scale = 1.0 / (factor * self.floor)[..., None]
-        dz = np.nan_to_num(columns * scale)[self.valid]
+        dz = np.nan_to_num(columns)[self.valid]
         rows = int(self.valid.sum())
         cells = np.argwhere(self.used)
         index = np.full(self.used.shape, -1)
         index[self.used] = np.arange(len(cells))
         owner = np.broadcast_to(index[..., None], self.valid.shape)[self.valid]
         event = np.zeros((rows, 2 * len(cells)))
-        de = np.nan_to_num(de * scale)[self.valid]
+        de = np.nan_to_num(de)[self.valid]
         at = np.arange(rows)
         event[at, 2 * owner] = de[:, 0]
         event[at, 2 * owner + 1] = de[:, 1]
         finite = [i for i, f in enumerate(self.free) if np.isfinite(f.width)]
         prior = np.zeros((len(finite), self.k + event.shape[1]))
         prior[np.arange(len(finite)), finite] = [1.0 / self.free[i].width for i in finite]
-        event_prior = np.hstack([np.zeros((event.shape[1], self.k)), np.diag(np.tile(1.0 / self.widths, len(cells)))])
-        return np.clip(np.vstack([np.hstack([dz, event]), prior, event_prior]), -1e7, 1e7)
+        event_prior = np.hstack([np.zeros((event.shape[1], self.k)), np.diag(1.0 / self.widths)])
+        slopes = self.common(factor)(np.hstack([dz, event]))
+        return np.clip(np.vstack([slopes, prior, event_prior]), -1e7, 1e7)
 
-    def information(self, x: np.ndarray, shared: float) -> np.ndarray:
-        """The Jacobian whitened for the covariance: Huber's weights, and scatter that ``shared`` cycles have alike."""
+    def information(self, x: np.ndarray) -> np.ndarray:
+        """The Jacobian for the covariance: with Huber's weights, and the data widened by MODEL_ERROR; priors not."""
         jac = self.jacobian(x, 1.0)
-        sensor = self.problem.measurement.sensor
-        real = np.maximum(self.floor**2 - sensor**2, 0.0)
         r = np.abs(self.data(x, 1.0))
-        weight = (self.floor / np.sqrt(sensor**2 + shared * real))[self.valid]
-        jac[: r.size] *= (weight * np.where(r > HUBER, np.sqrt(HUBER / np.maximum(r, HUBER)), 1.0))[:, None]
+        jac[: r.size] *= (np.where(r > HUBER, np.sqrt(HUBER / np.maximum(r, HUBER)), 1.0) / MODEL_ERROR)[:, None]
         return jac
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low, high = zip(*(f.bounds for f in self.free), strict=True)
-        n = 2 * int(self.used.sum())
-        reach = 4.0 * np.tile(self.widths, n // 2)
+        reach = 4.0 * self.widths
         return np.concatenate([low, -reach]), np.concatenate([high, reach])
 
 
@@ -231,6 +247,7 @@ def fit(
         FitError: the model could not be evaluated at the start.
     """
     res = _Residuals(problem, floor, event_scale, use)
+    coarse = problem.coarser() if any(factor >= WIDE for factor, _ in stages) else problem
     low, high = res.bounds()
     start = vector(problem.composition.free) if z is None else np.asarray(z, float)
     ev = np.zeros((*res.used.shape, 2)) if events is None else events
@@ -238,7 +255,7 @@ def fit(
     res.anew = anew or columns is None
     if columns is not None:
         res.start(x, columns)
-    scale = np.concatenate([[min(f.width, 1.0) for f in res.free], np.tile(res.widths, int(res.used.sum()))])
+    scale = np.concatenate([[min(f.width, 1.0) for f in res.free], res.widths])
     soft = problem.coupled()
 
     def outward(u: np.ndarray, begun: np.ndarray) -> np.ndarray:
@@ -257,6 +274,7 @@ def fit(
         # sought as a distance from where the stage begins, in units of the priors: scipy takes the length of the
         # start vector for the radius it trusts, and that of logarithms is far too long
         begun = x
+        res.solve(coarse if factor >= WIDE else problem)
 
         def residual(u: np.ndarray, factor: float = factor, begun: np.ndarray = begun) -> np.ndarray:
             r = res.residual(outward(u, begun), factor)
@@ -283,20 +301,23 @@ def fit(
             gtol=1e-6,
         )
         x = outward(found.x, begun)
-    features = res.evaluate(x)
+    res.solve(problem)
+    raw = res.evaluate(x)
+    offsets = -res.common(1.0).offsets(res.misfit(x))
     data, prior = res.data(x, 1.0), res.priors(x)
-    slopes = inward(res.information(x, shared_cycles(problem.measurement)))
+    slopes = inward(res.information(x))
     spread = np.linalg.pinv(slopes.T @ slopes)[: res.k, : res.k]
     back = np.diag(scale[: res.k])
     if soft is not None:
         back[soft[1], soft[0]] = scale[soft[0]]
-    covariance = MODEL_ERROR**2 * back @ spread @ back.T
+    covariance = back @ spread @ back.T
     return Fit(
         x[: res.k],
         res.events(x),
         robust(data) + float(prior @ prior),
         robust(data),
-        features,
+        raw + offsets,
+        offsets,
         covariance,
         problem.composition.free,
         res.columns(x),
@@ -314,3 +335,12 @@ def _box(
     if soft is not None:
         box[0][soft[1]], box[1][soft[1]] = -np.inf, np.inf
     return box
+
+
+def errors(measurement: Measurement, found: Fit, floor: np.ndarray) -> Misfit:
+    """The errors of a fit on the cycles it has seen, and what those have in common."""
+    used = found.use & np.asarray(measurement.cycles.used)
+    shown = replace(measurement, valid=measurement.valid & used[..., None])
+    common = Common(measurement, floor, used)
+    off = np.nan_to_num((found.features - found.offsets - measurement.values) / floor, nan=1e4) * floor
+    return replace(misfit(shown, found.features, floor), alike=common.alike(off[common.valid]))

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from ..errors import FitError
-from ..residual import misfit
-from .inertial import STAGES, Fit, fit, robust
+from .common import Common
+from .inertial import STAGES, Fit, errors, fit, robust
 from .parameters import vector
 from .problem import Problem
 
 STARTS = 4
-ENOUGH = 1.2  # floors; a fit with no phase above it needs no other start
+ENOUGH = 1.4  # floors; a fit with no phase above it needs no other start
 # factors on the distance of weakening and on the time of healing
 PAIRS = ((1.0, 1.0), (1.5, 3.0), (0.4, 1.0), (2.5, 0.5))
+FURTHER = ((5.0, 8), (1.0, 16))  # stages of a best fit that is begun again, until that takes less than 3 % off
+AGAIN, SETTLED = 3, 0.97
 AWAY = 2  # stages at wide floors after which a start that does worse than the best so far is left
 
 
@@ -43,7 +44,6 @@ def best_of(
     most = sum(n for _, n in STAGES)
     best: Fit | None = None
     failure: FitError | None = None
-    shown = replace(problem.measurement, valid=problem.measurement.valid & use[..., None])
     for i, z in enumerate(_starts(problem, starts)):
         done = 0
 
@@ -63,18 +63,25 @@ def best_of(
             continue
         if best is None or found.cost < best.cost:
             best = found
-        if max(misfit(shown, best.features, floor).by_phase.values(), default=0.0) <= ENOUGH:
+        if max(errors(problem.measurement, best, floor).by_phase.values(), default=0.0) <= ENOUGH:
             break
     if best is None:
         raise failure or FitError("the fit was given no start")
+    for _ in range(AGAIN):
+        more = fit(problem, floor, z=best.z, events=best.events, use=use, stages=FURTHER)
+        arrived = more.cost > SETTLED * best.cost
+        best = more if more.cost < best.cost else best
+        if arrived:
+            break
     return best
 
 
 def _cost(found: Fit, problem: Problem, floor: np.ndarray, factor: float) -> float:
     """Robust chi-square of the data with all floors times ``factor``."""
     m = problem.measurement
-    r = (found.features - m.values)[m.valid & found.use[..., None]]
-    return robust(np.nan_to_num(r / (factor * floor)[m.valid & found.use[..., None]], nan=1e4))
+    common = Common(m, floor, found.use, factor)
+    off = np.nan_to_num((found.features - found.offsets - m.values) / floor, nan=1e4) * floor
+    return robust(common(off[common.valid]))
 
 
 def _starts(problem: Problem, most: int) -> Iterator[np.ndarray]:

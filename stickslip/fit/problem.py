@@ -27,6 +27,8 @@ from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
 from .composition import START, Composition, Given
 
+FINE = Tolerance(1.5e-3, 6e-12, 6e-8)  # errors of half a floor (docs/verification)
+COARSE = Tolerance(5e-3, 2e-11, 2e-7)  # of two to three: for floors that are widened more than that
 STEP = 0.01  # of a difference, on the search scale, until it is known better
 BROKEN = 0.3  # change of a slip's size within such a step that can only be another event
 THREADS = max(1, min(4, os.cpu_count() or 1))
@@ -50,10 +52,14 @@ class Problem:
         threads: int = THREADS,
     ) -> None:
         self.composition, self.measurement, self.threads = composition, measurement, threads
-        self.tolerance = Tolerance(5e-3, 2e-11, 2e-7) if tolerance is None else tolerance
+        self.tolerance = FINE if tolerance is None else tolerance
         self.runs_done = 0
         both = (measurement.cycles, measurement.anchors)
         self._data = [jax.tree.map(lambda a, r=r: a[r], both) for r in range(measurement.runs)]
+
+    def coarser(self) -> Problem:
+        """The same at a tolerance that suffices where floors are widened."""
+        return Problem(self.composition, self.measurement, COARSE, self.threads)
 
     def features(self, z: np.ndarray, events: np.ndarray) -> np.ndarray:
         """Features of the model, shape (R, n, F)."""

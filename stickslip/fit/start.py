@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.signal import periodogram
 
 from ..campaign import Campaign, Rig, Unmeasured
 from ..errors import InputError
@@ -15,6 +14,7 @@ from ..segment import Segmentation
 from ..trace import Trace
 from .composition import START, Composition
 from .parameters import Free
+from .resonance import ringing
 from .surface import Guess, surface_prior
 
 SHARED = ("mass", "contacts", "normal_force", "friction_coefficient", "youngs_modulus", "poisson_ratio", "line_length",
@@ -32,45 +32,11 @@ UNHEARD = (
     "unless the roughness is given, contact.u_max is sought around what follows from that (within a factor of 1.6, one "
     "standard deviation)"
 )
-STANDS_OUT = 10.0  # times the median of the spectrum; of noise alone, the peak is about twice, its slow end five times
 
 
 def ring_period(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float:
     """Period (s) of the contact's resonance: that of the ringing, or 2 ms where none is heard (say so: `UNHEARD`)."""
     return ringing(traces, segmentations) or FALLBACK_PERIOD
-
-
-def ringing(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float | None:
-    """Period (s) of the ringing after the arrests: the highest peak of their mean spectrum above 60 Hz.
-
-    None where the sampling is too slow or nothing rings, that is where no peak stands out of the noise.
-    """
-    found = []
-    for trace, segments in zip(traces, segmentations, strict=True):
-        if trace.displacement is None or not segments.events:
-            continue
-        rate = trace.sampling_rate
-        for event in segments.events:
-            a = event.i_arrest + max(int(1e-3 * rate), 1)
-            b = a + int(0.03 * rate)
-            if b >= trace.time.size or b - a < 64:
-                continue
-            y = trace.displacement[a:b]
-            s = np.linspace(-1, 1, y.size)
-            y = y - np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyfit(s, y, 3))
-            found.append((rate, periodogram(y, rate, window="hann", nfft=8 * y.size)))
-    if not found:
-        return None
-    rates = {round(r) for r, _ in found}
-    if len(rates) > 1:
-        found = [f for f in found if round(f[0]) == max(rates)]
-    frequency = found[0][1][0]
-    size = min(f[1][1].size for f in found)
-    power = np.mean([f[1][1][:size] for f in found], axis=0)
-    band = (frequency[:size] > 60.0) & (frequency[:size] < found[0][0] / 5.0)
-    if not band.any() or power[band].max() < STANDS_OUT * np.median(power[band]):
-        return None
-    return float(1.0 / frequency[:size][band][np.argmax(power[band])])
 
 
 def _known(value: Any, default: float, width: float) -> tuple[float, float, float | None, float | None, bool]:

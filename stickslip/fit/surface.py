@@ -14,6 +14,8 @@ from .static_table import StaticRig
 
 LINES = 60
 GUESSES = ("H", "h_rms", "normal_force", "friction_coefficient", "youngs_modulus", "poisson_ratio", "line_length")
+OUTPUTS = ("contact.u_max", "contact.p", "contact.spread", "contact.strength")
+STEP = 0.05  # of a logarithm, for derivatives
 LOADS = np.linspace(0.02, 0.98, 49)
 
 
@@ -37,6 +39,21 @@ class SurfacePrior(NamedTuple):
     p: Guess
     spread: Guess | None
     text: str
+
+
+class Sensitivity(NamedTuple):
+    """How the contact's parameters follow from the quantities of a rough line that nobody measured.
+
+    Attributes:
+        names: of k quantities, as in ``[rig]``. outputs: of n parameters of the contact.
+        jacobian: derivatives of the logarithms of the parameters in those of the quantities, shape (n, k).
+        scatter: covariance of the logarithms of the parameters from one rig's few lines to another's, shape (n, n).
+    """
+
+    names: tuple[str, ...]
+    outputs: tuple[str, ...]
+    jacobian: np.ndarray
+    scatter: np.ndarray
 
 
 class _Lines(NamedTuple):
@@ -90,6 +107,39 @@ def surface_prior(rig: Rig) -> SurfacePrior | None:
         f"{np.exp(u.width):.2f}, p = {p.value:.3g} within {np.exp(p.width):.2f}."
     )
     return SurfacePrior(u, p, spread, text)
+
+
+def sensitivity(rig: Rig) -> Sensitivity:
+    """Derivatives of u_max, p, spread and strength in the unmeasured ones of H, h_rms, L, load, friction and E.
+
+    H, h_rms and L are never measured: they are parameters of the distribution of gaps. Derivatives are central
+    differences between the same random lines.
+
+    Args:
+        rig: with H and h_rms (m), be it those that a fit implies.
+
+    Raises:
+        InputError: load or friction are neither measured nor guessed; lines in contact over their whole length.
+    """
+    values = {"H": rig.H, "h_rms": rig.h_rms, "line_length": rig.line_length or StaticRig.length}
+    for name, default in (("normal_force", None), ("friction_coefficient", None), ("youngs_modulus", 210e9)):
+        if not isinstance(getattr(rig, name), float):
+            values[name] = getattr(rig, name) or default
+    centre = {name: _known(value) for name, value in values.items() if value is not None}
+    contacts = int(rig.contacts or 1)
+    columns = []
+    for name, value in centre.items():
+        ends = [_lines(rig.model_copy(update=centre | {name: value * np.exp(s)})) for s in (-STEP, STEP)]
+        change = [np.array([e.u.mean(), e.p.mean(), np.log(e.u.std(ddof=1))]) for e in ends]
+        strength = 1.0 if name in ("normal_force", "friction_coefficient") else 0.0  # friction times all loads
+        columns.append(np.append((change[1] - change[0]) / (2 * STEP), strength))
+    middle = _lines(rig.model_copy(update=centre))
+    scatter = np.zeros((4, 4))
+    scatter[:2, :2] = np.cov(middle.u, middle.p) / contacts + middle.mismatch**2 * np.eye(2)
+    scatter[2, 2] = 0.5 / max(contacts - 1, 1)
+    keep = [0, 1, 2, 3] if contacts > 1 else [0, 1, 3]
+    outputs = tuple(OUTPUTS[k] for k in keep)
+    return Sensitivity(tuple(centre), outputs, np.column_stack(columns)[keep], scatter[np.ix_(keep, keep)])
 
 
 def _open(value: object) -> bool:

@@ -1,8 +1,9 @@
 """Universal files of vibrometers and modal analysers: data sets 58 (text) and 58b (binary).
 
-Headers and text are parsed by pyuff. Binary numbers are taken here, because writers differ in ways pyuff does not
-follow: a line end before the closing mark, single-precision abscissas (as the standard has them) or double ones,
-doubles under a header that says single, and data that happen to hold the closing mark itself.
+Headers and text are parsed by pyuff, which is given marks and identifier lines set out as the standard has them. Binary
+numbers are taken here, because writers differ in ways pyuff does not follow: a line end before the closing mark,
+abscissas and ordinates each in single or in double precision whatever the header says, and data that happen to hold the
+closing mark itself.
 """
 
 from __future__ import annotations
@@ -19,12 +20,16 @@ import numpy as np
 from ..errors import InputError
 from .base import Columns, add_array, need_columns, unique
 
-_MARK = re.compile(rb"(?:^|(?<=\n)|(?<=\r))    -1[ \t]*(?:\r\n|\n|\r)[ ]*(\d+)([bB]?)[^\r\n]*(?:\r\n|\n|\r)")
-_CLOSE = re.compile(rb"(?:\r\n|\n|\r)?    -1[ \t]*(?:\r\n|\n|\r|\Z)")
+_MARK = re.compile(  # columns 5 and 6 in the standard; some writers begin at the left margin
+    rb"(?:^|(?<=\n)|(?<=\r))([ ]{0,8})-1[ \t]*(?:\r\n|\n|\r)[ ]*(\d+)([bB]?)([^\r\n]*)(?:\r\n|\n|\r)"
+)
+_CLOSE = re.compile(rb"(?:\r\n|\n|\r)?[ ]{0,8}-1[ \t]*(?:\r\n|\n|\r|\Z)")
+_INDENT = b"    "
 _NOTHING = re.compile(rb"[\s\0]*\Z")  # some writers leave the closing mark out
 _HEADER_LINES = 11  # records 1 to 11, after the line with the data set's number
 _KINDS = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}
 _SINGLE, _DOUBLE = 4, 8
+_KNOWN = {15, 18, 55, 58, 82, 151, 164, 1858, *range(2400, 2500)}  # data sets of modal analysis
 
 
 @dataclass(eq=False)  # arrays have no single truth value
@@ -43,7 +48,9 @@ class UffReader:
     description = "universal file (data set 58, text and binary)"
 
     def sniff(self, path: Path, head: bytes) -> bool:
-        return re.match(rb"\s{0,80}-1[ \t]*(\r\n|\n|\r)[ ]*\d{1,4}[bB]?", head) is not None
+        mark = re.match(rb"\s{0,80}?([ ]*)-1[ \t]*(?:\r\n|\n|\r)[ ]*(\d{1,4})[bB]?", head)
+        # elsewhere than in columns 5 and 6 it may be the first number of a plain column
+        return mark is not None and (mark[1] == _INDENT or int(mark[2]) in _KNOWN)
 
     def read(self, path: Path) -> Columns:
         sets = list(_sets(path))
@@ -68,20 +75,21 @@ def _sets(path: Path) -> Iterator[_Set]:
     position, number = 0, 0
     while (mark := _MARK.search(raw, position)) is not None:
         number += 1
-        kind, binary = int(mark[1]), bool(mark[2])
-        close = _CLOSE.search(raw, mark.end())
-        if kind != 58:
+        kind, binary = int(mark[2]), bool(mark[3])
+        if kind != 58:  # may hold lines of a lone -1 elsewhere
+            close = _closing(mark[1]).search(raw, mark.end())
             position = close.end() if close else len(raw)
             continue
         try:
             start = _skip_lines(raw, mark.end(), _HEADER_LINES)
             if binary:
-                header = _pyuff(raw[mark.start() : start] + b"    -1\n", header_only=True)
+                header = _pyuff(_identifier(mark[4]) + raw[mark.end() : start], header_only=True)
                 x, y, notes, position = _binary(raw, start, header)
             else:
-                end = close.end() if close else len(raw)
-                header = _pyuff(raw[mark.start() : end] + (b"" if close else b"\n    -1\n"))
-                x, y, notes, position = header.pop("x"), header.pop("data"), [], end
+                close = _closing(rb"[ ]{0,8}").search(raw, start)
+                end, position = (close.start(), close.end()) if close else (len(raw), len(raw))
+                header = _pyuff(b"    -1\n    58\n" + raw[mark.end() : end])
+                x, y, notes = header.pop("x"), header.pop("data"), []
                 _check_length(y, header)
         except InputError as error:
             raise error.at(file=path, key=f"data set {number}") from None
@@ -99,12 +107,34 @@ def _sets(path: Path) -> Iterator[_Set]:
         raise InputError("the universal file holds no data set", file=path)
 
 
+def _closing(indent: bytes) -> re.Pattern[bytes]:
+    return re.compile(rb"(?:^|(?<=\n)|(?<=\r))" + indent + rb"-1[ \t]*(?:\r\n|\n|\r|\Z)")
+
+
+def _identifier(rest: bytes) -> bytes:
+    """Opening mark and identifier line of a binary set, from what follows "58b": byte order, kind of numbers, lengths.
+
+    Some writers stop after the two numbers that matter, or do not keep to their columns.
+    """
+    words = rest.split()
+    if len(words) < 2 or not all(word.isdigit() for word in words[:2]):
+        raise InputError(
+            "the line '58b' does not state the byte order and the kind of numbers",
+            value=rest.decode("latin-1").strip() or "nothing",
+            allowed="58b, then 1 (Intel) or 2 (Motorola), then 2 (IEEE)",
+            hint="export the file again, as text or as CSV",
+        )
+    order, kind = (int(word) for word in words[:2])
+    return f"{-1:6d}\n{58:6d}b{order:6d}{kind:6d}{_HEADER_LINES:12d}{0:12d}{0:6d}{0:6d}{0:12d}{0:12d}\n".encode()
+
+
 def _pyuff(block: bytes, *, header_only: bool = False) -> dict[str, Any]:
+    """What pyuff makes of a data set without its closing mark."""
     import pyuff
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "set.uff"
-        file.write_bytes(block)
+        file.write_bytes(block + (b"" if block.endswith((b"\n", b"\r")) else b"\n") + b"    -1\n")
         found = pyuff.UFF(str(file)).read_sets(header_only=header_only)
     return found[0] if isinstance(found, list) else found
 
@@ -129,7 +159,7 @@ def _binary(raw: bytes, start: int, header: dict[str, Any]) -> tuple[np.ndarray,
     if int(header.get("fp_format", 2)) in (1, 3):
         raise InputError("the numbers are in VAX or IBM format", hint="export it in IEEE format")
     order = "<" if int(header["byte_ordering"]) == 1 else ">"
-    notes: list[str] = []
+    readings = []
     for x_size, y_size in _layouts(even, double):
         fields = [("x", f"{order}f{x_size}")] if x_size else []
         fields += [(part, f"{order}f{y_size}") for part in (("re", "im") if cplx else ("re",))]
@@ -138,6 +168,7 @@ def _binary(raw: bytes, start: int, header: dict[str, Any]) -> tuple[np.ndarray,
         close = _CLOSE.match(raw, end) or _NOTHING.match(raw, end)
         if close is None or end > len(raw):
             continue
+        notes: list[str] = []
         if _CLOSE.match(raw, end) is None:
             notes.append("the mark that closes the data set is missing")
         table = np.frombuffer(raw, layout, count, start)
@@ -146,17 +177,24 @@ def _binary(raw: bytes, start: int, header: dict[str, Any]) -> tuple[np.ndarray,
             notes.append("the byte order is not the one its header states; swapped")
         if (y_size == _DOUBLE) != double:
             notes.append(f"the numbers have {y_size} bytes, not what the header states")
-        y = table["re"].astype(float)
-        if cplx:
-            return np.arange(count, dtype=float), y + 1j * table["im"], notes, close.end()
-        if even:
-            x = float(header["abscissa_min"]) + float(header["abscissa_inc"]) * np.arange(count)
-        else:
-            x = table["x"].astype(float)
-        return x, y, notes, close.end()
-    raise InputError(
-        f"the binary data do not end where {count} values end", hint="the file is cut short or was transferred as text"
-    )
+        if x_size == _DOUBLE and y_size == _SINGLE:
+            notes.append("the abscissas have 8 bytes, the ordinates 4")
+        readings.append((table, notes, close.end()))
+    if not readings:
+        raise InputError(
+            f"the binary data do not end where {count} values end",
+            hint="the file is cut short or was transferred as text",
+        )
+    # 12 bytes a value are a single and a double in either order: the one that makes sense, else the one declared
+    table, notes, position = next((r for r in readings if len(readings) == 1 or _sensible(r[0])), readings[0])
+    y = table["re"].astype(float)
+    if cplx:
+        return np.arange(count, dtype=float), y + 1j * table["im"], notes, position
+    if even:
+        x = float(header["abscissa_min"]) + float(header["abscissa_inc"]) * np.arange(count)
+    else:
+        x = table["x"].astype(float)
+    return x, y, notes, position
 
 
 def _layouts(even: bool, double: bool) -> list[tuple[int, int]]:
@@ -164,8 +202,19 @@ def _layouts(even: bool, double: bool) -> list[tuple[int, int]]:
     if even:
         return [(0, _DOUBLE), (0, _SINGLE)] if double else [(0, _SINGLE), (0, _DOUBLE)]
     if double:
-        return [(_SINGLE, _DOUBLE), (_DOUBLE, _DOUBLE)]
-    return [(_SINGLE, _SINGLE), (_DOUBLE, _DOUBLE)]
+        return [(_SINGLE, _DOUBLE), (_DOUBLE, _DOUBLE), (_DOUBLE, _SINGLE), (_SINGLE, _SINGLE)]
+    return [(_SINGLE, _SINGLE), (_DOUBLE, _SINGLE), (_DOUBLE, _DOUBLE), (_SINGLE, _DOUBLE)]
+
+
+def _sensible(table: np.ndarray) -> bool:
+    """Whether ordinates are numbers of like sizes over abscissas that rise."""
+    size = np.abs(table["re"][table["re"] != 0].astype(float))
+    if not _sane(table["re"]) or size.size == 0:
+        return False
+    # pieces of two numbers taken for one have exponents all over the place
+    if np.diff(np.log10(np.percentile(size, [5, 95])))[0] > 20.0:
+        return False
+    return "x" not in (table.dtype.names or ()) or bool(np.mean(np.diff(table["x"].astype(float)) > 0) > 0.9)
 
 
 def _sane(values: np.ndarray) -> bool:

@@ -111,6 +111,17 @@ def _why(name: str, shapes: Shapes, events: int) -> str:
     return shapes.missing.get(keys.get(name, name), "no event allows it")
 
 
+def unused_channels(trace: Trace) -> list[str]:
+    """Channels that were measured and that no model takes up, in words."""
+    if trace.normal_load is None:
+        return []
+    mean, low, high = (float(f(trace.normal_load)) for f in (np.mean, np.min, np.max))
+    return [
+        f"normal_load is not used by the models, which take the constant one of [rig]: mean {mean:.3g} N, "
+        f"{low:.3g} to {high:.3g} N; the errors of the dynamic model are drawn against it"
+    ]
+
+
 def describe_trace(trace: Trace, found: Segmentation) -> dict[str, Any]:
     """Everything `inspect` says of a trace; numbers in SI unless ``units`` says otherwise."""
     signals = [n for n in ("displacement", "velocity", "spring_force") if getattr(trace, n) is not None]
@@ -148,7 +159,7 @@ def describe_trace(trace: Trace, found: Segmentation) -> dict[str, Any]:
         "decay_law": shapes.decay,
         "features": feature_table(events, shapes),
         "events": events,
-        "dropped": [str(d) for d in found.dropped],
+        "dropped": [*(str(d) for d in found.dropped), *unused_channels(trace)],
         "repairs": [str(r) for r in trace.repairs],
         "warnings": [*trace.warnings, *found.warnings],
         "stick_gain": stick_gain(trace, found),

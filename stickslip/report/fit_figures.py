@@ -57,11 +57,16 @@ def heat_map(table: Mapping[str, Any]) -> Figure:
 
 @styled
 def residual_plots(data: xarray.Dataset) -> Figure:
-    """Error of every cycle by phase against position, velocity, time, time in contact, force and event number."""
+    """Error of every cycle by phase against position, velocity, time, time in contact, force and event number.
+
+    Against the normal load instead of the spring force where it was measured.
+    """
     made, axes = figure(2, 3, width=11.0, height=6.0)
     phases = [str(p) for p in data["phase"].values]
     error = data["residual"].values  # (cycle, phase)
-    for ax, (name, unit, text) in zip(axes.flat, _COORDINATES, strict=True):
+    pressed = ("normal_load", "N", "measured normal load")
+    against = [pressed if c[0] == "load" and "cycle_normal_load" in data else c for c in _COORDINATES]
+    for ax, (name, unit, text) in zip(axes.flat, against, strict=True):
         x = data[f"cycle_{name}"].values.astype(float) if f"cycle_{name}" in data else np.full(error.shape[0], np.nan)
         if not np.isfinite(x).any():
             remark(ax, f"{text}: not known")

@@ -11,18 +11,18 @@ import numpy as np
 from ..errors import InputError
 from ..features.layout import PHASES
 from ..features.measurement import Measurement
-from ..fit.composition import Composition
+from ..fit.composition import START, Composition
 from ..fit.effective import effective_line
 from ..fit.inertial import Fit
 from ..fit.overlay import ModelledRun, modelled_runs
 from ..fit.problem import Problem
 from ..fit.static_table import StaticRig
-from ..fit.surface import surface_prior
+from ..fit.surface import sensitivity, surface_prior
 from ..forward import MOST_STEPS
 from ..residual import Misfit, misfit
 from ..segment import Segmentation
 from ..trace import Trace
-from ..uncertainty import flat_directions
+from ..uncertainty import flat_directions, null_directions, relative
 from .describe import describe_trace
 from .pieces import ZOOM, Variables, middle_event, thinned, trace_pieces
 from .sentences import misfit_sentence, phase_table
@@ -52,13 +52,32 @@ def parameters(composition: Composition, fit: Fit) -> dict[str, dict[str, Any]]:
     return out
 
 
-def identifiability(fit: Fit) -> list[str]:
-    """The identifiability table in words."""
-    names = [f.name for f in fit.free]
-    found = flat_directions(names, fit.covariance, widths=[f.width for f in fit.free])
-    lines = [d.text for d in found]
-    lines.append("h_rms, L, F_n and E* act only together, through u_max and the shape p of the contact")
-    return lines
+def identifiability(fit: Fit, rig: Any, line: dict[str, Any] | None) -> list[str]:
+    """The identifiability table in words: directions that the fit leaves open, and what is behind u_max and p.
+
+    Args:
+        fit: its covariance, and so its words, are those of the data and the priors together.
+        rig: of the campaign.
+        line: (H, h_rms) that the fit implies, from `effective`.
+    """
+    shared = [i for i, f in enumerate(fit.free) if not f.name.startswith(START)]
+    free, z = [fit.free[i] for i in shared], [float(fit.z[i]) for i in shared]
+    names, logs = [f.name for f in free], [f.scale == "log" for f in free]
+    kept, covariance, lost = relative(names, z, fit.covariance[np.ix_(shared, shared)], logs)
+    names = [names[i] for i in kept]
+    widths = [free[i].width if logs[i] else np.inf for i in kept]
+    lines = [d.text for d in flat_directions(names, covariance, widths=widths)] + lost
+    if line is None:
+        return lines
+    try:
+        behind = sensitivity(rig.model_copy(update={"H": line["H"], "h_rms": line["h_rms"]}))
+    except InputError:
+        return lines
+    seen = [k for k, name in enumerate(behind.outputs) if name in names]
+    at = [names.index(behind.outputs[k]) for k in seen]
+    known = covariance[np.ix_(at, at)] + behind.scatter[np.ix_(seen, seen)]
+    found = null_directions(behind.names, behind.jacobian[seen], known)
+    return lines + [f"behind the contact: {d.text}" for d in found]
 
 
 def effective(fit: Fit, rig: Any, contacts: int) -> dict[str, Any] | None:
@@ -121,10 +140,11 @@ def fit_sections(
     m, composition = problem.measurement, problem.composition
     shown = replace(m, valid=m.valid & use[..., None])
     stiffness = float(composition.fixed.get("rig.spring_stiffness", fit.values.get("rig.spring_stiffness", np.nan)))
+    line = effective(fit, rig, composition.contacts)
     result: dict[str, Any] = {
         "misfit": misfit_part(shown, fit.features, floor, misfit(shown, fit.features, floor)),
-        "identifiability": identifiability(fit),
-        "effective": effective(fit, rig, composition.contacts),
+        "identifiability": identifiability(fit, rig, line),
+        "effective": line,
         "traces": [describe_trace(t, s) for t, s in zip(traces, segmentations, strict=True)],
     }
     variables: dict[str, Any] = {}
@@ -212,7 +232,14 @@ def residual_arrays(
         columns["contact_time"].append(event.stick_time)
         columns["load"].append((own if np.isfinite(own) else stiffness) * (drive - event.x_onset))
         columns["event"].append(float(n + 1))
+        if trace.normal_load is not None:
+            begin = segmentations[m.names[r]].events[n - 1].i_arrest if n else 0
+            columns.setdefault("normal_load", [np.nan] * (len(rows) - 1))
+            columns["normal_load"].append(float(np.mean(trace.normal_load[begin : event.i_arrest + 1])))
+        elif "normal_load" in columns:
+            columns["normal_load"].append(np.nan)
     units = {"position": "m", "velocity": "m/s", "start": "s", "contact_time": "s", "load": "N", "event": "1"}
+    units["normal_load"] = "N"
     out: Variables = {
         "residual": (("cycle", "phase"), np.array(rows), {"units": "1"}),  # type: ignore[dict-item]
         "feature_residual": (("run", "cycle_of_run", "feature"), z, {"units": "1"}),  # type: ignore[dict-item]

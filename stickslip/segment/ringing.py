@@ -54,7 +54,7 @@ def ringing(
         duration: usual length of a slip (s), the unit of the window.
     """
     none: list[Ringing | None] = [None] * len(found.events)
-    rate = (time.size - 1) / float(time[-1] - time[0])
+    rate = 1.0 / float(np.median(np.diff(time)))  # not the mean: samples may be lost
     sticks = [e.stick_time for e in found.events if np.isfinite(e.stick_time)]
     length = min(WINDOW * duration, SHARE * float(np.median(sticks))) if sticks else WINDOW * duration
     low, high = PERIODS / length, rate / SAMPLES

@@ -122,8 +122,8 @@ def own(measured: np.ndarray, finer: int) -> Callable[[np.ndarray], tuple[np.nda
     from stickslip.fit.multistart import best_of
     from stickslip.fit.parameters import Free
     from stickslip.fit.problem import Problem
+    from stickslip.floors import floors
     from stickslip.model import Block, LoadPoint, Model, Weakening
-    from stickslip.residual import floors
     from stickslip.segment import segment
     from stickslip.trace import Drive, Trace
 

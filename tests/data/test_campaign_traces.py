@@ -7,6 +7,7 @@ import pytest
 import scipy.io
 
 from stickslip.campaign import campaign_text, load_campaign, load_traces
+from stickslip.cli import run as command
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
 
@@ -285,3 +286,18 @@ def test_messages_are_plain_text(campaign, run, refuses):
     error = refuses(lambda: only(campaign(TIME + X + DRIVE, rows=np.column_stack(run)[:1])), "fewer than two samples")
     assert json.dumps(str(error))
     assert "Traceback" not in str(error)
+
+
+def test_a_load_that_no_model_takes_up_is_said_to_be_left_out(campaign, run, capsys):
+    t, x = run
+    rows = np.column_stack([t, x, 0.3 + 0.02 * t / t[-1]])
+    load = 'normal_load = { column = "N", unit = "N" }\n'
+    told = []
+    for more in ("", load):
+        path = campaign(TIME + X + more + DRIVE, rows=rows, header="time,x,N")
+        assert command(["inspect", str(path), "--json"]) == 0
+        told.append(json.loads(capsys.readouterr().out)["dropped"])
+        assert command(["inspect", str(path)]) == 0
+        assert ("left out: normal_load is not used by the models" in capsys.readouterr().out) == bool(more)
+    assert not any("normal_load" in text for text in told[0])
+    assert any("normal_load" in text and "mean 0.31 N, 0.3 to 0.32 N" in text for text in told[1])

@@ -181,3 +181,90 @@ def test_a_header_cut_short_names_the_file(tmp_path, refuses):
     path = tmp_path / "a.uff"
     path.write_text("\n".join(header(1, 4, 1, X.size, total=320)[:6]))
     refuses(lambda: read_columns(path), "a.uff", "data set 1", "header", "export")
+
+
+def _edited(path, lines, indents, payload=b""):
+    """A file with its opening and closing mark at other columns, byte by byte."""
+    opening, closing = indents
+    lines[0] = " " * opening + "-1"
+    path.write_bytes("".join(f"{line}\n" for line in lines).encode() + payload + b" " * closing + b"-1\n")
+    return path
+
+
+MARGINS = [(0, 0), (0, 4), (4, 0), (2, 2)]
+
+
+@pytest.mark.parametrize("indents", MARGINS)
+@pytest.mark.parametrize("ending", [".uff", ".dat"])
+def test_binary_with_its_marks_at_the_left_margin(tmp_path, indents, ending):
+    lines = header(1, 4, 1, X.size, total=320)
+    lines[1] = lines[1].lstrip()  # "58b" goes with the mark
+    path = _edited(tmp_path / f"a{ending}", lines, indents, struct.pack(f"<{X.size}d", *X))
+    columns = read_columns(path)
+    assert columns.reader == "uff"
+    assert np.array_equal(columns.data["Vib Displacement"], X)
+    assert columns.units == {"time": "s", "Vib Displacement": "um"}
+
+
+@pytest.mark.parametrize("indents", MARGINS)
+def test_text_with_its_marks_at_the_left_margin(tmp_path, indents):
+    lines = header(1, 4, 1, X.size, total=0)
+    lines[1] = "58"
+    lines += ["".join(f"{x:20.11e}" for x in X[i : i + 4]) for i in range(0, X.size, 4)]
+    columns = read_columns(_edited(tmp_path / "a.uff", lines, indents))
+    assert columns.data["Vib Displacement"] == pytest.approx(X, rel=1e-11, abs=1e-18)
+    assert columns.data["time"] == pytest.approx(T, rel=1e-5, abs=1e-12)
+
+
+def test_two_sets_at_the_left_margin_behind_another_kind(tmp_path):
+    """A set that is passed over ends at a mark like its first, not at a number of its own that looks like one."""
+    payload = struct.pack(f"<{X.size}d", *X)
+    path = tmp_path / "a.uff"
+    one = _edited(path, header(1, 4, 1, X.size, total=320), (0, 0), payload).read_bytes()
+    path.write_bytes(b"-1\n2411\n         1\n    -1\n         7\n-1\n" + one + one)
+    columns = read_columns(path)
+    assert set(columns.data) == {"time", "Vib Displacement", "Vib Displacement (2)"}
+    assert np.array_equal(columns.data["Vib Displacement (2)"], X)
+
+
+def test_a_column_of_numbers_that_begins_with_minus_one_is_a_table(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("-1\n5\n3\n2\n")
+    assert read_columns(path).reader != "uff"
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("line", ["    58b   {}   2", "    58b     {}     2", "    58b {} 2", "58b {} 2 11"])
+def test_a_short_identifier_line(tmp_path, line, order):
+    lines = header(order, 4, 1, X.size, total=320)
+    lines[1] = line.format(order)
+    path = _edited(tmp_path / "a.uff", lines, (4, 4), struct.pack(f"{'<>'[order - 1]}{X.size}d", *X))
+    columns = read_columns(path)
+    assert np.array_equal(columns.data["Vib Displacement"], X)
+    assert columns.notes == ["Vib Displacement: time step 0.00025, which this format rounds to 6 digits"]
+
+
+@pytest.mark.parametrize("line", ["    58b", "    58b     1", "    58b little ieee"])
+def test_an_identifier_line_without_the_kind_of_numbers_is_refused(tmp_path, refuses, line):
+    lines = header(1, 4, 1, X.size, total=320)
+    lines[1] = line
+    path = _edited(tmp_path / "a.uff", lines, (4, 4), struct.pack(f"<{X.size}d", *X))
+    refuses(lambda: read_columns(path), "a.uff", "data set 1", "byte order", "export")
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("says", [2, 4])
+@pytest.mark.parametrize("sizes", ["fd", "df", "ff", "dd"])
+def test_abscissas_and_ordinates_of_any_precision(tmp_path, sizes, says, order):
+    """A single and a double take twelve bytes in either order; the one that makes sense is taken."""
+    count = 400
+    t = 3.0 + np.arange(count) * 2.5e-4
+    x = 5.0 + np.cos(t * 300)
+    payload = b"".join(struct.pack(f"{'<>'[order - 1]}{sizes}", *pair) for pair in zip(t, x, strict=True))
+    path = write(tmp_path / "a.uff", header(order, says, 0, count, total=len(payload)), payload)
+    columns = read_columns(path)
+    kinds = {"f": np.float32, "d": np.float64}
+    assert np.array_equal(columns.data["time"], t.astype(kinds[sizes[0]]).astype(float))
+    assert np.array_equal(columns.data["Vib Displacement"], x.astype(kinds[sizes[1]]).astype(float))
+    declared = says == (4 if sizes[1] == "d" else 2)
+    assert any("not what the header states" in note for note in columns.notes) != declared

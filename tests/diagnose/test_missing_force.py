@@ -16,10 +16,10 @@ from stickslip.errors import InputError
 from stickslip.fit.inertial import fit
 from stickslip.fit.problem import Problem
 from stickslip.fit.record import fitted, from_record, record
+from stickslip.floors import floors
 from stickslip.report.html import render
 from stickslip.report.missing_force import LABEL, _text, _variables
 from stickslip.report.sections import pictures
-from stickslip.residual import floors
 from stickslip.solve import Tolerance, integrate
 from stickslip.trace import Drive, Trace
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from stickslip.diagnose.candidate import Candidate, starts
+from stickslip.diagnose.engine import Rung
 from stickslip.diagnose.heldout import HeldOut
 from stickslip.diagnose.holdout import training_cycles
 from stickslip.diagnose.pieces import fit_arrays, fit_from
@@ -37,7 +39,11 @@ def measurement(velocities=(5e-5, 1e-4, 2e-4, 4e-4, 1e-4), cycles=6, hold_runs=(
                jnp.full(runs, jnp.nan), jnp.ones(runs, bool))  # fmt: skip
     zero = np.zeros((runs, cycles, layout.size))
     names = tuple(f"run{r}" for r in range(runs))
-    return Measurement(layout, c, None, zero, valid, zero + 1, names, np.array(velocities))
+    anchors = SimpleNamespace(
+        ring_period=np.full((runs, cycles), 2e-3),
+        creep=np.broadcast_to(np.geomspace(1.0, 4e-3, 16), (runs, cycles, 16)),
+    )
+    return Measurement(layout, c, anchors, zero, valid, zero + 1, names, np.array(velocities))
 
 
 def test_a_middle_velocity_and_the_later_hold_are_held_out():
@@ -78,7 +84,7 @@ def candidate(tag: str, cost: float, score: float, at_bound: bool = False) -> Ca
         z[0] = free[0].bounds[1]
     sd = np.ones(len(free)) * 1e-3
     shape = (1, 1, 3)
-    fit = Fit(z, np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.diag(sd**2), free, np.zeros((*shape, len(z))),
+    fit = Fit(z, np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.zeros(shape), np.diag(sd**2), free, np.zeros((*shape, len(z))),
               np.ones((1, 1), bool), 1, 1)  # fmt: skip
     train = Misfit(1.0, {"creep": 1.0}, {})
     return Candidate(tag, {}, effect, 0.5, fit=fit, train=train, held=held(score))
@@ -165,11 +171,15 @@ def test_the_special_case_is_named_where_the_general_law_is_no_better(general, s
 
 def test_what_is_left_decides_between_complete_and_unknown():
     refused = [judge(candidate("viscous-drag", 900, 8.0), 1000.0, held(9.0))]
-    small, large = THRESHOLDS.adequate - 0.1, THRESHOLDS.adequate + 0.1
-    assert nothing([], refused, "slip", small).kind == "complete"
-    assert nothing([], refused, "slip", large).kind == "unknown"
-    assert nothing(["tilt"], refused, "slip", small).kind == "missing"
-    verdict = nothing(["tilt"], refused, "slip", large)
+    limit = THRESHOLDS.complete["slip"]
+
+    def left(factor: float) -> Rung:
+        return Rung((), None, Misfit(1.0, {"slip": factor * limit}, {}), None, None, None, np.zeros(0))
+
+    assert nothing([], refused, left(THRESHOLDS.remainder - 0.05)).kind == "complete"
+    assert nothing([], refused, left(THRESHOLDS.remainder + 0.05)).kind == "unknown"
+    assert nothing(["tilt"], refused, left(THRESHOLDS.adequate - 0.05)).kind == "missing"
+    verdict = nothing(["tilt"], refused, left(THRESHOLDS.adequate + 0.05))
     assert verdict.kind == "unknown"
     assert "viscous-drag" in verdict.text
     assert verdict.reasons == refused[0].failures
@@ -191,6 +201,8 @@ def test_complete_means_every_phase_also_where_no_fit_looked():
     for phase in limit:
         assert is_complete(replace(good, by_phase={phase: limit[phase]}), unseen)
         assert not is_complete(replace(good, by_phase={phase: limit[phase] + 0.1}), unseen)
+    assert is_complete(replace(good, alike={"slip": THRESHOLDS.alike}), unseen)
+    assert not is_complete(replace(good, alike={"slip": THRESHOLDS.alike + 0.1}), unseen)
 
 
 def test_complete_means_all_phases_together_too():

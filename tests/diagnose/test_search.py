@@ -10,9 +10,9 @@ import pytest
 
 from stickslip.diagnose.linear import Linear
 from stickslip.diagnose.periods import periods
-from stickslip.fit.composition import EVENT_WIDTHS
 from stickslip.fit.inertial import Fit
 from stickslip.fit.parameters import Free
+from stickslip.floors import EVENT_WIDTHS
 
 from .test_rules import measurement
 
@@ -25,7 +25,7 @@ def made(seed: int = 0):
     shape = data.values.shape
     columns, line = rng.standard_normal((*shape, 2)), rng.standard_normal(shape)
     free = tuple(Free(n, "1", "log", 1.0, 1.0, 1e3, 1e-9, 1e9) for n in ("a", "b"))
-    fit = Fit(np.zeros(2), np.zeros((*shape[:2], 2)), 0, 0, np.zeros(shape), np.eye(2), free, columns,
+    fit = Fit(np.zeros(2), np.zeros((*shape[:2], 2)), 0, 0, np.zeros(shape), np.zeros(shape), np.eye(2), free, columns,
               np.ones(shape[:2], bool), 1, 1)  # fmt: skip
     problem = SimpleNamespace(event_columns=lambda columns, z, events: np.zeros((*shape, 2)))
     return data, columns, line, fit, problem

@@ -9,7 +9,7 @@ from stickslip.campaign import load_campaign, load_traces
 from stickslip.challenge.generator import make_campaign
 from stickslip.features.measurement import measure
 from stickslip.fit.start import ring_period
-from stickslip.residual import floors
+from stickslip.floors import floors
 from stickslip.segment import segment
 
 pytestmark = pytest.mark.slow  # eight campaigns
@@ -25,7 +25,7 @@ def scatter(folder, new_lines: bool) -> dict[str, float]:
         traces = load_traces(load_campaign(folder / str(seed) / "campaign.toml"))
         segments = [segment(t) for t in traces]
         m = measure(traces, segments, ring_period=ring_period(traces, segments), most_cycles=14)
-        floor = floors(m, factor=2.0 if new_lines else 1.0)
+        floor = floors(m, factor=1.0 if new_lines else 0.0)
         for r, name in enumerate(m.names):
             if name == "holds":
                 continue

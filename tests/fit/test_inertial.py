@@ -9,7 +9,8 @@ import pytest
 
 from stickslip.fit.inertial import fit
 from stickslip.fit.problem import Problem
-from stickslip.residual import floors, misfit
+from stickslip.floors import floors
+from stickslip.residual import misfit
 
 from . import synthetic
 

@@ -31,7 +31,7 @@ def measurement(times, positions, start=0.0, limit=9.0, stiffness=np.nan):
 def optimum():
     z = truth()
     none = np.zeros(0)
-    return Fit(z, none, 1.0, 1.0, none, np.eye(z.size) * 1e-4, composition().free, none, none, 1, 1)
+    return Fit(z, none, 1.0, 1.0, none, none, np.eye(z.size) * 1e-4, composition().free, none, none, 1, 1)
 
 
 def test_pieces_of_the_drive_are_kept_from_the_start_of_the_record():

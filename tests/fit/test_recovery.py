@@ -13,7 +13,7 @@ from stickslip.features.measurement import measure
 from stickslip.fit.multistart import best_of
 from stickslip.fit.problem import Problem
 from stickslip.fit.start import base_composition, ring_period
-from stickslip.residual import floors, scatter_factor
+from stickslip.floors import floors
 from stickslip.segment import segment
 
 CAMPAIGNS = 20
@@ -41,7 +41,7 @@ def deviations(folder, seed: int) -> dict[str, float]:
     data = measure(traces, segments, ring_period=ring_period(traces, segments), most_cycles=14)
     base = base_composition(campaign, data)
     use = np.asarray(data.cycles.used)
-    found = best_of(Problem(base, data), floors(data, factor=scatter_factor(data)), use)
+    found = best_of(Problem(base, data), floors(data), use)
     sd = np.sqrt(np.diag(found.covariance))
     values = true_values(truth["rig"])
     return {

@@ -1,5 +1,7 @@
 """Where a dynamic fit starts when springs are stated for single traces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,20 +78,34 @@ def test_the_roughness_is_the_prior_of_the_contact(start):
     assert stiffness[0] == pytest.approx(stiffness[1])
 
 
-def slips(folder, ring):
-    """Five slips at 10 kHz read in counts of 8 nm, each followed by ringing of the given size (m) at 430 Hz."""
-    t = np.arange(0.0, 4.5, 1e-4)
-    rng = np.random.default_rng(2)
-    x = 0.5e-6 * t + 5e-9 * rng.standard_normal(t.size)
-    for end in (0.8, 1.6, 2.4, 3.2, 4.0):
+RATE, COUNT = 1e4, 8e-9
+ARRESTS = (0.8, 1.6, 2.4, 3.2, 4.0)
+
+
+def bare_slips(ring, frequency=430.0, lasting=0.01):
+    """Positions at 10 kHz of five slips, each followed by ringing of the given size (m), without noise and counts."""
+    t = np.arange(0.0, 4.5, 1 / RATE)
+    x = 0.5e-6 * t
+    for end in ARRESTS:
         x += 19.6e-6 * (1 - np.cos(np.pi * np.clip((t - end + 0.03) / 0.03, 0, 1)))
         after = np.clip(t - end, 0, None)
-        x += ring * np.sin(2 * np.pi * 430 * after) * np.exp(-after / 0.01)
-    np.savetxt(folder / "a.csv", np.column_stack([t, np.round(x / 8e-9) * 8e-3]), delimiter=",", fmt="%.9g")
+        x += ring * np.sin(2 * np.pi * frequency * after) * np.exp(-after / lasting)
+    return t, x
+
+
+def counted(x):
+    return np.round(x / COUNT) * COUNT
+
+
+def slips(folder, ring, **decay):
+    """Five slips read with noise in counts of 8 nm."""
+    t, x = bare_slips(ring, **decay)
+    x = counted(x + 5e-9 * np.random.default_rng(2).standard_normal(t.size))
+    np.savetxt(folder / "a.csv", np.column_stack([t, x * 1e6]), delimiter=",", fmt="%.9g")
     (folder / "c.toml").write_text(RIG + SPRING + TRACE.format(name="a"))
     traces = load_traces(load_campaign(folder / "c.toml"))
     found = [segment(t) for t in traces]
-    assert len(found[0].events) == 5
+    assert len(found[0].events) == len(ARRESTS)
     return traces, found
 
 
@@ -97,11 +113,58 @@ def test_the_ringing_tells_the_contact_s_resonance(tmp_path):
     assert 1.0 / ring_period(*slips(tmp_path, 1e-7)) == pytest.approx(430.0, rel=0.05)
 
 
+@pytest.mark.parametrize(("frequency", "lasting"), [(500.0, 3e-3), (500.0, 2e-3), (800.0, 1.5e-3), (250.0, 5e-3)])
+def test_ringing_that_dies_within_a_few_periods_is_heard(tmp_path, frequency, lasting):
+    heard = ringing(*slips(tmp_path, 1e-7, frequency=frequency, lasting=lasting))
+    assert heard is not None
+    assert 1.0 / heard == pytest.approx(frequency, rel=0.08)
+
+
 def test_noise_is_no_ringing(tmp_path):
     """The highest peak of noise is somewhere, often at the slow end; a contact a hundred times as soft would follow."""
     record = slips(tmp_path, 0.0)
     assert ringing(*record) is None
     assert ring_period(*record) == 1.0 / FALLBACK_FREQUENCY
+
+
+def coloured(rng, size, slope):
+    """Noise whose power falls as the frequency to the power ``slope``, as loud as 5 nm of white noise at 300 Hz."""
+    frequency = np.fft.rfftfreq(size, 1 / RATE)
+    spectrum = rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size)
+    weight = np.where(frequency > 0.2, np.maximum(frequency, 0.2) / 300.0, np.inf) ** (-slope / 2)
+    return np.fft.irfft(5e-9 * np.sqrt(size / 2) * spectrum * weight, size)
+
+
+@pytest.mark.parametrize("events", [1, 2, 5])
+@pytest.mark.parametrize("noise", ["white", "counts", "1/f", "1/f^2", "drift"])
+def test_noise_of_any_colour_rings_in_less_than_one_record_of_a_hundred(tmp_path, noise, events):
+    (trace,), (found,) = slips(tmp_path, 0.0)
+    found = replace(found, events=found.events[:events])
+    clean = bare_slips(0.0)[1]
+    rng = np.random.default_rng(events)
+    heard, draws = 0, 100
+    for _ in range(draws):
+        x = clean + {"counts": 1e-9}.get(noise, 5e-9) * rng.standard_normal(clean.size)
+        if noise in ("1/f", "1/f^2", "drift"):
+            x += (10.0 if noise == "drift" else 1.0) * coloured(rng, clean.size, 1.0 if noise == "1/f" else 2.0)
+        heard += ringing([trace.replace(displacement=counted(x))], [found]) is not None
+    assert heard < 0.01 * draws
+
+
+@pytest.mark.parametrize("size", [2e-8, 1e-6])
+def test_hum_is_no_ringing(tmp_path, size):
+    (trace,), found = slips(tmp_path, 0.0)
+    hum = size * np.sin(2 * np.pi * 150.0 * np.asarray(trace.time))
+    assert ringing([trace.replace(displacement=trace.displacement + hum)], found) is None
+
+
+def test_settling_is_no_ringing(tmp_path):
+    (trace,), found = slips(tmp_path, 0.0)
+    x = np.array(trace.displacement)
+    for end in ARRESTS:
+        after = np.clip(np.asarray(trace.time) - end, 0, None)
+        x += 1e-7 * (1 - np.exp(-after / 5e-3)) + 1e-7 * np.log1p(after / 1e-3)
+    assert ringing([trace.replace(displacement=x)], found) is None
 
 
 def test_what_every_trace_gives_anew_is_the_rig_s(start):

@@ -108,8 +108,8 @@ def test_a_report_names_cut_cycles(monkeypatch):
     """The sentence of the misfit carries it into report.html, result.json and the command line."""
     from stickslip.fit.inertial import fit
     from stickslip.fit.problem import Problem
+    from stickslip.floors import floors
     from stickslip.report import inertial_result
-    from stickslip.residual import floors
     from stickslip.segment import segment
     from tests.fit import synthetic
 
