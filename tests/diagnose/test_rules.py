@@ -84,8 +84,9 @@ def candidate(tag: str, cost: float, score: float, at_bound: bool = False) -> Ca
         z[0] = free[0].bounds[1]
     sd = np.ones(len(free)) * 1e-3
     shape = (1, 1, 3)
-    fit = Fit(z, np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.zeros(shape), np.diag(sd**2), free, np.zeros((*shape, len(z))),
-              np.ones((1, 1), bool), 1, 1)  # fmt: skip
+    empty = np.zeros(shape)
+    fit = Fit(z, np.zeros((1, 1, 2)), cost, cost, empty, empty, np.diag(sd**2), free,
+              np.zeros((*shape, len(z))), np.ones((1, 1), bool), 1, 1)  # fmt: skip
     train = Misfit(1.0, {"creep": 1.0}, {})
     return Candidate(tag, {}, effect, 0.5, fit=fit, train=train, held=held(score))
 

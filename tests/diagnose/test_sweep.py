@@ -18,8 +18,8 @@ FINAL = {"contact-ageing": 100.0, "wear": 110.0}  # where a fit to the end arriv
 
 def invented(effect, cost: float, promise: float, note: str = "") -> Candidate:
     shape = (1, 1, 1)
-    fit = Fit(np.zeros(1), np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.zeros(shape), np.eye(1), (), np.zeros((*shape, 1)),
-              np.ones((1, 1), bool), 1, 1)  # fmt: skip
+    fit = Fit(np.zeros(1), np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.zeros(shape), np.eye(1), (),
+              np.zeros((*shape, 1)), np.ones((1, 1), bool), 1, 1)  # fmt: skip
     form = {k: str(v) for k, v in vars(effect).items() if isinstance(v, str)}
     return Candidate(effect.tag, form, effect, promise / 2, promise, fit=fit, note=note)
 
