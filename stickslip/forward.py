@@ -193,7 +193,7 @@ def run_cycles(
     )
 
     def cycle(carry: tuple, item: tuple) -> tuple[tuple, Track]:
-        y, late, offset, strength = carry
+        y, past, offset, strength = carry
         event, t0, position, limit, least_slip, used = item
         model = build(event, nodes)
         # new lines keep the share of its cap that every element carries: at arrest all of them are at their caps
@@ -205,10 +205,12 @@ def run_cycles(
         zero = jax.tree.map(jnp.zeros_like, y.work)
         y = eqx.tree_at(lambda s: s.work, y, zero)
         track, end, now = run_cycle(
-            model, y, t0 + late, jnp.where(used, limit, t0 + late + 1e-6), least_slip, tolerance, most_steps
+            model, y, t0 + past, jnp.where(used, limit, t0 + past + 1e-6), least_slip, tolerance, most_steps
         )
-        at = jnp.interp(track.arrest, track.t, track.reading)
-        return (end, now - track.arrest, end.x - at, model.bank.strength), track
+        late = now - track.arrest
+        # the velocity is nearly linear around its zero: how far the block has come back since the arrest
+        back = 0.5 * track.v[-1] * late
+        return (end, late, end.x - track.reading[-1] + back, model.bank.strength), track
 
     zero = jnp.zeros(())
     items = (events, cycles.start, cycles.position, cycles.limit, cycles.least_slip, cycles.used)

@@ -26,18 +26,15 @@ from .periods import periods
 
 START = 0.02  # of the amplitude's range; scaled until its effect on the features is moderate
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
-MOST_STARTS = 8
-PLAUSIBLE = (
-    30.0,
-    150.0,
-)  # floors, rms: by how much an amplitude moves the features at which everything else is refitted
-CARRIED = ((30.0, 7), (7.0, 7), (2.5, 7))  # stages of that refit, with the base's derivatives carried on
-OTHERS = 2  # further starts that a leader is fitted from
+MOST_STARTS = 4
+PLAUSIBLE = 60.0  # floors, rms: by how much an amplitude moves the features at which everything else is refitted
+CARRIED = ((30.0, 6), (7.0, 6), (2.5, 7))  # stages of that refit, with the base's derivatives carried on
+OTHERS = 1  # further starts that a leader is fitted from
 SHARES = (1.0, 0.4)  # of a linear step that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
-AGAIN, SETTLED = 4, 0.98  # a leader is refined again until that takes less than 2 % off its cost
+AGAIN, SETTLED = 2, 0.97  # a leader is refined again until that takes less than 3 % off its cost
 WIDEST = 30.0
 
 
@@ -171,7 +168,9 @@ def refine(
     wide = ease(old, measurement, floor)
     stages = ((wide, evaluations // 2), (1.0, evaluations - evaluations // 2)) if wide > 1.5 else ((1.0, evaluations),)
     try:
-        new = fit(problem, floor, z=old.z, events=old.events, stages=stages, use=train)
+        # derivatives in the effect's own parameters are known where everything was refitted around it
+        known = old.columns if np.any(old.columns[..., -1]) else None
+        new = fit(problem, floor, z=old.z, events=old.events, stages=stages, use=train, columns=known)
     except StickslipError as error:
         return replace(candidate, note=str(error))
     (progress or _silent)(f"{candidate.tag}: cost {old.cost:.0f} -> {new.cost:.0f}")
@@ -234,7 +233,7 @@ def ease(optimum: Fit, measurement: Measurement, floor: np.ndarray) -> float:
 def _score(effect, form, base, optimum, measurement, floor, train, threads, tell) -> Candidate:
     free = effect_parameters(effect)
     composition = base.with_effect(effect, free)
-    problem = Problem(composition, measurement, threads=threads)
+    problem = Problem(composition, measurement, threads=threads).coarser()
     k = len(base.free)
     use = train & np.asarray(measurement.cycles.used)
     valid = measurement.valid & use[..., None]
@@ -256,15 +255,16 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
             explained, likely = share, values
         tell(f"{effect.tag}: start {values}, explains {100 * share:.0f} %")
     if effect.periodic is None and search.best is not None:
-        for rms in PLAUSIBLE:
-            search.push(likely, rms, use)
-            tell(f"{effect.tag}: everything else refitted around {rms:g} floors of it")
+        search.push(likely, PLAUSIBLE, use)
+        tell(f"{effect.tag}: everything else refitted around a plausible amplitude")
     if search.best is None:
         return Candidate(effect.tag, form, effect, explained, composition=composition, note="cannot be evaluated")
     cost, z, events, features = search.best
     others = tuple((o[1], o[2]) for o in sorted(search.each, key=lambda o: o[0])[1 : 1 + OTHERS])
     promise = 1.0 - cost / search.cost(optimum.z, optimum.events, search.bare)
-    columns = np.concatenate([optimum.columns, np.zeros((*features.shape, len(free)))], axis=-1)
+    columns = search.columns.get(z.tobytes())
+    if columns is None:
+        columns = np.concatenate([optimum.columns, np.zeros((*features.shape, len(free)))], axis=-1)
     common = Common(measurement, floor, use)
     off = search.off(features)
     offsets, r = -common.offsets(off), robust(common(off[valid]))
@@ -283,13 +283,14 @@ class _Search:
         self.problem, self.optimum, self.floor, self.valid, self.factor = problem, optimum, floor, valid, factor
         self.free, self.k, self.effect = free, k, effect
         self.amplitude = next(i for i, f in enumerate(free) if f.amplitude)
-        self.bare = optimum.features - optimum.offsets
         self.common = Common(problem.measurement, floor, valid.any(axis=-1), factor)
         self.widths = event_widths(problem.measurement)[valid.any(axis=-1)]
         self.null = free[self.amplitude].inward(specs(effect)[effect.amplitude].null or 0.0)
         self.best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
         self.moderate: float | None = None
+        self.columns: dict[bytes, np.ndarray] = {}  # derivatives where everything was refitted
         self.each: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []  # the best from every start
+        self.bare = problem.features(self.point({}, self.null), optimum.events)  # the base at this tolerance
 
     def point(self, values: dict[str, float], amplitude: float, base: np.ndarray | None = None) -> np.ndarray:
         """Free parameters with the effect's inner ``values`` and its ``amplitude`` on the search scale."""
@@ -369,8 +370,8 @@ class _Search:
             self.problem, self.floor, z=z, events=self.optimum.events, stages=CARRIED, use=use, columns=columns,
             anew=False,
         )  # fmt: skip
-        offer = self._keep(found.z, found.events, found.features - found.offsets)
-        self.each.append(offer)
+        self.each.append(self._keep(found.z, found.events, found.features - found.offsets))
+        self.columns[found.z.tobytes()] = found.columns
 
     def cost(self, z: np.ndarray, events: np.ndarray, features: np.ndarray) -> float:
         """Robust chi-square at the widened floors, with the priors of the base; ``features`` of the model alone."""

@@ -189,6 +189,8 @@ def learn(
         z, events, columns = begin.fit.z[which], begin.fit.events, begin.fit.columns[..., which]
         wide = 1.0
     problem = Problem(base.with_effect(blank(seen(measurement, train), optimum), free), measurement)
+    if begin is None:
+        problem = problem.coarser()  # a picture
     stages = ((wide, evaluations // 2), (1.0, evaluations)) if wide > 1.5 else ((1.0, evaluations),)
     found = fit(problem, floor, z=z, events=events, stages=stages, use=train, columns=columns, progress=progress)
     for _ in range(MOST):

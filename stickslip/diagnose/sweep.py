@@ -19,7 +19,7 @@ from ..fit.inertial import Fit
 from .candidate import FEW, MORE, Candidate, forms_of, refine, score, settle
 from .pieces import candidate_arrays, candidate_from
 
-PROMISING, EXPLAINING = 12, 6  # candidates that are refitted: by the best point seen, and by the linear score
+PROMISING, EXPLAINING = 9, 4  # candidates that are refitted: by the best point seen, and by the linear score
 LEAST = 6  # of those that get more than the first steps
 NEAR = 1.3  # times the leader's cost: candidates that the data may not tell from it are followed to the end
 LEADERS = 5

@@ -19,7 +19,8 @@ class Thresholds:
         alike: largest that events may have in common, in any phase (standard deviations of what is expected of that).
         overall: largest error over all phases together, training and held-out, at which it is: an effect may be spread
             so thinly that no single phase shows it. 55 of the 58 campaigns above stay below.
-        gain: an effect must take off at least this share of the training cost, and of the held-out score.
+        gain: an effect must take off at least this share of the training cost.
+        unseen: and this share of the score on unseen cycles, which few cycles tell poorly.
         adequate: factor on the limits of ``complete`` and ``alike`` that the model with the named effect must meet;
             above it something else is missing.
         remainder: factor on them up to which a misfit that no effect explains is called a small one.
@@ -30,17 +31,18 @@ class Thresholds:
     """
 
     complete: Mapping[str, float] = field(
-        default_factory=lambda: {"creep": 1.1, "slip": 1.1, "ring-down": 1.5, "recurrence": 1.2, "hold": 1.3}
+        default_factory=lambda: {"creep": 1.5, "slip": 1.3, "ring-down": 1.3, "recurrence": 1.6, "hold": 1.3}
     )
-    alike: float = 2.2
-    overall: float = 0.95
+    alike: float = 3.0
+    overall: float = 1.1
     gain: float = 0.25
     adequate: float = 2.0
     remainder: float = 1.3
     significant: float = 3.0
     rival: float = 1.15
     failed: float = 300.0
-    standard_errors: float = 2.0
+    unseen: float = 0.1
+    standard_errors: float = 1.0
 
 
 THRESHOLDS = Thresholds()

@@ -113,7 +113,7 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
     gain = base_held.per_cycle - candidate.held.per_cycle
     if gain.size:
         error = np.std(gain, ddof=1) / np.sqrt(gain.size) if gain.size > 1 else 0.0
-        if candidate.held.score > (1.0 - limits.gain) * base_held.score:
+        if candidate.held.score > (1.0 - limits.unseen) * base_held.score:
             fails.append("the error on unseen cycles does not fall enough")
         elif np.mean(gain) < limits.standard_errors * error:
             fails.append("the gain on unseen cycles is not significant")

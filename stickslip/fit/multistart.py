@@ -17,7 +17,7 @@ ENOUGH = 1.4  # floors; a fit with no phase above it needs no other start
 # factors on the distance of weakening and on the time of healing
 PAIRS = ((1.0, 1.0), (1.5, 3.0), (0.4, 1.0), (2.5, 0.5))
 FURTHER = ((5.0, 8), (1.0, 16))  # stages of a best fit that is begun again, until that takes less than 3 % off
-AGAIN, SETTLED = 3, 0.97
+AGAIN, SETTLED = 2, 0.95
 AWAY = 2  # stages at wide floors after which a start that does worse than the best so far is left
 
 
