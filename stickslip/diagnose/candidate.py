@@ -34,7 +34,7 @@ SHARES = (1.0, 0.4)  # of a linear step that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
-AGAIN, SETTLED = 2, 0.97  # a leader is refined again until that takes less than 3 % off its cost
+AGAIN, SETTLED = 4, 0.97  # a leader is refined again until that takes less than 3 % off its cost
 WIDEST = 30.0
 
 

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
 from ..fit.inertial import Fit, errors, fit
-from ..fit.multistart import best_of
+from ..fit.multistart import FURTHER, best_of
 from ..fit.problem import Problem
 from ..fit.start import FALLBACK_PERIOD, UNHEARD, base_composition, ringing
 from ..floors import floors
@@ -154,6 +154,11 @@ def diagnose(
     sure = 1.0
     while True:
         assert rung.held is not None
+        if named and not is_complete(rung.train, rung.held, limits):
+            # before another effect is looked for: is it the fit that has not arrived?
+            tell("the last model once more", 1.0)
+            ladder[-1] = rung = _further(rung, data, floor, train, store, f"named{len(named)}")
+        assert rung.held is not None
         phase, worst = worst_phase(rung.train, rung.held, limits)
         if is_complete(rung.train, rung.held, limits):
             verdict = finished(named)
@@ -236,6 +241,25 @@ def _round(
     if again.cost < rung.fit.cost:
         rung = _rung(rung.model, rung.added, rung.composition, again, data, floor, train)
     return rung, done
+
+
+def _further(
+    rung: Rung, data: Measurement, floor: np.ndarray, train: np.ndarray, store: Store | None, name: str
+) -> Rung:
+    """The rung fitted again from where its fit arrived, if that is better."""
+    assert rung.composition is not None
+    assert rung.fit is not None
+    kept = store.load(name) if store is not None else None
+    if kept is not None:
+        more = fit_from(kept)
+    else:
+        problem = Problem(rung.composition, data)
+        more = fit(problem, floor, z=rung.fit.z, events=rung.fit.events, stages=FURTHER, use=train)
+        if store is not None:
+            store.save(name, fit_arrays(more))
+    if more.cost >= rung.fit.cost:
+        return rung
+    return _rung(rung.model, rung.added, rung.composition, more, data, floor, train)
 
 
 def _without(
