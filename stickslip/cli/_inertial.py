@@ -17,7 +17,7 @@ from ..effects import catalogue
 from ..errors import FitError, InputError, nearest
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
-from ..fit.inertial import MODEL_ERROR, Fit, fit
+from ..fit.inertial import MODEL_ERROR, Fit, errors, fit
 from ..fit.multistart import best_of
 from ..fit.problem import Problem
 from ..fit.record import KEY, fitted, record
@@ -169,7 +169,7 @@ def _step(
     problem: Problem, optimum: Fit, floor: np.ndarray, train: np.ndarray, model: list[str], added: str | None
 ) -> dict[str, Any]:
     m = problem.measurement
-    fitted = misfit(replace(m, valid=m.valid & train[..., None]), optimum.features, floor)
+    fitted = errors(m, optimum, floor)
     unseen = np.asarray(m.cycles.used) & ~train
     held = held_out(problem, optimum, floor, unseen) if unseen.any() else None
     return {
@@ -179,6 +179,7 @@ def _step(
         "heldout_error": None if held is None else held.error,
         "by_phase": fitted.by_phase,
         "heldout_by_phase": {} if held is None else held.by_phase,
+        "alike": fitted.alike,
     }
 
 

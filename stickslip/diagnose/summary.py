@@ -61,6 +61,7 @@ def _rung(rung: Rung) -> dict[str, Any]:
         "by_phase": rung.train.by_phase,
         "heldout_by_phase": {} if rung.held is None else rung.held.by_phase,
         "by_run": rung.train.by_run,
+        "alike": rung.train.alike,
     }
 
 
