@@ -12,6 +12,7 @@ from ..diagnose.missing_force import Curve, MissingForce, again, curves, learn, 
 from ..diagnose.pieces import fit_arrays, fit_from
 from ..diagnose.sweep import Store
 from ..diagnose.thresholds import THRESHOLDS
+from ..diagnose.verdict import is_complete
 from ..errors import FitError, StickslipError
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
@@ -54,7 +55,9 @@ def missing_sections(
     variables: Variables = {}
     found: MissingForce | None = None
     try:
-        for r in (base, top) if top is not base else (base,):
+        # of a model that is complete nothing is missing; only what may be used for prediction is fitted on top of it
+        last = top is not base and (learn_residual or not is_complete(top.train, top.held))
+        for r in (base, top) if last else (base,):
             tell(f"force missing from {' + '.join(r.model)}", 1.0)
             found = _piece(f"missing-{len(r.model)}", r, d, store, None)
             worst = max(rung(found, r, d.measurement, d.floor, d.train).train.by_phase.values())
