@@ -19,9 +19,10 @@ from ..fit.inertial import Fit
 from .candidate import FEW, MORE, Candidate, forms_of, refine, score, settle
 from .pieces import candidate_arrays, candidate_from
 
-PROMISING, EXPLAINING = 9, 4  # candidates that are refitted: by the best point seen, and by the linear score
-LEAST = 6  # of those that get more than the first steps
+PROMISING, EXPLAINING = 7, 3  # candidates that are refitted: by the best point seen, and by the linear score
+LEAST = 4  # of those that get more than the first steps
 NEAR = 1.3  # times the leader's cost: candidates that the data may not tell from it are followed to the end
+WORTH = 0.75  # times the base's cost: a leader below it is compared with all it may be taken for
 LEADERS = 5
 
 
@@ -77,6 +78,12 @@ class Sweep:
         half += [c for c in few[len(half) :] if c.cost < NEAR * few[0].cost]
         forms = self._score([form for c in half[:LEAST] for form in forms_of(c.tag)[1:]], 0.6, 0.7)
         more = self._refine([*half, *forms], MORE, "more", 0.7, 0.85)
+        leader = min(more, key=lambda c: c.cost, default=None)
+        if leader is not None and leader.cost < WORTH * self.ground.optimum.cost:
+            # what it may be taken for deserves the same, whatever its own score promised
+            known = {c.tag for c in more}
+            like = [c for c in scored if c.tag in _like(leader.effect) and c.tag not in known]
+            more += self._refine(self._refine(like, FEW, "like", 0.8, 0.82), MORE, "like more", 0.82, 0.85)
         best = min((c.cost for c in more), default=np.inf)
         near = sorted((c for c in more if c.cost < NEAR * best), key=lambda c: c.cost)[:LEADERS]
         most = self._settle(near, 0.85, 1.0)
@@ -133,6 +140,12 @@ class Sweep:
             warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
             pool = Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1)
             yield from pool(delayed(_named)(key, job) for key, job in work.items())
+
+
+def _like(effect: Effect) -> set[str]:
+    """Tags that an effect is confused with, and those whose law contains its own."""
+    wider = {tag for tag, cls in catalogue.all().items() if effect.tag in cls.generalises}
+    return wider | set(effect.confused_with)
 
 
 def _named(key: str, job: Job) -> tuple[str, Candidate]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -61,7 +62,7 @@ class Memory(dict):
 
 def run(store=None, tags=None):
     told: list[float] = []
-    ground = Ground(*[None] * 5)  # type: ignore[arg-type]
+    ground = Ground(None, SimpleNamespace(cost=1000.0), None, None, None)  # type: ignore[arg-type]
     sweep = Sweep(ground, 1, store, "round1", lambda text, share: told.append(share))
     return *sweep.run(tags or catalogue.tags()), told
 
@@ -74,7 +75,9 @@ def test_every_tag_comes_back_and_the_leaders_are_followed_to_the_end(calls):
     assert costs["contact-ageing"] == 100.0
     assert {tag for what, tag in calls if what == "settle"} == set(FINAL)
     followed = {tag for what, tag in calls if what.startswith("refine")}
-    assert len(followed) <= PROMISING + EXPLAINING
+    like = {tag for tag in catalogue.tags() if tag in catalogue.get("contact-ageing").confused_with}
+    assert like <= followed  # what the leader may be taken for, whatever its own score promised
+    assert len(followed - like) <= PROMISING + EXPLAINING
     assert all(c.note == "not refitted" for c in best if c.tag not in followed)
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1.0)
