@@ -77,7 +77,7 @@ class Sweep:
         half = few[: max(LEAST, len(few) // 2)]
         half += [c for c in few[len(half) :] if c.cost < NEAR * few[0].cost]
         forms = self._score([form for c in half[:LEAST] for form in forms_of(c.tag)[1:]], 0.6, 0.7)
-        more = self._refine([*half, *forms], MORE, "more", 0.7, 0.85)
+        more = self._refine([*half, *forms], MORE, "more", 0.7, 0.8)
         leader = min(more, key=lambda c: c.cost, default=None)
         if leader is not None and leader.cost < WORTH * self.ground.optimum.cost:
             # what it may be taken for deserves the same, whatever its own score promised
