@@ -176,3 +176,15 @@ def _scatter(values: np.ndarray) -> float:
     t = np.arange(len(values))
     lines = np.polynomial.polynomial.polyval(t, np.polynomial.polynomial.polyfit(t, values, 1)).T
     return float(np.sqrt(np.median(np.sum((values - lines) ** 2, axis=0) / (len(values) - 2))))
+
+
+def uncertain(measurement: Measurement) -> np.ndarray:
+    """Standard deviation of every feature that tells of a parameter (SI, shape (R, n, F)).
+
+    What no model of few parameters describes is the same realisation in all cycles where the lines are the same at
+    every event; their average knows no more of it than one of them. With new lines each cycle has its own.
+    """
+    same = float(np.clip(1.0 - scatter_factor(measurement), 0.0, 1.0))
+    cycles = 1.0 + (float(np.sum(np.asarray(measurement.cycles.used))) - 1.0) * same
+    real = (2.0 - same) * _level(measurement, Scatter())
+    return _root_sum(measurement.sensor, np.sqrt(cycles) * real)

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from ..errors import FitError
 from ..features.measurement import Measurement
-from ..floors import event_widths
+from ..floors import event_widths, uncertain
 from ..residual import Misfit, misfit
 from .common import Common
 from .parameters import Free, to_si, vector
@@ -37,8 +37,8 @@ class Fit:
         data_cost: of the data alone.
         features: of the model at the optimum and what all events have in common, shape (R, n, F).
         offsets: what all events, or all of a run, have in common, as far as it is in ``features``, shape (R, n, F).
-        covariance: of z, event-wise factors marginalised, shape (k, k); widened by MODEL_ERROR, which development
-            campaigns asked for.
+        covariance: of z, event-wise factors marginalised, shape (k, k); what the data tell is widened by MODEL_ERROR,
+            which development campaigns asked for.
         free: what z means.
         columns: derivatives of the features in z, the last ones used, shape (R, n, F, k).
         use: cycles the fit has seen, shape (R, n).
@@ -180,30 +180,35 @@ class _Residuals:
     def jacobian(self, x: np.ndarray, factor: float) -> np.ndarray:
         columns = self.columns(x)
         de = self.problem.event_columns(columns, x[: self.k], self.events(x))
-        dz = np.nan_to_num(columns)[self.valid]
-        rows = int(self.valid.sum())
-        cells = np.argwhere(self.used)
+        slopes = self._side_by_side(np.nan_to_num(columns)[self.valid], np.nan_to_num(de)[self.valid])
+        return np.clip(np.vstack([self.common(factor)(slopes), self._prior_slopes()]), -1e7, 1e7)
+
+    def _side_by_side(self, shared: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Columns of what is common to all cycles, and of the two factors that each cycle has for itself."""
+        cells = int(self.used.sum())
         index = np.full(self.used.shape, -1)
-        index[self.used] = np.arange(len(cells))
+        index[self.used] = np.arange(cells)
         owner = np.broadcast_to(index[..., None], self.valid.shape)[self.valid]
-        event = np.zeros((rows, 2 * len(cells)))
-        de = np.nan_to_num(de)[self.valid]
-        at = np.arange(rows)
-        event[at, 2 * owner] = de[:, 0]
-        event[at, 2 * owner + 1] = de[:, 1]
+        event = np.zeros((len(shared), 2 * cells))
+        at = np.arange(len(shared))
+        event[at, 2 * owner] = own[:, 0]
+        event[at, 2 * owner + 1] = own[:, 1]
+        return np.hstack([shared, event])
+
+    def _prior_slopes(self) -> np.ndarray:
         finite = [i for i, f in enumerate(self.free) if np.isfinite(f.width)]
-        prior = np.zeros((len(finite), self.k + event.shape[1]))
+        prior = np.zeros((len(finite), self.k + self.widths.size))
         prior[np.arange(len(finite)), finite] = [1.0 / self.free[i].width for i in finite]
-        event_prior = np.hstack([np.zeros((event.shape[1], self.k)), np.diag(1.0 / self.widths)])
-        slopes = self.common(factor)(np.hstack([dz, event]))
-        return np.clip(np.vstack([slopes, prior, event_prior]), -1e7, 1e7)
+        event = np.hstack([np.zeros((self.widths.size, self.k)), np.diag(1.0 / self.widths)])
+        return np.vstack([prior, event])
 
     def information(self, x: np.ndarray) -> np.ndarray:
-        """The Jacobian for the covariance: with Huber's weights, and the data widened by MODEL_ERROR; priors not."""
-        jac = self.jacobian(x, 1.0)
-        r = np.abs(self.data(x, 1.0))
-        jac[: r.size] *= (np.where(r > HUBER, np.sqrt(HUBER / np.maximum(r, HUBER)), 1.0) / MODEL_ERROR)[:, None]
-        return jac
+        """The Jacobian for the covariance: what every feature tells of a parameter (:func:`uncertain`), and priors."""
+        columns = self.columns(x)
+        event = self.problem.event_columns(columns, x[: self.k], self.events(x))
+        width = MODEL_ERROR * uncertain(self.problem.measurement)[self.valid][:, None]
+        slopes = self._side_by_side(np.nan_to_num(columns)[self.valid], np.nan_to_num(event)[self.valid]) / width
+        return np.clip(np.vstack([slopes, self._prior_slopes()]), -1e7, 1e7)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low, high = zip(*(f.bounds for f in self.free), strict=True)

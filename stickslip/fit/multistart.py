@@ -14,6 +14,7 @@ from .problem import Problem
 
 STARTS = 4
 ENOUGH = 1.4  # floors; a fit with no phase above it needs no other start
+ALIKE = 2.0  # standard deviations; nor has one whose events have no more than this in common
 # factors on the distance of weakening and on the time of healing
 PAIRS = ((1.0, 1.0), (1.5, 3.0), (0.4, 1.0), (2.5, 0.5))
 FURTHER = ((5.0, 8), (1.0, 16))  # stages of a best fit that is begun again, until that takes less than 3 % off
@@ -63,7 +64,8 @@ def best_of(
             continue
         if best is None or found.cost < best.cost:
             best = found
-        if max(errors(problem.measurement, best, floor).by_phase.values(), default=0.0) <= ENOUGH:
+        left = errors(problem.measurement, best, floor)
+        if max(left.by_phase.values(), default=0.0) <= ENOUGH and max(left.alike.values(), default=0.0) <= ALIKE:
             break
     if best is None:
         raise failure or FitError("the fit was given no start")

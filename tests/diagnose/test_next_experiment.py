@@ -35,7 +35,7 @@ def asked(monkeypatch):
 
     calls_floors = [8.0]
     monkeypatch.setattr(summary, "recommend", recommend)
-    monkeypatch.setattr(summary, "scatter_factor", lambda m: 1.7)
+    monkeypatch.setattr(summary, "scatter_factor", lambda m: 0.7)
     monkeypatch.setattr(Conditions, "of", classmethod(lambda cls, m: "conditions"))
     return calls, calls_floors
 
