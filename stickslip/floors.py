@@ -51,8 +51,8 @@ ALONE = Scatter(
 )  # fmt: skip
 # ... what new lines at every event add, ...
 LINES = Scatter(
-    recurrence=0.0015, recurrence_periods=0.1, size=0.0022, times=3e-4, overshoot=0.03, ring=0.02, ring_loudest=0.01,
-    frequency=0.03, creep=0.006, creep_largest=0.004, creep_clock=5e-5, hold=0.01, resolution=0.2e-9,
+    recurrence=0.0015, recurrence_periods=0.1, size=0.0026, times=3e-4, overshoot=0.03, ring=0.02, ring_loudest=0.01,
+    frequency=0.045, creep=0.006, creep_largest=0.004, creep_clock=5e-5, hold=0.01, resolution=0.2e-9,
     overshoot_resolution=1e-9, first=3.0,
 )  # fmt: skip
 # ... what all events of a run have alike, ...

@@ -41,15 +41,15 @@ def scatter(folder, new_lines: bool) -> dict[str, float]:
 def test_fresh_lines_scatter_the_features_as_the_floors_say(tmp_path):
     found = scatter(tmp_path, new_lines=True)
     print({group: round(value, 2) for group, value in found.items()})
-    for group in ("recurrence", "size", "overshoot", "frequency", "creep"):
+    for group in ("recurrence", "size", "times", "overshoot", "ring", "frequency", "settle"):
         assert 0.6 < found[group] < 1.5, (group, found)
-    # wider than need be
-    for group in ("times", "ring", "settle"):
-        assert found[group] < 1.0, (group, found)
+    # more than the floor, for two factors of each event are refitted and take most of it
+    assert 1.0 < found["creep"] < 3.0, found
 
 
 def test_with_the_same_lines_only_the_sensor_scatters(tmp_path):
     found = scatter(tmp_path, new_lines=False)
+    print({group: round(value, 2) for group, value in found.items()})
     for group in ("recurrence", "size", "times"):
-        assert found[group] < 0.3, (group, found)
+        assert found[group] < 0.8, (group, found)
     assert found["overshoot"] == pytest.approx(1.0, abs=0.4)  # a count of the sensor
