@@ -75,6 +75,7 @@ MOST_VARIED = 1.5
 EVENT_WIDTHS = (0.12, 0.08)  # prior s.d. of ln(u_max) and ln(p) from event to event where lines are new every time
 LEAST_WIDTH = 0.02  # share of these where the lines are the same
 FEWEST = 4  # events of a run that tell scatter
+CREEP_MIDDLE = slice(3, 9)  # points of the creep that scatter most with the lines
 
 
 def floors(measurement: Measurement, *, factor: float | None = None) -> np.ndarray:
@@ -166,9 +167,6 @@ def scatter_factor(measurement: Measurement) -> float:
     creep = np.sqrt(max(creep**2 - CREEP_NOISE**2, 0.0))
     varied = min(float(size) / NEW_SIZE, float(creep) / NEW_CREEP)
     return float(np.clip(varied, 0.0, MOST_VARIED))
-
-
-CREEP_MIDDLE = slice(3, 9)
 
 
 def _scatter(values: np.ndarray) -> float:

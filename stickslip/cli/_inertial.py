@@ -189,17 +189,17 @@ def _static_step(problem: Problem, optimum: Fit, floor: np.ndarray, train: np.nd
         "rig.spring_stiffness", np.nan
     )
     model = static_features(m, floor, optimum, stiffness, train)
-    errors = [
+    found = [
         misfit(replace(m, valid=m.valid & part[..., None]), model, floor)
         for part in (train, np.asarray(m.cycles.used) & ~train)
     ]
     return {
         "model": ["static"],
         "added": None,
-        "train_error": errors[0].total,
-        "heldout_error": errors[1].total or None,
-        "by_phase": errors[0].by_phase,
-        "heldout_by_phase": errors[1].by_phase,
+        "train_error": found[0].total,
+        "heldout_error": found[1].total or None,
+        "by_phase": found[0].by_phase,
+        "heldout_by_phase": found[1].by_phase,
     }
 
 

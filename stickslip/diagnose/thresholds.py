@@ -18,7 +18,7 @@ class Thresholds:
             nearly all of the development campaigns without a missing effect stay below (docs/diagnosis).
         alike: largest that events may have in common, in any phase (standard deviations of what is expected of that).
         overall: largest error over all phases together, training and held-out, at which it is: an effect may be spread
-            so thinly that no single phase shows it. 55 of the 58 campaigns above stay below.
+            so thinly that no single phase shows it.
         gain: an effect must take off at least this share of the training cost.
         unseen: and this share of the score on unseen cycles, which few cycles tell poorly.
         adequate: factor on the limits of ``complete`` and ``alike`` that the model with the named effect must meet;

@@ -17,8 +17,8 @@ ENOUGH = 1.4  # floors; a fit with no phase above it needs no other start
 ALIKE = 2.0  # standard deviations; nor has one whose events have no more than this in common
 # factors on the distance of weakening and on the time of healing
 PAIRS = ((1.0, 1.0), (1.5, 3.0), (0.4, 1.0), (2.5, 0.5))
-FURTHER = ((5.0, 8), (1.0, 16))  # stages of a best fit that is begun again, until that takes less than 3 % off
-AGAIN, SETTLED = 2, 0.95
+FURTHER = ((5.0, 8), (1.0, 16))  # stages of a best fit that is begun again
+AGAIN, SETTLED = 2, 0.95  # so often at most, until that takes less than 5 % off its cost
 AWAY = 2  # stages at wide floors after which a start that does worse than the best so far is left
 
 

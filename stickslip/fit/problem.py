@@ -27,7 +27,7 @@ from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
 from .composition import START, Composition, Given
 
-FINE = Tolerance(1.5e-3, 6e-12, 6e-9)  # errors of half a floor, of onsets in slow runs up to two
+FINE = Tolerance(1.5e-3, 6e-12, 6e-9)  # errors below a floor, of onsets in slow runs up to two
 COARSE = Tolerance(5e-3, 2e-11, 2e-8)  # of two to three: for floors that are widened more than that
 STEP = 0.01  # of a difference, on the search scale, until it is known better
 BROKEN = 0.3  # change of a slip's size within such a step that can only be another event

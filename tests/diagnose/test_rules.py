@@ -15,7 +15,16 @@ from stickslip.diagnose.heldout import HeldOut
 from stickslip.diagnose.holdout import training_cycles
 from stickslip.diagnose.pieces import fit_arrays, fit_from
 from stickslip.diagnose.thresholds import THRESHOLDS
-from stickslip.diagnose.verdict import confidence, decide, is_complete, judge, nothing, weights
+from stickslip.diagnose.verdict import (
+    confidence,
+    decide,
+    is_adequate,
+    is_complete,
+    judge,
+    nothing,
+    weights,
+    worst_phase,
+)
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
 from stickslip.features.layout import Layout
@@ -204,6 +213,14 @@ def test_complete_means_every_phase_also_where_no_fit_looked():
         assert not is_complete(replace(good, by_phase={phase: limit[phase] + 0.1}), unseen)
     assert is_complete(replace(good, alike={"slip": THRESHOLDS.alike}), unseen)
     assert not is_complete(replace(good, alike={"slip": THRESHOLDS.alike + 0.1}), unseen)
+
+
+def test_what_all_events_have_in_common_is_named_where_it_is_worst():
+    left = Misfit(0.8, {"slip": 0.8}, {}, {"slip": 2.0 * THRESHOLDS.alike, "creep": 0.1})
+    assert worst_phase(left, None) == ("slip in all events", 2.0 * THRESHOLDS.alike)
+    assert worst_phase(replace(left, alike={}), None) == ("slip", 0.8)
+    assert not is_adequate(left, None, factor=1.9)
+    assert is_adequate(left, None, factor=2.1)
 
 
 def test_complete_means_all_phases_together_too():

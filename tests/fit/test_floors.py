@@ -9,7 +9,7 @@ from stickslip.campaign import load_campaign, load_traces
 from stickslip.challenge.generator import make_campaign
 from stickslip.features.measurement import measure
 from stickslip.fit.start import ring_period
-from stickslip.floors import floors
+from stickslip.floors import floors, scatter_factor
 from stickslip.segment import segment
 
 pytestmark = pytest.mark.slow  # eight campaigns
@@ -25,6 +25,8 @@ def scatter(folder, new_lines: bool) -> dict[str, float]:
         traces = load_traces(load_campaign(folder / str(seed) / "campaign.toml"))
         segments = [segment(t) for t in traces]
         m = measure(traces, segments, ring_period=ring_period(traces, segments), most_cycles=14)
+        told = scatter_factor(m)  # the events tell which of the two it is
+        assert told > 0.4 if new_lines else told < 0.2, (seed, told)
         floor = floors(m, factor=1.0 if new_lines else 0.0)
         for r, name in enumerate(m.names):
             if name == "holds":
