@@ -97,6 +97,7 @@ def diagnose_campaign(
     from .effects import catalogue
     from .fit.problem import Problem
     from .report import write_report
+    from .report.describe import unused_channels
     from .report.inertial_result import fit_sections
     from .report.missing_force import missing_sections
     from .segment import segment
@@ -138,6 +139,7 @@ def diagnose_campaign(
             "inputs": inputs,
             "versions": versions(),
         }
+        result["dropped"] = [*(f"{t.name}: {c}" for t in traces for c in unused_channels(t)), *result["dropped"]]
         top = next((r for r in reversed(found.ladder) if r.fit is not None), None)
         if top is not None and top.fit is not None and top.composition is not None:
             problem = Problem(top.composition, found.measurement)

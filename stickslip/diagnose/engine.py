@@ -146,7 +146,13 @@ def diagnose(
 
     base = base_composition(campaign, data)
     tell("fitting the base model", 0.0)
-    base, optimum = _base_fit(base, data, floor, train, store, tell)
+    optimum = _kept(
+        store,
+        "base",
+        lambda: best_of(
+            Problem(base, data), floor, train, progress=lambda text, share: tell(f"base model, {text}", share)
+        ),
+    )
     rung = _rung(("static", "inertia"), "inertia", base, optimum, data, floor, train)
     stiffness = base.fixed.get("rig.spring_stiffness", optimum.values.get("rig.spring_stiffness", np.nan))
     ladder = [_static(data, floor, train, optimum, float(stiffness)), rung]
@@ -161,7 +167,9 @@ def diagnose(
                 break
             tell("the last model once more", 1.0)
             before = rung.fit.cost
-            ladder[-1] = rung = _further(rung, data, floor, train, store, f"named{len(named)}-{again + 1}")
+            ladder[-1] = rung = _further(
+                rung, rung.fit, FURTHER, data, floor, train, store, f"named{len(named)}-{again + 1}"
+            )
             if rung.fit is None or rung.fit.cost > ARRIVED * before:
                 break
         assert rung.held is not None
@@ -236,36 +244,39 @@ def _round(
     if best is None or best.fit is None:
         return rung, done
     k = len(rung.composition.free)
-    kept = store.load(f"{name}-again") if store is not None else None
-    if kept is not None:
-        again = fit_from(kept)
-    else:
-        problem = Problem(rung.composition, data)
-        again = fit(problem, floor, z=best.fit.z[:k], events=best.fit.events, stages=((3.0, 4), (1.0, MORE)), use=train)
-        if store is not None:
-            store.save(f"{name}-again", fit_arrays(again))
-    if again.cost < rung.fit.cost:
-        rung = _rung(rung.model, rung.added, rung.composition, again, data, floor, train)
-    return rung, done
+    begin, stages = replace(rung.fit, z=best.fit.z[:k], events=best.fit.events), ((3.0, 4), (1.0, MORE))
+    return _further(rung, begin, stages, data, floor, train, store, f"{name}-again"), done
 
 
 def _further(
-    rung: Rung, data: Measurement, floor: np.ndarray, train: np.ndarray, store: Store | None, name: str
+    rung: Rung,
+    begin: Fit,
+    stages: tuple[tuple[float, int], ...],
+    data: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    store: Store | None,
+    name: str,
 ) -> Rung:
-    """The rung fitted again from where its fit arrived, if that is better."""
+    """The rung fitted again from where ``begin`` is, if that is better."""
     assert rung.composition is not None
     assert rung.fit is not None
-    kept = store.load(name) if store is not None else None
-    if kept is not None:
-        more = fit_from(kept)
-    else:
-        problem = Problem(rung.composition, data)
-        more = fit(problem, floor, z=rung.fit.z, events=rung.fit.events, stages=FURTHER, use=train)
-        if store is not None:
-            store.save(name, fit_arrays(more))
+    problem = Problem(rung.composition, data)
+    more = _kept(store, name, lambda: fit(problem, floor, z=begin.z, events=begin.events, stages=stages, use=train))
     if more.cost >= rung.fit.cost:
         return rung
     return _rung(rung.model, rung.added, rung.composition, more, data, floor, train)
+
+
+def _kept(store: Store | None, name: str, make: Callable[[], Fit]) -> Fit:
+    """The fit of that name from the store, or made and kept there."""
+    kept = store.load(name) if store is not None else None
+    if kept is not None:
+        return fit_from(kept)
+    found = make()
+    if store is not None:
+        store.save(name, fit_arrays(found))
+    return found
 
 
 def _without(
@@ -287,23 +298,6 @@ def _without(
         if found.cost < limits.rival * top.fit.cost and is_complete(rung.train, rung.held, limits):
             return [*ladder[:2], rung], left
     return ladder, named
-
-
-def _base_fit(
-    base: Composition,
-    data: Measurement,
-    floor: np.ndarray,
-    train: np.ndarray,
-    store: Store | None,
-    tell: Callable[[str, float], None],
-) -> tuple[Composition, Fit]:
-    kept = store.load("base") if store is not None else None
-    if kept is not None:
-        return base, fit_from(kept)
-    found = best_of(Problem(base, data), floor, train, progress=lambda text, share: tell(f"base model, {text}", share))
-    if store is not None:
-        store.save("base", fit_arrays(found))
-    return base, found
 
 
 def _rung(
