@@ -136,7 +136,7 @@ def _drawing(variables: Mapping[str, tuple], number: int, columns: int) -> list[
 def _scale(values: Sequence[float], unit: str) -> tuple[int, str]:
     """Power of ten and symbol of the unit that suits most of the values."""
     known = sorted(abs(v) for v in values if v is not None and math.isfinite(v) and v != 0)
-    if not known or unit in ("1", "") or " " in unit.split("/")[0]:
+    if not known or unit[:1] in ("", "1") or " " in unit.split("/")[0]:
         return 0, unit
     most = 0 if unit == "s" else 9
     power = max(-12, min(most, 3 * math.floor(math.log10(known[len(known) // 2] * (1 + 1e-9)) / 3)))

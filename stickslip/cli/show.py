@@ -58,7 +58,7 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
         return "-"
     if value in (float("inf"), float("-inf")):
         return "unlimited" if value > 0 else "-unlimited"
-    if value == 0 or unit in ("1", ""):
+    if value == 0 or unit[:1] in ("", "1"):  # no prefix for 1/m
         return f"{value:.{digits}g} {unit if unit != '1' else ''}".strip()
     import math
 

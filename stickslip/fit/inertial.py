@@ -13,6 +13,7 @@ from ..features.measurement import Measurement
 from ..floors import event_widths, uncertain
 from ..residual import Misfit, misfit
 from .common import Common
+from .composition import START
 from .parameters import Free, to_si, vector
 from .problem import STEP, Problem
 
@@ -20,6 +21,9 @@ HUBER = 3.0
 QUIET = 0.15  # floors; mean change of the features below which derivatives are kept as they are
 TRUST = 0.1  # share of a step's change that Broyden's update may have missed
 MODERATE = 4.0  # floors, rms, by which the step of a difference should move the features
+FAR = 100.0  # floors, from what a slope lets expect, beyond which a difference is that of another event
+AT_ONCE = 8  # evaluations after which derivatives that were carried on are taken again
+FARTHEST = (0.2, 0.5)  # step on the search scale along a direction that moves little; of a logarithm, of another scale
 LEAST, LARGEST = 1e-3, (0.05, 0.5)  # such a step on the search scale; the largest of a logarithm, of another scale
 MODEL_ERROR = 4.0  # on standard deviations: a bank of three parameters is no rough line (tests/fit/test_recovery.py)
 WIDE = 2.4  # factor on the floors from which a coarser tolerance of the solver does
@@ -84,6 +88,8 @@ class _Residuals:
         self._at: np.ndarray | None = None
         self._features: np.ndarray | None = None
         self._columns: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._taken = np.array([])  # where they were last taken by differences
+        self._stale = False  # whether they must be, wherever they are asked for next
         self.anew = True  # whether derivatives may be taken again where Broyden's update fails
         self.evaluations = self.jacobians = 0
         self.steps = np.full(self.k, STEP)
@@ -110,7 +116,7 @@ class _Residuals:
     def columns(self, x: np.ndarray) -> np.ndarray:
         """Derivatives in z: taken anew, or carried on by Broyden's update while that predicts the change well."""
         f = self.evaluate(x)
-        if self._columns is not None:
+        if self._columns is not None and not self._stale:
             at, old, columns = self._columns
             if np.array_equal(at, x):
                 return columns
@@ -127,14 +133,44 @@ class _Residuals:
                 columns = columns + miss[..., None] * dz / (dz @ dz)
                 self._columns = (x.copy(), f, columns)
                 return columns
+        columns = self._along(x, f, self._columns[2]) if self._columns is not None else self._apart(x, f)
+        self.jacobians += 1
+        self._taken, self._stale = x.copy(), False
+        self._columns = (x.copy(), f, columns)
+        return columns
+
+    def _apart(self, x: np.ndarray, f: np.ndarray) -> np.ndarray:
+        """Derivatives by a difference for each parameter."""
         columns = self._differences(x, f, range(self.k))
         again = self._adapt(columns, range(self.k))
         if again:
             columns[..., again] = self._differences(x, f, again)
             self._adapt(columns, again)
-        self.jacobians += 1
-        self._columns = (x.copy(), f, columns)
         return columns
+
+    def _along(self, x: np.ndarray, f: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """Derivatives by differences along the principal directions of those ``known``.
+
+        What several parameters do together may be a thousandth of what each does alone, and is lost in the noise of
+        differences taken apart: it is measured in a step of its own, long enough to be seen.
+        """
+        apart = np.array([free.name.startswith(START) for free in self.free])  # of one run each
+        widths = np.array([min(free.width, 1.0) for free in self.free])
+        seen = np.nan_to_num(known)[self.valid] * widths
+        whitened = np.clip(self.common(1.0)(seen[:, ~apart]), -1e6, 1e6)
+        _, _, rotation = np.linalg.svd(whitened, full_matrices=False)
+        directions = np.diag(widths)
+        directions[np.ix_(~apart, ~apart)] = widths[~apart, None] * rotation.T
+        reach = np.array([FARTHEST[0] if free.scale == "log" else FARTHEST[1] for free in self.free])
+        longest = (reach[:, None] / np.maximum(np.abs(directions), 1e-12)).min(axis=0)
+        moved = np.abs(seen / self.floor[self.valid][:, None] @ (directions / widths[:, None]))
+        steps = np.array([_moderate(column, most) for column, most in zip(moved.T, longest, strict=True)])
+        slopes = self.problem.slopes(x[: self.k], self.events(x), directions, f, steps)
+        before = known @ directions
+        # an event that falls on the other side of a hold within the step tells nothing of a slope
+        far = np.abs(np.nan_to_num((slopes - before) * steps / self.floor[..., None])) > FAR
+        slopes = np.where(np.any(far & self.valid[..., None], axis=2, keepdims=True), before, slopes)
+        return np.asarray(slopes @ np.linalg.inv(directions))
 
     def _differences(self, x: np.ndarray, f: np.ndarray, which: Sequence[int]) -> np.ndarray:
         return self.problem.columns(x[: self.k], self.events(x), which, f, self.steps[list(which)])
@@ -150,6 +186,12 @@ class _Residuals:
             largest = LARGEST[0] if self.free[i].scale == "log" else LARGEST[1]
             self.steps[i] = np.clip(self.steps[i] * np.clip(MODERATE / max(rms, 1e-9), 0.1, 5.0), LEAST, largest)
         return far
+
+    def renew(self, x: np.ndarray) -> bool:
+        """Have the derivatives at ``x`` taken again, unless they were taken just there; returns whether so."""
+        stale = self.anew and not np.array_equal(self._taken, x)
+        self._stale = self._stale or stale
+        return stale
 
     def start(self, x: np.ndarray, columns: np.ndarray) -> None:
         """Take ``columns`` for the derivatives at ``x``."""
@@ -216,6 +258,13 @@ class _Residuals:
         return np.concatenate([low, -reach]), np.concatenate([high, reach])
 
 
+def _moderate(rate: np.ndarray, longest: float) -> float:
+    """The step, at most ``longest``, that moves features by MODERATE (rms); ``rate`` in floors for a unit of it."""
+    steps = longest * np.geomspace(1e-4, 1.0, 60)
+    rms = np.sqrt(np.mean(np.minimum(rate * steps[:, None], 100.0) ** 2, axis=1))
+    return float(steps[max(np.searchsorted(rms, MODERATE, side="right") - 1, 0)])
+
+
 def robust(r: np.ndarray) -> float:
     """Huber's loss: chi-square with the far tails straightened."""
     a = np.abs(r)
@@ -275,7 +324,9 @@ def fit(
             out[:, soft[0]] += jac[:, soft[1]] * scale[soft[0]]
         return out
 
-    for factor, most in stages:
+    ahead = list(stages)
+    while ahead:
+        factor, most = ahead.pop(0)
         # sought as a distance from where the stage begins, in units of the priors: scipy takes the length of the
         # start vector for the radius it trusts, and that of logarithms is far too long
         begun = x
@@ -300,12 +351,15 @@ def fit(
             bounds=_box(low, high, begun, scale, soft),
             loss="huber",
             f_scale=HUBER,
-            max_nfev=most,
+            max_nfev=most if ahead else min(most, AT_ONCE),
             ftol=4e-3,
             xtol=1e-4,
             gtol=1e-6,
         )
         x = outward(found.x, begun)
+        if not ahead and most - found.nfev > 1 and res.renew(x):
+            # what stands still with derivatives that were carried on may go on with new ones
+            ahead = [(factor, most - found.nfev)]
     res.solve(problem)
     raw = res.evaluate(x)
     offsets = -res.common(1.0).offsets(res.misfit(x))

@@ -30,6 +30,7 @@ from .composition import START, Composition, Given
 FINE = Tolerance(1.5e-3, 6e-12, 6e-9)  # errors below a floor, of onsets in slow runs up to two
 COARSE = Tolerance(5e-3, 2e-11, 2e-8)  # of two to three: for floors that are widened more than that
 STEP = 0.01  # of a difference, on the search scale, until it is known better
+TINY = 0.1  # share of a step that is taken beyond a border where there is no room to either side
 BROKEN = 0.3  # change of a slip's size within such a step that can only be another event
 THREADS = max(1, min(4, os.cpu_count() or 1))
 
@@ -89,24 +90,36 @@ class Problem:
         extra = soft is not None and soft[0] in which and soft[1] not in which
         if soft is not None and extra:
             which, sizes = [*which, soft[1]], np.append(sizes, sizes[which.index(soft[0])])
-        lanes, taken = [], []
-        for i, size in zip(which, sizes, strict=True):
-            _, high = self.composition.free[i].bounds
-            step = float(size) if z[i] + size <= high else -float(size)
-            moved = np.array(z, float)
-            moved[i] += step
-            if soft is not None and i == soft[0]:
-                moved[soft[1]] += step
-            lanes.append((moved, events))
-            taken.append(step)
-        at = self.measurement.layout.slices()["size"]
-        found = self._call(lanes, [self._alone(i) for i in which], base)
-        out = np.stack([(o - base) / h for o, h in zip(found, taken, strict=True)], axis=-1)
-        jump = np.abs(out[:, :, at] * np.array(taken)) > BROKEN * np.abs(base[:, :, at, None])
-        out = np.where(jump, 0.0, out)
+        directions = np.eye(len(z))[:, which]
+        if soft is not None and soft[0] in which:
+            directions[soft[1], which.index(soft[0])] = 1.0
+        out = self.slopes(z, events, directions, base, sizes)
         if soft is not None and soft[0] in which:
             out[..., which.index(soft[0])] -= out[..., which.index(soft[1])]
         return out[..., :-1] if extra else out
+
+    def slopes(
+        self, z: np.ndarray, events: np.ndarray, directions: np.ndarray, base: np.ndarray, steps: np.ndarray
+    ) -> np.ndarray:
+        """Derivatives of the features along ``directions`` (k, d), shape (R, n, F, d); else as :meth:`columns`."""
+        low, high = np.array([f.bounds for f in self.composition.free]).T
+        lanes, taken, only = [], [], []
+        for direction, size in zip(directions.T, steps, strict=True):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                border = np.where(direction > 0, [high - z, z - low], [z - low, high - z]) / np.abs(direction)
+            room = np.where(direction == 0, np.inf, border).min(axis=1)
+            ahead = room[0] >= min(size, room[1])
+            step = (1.0 if ahead else -1.0) * max(min(float(size), float(max(room))), TINY * float(size))
+            moved = np.where(direction != 0.0, np.clip(z + step * direction, low, high), z)
+            lanes.append((moved, events))
+            taken.append(step)
+            touched = np.flatnonzero(direction)
+            only.append(self._alone(int(touched[0])) if touched.size == 1 else None)
+        found = self._call(lanes, only, base)
+        out = np.stack([(o - base) / h for o, h in zip(found, taken, strict=True)], axis=-1)
+        at = self.measurement.layout.slices()["size"]
+        jump = np.abs(out[:, :, at] * np.array(taken)) > BROKEN * np.abs(base[:, :, at, None])
+        return np.where(jump, 0.0, out)
 
     def coupled(self) -> tuple[int, int] | None:
         """Positions of the spring's stiffness and the contact's strength where both are free.

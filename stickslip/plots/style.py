@@ -59,7 +59,7 @@ def scaled(values: np.ndarray, unit: str) -> tuple[float, str]:
     finite = np.abs(np.asarray(values, float))
     finite = finite[np.isfinite(finite)]
     top = float(finite.max()) if finite.size else 0.0
-    if top == 0.0 or unit in ("1", ""):
+    if top == 0.0 or unit[:1] in ("", "1"):  # no prefix for 1/m
         return 1.0, unit
     for size, letter in _PREFIXES:
         if top >= size:

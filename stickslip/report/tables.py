@@ -35,7 +35,7 @@ def show(value: Any, unit: str = "1", digits: int = 4) -> str:
         return str(value) or "–" if isinstance(value, str) else "–"
     if not math.isfinite(value):
         return "–"
-    if value == 0 or unit in ("1", "", None) or " " in unit.split("/")[0]:
+    if value == 0 or not unit or unit.startswith("1") or " " in unit.split("/")[0]:  # no prefix for 1/m
         return f"{_digits(value, digits)} {unit if unit not in ('1', None) else ''}".strip()
     if unit == "kg":
         value, unit = 1e3 * value, "g"

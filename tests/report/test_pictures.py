@@ -5,6 +5,8 @@ import pytest
 import xarray
 
 from stickslip.cli import run
+from stickslip.cli.show import quantity
+from stickslip.plots.style import scaled
 from stickslip.report import trace_pieces
 from stickslip.report.figures import trace_picture
 from stickslip.report.fit_figures import creep_grid, heat_map, ladder_picture, ramp_grid
@@ -152,3 +154,9 @@ def test_what_follows_a_slip_is_drawn_in_its_own_scale():
 )
 def test_numbers_of_a_report_have_no_needless_powers(value, unit, digits, shown):
     assert show(value, unit, digits) == shown
+
+
+def test_a_prefix_never_stands_before_a_one():
+    assert show(0.614, "1/m") == "0.614 1/m"
+    assert quantity(0.614, "1/m") == "0.614 1/m"
+    assert scaled(np.array([0.614]), "1/m") == (1.0, "1/m")
