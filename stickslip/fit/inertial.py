@@ -262,7 +262,7 @@ def _moderate(rate: np.ndarray, longest: float) -> float:
     """The step, at most ``longest``, that moves features by MODERATE (rms); ``rate`` in floors for a unit of it."""
     steps = longest * np.geomspace(1e-4, 1.0, 60)
     rms = np.sqrt(np.mean(np.minimum(rate * steps[:, None], 100.0) ** 2, axis=1))
-    return float(steps[max(np.searchsorted(rms, MODERATE, side="right") - 1, 0)])
+    return float(steps[max(int(np.searchsorted(rms, MODERATE, side="right")) - 1, 0)])
 
 
 def robust(r: np.ndarray) -> float:

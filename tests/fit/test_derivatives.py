@@ -1,4 +1,4 @@
-"""Derivatives by differences: what two parameters do together is seen although each alone does a thousand times more."""
+"""Derivatives by differences: what two parameters do together is seen, though each alone does a hundred times more."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Straight(Problem):
             found = self.measurement.values + self.slope @ step
             found = found + NOISE * self.floor * self.noise.standard_normal(found.shape)
             if self.jump is not None and abs(step[FIRST]) > 1e-4:
-                found[self.jump] += 1e4 * self.floor[self.jump]
+                found[self.jump][2:] += 1e4 * self.floor[self.jump][2:]  # but not the slip's size
             out.append(found)
         return out
 
