@@ -17,7 +17,7 @@ from ..effects import catalogue
 from ..errors import FitError, InputError, nearest
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
-from ..fit.inertial import MODEL_ERROR, Fit, errors, fit
+from ..fit.inertial import DISPERSION, Fit, errors, fit
 from ..fit.multistart import best_of
 from ..fit.problem import Problem
 from ..fit.record import KEY, fitted, record
@@ -222,8 +222,7 @@ def _profile(name: str, problem: Problem, optimum: Fit, floor: np.ndarray, tell:
         z = z0.copy()
         z[k] = value
         found = fit(pinned, floor, z=z, events=optimum.events, stages=REFIT, use=optimum.use)
-        # counted as the covariance is: all events share what a bank of few parameters cannot describe
-        return (found.cost - ((found.z[k] - value) / PIN) ** 2) / MODEL_ERROR**2
+        return (found.cost - ((found.z[k] - value) / PIN) ** 2) / DISPERSION
 
     std = float(np.sqrt(max(optimum.covariance[k, k], 0.0)))
     progress = lambda done, of: tell(f"profile of {name}: {done} of {of}", done / of)  # noqa: E731

@@ -22,7 +22,7 @@ from ..params import specs
 from ..residual import Misfit
 from .heldout import HeldOut, held_out
 from .linear import Linear
-from .periods import periods
+from .periods import periods, phasor
 
 START = 0.02  # of the amplitude's range; scaled until its effect on the features is moderate
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
@@ -31,6 +31,7 @@ PLAUSIBLE = 60.0  # floors, rms: by how much an amplitude moves the features at 
 CARRIED = ((30.0, 6), (7.0, 6), (2.5, 7))  # stages of that refit, with the base's derivatives carried on
 OTHERS = 1  # further starts that a leader is fitted from
 SHARES = (1.0, 0.4)  # of a linear step that are tried
+LOCKED = (1.0, 0.6)  # shares of the amplitude that locked onsets tell that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
@@ -86,17 +87,16 @@ def starts(effect: Effect, found: list[float] | None = None) -> list[dict[str, f
 
     Args:
         effect: with its form chosen.
-        found: periods the data hint at, for an effect that is periodic; they stand before the grid's.
+        found: periods the data hint at, for an effect that is periodic, the strongest first; they replace the grid's.
     """
     table = specs(effect)
     inner = {k: s.grid for k, s in table.items() if k != effect.amplitude and s.grid}
     if effect.periodic is not None:
         name = effect.periodic[0]
         inner.pop("phase", None)
-        if found:
-            low, high = table[name].lower, table[name].upper
-            at = [1.0 / p if name == "frequency" else p for p in found]
-            inner[name] = tuple(v for v in (*at, *inner.get(name, ())) if low < v < high)
+        low, high = table[name].lower, table[name].upper
+        at = tuple(v for v in (1.0 / p if name == "frequency" else p for p in found or ()) if low < v < high)
+        inner[name] = at[:MOST_STARTS] or inner.get(name, ())
     grid = [dict(zip(inner, values, strict=True)) for values in product(*inner.values())]
     if len(grid) <= MOST_STARTS:
         return grid
@@ -245,8 +245,7 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
         bounds = (spec.lower, spec.upper)
         if effect.periodic[0] == "frequency":
             bounds = (1.0 / spec.upper, 1.0 / spec.lower)
-        residual = (measurement.values - optimum.features) / floor
-        hints = periods(effect.periodic[1], measurement, np.nan_to_num(residual), use, bounds)
+        hints = periods(effect.periodic[1], measurement, optimum.features - optimum.offsets, use, bounds)
     search = _Search(problem, optimum, floor, valid, factor, free, k, effect)
     explained, likely = 0.0, {}
     for values in starts(effect, hints):
@@ -341,12 +340,30 @@ class _Search:
             offers.append(self._offer(self.point(values, self.null + share * size, moved), events))
             if not first and self.best is not None and offers[-1][0] <= self.best[0]:
                 break
+        if phased:
+            offers += self._locked(values, known[0][0])
         if first:
             # the least there is: the base with a little of the effect
             little = self.null + np.sign(size or 1.0) * 0.1 * abs(known[0][1])
             offers.append(self._offer(self.point(values, little), self.optimum.events))
         self.each.append(min(offers, key=lambda o: o[0]))
         return step.share
+
+    def _locked(self, values: dict[str, float], rate: np.ndarray) -> list[tuple]:
+        """Starts with the amplitude and the phase that the measured onsets tell, which may be locked to the period.
+
+        ``rate`` is the change of the features for a unit of the amplitude at a phase of zero.
+        """
+        name, variable = self.effect.periodic
+        period = 1.0 / values[name] if name == "frequency" else values[name]
+        m, used = self.problem.measurement, self.valid.any(axis=-1)
+        own = phasor(variable, m, self.bare, rate, period, used)
+        late = phasor(variable, m, m.values, m.values - self.bare, period, used)
+        if own == 0.0:
+            return []
+        ratio = late / own
+        told = {**values, "phase": float(np.angle(ratio))}
+        return [self._offer(self.point(told, self.null + share * abs(ratio)), self.optimum.events) for share in LOCKED]
 
     def push(self, values: dict[str, float], rms: float, use: np.ndarray) -> None:
         """Refit everything from an amplitude that moves the features by ``rms`` floors, however little that promises.

@@ -18,7 +18,7 @@ from ..effects.learned import AGES, PLACES, REACH, SPEEDS, LearnedForce
 from ..features.layout import LEVELS
 from ..features.measurement import Measurement
 from ..fit.composition import Composition
-from ..fit.inertial import MODEL_ERROR, Fit, errors, fit
+from ..fit.inertial import DISPERSION, Fit, errors, fit
 from ..fit.parameters import Free
 from ..fit.problem import Problem
 from ..params import specs
@@ -224,13 +224,13 @@ def rung(missing: MissingForce, below: Rung, measurement: Measurement, floor: np
 
 
 def _covariance(problem: Problem, found: Fit, measurement: Measurement, floor: np.ndarray) -> np.ndarray:
-    """Of the weights, everything else marginalised; data widened as the model's own parameters are, priors not.
+    """Of the weights, everything else marginalised; data widened by what events share, priors not.
 
     A weight that was left out has none.
     """
     linear = Linear(problem, found, measurement, floor, measurement.valid & found.use[..., None])
     matrix = linear.basis @ linear.triangle * linear.size
-    matrix[: linear.rows] /= MODEL_ERROR
+    matrix[: linear.rows] /= np.sqrt(DISPERSION)
     at = {f.name: i for i, f in enumerate(found.free)}
     own = [at.get(f"{LearnedForce.tag}.{name}") for name in names()]
     whole = np.linalg.pinv(matrix.T @ matrix)

@@ -1,69 +1,128 @@
-"""Which periods the base's residuals hint at, for effects that come back in time, in travel or along the track."""
+"""Which periods the base's residuals hint at, for effects that come back in time, in travel or along the track.
+
+What modulates the threshold or the load point moves the onset to where the spring has caught up: the way the load point
+still makes is a sine of the *measured* onset, however far that is from where the base expects it.
+"""
 
 from __future__ import annotations
 
 from typing import Literal
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from ..features.measurement import Measurement
 
 Variable = Literal["time", "load point", "displacement"]
-MOST = 400  # frequencies tried
+MOST = 20_000  # frequencies tried
 KEPT = 5
+FEWEST = 6  # slips
+FAR = 5.0  # standard deviations, from the median of the absolute deviations, at which a deviation is cut
 
 
 def periods(
-    variable: Variable, measurement: Measurement, residual: np.ndarray, use: np.ndarray, bounds: tuple[float, float]
+    variable: Variable, measurement: Measurement, model: np.ndarray, use: np.ndarray, bounds: tuple[float, float]
 ) -> list[float]:
-    """Periods (s or m) with which recurrence and slip size deviate most, the strongest first.
+    """Periods (s or m) with which onsets and slip sizes deviate most, the strongest first.
 
-    A sine and a cosine over ``variable`` at the slips are fitted to the two residuals for every frequency that the
-    record resolves; neighbours of a frequency already taken are left out.
+    A sine and a cosine over ``variable`` at the onsets are fitted to both for every frequency that the record resolves;
+    neighbours of a frequency already taken are left out.
 
     Args:
         variable: over which the effect is periodic.
         measurement: the data.
-        residual: of the base over its floors, shape (R, n, F).
+        model: features of the base, shape (R, n, F).
         use: cycles to look at, shape (R, n).
         bounds: shortest and longest period.
     """
-    m, s = measurement, measurement.layout.slices()
-    ok = use & m.valid[..., s["recurrence"].start] & m.valid[..., s["size"].start]
-    if ok.sum() < 6:
+    ok = _complete(measurement, use)
+    if ok.sum() < FEWEST:
         return []
-    start = np.asarray(m.cycles.start)
-    slip = start + m.values[..., s["recurrence"].start]
-    if variable == "time":
-        at = slip[ok]
-    elif variable == "displacement":
-        at = np.asarray(m.cycles.position)[ok]
-    else:
-        nodes = zip(np.asarray(m.cycles.load_times), np.asarray(m.cycles.load_positions), strict=True)
-        travel = np.stack([_along(t, p, row) for (t, p), row in zip(nodes, slip, strict=True)])
-        at = travel[ok]
-    data = np.stack([residual[..., s["recurrence"].start][ok], residual[..., s["size"].start][ok]], axis=1)
-    data = np.clip(data, -50, 50) - np.clip(data, -50, 50).mean(axis=0)
+    size = measurement.layout.slices()["size"].start
+    off = measurement.values - model
+    data = np.stack([_cut(_late(measurement, off)[ok]), _cut(off[..., size][ok])], axis=1)
+    at = _at(variable, measurement, measurement.values)[ok]
     span = float(np.ptp(at))
-    if span <= 0:
+    if span <= 0 or not np.any(data):
         return []
     low, high = max(1.0 / bounds[1], 0.3 / span), 1.0 / bounds[0]
-    # half the record's own resolution; where the band is wider than that allows, its lower part
-    frequency = np.arange(low, high, max(0.3 / span, 1e-12))[:MOST]
+    # a fifth of the record's own resolution; where the band is wider than that allows, its lower part
+    frequency = np.arange(low, high, 0.2 / span)[:MOST]
     if frequency.size == 0:
         return [bounds[1]]
-    power = np.empty(frequency.size)
-    for i, f in enumerate(frequency):
-        basis = np.stack([np.sin(2 * np.pi * f * at), np.cos(2 * np.pi * f * at), np.ones_like(at)], axis=1)
-        rest = data - basis @ np.linalg.lstsq(basis, data, rcond=None)[0]
-        power[i] = 1.0 - np.sum(rest**2) / max(np.sum(data**2), 1e-30)
+    basis = _waves(frequency, at)
+    normal = np.swapaxes(basis, 1, 2) @ basis
+    explained = np.linalg.pinv(normal, hermitian=True) @ (np.swapaxes(basis, 1, 2) @ data)
+    rest = np.sum((data - basis @ explained) ** 2, axis=(1, 2))
     out: list[float] = []
-    for i in np.argsort(power)[::-1]:
+    for i in np.argsort(rest):
         if all(abs(frequency[i] - 1.0 / p) > 0.5 / span for p in out):
             out.append(float(1.0 / frequency[i]))
         if len(out) == KEPT:
             break
     return out
+
+
+def phasor(
+    variable: Variable, measurement: Measurement, onsets: np.ndarray, change: np.ndarray, period: float, use: np.ndarray
+) -> complex:
+    """How far the onsets are late at this period: amplitude (m of the load point's way) and phase of a sine.
+
+    Args:
+        variable: over which it is periodic.
+        measurement: the data.
+        onsets: features (R, n, F) that tell where the onsets are.
+        change: of the features, shape (R, n, F).
+        period: s or m.
+        use: cycles to look at, shape (R, n).
+    """
+    ok = _complete(measurement, use) & np.isfinite(change[..., 0]) & np.isfinite(onsets[..., 0])
+    late = _late(measurement, change)[ok]
+    basis = _waves(np.array([1.0 / period]), _at(variable, measurement, onsets)[ok])[0]
+    cut = np.median(late) + _width(late) * _cut(late)
+    found = np.linalg.lstsq(basis, cut, rcond=None)[0]
+    width = _width(late - basis @ found)
+    if width > 0:  # what is far is told by what is left, not by how far a locked onset is late
+        found = least_squares(lambda x: (basis @ x - late) / width, found, loss="soft_l1", x_scale=width).x
+    return complex(found[0], found[1])
+
+
+def _complete(m: Measurement, use: np.ndarray) -> np.ndarray:
+    s = m.layout.slices()
+    return np.asarray(use & m.valid[..., s["recurrence"].start] & m.valid[..., s["size"].start])
+
+
+def _late(m: Measurement, change: np.ndarray) -> np.ndarray:
+    """Way of the load point between the onset expected and that measured (m), shape (R, n)."""
+    late: np.ndarray = change[..., m.layout.slices()["recurrence"].start] * np.asarray(m.velocities)[:, None]
+    return late
+
+
+def _width(values: np.ndarray) -> float:
+    """Standard deviation, from the median of the absolute deviations."""
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+def _cut(values: np.ndarray) -> np.ndarray:
+    """Deviations from the median in such standard deviations, far ones cut."""
+    return np.clip((values - np.median(values)) / (_width(values) or 1.0), -FAR, FAR)
+
+
+def _waves(frequency: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Sine, cosine and a constant, shape (frequencies, N, 3)."""
+    turn = 2.0 * np.pi * frequency[:, None] * at
+    return np.stack([np.sin(turn), np.cos(turn), np.ones_like(turn)], axis=-1)
+
+
+def _at(variable: Variable, m: Measurement, features: np.ndarray) -> np.ndarray:
+    """Where the onsets are on the variable, shape (R, n)."""
+    if variable == "displacement":
+        return np.asarray(m.cycles.position)
+    slip = np.asarray(m.cycles.start) + features[..., m.layout.slices()["recurrence"].start]
+    if variable == "time":
+        return slip
+    nodes = zip(np.asarray(m.cycles.load_times), np.asarray(m.cycles.load_positions), strict=True)
+    return np.stack([_along(t, p, row) for (t, p), row in zip(nodes, slip, strict=True)])
 
 
 def _along(times: np.ndarray, positions: np.ndarray, t: np.ndarray) -> np.ndarray:

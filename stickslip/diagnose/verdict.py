@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ..effects import catalogue
-from ..fit.inertial import MODEL_ERROR
+from ..fit.inertial import DISPERSION
 from ..residual import Misfit
 from .candidate import Candidate
 from .heldout import HeldOut
@@ -180,14 +180,14 @@ def _worse(one: Candidate, other: Candidate, limits: Thresholds) -> bool:
 def weights(judged: Sequence[Judged]) -> dict[str, float]:
     """How likely each effect is, given that one of these is the missing one: tag -> weight, adding up to 1.
 
-    The likelihood ratio of the refitted candidates, with costs divided by the square of the factor by which the errors
-    of a fit are widened: all events share what a bank of few parameters cannot describe.
+    The likelihood ratio of the refitted candidates, with costs divided by DISPERSION: all events share what a bank of
+    few parameters cannot describe.
     """
     best: dict[str, float] = {}
     for j in judged:
         best[j.candidate.tag] = min(j.cost, best.get(j.candidate.tag, np.inf))
     least = min(best.values())
-    raw = {tag: float(np.exp(-0.5 * (cost - least) / MODEL_ERROR**2)) for tag, cost in best.items()}
+    raw = {tag: float(np.exp(-0.5 * (cost - least) / DISPERSION)) for tag, cost in best.items()}
     total = sum(raw.values())
     return {tag: w / total for tag, w in raw.items()}
 

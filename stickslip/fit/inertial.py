@@ -25,7 +25,8 @@ FAR = 100.0  # floors, from what a slope lets expect, beyond which a difference 
 AT_ONCE = 8  # evaluations after which derivatives that were carried on are taken again
 FARTHEST = (0.2, 0.5)  # step on the search scale along a direction that moves little; of a logarithm, of another scale
 LEAST, LARGEST = 1e-3, (0.05, 0.5)  # such a step on the search scale; the largest of a logarithm, of another scale
-MODEL_ERROR = 4.0  # on standard deviations: a bank of three parameters is no rough line (tests/fit/test_recovery.py)
+DISPERSION = 16.0  # of costs, over that of noise alone: events share what a bank of three parameters cannot describe
+MODEL_ERROR = 2.0  # on standard deviations: a bank of three parameters is no rough line (tests/fit/test_recovery.py)
 WIDE = 2.4  # factor on the floors from which a coarser tolerance of the solver does
 STAGES = ((30.0, 6), (7.0, 8), (2.5, 8), (1.0, 20))  # factor on the floors, most evaluations at it
 

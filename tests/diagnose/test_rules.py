@@ -29,7 +29,7 @@ from stickslip.effects import catalogue
 from stickslip.errors import InputError
 from stickslip.features.layout import Layout
 from stickslip.features.measurement import Measurement
-from stickslip.fit.inertial import MODEL_ERROR, Fit, robust
+from stickslip.fit.inertial import DISPERSION, Fit, robust
 from stickslip.fit.parameters import effect_parameters
 from stickslip.forward import Cycles
 from stickslip.residual import Misfit
@@ -142,7 +142,7 @@ def test_no_rival_is_what_fails_on_unseen_cycles_or_needs_the_implausible(rival)
 def test_weights_follow_the_costs_and_the_widened_errors():
     judged = [judge(candidate(t, c, 0.8), 1000.0, held(9.0)) for t, c in (("tilt", 300), ("wear", 332), ("tilt", 350))]
     found = weights(judged)
-    assert found["tilt"] / found["wear"] == pytest.approx(np.exp(32 / (2 * MODEL_ERROR**2)))
+    assert found["tilt"] / found["wear"] == pytest.approx(np.exp(32 / (2 * DISPERSION)))
     assert sum(found.values()) == pytest.approx(1.0)
     assert confidence(judged, judged[:1]) == pytest.approx(found["tilt"])
     # the law that contains the one that was said counts with it

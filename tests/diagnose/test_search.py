@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.diagnose.linear import Linear
-from stickslip.diagnose.periods import periods
+from stickslip.diagnose.periods import periods, phasor
 from stickslip.fit.inertial import Fit
 from stickslip.fit.parameters import Free
 from stickslip.floors import EVENT_WIDTHS
@@ -68,10 +68,12 @@ def test_a_period_in_the_residual_is_found(variable, scale):
     data = replace(data, cycles=cycles, values=values)
     at = {"time": slips, "load point": 1e-4 * slips, "displacement": position}[variable]
     true = 5.3 * scale
-    residual = np.zeros_like(values)
-    residual[0, :, 0] = 3.0 * np.sin(2 * np.pi * at / true + 0.7) + 0.3 * rng.standard_normal(n)
-    residual[0, :, 1] = 2.0 * np.cos(2 * np.pi * at / true) + 0.3 * rng.standard_normal(n)
-    found = periods(variable, data, residual, np.ones((1, n), bool), (1.5 * scale, 100 * scale))
+    off = np.zeros_like(values)
+    off[0, :, 0] = 3.0 * np.sin(2 * np.pi * at / true + 0.7) + 0.3 * rng.standard_normal(n)
+    off[0, :, 1] = 2.0 * np.cos(2 * np.pi * at / true) + 0.3 * rng.standard_normal(n)
+    off[0, 7] = 40.0  # one slip that went astray
+    model = values - 1e-3 * off
+    found = periods(variable, data, model, np.ones((1, n), bool), (1.5 * scale, 100 * scale))
     assert found[0] == pytest.approx(true, rel=0.05)
     assert len(found) <= 5
 
@@ -79,3 +81,39 @@ def test_a_period_in_the_residual_is_found(variable, scale):
 def test_too_few_slips_hint_at_nothing():
     data = measurement((1e-4,), 3, ())
     assert periods("time", data, np.zeros_like(data.values), np.ones((1, 3), bool), (0.1, 10.0)) == []
+
+
+def locked(velocities=(7e-5, 2e-4), n=12, frequency=10.25, size=3e-6, phase=0.66):
+    """Onsets where the load point has caught up with a threshold that swings: up to half a period late, and locked."""
+    data = measurement(velocities, n, ())
+    values, valid = data.values.copy(), np.ones_like(data.valid)
+    start = np.zeros(values.shape[:2])
+    expected = values.copy()
+    rng = np.random.default_rng(8)
+    for r, v in enumerate(velocities):
+        now = 0.0
+        for i in range(n):
+            start[r, i] = now
+            due = now + 5e-5 / v * rng.uniform(0.99, 1.01)
+            t = np.linspace(due - 1.2 * size / v, due + 1.2 * size / v, 20001)
+            over = v * (t - due) - size * np.sin(2 * np.pi * frequency * t + phase)
+            at = t[np.argmax(over >= 0)]
+            expected[r, i, 0], values[r, i, 0] = due - now, at - now
+            now = at + 0.005
+    data = replace(data, values=values, valid=valid, cycles=data.cycles._replace(start=start))
+    return data, expected, np.ones(start.shape, bool)
+
+
+def test_onsets_locked_to_a_period_tell_it_with_amplitude_and_phase():
+    frequency, size, phase = 10.25, 3e-6, 0.66
+    data, model, use = locked()
+    late = (data.values - model)[..., 0] * np.array(data.velocities)[:, None]
+    assert np.ptp(late / np.array(data.velocities)[:, None]) * frequency > 0.5  # far beyond what a linear step sees
+    found = periods("time", data, model, use, (1 / 50.0, 10.0))
+    assert 1.0 / found[0] == pytest.approx(frequency, abs=0.3 / np.ptp(data.cycles.start))
+    told = phasor("time", data, data.values, data.values - model, 1.0 / frequency, use)
+    assert abs(told) == pytest.approx(size, rel=0.02)
+    assert np.angle(told) == pytest.approx(phase, abs=0.02)
+    # at the onsets that the base expects it is quite another one
+    wrong = phasor("time", data, model, data.values - model, 1.0 / frequency, use)
+    assert abs(wrong * np.exp(-1j * phase) - size) > 0.3 * size
