@@ -31,7 +31,7 @@ class Thresholds:
     """
 
     complete: Mapping[str, float] = field(
-        default_factory=lambda: {"creep": 1.5, "slip": 1.3, "ring-down": 1.3, "recurrence": 1.6, "hold": 1.3}
+        default_factory=lambda: {"creep": 1.5, "slip": 1.1, "ring-down": 1.2, "recurrence": 1.6, "hold": 1.3}
     )
     alike: float = 3.0
     overall: float = 1.1
