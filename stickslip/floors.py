@@ -78,16 +78,13 @@ FEWEST = 4  # events of a run that tell scatter
 CREEP_MIDDLE = slice(3, 9)  # points of the creep that scatter most with the lines
 
 
-def floors(measurement: Measurement, *, factor: float | None = None) -> np.ndarray:
+def floors(measurement: Measurement) -> np.ndarray:
     """Standard deviation of every feature around the mean of its run and a perfect model, SI, shape (R, n, F).
 
-    Args:
-        measurement: the data.
-        factor: on the part of new lines; default as the events of the campaign scatter (:func:`scatter_factor`).
+    The part of new lines counts as much as the events of the campaign scatter (:func:`scatter_factor`).
     """
-    varied = scatter_factor(measurement) if factor is None else factor
     own, lines = _level(measurement, ALONE), _level(measurement, LINES)
-    return _root_sum(measurement.sensor, own, varied * lines)
+    return _root_sum(measurement.sensor, own, scatter_factor(measurement) * lines)
 
 
 def floors_alone(measurement: Measurement, *, factor: float = 1.0) -> np.ndarray:
@@ -145,9 +142,11 @@ def _root_sum(*parts: np.ndarray | float) -> np.ndarray:
 def scatter_factor(measurement: Measurement) -> float:
     """How much the contact varies from event to event: 0 where the lines are the same, about 1 where they are new.
 
-    The lesser of what slip sizes and the shape of the creep say, for both scatter with the lines, and few effects do
-    that with both. 0.5 where too few events tell.
+    What the measurement states, if it does. Else the lesser of what slip sizes and the shape of the creep say, for both
+    scatter with the lines, and few effects do that with both. 0.5 where too few events tell.
     """
+    if measurement.new_lines is not None:
+        return measurement.new_lines
     m, s = measurement, measurement.layout.slices()
     used = np.asarray(m.cycles.used)
     ratios = []

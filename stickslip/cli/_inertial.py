@@ -72,8 +72,8 @@ def fit_inertial(
         m = measure(own, segments, ring_period=period, most_cycles=options.most_events)
     except InputError as error:
         raise error.at(file=loaded.path) from None
-    scatter = scatter_factor(m) if options.scatter is None else options.scatter
-    floor = floors(m, factor=scatter)
+    m = replace(m, new_lines=options.scatter)
+    floor = floors(m)
     base = base_composition(loaded, m)
     _check_names(options.profiles, base, effects)
     train = _training(m, traces)
@@ -97,7 +97,7 @@ def fit_inertial(
             "jacobians": optimum.jacobians,
             "covariance": optimum.covariance,
             "ring_period": period,
-            "scatter_factor": scatter,
+            "scatter_factor": scatter_factor(m),
             "cycles": int(train.sum()),
         },
         "notes": notes,

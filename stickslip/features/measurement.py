@@ -36,6 +36,7 @@ class Measurement:
         names: of the runs.
         velocities: usual speed of the drive in each run (m/s), shape (R,).
         dropped: what was left out, and why.
+        new_lines: how much of the contact is new at every event, 0 to 1, where that is known; None: its scatter tells.
     """
 
     layout: Layout
@@ -47,6 +48,7 @@ class Measurement:
     names: tuple[str, ...]
     velocities: np.ndarray
     dropped: tuple[str, ...] = ()
+    new_lines: float | None = None
 
     @property
     def runs(self) -> int:
@@ -65,6 +67,7 @@ class Measurement:
             tuple(self.names[k] for k in i),
             self.velocities[i],
             self.dropped,
+            self.new_lines,
         )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,7 +29,7 @@ def scatter(folder, new_lines: bool) -> dict[str, float]:
         m = measure(traces, segments, ring_period=ring_period(traces, segments), most_cycles=14)
         told = scatter_factor(m)  # the events tell which of the two it is
         assert told > 0.4 if new_lines else told < 0.2, (seed, told)
-        floor = floors(m, factor=1.0 if new_lines else 0.0)
+        floor = floors(replace(m, new_lines=1.0 if new_lines else 0.0))
         for r, name in enumerate(m.names):
             if name == "holds":
                 continue

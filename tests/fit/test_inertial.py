@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from stickslip.fit.inertial import fit
 from stickslip.fit.problem import Problem
-from stickslip.floors import floors
+from stickslip.floors import EVENT_WIDTHS, event_widths, floors, scatter_factor, uncertain
 from stickslip.residual import misfit
 
 from . import synthetic
@@ -74,6 +75,17 @@ def test_event_wise_factor_acts_on_its_own_cycle(campaign, problem):
     assert own > 1e-9
     assert np.abs(moved[0, :2]).max() == 0.0  # nothing before it changes
     assert np.abs(moved[1]).max() == 0.0  # nor another run
+
+
+def test_lines_said_to_be_new_widen_floors_and_what_events_may_vary(campaign):
+    assert scatter_factor(campaign) == 0.5  # three slips tell nothing of it
+    same, new = replace(campaign, new_lines=0.0), replace(campaign, new_lines=1.0)
+    size = campaign.layout.slices()["size"]
+    assert np.all(floors(new)[:, 1:, size] > 1.5 * floors(same)[:, 1:, size])
+    assert event_widths(new)[1, 2] == pytest.approx(EVENT_WIDTHS)
+    assert np.all(event_widths(same)[1, 2] < 0.2 * event_widths(new)[1, 2])
+    assert np.mean(uncertain(new)) < np.mean(uncertain(same))  # every event has lines of its own to tell of
+    assert new.take([1]).new_lines == 1.0
 
 
 def test_progress_names_iteration_and_error(campaign, problem):
