@@ -23,13 +23,22 @@ class Common:
         floor: standard deviation of what is wrong in a single event (SI), shape (R, n, F).
         use: cycles that are fitted, shape (R, n).
         factor: on the floor.
+        widths: standard deviations of what all events of a run, and of what all events, have alike (SI, shape (R, n, F)
+            each); default those of rough lines, :func:`stickslip.floors.common`.
     """
 
-    def __init__(self, measurement: Measurement, floor: np.ndarray, use: np.ndarray, factor: float = 1.0) -> None:
+    def __init__(
+        self,
+        measurement: Measurement,
+        floor: np.ndarray,
+        use: np.ndarray,
+        factor: float = 1.0,
+        widths: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> None:
         self.valid = measurement.valid & (use & np.asarray(measurement.cycles.used))[..., None]
         self.shape = measurement.values.shape
         runs, _, features = self.shape
-        of_run, of_all = common(measurement)
+        of_run, of_all = common(measurement) if widths is None else widths
         index = np.full(self.shape, -1)
         index[self.valid] = np.arange(int(self.valid.sum()))
         self._loads: list[np.ndarray] = []  # offsets -> feature, of all cells

@@ -201,7 +201,7 @@ class _Residuals:
     def common(self, factor: float) -> Common:
         """What events have in common, with the floors times ``factor``."""
         if factor not in self._common:
-            self._common[factor] = Common(self.problem.measurement, self.floor, self.used, factor)
+            self._common[factor] = self.problem.common(self.floor, self.used, factor)
         return self._common[factor]
 
     def misfit(self, x: np.ndarray) -> np.ndarray:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ..errors import FitError
-from .common import Common
 from .inertial import STAGES, Fit, errors, fit, robust
 from .parameters import vector
 from .problem import Problem
@@ -81,7 +80,7 @@ def best_of(
 def _cost(found: Fit, problem: Problem, floor: np.ndarray, factor: float) -> float:
     """Robust chi-square of the data with all floors times ``factor``."""
     m = problem.measurement
-    common = Common(m, floor, found.use, factor)
+    common = problem.common(floor, found.use, factor)
     off = np.nan_to_num((found.features - found.offsets - m.values) / floor, nan=1e4) * floor
     return robust(common(off[common.valid]))
 

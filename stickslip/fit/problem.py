@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from functools import lru_cache
 from typing import Any
 
@@ -25,6 +26,7 @@ from ..features.layout import Layout
 from ..features.measurement import Measurement
 from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
+from .common import Common
 from .composition import START, Composition, Given
 
 FINE = Tolerance(1.5e-3, 6e-12, 6e-9)  # errors below a floor, of onsets in slow runs up to two
@@ -60,7 +62,13 @@ class Problem:
 
     def coarser(self) -> Problem:
         """The same at a tolerance that suffices where floors are widened."""
-        return Problem(self.composition, self.measurement, COARSE, self.threads)
+        other = copy(self)
+        other.tolerance = COARSE
+        return other
+
+    def common(self, floor: np.ndarray, use: np.ndarray, factor: float = 1.0) -> Common:
+        """What events may have in common besides the model: as rough lines do that a bank stands for."""
+        return Common(self.measurement, floor, use, factor)
 
     def features(self, z: np.ndarray, events: np.ndarray) -> np.ndarray:
         """Features of the model, shape (R, n, F)."""

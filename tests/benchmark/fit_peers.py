@@ -118,6 +118,7 @@ def own(measured: np.ndarray, finer: int) -> Callable[[np.ndarray], tuple[np.nda
     from stickslip.contact import Bank
     from stickslip.effects.velocity_weakening import VelocityWeakening
     from stickslip.features.measurement import measure
+    from stickslip.fit.common import Common
     from stickslip.fit.composition import Composition
     from stickslip.fit.multistart import best_of
     from stickslip.fit.parameters import Free
@@ -149,6 +150,10 @@ def own(measured: np.ndarray, finer: int) -> Callable[[np.ndarray], tuple[np.nda
         def event_columns(self, columns, z, events):
             return np.zeros((*columns.shape[:-1], 2))
 
+        def common(self, floor, use, factor=1.0):
+            none = np.zeros_like(floor)  # the bank is known: there are no rough lines that it only stands for
+            return Common(self.measurement, floor, use, factor, (none, none))
+
     at = times()
     fine = np.linspace(at[0], at[-1], (at.size - 1) * finer + 1)
     reading = measured if finer == 1 else CubicSpline(at, measured)(fine)
@@ -159,7 +164,7 @@ def own(measured: np.ndarray, finer: int) -> Callable[[np.ndarray], tuple[np.nda
     valid, parts = data.valid.copy(), data.layout.slices()
     for group in ("overshoot", "ring", "frequency"):
         valid[..., parts[group]] = False  # the contact rings at 440 Hz, which 1 kHz does not show
-    data = replace(data, valid=valid)
+    data = replace(data, valid=valid, new_lines=0.0)
     floor = floors(data)
 
     def run(start: np.ndarray) -> tuple[np.ndarray, int]:
