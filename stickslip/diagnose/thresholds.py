@@ -28,6 +28,8 @@ class Thresholds:
         rival: the runner-up must cost at least this factor more; otherwise the data cannot tell them apart.
         failed: a base fit with a larger error (floors) is not ranked.
         standard_errors: least gain on held-out cycles over its standard error.
+        clearly: by how many of them a rival must be worse on unseen cycles to be left out: what fits as well stays a
+            rival until the unseen cycles speak plainly.
     """
 
     complete: Mapping[str, float] = field(
@@ -43,6 +45,7 @@ class Thresholds:
     failed: float = 300.0
     unseen: float = 0.1
     standard_errors: float = 1.0
+    clearly: float = 2.0
 
 
 THRESHOLDS = Thresholds()

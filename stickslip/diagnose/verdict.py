@@ -174,7 +174,7 @@ def _worse(one: Candidate, other: Candidate, limits: Thresholds) -> bool:
     more = one.held.per_cycle - other.held.per_cycle
     if more.size < 2:
         return False
-    return bool(np.mean(more) > limits.standard_errors * np.std(more, ddof=1) / np.sqrt(more.size))
+    return bool(np.mean(more) > limits.clearly * np.std(more, ddof=1) / np.sqrt(more.size))
 
 
 def weights(judged: Sequence[Judged]) -> dict[str, float]:

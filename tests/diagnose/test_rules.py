@@ -139,6 +139,18 @@ def test_no_rival_is_what_fails_on_unseen_cycles_or_needs_the_implausible(rival)
     assert [j.candidate.tag for j in close] == ["sensor-drift"]
 
 
+@pytest.mark.parametrize(("errors", "said"), [(1.5, {"sensor-drift", "thermal-creep"}), (2.5, {"sensor-drift"})])
+def test_a_rival_is_left_out_only_where_unseen_cycles_speak_plainly(errors, said):
+    """One that is cheaper on the fitted cycles is not silenced by a little more on few unseen ones."""
+    leader, rival = candidate("sensor-drift", 300, 0.8), candidate("thermal-creep", 280, 0.8)
+    off = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    more = 0.1 * off + errors * 0.1 * np.std(off, ddof=1) / np.sqrt(off.size)
+    own = leader.held.per_cycle + more
+    worse = replace(rival, held=replace(rival.held, score=float(np.mean(own)), per_cycle=own))
+    _, close = decide([judge(c, 1000.0, held(9.0)) for c in (leader, worse)])
+    assert {j.candidate.tag for j in close} == said
+
+
 def test_weights_follow_the_costs_and_the_widened_errors():
     judged = [judge(candidate(t, c, 0.8), 1000.0, held(9.0)) for t, c in (("tilt", 300), ("wear", 332), ("tilt", 350))]
     found = weights(judged)
