@@ -24,6 +24,7 @@ LEAST = 4  # of those that get more than the first steps
 NEAR = 1.3  # times the leader's cost: candidates that the data may not tell from it are followed to the end
 WORTH = 0.75  # times the base's cost: a leader below it is compared with all it may be taken for
 LEADERS = 5
+LIKE = 2  # of those a leader may be taken for that are followed to the end, however far from it they seem
 
 
 class Store(Protocol):
@@ -85,7 +86,12 @@ class Sweep:
             like = [c for c in scored if c.tag in _like(leader.effect) and c.tag not in known]
             more += self._refine(self._refine(like, FEW, "like", 0.8, 0.82), MORE, "like more", 0.82, 0.85)
         best = min((c.cost for c in more), default=np.inf)
-        near = sorted((c for c in more if c.cost < NEAR * best), key=lambda c: c.cost)[:LEADERS]
+        ranked = sorted(more, key=lambda c: c.cost)
+        near = [c for c in ranked if c.cost < NEAR * best][:LEADERS]
+        if near and best < WORTH * self.ground.optimum.cost:
+            taken_for = _like(near[0].effect) - {c.tag for c in near}
+            firsts = {c.tag: c for c in reversed(ranked) if c.tag in taken_for}  # each in its best form
+            near += sorted(firsts.values(), key=lambda c: c.cost)[:LIKE]
         most = self._settle(near, 0.85, 1.0)
         every = {_word(c.effect): c for c in (*scored, *forms, *few, *more, *most)}
         out = {tag: min((c for c in every.values() if c.tag == tag), key=_rank) for tag in tags}
