@@ -56,6 +56,9 @@ class Rig(RigKeys):
     h_rms: Annotated[Measured | None, quantity("m", above=0, unmeasured=True)] = None
 
 
+LEAST_SIZE = 1e-18  # of a count or a counter's range (SI); below it is a slip of the pen
+
+
 class _Scaled(Model):
     """A column with a unit; ``factor`` turns it into SI (None: the file's own header must say the unit)."""
 
@@ -106,8 +109,8 @@ class Channel(_Scaled):
             return None
         try:
             number = to_si(value, cls.si)
-            if number <= 0:
-                raise InputError("out of range", value=value, allowed=f"above 0 {cls.si}")
+            if number < LEAST_SIZE:
+                raise InputError("out of range", value=value, allowed=f"at least {LEAST_SIZE:g} {cls.si}")
         except InputError as error:
             raise fault(error) from None
         return number

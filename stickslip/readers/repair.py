@@ -16,6 +16,7 @@ Mask = NDArray[np.bool_]
 
 _UNITS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
 _PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k"}
+MOST_COUNTS = 2.0**53  # beyond which whole counts cannot be told from others
 
 
 def unwrap(values: Array, period: float, channel: str, resolution: float | None = None) -> tuple[Array, list[Repair]]:
@@ -30,7 +31,7 @@ def unwrap(values: Array, period: float, channel: str, resolution: float | None 
     Raises:
         InputError: jumps that lie near half a period, which may be of either sign.
     """
-    if resolution:
+    if resolution and period < MOST_COUNTS * resolution:
         period = max(1.0, round(period / resolution)) * resolution
     valid = np.flatnonzero(np.isfinite(values))
     jumps = np.diff(values[valid])
@@ -101,7 +102,7 @@ def join_resets(
     # what the block moved during that one sample is lost: the motion just before stands in for it
     before = np.where(places > 0, jumps[np.maximum(places - 1, 0)], 0.0)
     offsets = jumps[places] - np.where(np.abs(before) < 0.2 * np.abs(jumps[places]), before, 0.0)
-    if resolution:
+    if resolution and np.max(np.abs(offsets)) < MOST_COUNTS * resolution:
         offsets = np.round(offsets / resolution) * resolution
     result = values.copy()
     edges = np.concatenate([places + 1, [values.size]])

@@ -43,6 +43,17 @@ def test_clean_records_are_left_alone(record):
     assert correct_clock(t, 0.0)[0] is t
 
 
+def test_a_count_far_below_the_range_rounds_nothing():
+    x = np.array([0.0, 0.4, 0.8, 0.2, 0.6]) * 1e-3
+    result, repairs = unwrap(x, 1e-3, "x", 1e-320)
+    assert np.all(np.isfinite(result))
+    assert result[-1] == pytest.approx(1.6e-3)
+    assert repairs[0].kind == "wrap"
+    cleared = np.concatenate([np.linspace(1e-6, 2e-6, 50), np.linspace(0, 1e-6, 50)])
+    result, _ = join_resets(np.arange(100.0), cleared, "x", True, 1e-320, 1e-12)
+    assert np.all(np.isfinite(result))
+
+
 def test_counter_wrap_is_undone_to_the_count(record):
     _, x = record
     counts = np.round(x / LSB).astype(int)
