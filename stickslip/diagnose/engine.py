@@ -37,6 +37,7 @@ from .verdict import (
     is_adequate,
     is_complete,
     judge,
+    nearly,
     nothing,
     undecided,
     worst_phase,
@@ -177,6 +178,9 @@ def diagnose(
         if is_complete(rung.train, rung.held, limits):
             verdict = finished(named)
             break
+        if named and is_adequate(rung.train, rung.held, limits, limits.remainder):
+            verdict = nearly(named, phase, worst, tried=False)  # too little is left to name another effect by
+            break
         if not named and worst > limits.failed:
             verdict = Verdict(
                 "unknown", text=f"The base model could not be fitted ({phase} is off by {worst:.0f} floors), so no "
@@ -213,8 +217,9 @@ def diagnose(
         rung = new
     if verdict.kind == "missing" and len(named) > 1:
         tell("trying to do without each effect", 1.0)
-        ladder, named = _without(ladder, named, data, floor, train, limits)
-        verdict = replace(finished(named), reasons=verdict.reasons)
+        ladder, left = _without(ladder, named, data, floor, train, limits)
+        if len(left) < len(named):
+            verdict = replace(finished(left), reasons=verdict.reasons)
     if verdict.kind in ("missing", "ambiguous"):
         verdict = replace(verdict, confidence=sure)
     return Diagnosis(verdict, tuple(ladder), tuple(rounds), data, floor, train, (*data.dropped, *dropped))

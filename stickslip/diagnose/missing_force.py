@@ -192,12 +192,13 @@ def learn(
     if begin is None:
         problem = problem.coarser()  # a picture
     stages = ((wide, evaluations // 2), (1.0, evaluations)) if wide > 1.5 else ((1.0, evaluations),)
-    found = fit(problem, floor, z=z, events=events, stages=stages, use=train, columns=columns, progress=progress)
+    # some thirty weights: derivatives are taken once, and then only carried on
+    once = {"use": train, "anew": False, "progress": progress}
+    found = fit(problem, floor, z=z, events=events, stages=stages, columns=columns, **once)
     for _ in range(MOST):
         more = fit(
-            problem, floor, z=found.z, events=found.events, stages=((1.0, evaluations),), use=train,
-            columns=found.columns, progress=progress,
-        )  # fmt: skip
+            problem, floor, z=found.z, events=found.events, stages=((1.0, evaluations),), columns=found.columns, **once
+        )
         arrived = more.cost > ARRIVED * found.cost
         found = more if more.cost < found.cost else found
         if arrived:

@@ -215,6 +215,18 @@ def finished(named: Sequence[str]) -> Verdict:
     )
 
 
+def nearly(named: Sequence[str], phase: str, worst: float, *, tried: bool, reasons: tuple[str, ...] = ()) -> Verdict:
+    """The verdict when what is left beside the named effects is small; ``tried``: whether others were, after them."""
+    return Verdict(
+        "missing",
+        tuple(named),
+        tuple(named),
+        f"The base model lacks {_listed(named)}. A small misfit remains ({phase}, {worst:.1f} floors)"
+        + (" that no other effect that was tried explains." if tried else "."),
+        reasons,
+    )
+
+
 def undecided(named: Sequence[str], close: Sequence[Judged]) -> Verdict:
     """The verdict when several effects describe the data alike."""
     tags = tuple(j.candidate.tag for j in close)
@@ -241,11 +253,7 @@ def nothing(named: Sequence[str], judged: Sequence[Judged], rung: _Errors, limit
     if not named:
         return Verdict("unknown", (), (), text + ".", reasons)
     if is_adequate(rung.train, rung.held, limits):
-        return Verdict(
-            "missing", tuple(named), tuple(named),
-            f"The base model lacks {_listed(named)}. A small misfit remains ({phase}, {worst:.1f} floors) that "
-            "no other effect that was tried explains.", reasons,
-        )  # fmt: skip
+        return nearly(named, phase, worst, tried=True, reasons=reasons)
     return Verdict("unknown", tuple(named), tuple(named), f"{_listed(named)} helps, but: {text}.", reasons)
 
 

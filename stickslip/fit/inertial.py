@@ -295,7 +295,7 @@ def fit(
         event_scale: on the prior width of the event-wise variation.
         use: cycles to fit, shape (R, n); default all.
         columns: derivatives at the start if they are known, shape (R, n, F, k).
-        anew: whether derivatives may be taken again; if not, those given are only updated.
+        anew: whether derivatives may be taken again; if not, those given, or taken at the start, are only updated.
         progress: told the iteration and the error (rms, in floors) after every evaluation.
 
     Raises:
@@ -307,7 +307,7 @@ def fit(
     start = vector(problem.composition.free) if z is None else np.asarray(z, float)
     ev = np.zeros((*res.used.shape, 2)) if events is None else events
     x = np.clip(np.concatenate([start, ev[res.used].ravel()]), low + 1e-9, high - 1e-9)
-    res.anew = anew or columns is None
+    res.anew = anew
     if columns is not None:
         res.start(x, columns)
     scale = np.concatenate([[min(f.width, 1.0) for f in res.free], res.widths])
