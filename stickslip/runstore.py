@@ -279,7 +279,7 @@ def read_result(folder: str | Path) -> dict[str, Any]:
     path = folder / RESULT
     if not path.is_file():
         what = "there is no such folder" if not folder.is_dir() else "not a run folder: it holds no result.json"
-        raise RunFolderError(what, file=folder)
+        raise RunFolderError(what, file=folder, hint="name the folder that a command with --out has finished")
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

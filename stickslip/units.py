@@ -78,6 +78,7 @@ def factor_to_si(text: str, unit: str, *, key: str | None = None, file: object =
     return number
 
 
+_RUN_ON = re.compile(r",|\.\d*\.|[\d.]\s+(?!1\s*/)[\d.]|\d\s*'\s*\d")
 _POWER = re.compile(r"\*\*|\^|[⁰¹²³⁴⁵⁶⁷⁸⁹]+|\b(?:squared|cubed|square|cubic|sq)\b")
 _EXPONENT = re.compile(r"\s*(?:[-+]?\d{1,2}(?:\.\d+)?|\([-+]?\d{1,2}(?:[./]\d+)?\))(?![\d.eE(])")
 
@@ -104,6 +105,11 @@ def _parse(text: str, unit: str, where: dict) -> float:
         raise InputError("not a quantity", value=text[:40] + "...", allowed=example, **where)
     if _unbounded(text):
         raise InputError("cannot read the quantity: powers of powers", value=text, allowed=example, **where)
+    if _RUN_ON.search(text):  # pint would take a comma or a blank between digits for a product, or leave it out
+        raise InputError(
+            "cannot read the quantity: a decimal comma, two points or a blank in a number",
+            value=text, allowed=example, hint="write numbers with one point: 0.05 mm/s, 1.5e3 N/m", **where,
+        )  # fmt: skip
     try:
         quantity = registry.Quantity(text)
     except (pint.UndefinedUnitError, pint.DefinitionSyntaxError) as error:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import jax.numpy as jnp
@@ -193,12 +194,10 @@ def learn(
         problem = problem.coarser()  # a picture
     stages = ((wide, evaluations // 2), (1.0, evaluations)) if wide > 1.5 else ((1.0, evaluations),)
     # some thirty weights: derivatives are taken once, and then only carried on
-    once = {"use": train, "anew": False, "progress": progress}
-    found = fit(problem, floor, z=z, events=events, stages=stages, columns=columns, **once)
+    once = partial(fit, problem, floor, use=train, anew=False, progress=progress)
+    found = once(z=z, events=events, stages=stages, columns=columns)
     for _ in range(MOST):
-        more = fit(
-            problem, floor, z=found.z, events=found.events, stages=((1.0, evaluations),), columns=found.columns, **once
-        )
+        more = once(z=found.z, events=found.events, stages=((1.0, evaluations),), columns=found.columns)
         arrived = more.cost > ARRIVED * found.cost
         found = more if more.cost < found.cost else found
         if arrived:

@@ -15,6 +15,8 @@ from ..trace import Trace
 from .describe import stick_gain
 
 _RING_RATE = 5000.0  # Hz: a contact resonance of some 500 Hz needs ten samples a period
+_PACED = 4  # slips from which the mean velocity of the block is that of its drive
+_OFF = 1.4  # factor between them beyond which one is wrong
 _NEAR = 1.25  # drive velocities closer than this factor count as one
 
 
@@ -40,7 +42,7 @@ def abilities(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) ->
     if not slipping:
         cannot.append("No trace holds a slip: nothing but creep or sliding can be looked at, no dynamic model fitted.")
     shapes = [event_shapes(t, s) for t, s in slipping]
-    verdicts = [judge(pairs, slipping) for judge in (_velocities, _events, _holds, _virgin, _signals)]
+    verdicts = [judge(pairs, slipping) for judge in (_velocities, _pace, _events, _holds, _virgin, _signals)]
     verdicts += [judge(slipping, shapes) for judge in (_slip, _overshoot, _ringing)]
     verdicts += [judge(pairs, slipping) for judge in (_creep, _ramps, _unseen)]
     for good, bad in verdicts:
@@ -74,6 +76,24 @@ def _velocities(pairs: Pairs, slipping: Pairs) -> Verdict:
             "Fewer than three velocities over a factor of four: many effects will stay alike."
         ]
     return [f"{len(groups)} drive velocities ({shown} um/s) separate what depends on velocity from what does not."], []
+
+
+def _pace(pairs: Pairs, slipping: Pairs) -> Verdict:
+    """From slip to slip a block on a spring keeps up with its load point, whatever the spring."""
+    bad = []
+    for t, s in slipping:
+        if t.drive is None or t.displacement is None or len(s.events) < _PACED:
+            continue
+        ends = np.array([s.events[0].t_onset, s.events[-1].t_onset])
+        block = float(np.diff(np.interp(ends, t.time, t.displacement))[0]) / float(np.ptp(ends))
+        drive = float(np.diff(t.drive.position(ends))[0]) / float(np.ptp(ends))
+        if drive <= 0 or not 1 / _OFF < block / drive < _OFF:
+            bad.append(
+                f"{t.name}: from slip to slip the block moves {block * 1e6:.3g} um/s, "
+                f"the drive {drive * 1e6:.3g} um/s, and a spring cannot be stretched for ever: check "
+                "the drive's velocity, and the units of time and displacement."
+            )
+    return [], bad
 
 
 def _events(pairs: Pairs, slipping: Pairs) -> Verdict:

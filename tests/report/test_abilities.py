@@ -1,0 +1,28 @@
+"""What is said of a campaign before anything is fitted."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stickslip.report.abilities import _pace
+from stickslip.trace import Drive
+
+
+@pytest.mark.parametrize(("said", "warned"), [(50e-6, False), (60e-6, False), (500e-6, True), (5e-6, True)])
+def test_a_block_that_does_not_keep_up_with_its_drive_is_pointed_out(said, warned):
+    """Slips of 45 um every 0.9 s: 50 um/s, whatever the spring's stiffness may be."""
+    time = np.linspace(0.0, 9.0, 9001)
+    trace = SimpleNamespace(
+        name="v050", time=time, displacement=45e-6 * np.floor(time / 0.9), drive=Drive.constant(said, 0.0, 9.0)
+    )
+    events = [SimpleNamespace(t_onset=0.9 * k - 0.01) for k in range(1, 10)]
+    good, bad = _pace([], [(trace, SimpleNamespace(events=events))])
+    assert good == []
+    assert bool(bad) == warned
+    if warned:
+        assert "v050" in bad[0]
+        assert "50 um/s" in bad[0]
+        assert f"the drive {said * 1e6:.3g} um/s" in bad[0]
