@@ -430,3 +430,18 @@ def test_long_lines_of_a_fit_break_between_words_on_a_terminal(monkeypatch):
     assert max(len(line) for line in lines[:-1]) <= 24
     assert " ".join(" ".join(lines[:-1]).split()) == text.splitlines()[0]
     assert lines[-1] == text.splitlines()[1]
+
+
+def test_a_log_hears_of_long_work_now_and_then(capsys, monkeypatch):
+    from stickslip.cli import working
+
+    clock = iter([0.0, 10.0, 31.0, 40.0, 65.0])
+    monkeypatch.setattr(working.time, "monotonic", lambda: next(clock))
+    with working.working("diagnosing") as tell:
+        for text in ("a", "b", "c", "d"):
+            tell(text, 0.5)
+    said = capsys.readouterr().err.splitlines()
+    assert said == [
+        "diagnosing: b (31 s, about 31 s left of this stage)",
+        "diagnosing: d (65 s, about 65 s left of this stage)",
+    ]

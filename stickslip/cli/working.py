@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 PATIENCE = 1.0  # s before anything is shown
+EVERY = 30.0  # s between lines where there is no terminal
 Tell = Callable[..., None]
 
 
@@ -15,10 +16,11 @@ Tell = Callable[..., None]
 def working(title: str) -> Iterator[Tell]:
     """A line with a bar on stderr; gives a function ``tell(text, share=None)``.
 
-    ``share`` (0 to 1) is how much is done; time left follows from it. Nothing is shown where stderr is no terminal.
+    ``share`` (0 to 1) is how much is done; time left follows from it. Where stderr is no terminal a line is written
+    every half minute.
     """
     if not sys.stderr.isatty():
-        yield lambda text, share=None: None
+        yield _lines(title)
         return
     from rich import progress as bars
     from rich.console import Console
@@ -55,3 +57,19 @@ def working(title: str) -> Iterator[Tell]:
     finally:
         if shown:
             bar.stop()
+
+
+def _lines(title: str) -> Tell:
+    """Tells by a line on stderr now and then, for a log."""
+    began = last = time.monotonic()
+
+    def tell(text: str, share: float | None = None) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last < EVERY:
+            return
+        last, spent = now, now - began
+        left = f", about {spent / share * (1 - share):.0f} s left of this stage" if share and share > 0.02 else ""
+        print(f"{title}: {text} ({spent:.0f} s{left})", file=sys.stderr, flush=True)
+
+    return tell
