@@ -227,6 +227,29 @@ def test_interrupting_a_series_keeps_what_is_finished(scenario, capsys, monkeypa
     assert "1 of 3" in capsys.readouterr().out
 
 
+def test_an_interrupt_that_falls_into_a_destructor_is_not_lost():
+    code = """
+import signal, time
+from stickslip.cli import keep_interrupts
+
+class Hook:
+    def __del__(self):
+        raise KeyboardInterrupt
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+keep_interrupts()
+try:
+    Hook()
+    time.sleep(5)
+    print("lost")
+except KeyboardInterrupt:
+    print("kept")
+"""
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert found.stdout.strip() == "kept"
+    assert found.stderr == ""
+
+
 def test_a_signal_ends_the_program_cleanly(scenario, tmp_path):
     command = [
         sys.executable,

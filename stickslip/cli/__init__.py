@@ -6,9 +6,12 @@ Nothing heavy is imported before a command runs, so that ``stickslip --help`` is
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 from contextlib import suppress
+from types import FrameType
 
 from cyclopts import App, CycloptsError
 
@@ -50,10 +53,44 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted.
     """
+    if arguments is None:
+        keep_interrupts()
     code = run(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
+        sys.unraisablehook = sys.__unraisablehook__
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the exit itself is not interrupted
         sys.exit(code)
     return code
+
+
+def keep_interrupts() -> None:
+    """Have an interrupt raised again that came while a destructor or JAX's hook on garbage collection ran.
+
+    Python prints such an exception and goes on; one Ctrl-C in ten was lost so.
+    """
+
+    def later() -> None:
+        timer = threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT))
+        timer.daemon = True
+        timer.start()
+
+    def interrupted(number: int, frame: FrameType | None) -> None:
+        at = frame
+        while at is not None:
+            if at.f_code.co_name in ("_xla_gc_callback", "__del__"):
+                return later()
+            at = at.f_back
+        raise KeyboardInterrupt
+
+    def again(lost: sys.UnraisableHookArgs) -> None:
+        if issubclass(lost.exc_type, KeyboardInterrupt):
+            later()
+        else:
+            sys.__unraisablehook__(lost)
+
+    sys.unraisablehook = again
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background ignores it
+        signal.signal(signal.SIGINT, interrupted)
 
 
 def run(arguments: Sequence[str]) -> int:
