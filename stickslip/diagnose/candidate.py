@@ -31,7 +31,7 @@ PLAUSIBLE = 60.0  # floors, rms: by how much an amplitude moves the features at 
 CARRIED = ((30.0, 6), (7.0, 6), (2.5, 7))  # stages of that refit, with the base's derivatives carried on
 OTHERS = 1  # further starts that a leader is fitted from
 SHARES = (1.0, 0.4)  # of a linear step that are tried
-PROMISING = 0.2  # share of the misfit gone at the start from which a search that led nowhere is begun anew
+HOPEFUL = 0.2  # share of the misfit gone at the start from which a search that led nowhere is begun anew
 LOCKED = (1.0, 0.6)  # shares of the amplitude that locked onsets tell that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
@@ -172,7 +172,7 @@ def refine(
         # derivatives in the effect's own parameters are known where everything was refitted around it
         known = old.columns if np.any(old.columns[..., -1]) else None
         new = fit(problem, floor, z=old.z, events=old.events, stages=stages, use=train, columns=known)
-        if new.cost >= old.cost and len(stages) > 1 and candidate.promise > PROMISING:
+        if new.cost >= old.cost and len(stages) > 1 and candidate.promise > HOPEFUL:
             # wide floors led away from a good place: straight on from there
             straight = ((1.0, evaluations),)
             new = fit(problem, floor, z=old.z, events=old.events, stages=straight, use=train, columns=known)

@@ -16,6 +16,7 @@ from .describe import stick_gain
 
 _RING_RATE = 5000.0  # Hz: a contact resonance of some 500 Hz needs ten samples a period
 _PACED = 4  # slips from which the mean velocity of the block is that of its drive
+_WAY = 1000  # points at which a drive is looked at for turning round
 _OFF = 1.4  # factor between them beyond which one is wrong
 _NEAR = 1.25  # drive velocities closer than this factor count as one
 
@@ -86,8 +87,10 @@ def _pace(pairs: Pairs, slipping: Pairs) -> Verdict:
             continue
         ends = np.array([s.events[0].t_onset, s.events[-1].t_onset])
         block = float(np.diff(np.interp(ends, t.time, t.displacement))[0]) / float(np.ptp(ends))
-        drive = float(np.diff(t.drive.position(ends))[0]) / float(np.ptp(ends))
-        if drive <= 0 or not 1 / _OFF < block / drive < _OFF:
+        way = t.drive.position(np.linspace(*ends, _WAY))
+        drive = float(way[-1] - way[0]) / float(np.ptp(ends))
+        turns = np.abs(way[-1] - way[0]) < 0.99 * np.sum(np.abs(np.diff(way)))
+        if drive != 0 and not turns and not 1 / _OFF < block / drive < _OFF:
             bad.append(
                 f"{t.name}: from slip to slip the block moves {block * 1e6:.3g} um/s, "
                 f"the drive {drive * 1e6:.3g} um/s, and a spring cannot be stretched for ever: check "

@@ -26,3 +26,15 @@ def test_a_block_that_does_not_keep_up_with_its_drive_is_pointed_out(said, warne
         assert "v050" in bad[0]
         assert "50 um/s" in bad[0]
         assert f"the drive {said * 1e6:.3g} um/s" in bad[0]
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_drive_that_goes_back_is_no_fault(turns):
+    """Pulled the other way all along, or forth and back: nothing is to be said of either."""
+    time = np.linspace(0.0, 9.0, 9001)
+    at = 45e-6 * np.floor(time / 0.9)
+    x, nodes = (np.minimum(at, 45e-6 * 9 - at), [0.0, 225e-6, 0.0]) if turns else (-at, [0.0, -225e-6, -450e-6])
+    drive = SimpleNamespace(position=lambda t: np.interp(t, [0.0, 4.5, 9.0], nodes))
+    trace = SimpleNamespace(name="back", time=time, displacement=x, drive=drive)
+    events = [SimpleNamespace(t_onset=0.9 * k - 0.01) for k in range(1, 10)]
+    assert _pace([], [(trace, SimpleNamespace(events=events))]) == ([], [])
