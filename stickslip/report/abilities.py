@@ -87,7 +87,7 @@ def _pace(pairs: Pairs, slipping: Pairs) -> Verdict:
             continue
         ends = np.array([s.events[0].t_onset, s.events[-1].t_onset])
         block = float(np.diff(np.interp(ends, t.time, t.displacement))[0]) / float(np.ptp(ends))
-        way = t.drive.position(np.linspace(*ends, _WAY))
+        way = t.drive.position(np.linspace(float(ends[0]), float(ends[1]), _WAY))
         drive = float(way[-1] - way[0]) / float(np.ptp(ends))
         turns = np.abs(way[-1] - way[0]) < 0.99 * np.sum(np.abs(np.diff(way)))
         if drive != 0 and not turns and not 1 / _OFF < block / drive < _OFF:
