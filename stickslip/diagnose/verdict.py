@@ -109,7 +109,8 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
     assert candidate.held is not None
     cost = candidate.fit.cost
     if cost > (1.0 - limits.gain) * base_cost:
-        fails.append(f"takes only {100 * (1 - cost / base_cost):.0f} % off the training cost")
+        share = 1 - cost / base_cost
+        fails.append(f"takes {f'only {100 * share:.0f} %' if share > 0 else 'nothing'} off the training cost")
     gain = base_held.per_cycle - candidate.held.per_cycle
     if gain.size:
         error = np.std(gain, ddof=1) / np.sqrt(gain.size) if gain.size > 1 else 0.0
