@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import tomllib
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +11,7 @@ from pydantic import ValidationError
 from ..errors import InputError, nearest
 from .models import CampaignFile, Rig, RigKeys, TraceEntry
 from .place import readable
-
-_MOST_BYTES = 10_000_000
+from .toml_file import read_toml
 
 
 @dataclass(frozen=True)
@@ -64,23 +61,15 @@ def load_campaign(path: str | Path) -> Campaign:
     """Read and check a campaign file (TOML; see `campaign_template`).
 
     Raises:
-        InputError: the file is not there or not TOML; unknown keys, missing units, values out of range, two traces
-            of one name, a trace's file that is not there or lies outside the campaign's folder without ``outside``.
+        InputError: the file is not there, not TOML or a scenario; unknown keys, missing units, values out of range, two
+            traces of one name, a trace's file that is not there or lies outside its folder without ``outside``.
     """
     path = Path(path)
-    text, digest = _text(path)
+    read = read_toml(path, "campaign")
     try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            f"not valid TOML: {error}", file=path, hint="correct the line; text stands in quotes"
-        ) from None
-    except RecursionError:
-        raise InputError("tables and lists are nested too deeply", file=path) from None
-    try:
-        file = CampaignFile.model_validate(content)
+        file = CampaignFile.model_validate(read.content)
     except ValidationError as error:
-        raise readable(error, CampaignFile, text, path) from None
+        raise readable(error, CampaignFile, read.text, path) from None
     entries = tuple(file.trace)
     repeated = [name for name, count in Counter(entry.label for entry in entries).items() if count > 1]
     if repeated:
@@ -94,7 +83,7 @@ def load_campaign(path: str | Path) -> Campaign:
     for number, entry in enumerate(entries, start=1):
         for key, name in (("file", entry.file), *_further(entry)):
             trace_file(path, name, outside=entry.outside, key=f"trace[{number}].{key}")
-    return Campaign(path, digest, file.title, file.note, file.rig, entries)
+    return Campaign(path, read.sha256, file.title, file.note, file.rig, entries)
 
 
 def trace_file(campaign: Path, name: str, *, outside: bool, key: str) -> tuple[Path, bool]:
@@ -129,23 +118,3 @@ def trace_file(campaign: Path, name: str, *, outside: bool, key: str) -> tuple[P
 def _further(entry: TraceEntry) -> list[tuple[str, str]]:
     channels = ("displacement", "velocity", "spring_force", "normal_load", "drive_position")
     return [(f"{c}.file", getattr(entry, c).file) for c in channels if getattr(entry, c) and getattr(entry, c).file]
-
-
-def _text(path: Path) -> tuple[str, str]:
-    try:
-        if path.is_dir():
-            raise InputError("not a campaign file but a folder", file=path, hint="name the .toml file in it")
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError("too large for a campaign file", file=path, hint="is it a file of measurements?")
-        raw = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError("the campaign file is not there", file=path, hint="check the path") from None
-    except OSError as error:
-        raise InputError(f"the campaign file cannot be opened ({error.strerror})", file=path) from None
-    try:
-        return raw.decode("utf-8-sig"), hashlib.sha256(raw).hexdigest()
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise InputError(
-            "not a text file in UTF-8", file=path, key=f"line {line}", hint="save it as UTF-8; is it the .toml file?"
-        ) from None

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +10,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..campaign.place import key_lines, readable
-from ..errors import InputError, nearest
+from ..campaign.toml_file import read_toml
+from ..errors import InputError
 from .overrides import parse_assignment, with_overrides
 from .schema import ScenarioFile, file_model
-
-_MOST_BYTES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -64,20 +61,12 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         overrides: changes such as ``"contact.H=0.5"``.
 
     Raises:
-        InputError: the file is not there or not TOML; unknown keys, missing units, values out of range.
+        InputError: the file is not there, not TOML or a campaign; unknown keys, missing units, values out of range.
     """
     path = Path(path)
     changes = [parse_assignment(text) for text in overrides]
-    text, digest = _text(path)
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            f"not valid TOML: {error}", file=path, hint="correct the line; text stands in quotes"
-        ) from None
-    except RecursionError:
-        raise InputError("tables and lists are nested too deeply", file=path) from None
-    return _checked(content, path, digest, tuple(changes), changes, text)
+    read = read_toml(path, "scenario")
+    return _checked(read.content, path, read.sha256, tuple(changes), changes, read.text)
 
 
 def make_scenario(content: Mapping[str, Any], folder: str | Path | None = None) -> Scenario:
@@ -150,24 +139,3 @@ def _check_effects(file: ScenarioFile) -> None:
     from .effects import make_effects
 
     make_effects(file)
-
-
-def _text(path: Path) -> tuple[str, str]:
-    try:
-        if path.is_dir():
-            raise InputError("not a scenario file but a folder", file=path, hint="name a .toml file")
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError("too large for a scenario file", file=path)
-        raw = path.read_bytes()
-    except FileNotFoundError:
-        beside = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-        hint = nearest(path.name, beside) if beside else "stickslip new scenario FILE writes one to start from"
-        raise InputError("the scenario file is not there", file=path, hint=hint) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"the scenario file cannot be opened ({reason})", file=path) from None
-    try:
-        return raw.decode("utf-8-sig"), hashlib.sha256(raw).hexdigest()
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise InputError("not a text file in UTF-8", file=path, key=f"line {line}", hint="save it as UTF-8") from None

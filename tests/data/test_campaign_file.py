@@ -106,6 +106,13 @@ def test_files_that_are_no_campaign(tmp_path, refuses):
     with (tmp_path / "big.toml").open("wb") as stream:
         stream.truncate(20_000_000)
     refuses(lambda: load_campaign(tmp_path / "big.toml"), "too large")
+    (tmp_path / "s.toml").write_text("schema = 1\n[block]\nmass = 1\n[drive]\nvelocity = 1\n")
+    refuses(lambda: load_campaign(tmp_path / "s.toml"), "a scenario file, where a campaign", "simulate", "new campaign")
+    (tmp_path / "run.csv").write_text("time,displacement\n0,0\n")
+    refuses(lambda: load_campaign(tmp_path / "run.csv"), "not a campaign file", 'file = "run.csv"')
+    (tmp_path / "run.mat").write_bytes(b"\x00\xff\xfe")
+    refuses(lambda: load_campaign(tmp_path / "run.mat"), "not a campaign file", 'file = "run.mat"')
+    refuses(lambda: load_campaign(tmp_path / "c.toml"), "not there", "'s.toml'")
 
 
 def test_two_traces_of_one_name(campaign, refuses):

@@ -105,6 +105,8 @@ def test_the_line_of_a_fault_is_named(tmp_path):
         ("broken.toml", b"mass = = 3", "not valid TOML"),
         ("binary.toml", b"\xff\xfe\x00schema", "UTF-8"),
         ("empty.toml", b"", "'schema'"),
+        ("campaign.toml", b"schema = 1\n[[trace]]\nfile = 'a.csv'\n", "a campaign file, where a scenario file"),
+        ("run.csv", b"time,displacement\n", "not a scenario file"),
     ],
 )
 def test_files_that_cannot_be_read(tmp_path, name, content, words):
