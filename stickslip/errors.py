@@ -51,6 +51,11 @@ class InputError(StickslipError):
             hint=self.hint,
         )
 
+    def with_hint(self, more: str) -> InputError:
+        """The same error with a further line on how to mend it."""
+        hint = f"{self.hint}\n  {more}" if self.hint else more
+        return type(self)(self.what, file=self.file, key=self.key, value=self.value, allowed=self.allowed, hint=hint)
+
     def __str__(self) -> str:
         where = ": ".join(str(p) for p in (self.file, self.key) if p)
         text = f"{where}: {self.what}" if where else self.what

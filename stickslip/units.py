@@ -23,7 +23,9 @@ def unit_registry() -> pint.UnitRegistry:
 
 _SIMPLE = re.compile(r"([+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?) ?([^\d\s].*)")
 _FIRST = re.compile(r"[a-zA-Z]+(?=[ /]|$)")  # a unit whose first factor stands in the first power
-_PREFIXES = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+_READ = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}  # by power of ten, as they are shown
 
 
 def _simple(text: str, unit: str) -> float | None:
@@ -40,9 +42,9 @@ def _simple(text: str, unit: str) -> float | None:
     if unit == "kg":
         return number * 1e-3 if written == "g" else None
     prefix = written.removesuffix(unit)
-    if prefix == written or unit.startswith("kg") or not _FIRST.match(unit) or prefix not in _PREFIXES:
+    if prefix == written or unit.startswith("kg") or not _FIRST.match(unit) or prefix not in _READ:
         return None
-    return number * _PREFIXES[prefix]
+    return number * _READ[prefix]
 
 
 def to_si(value: float | int | str, unit: str, *, key: str | None = None, file: object = None) -> float:
@@ -76,6 +78,32 @@ def factor_to_si(text: str, unit: str, *, key: str | None = None, file: object =
     if not math.isfinite(number) or number == 0:
         raise InputError("a unit must be a finite factor other than zero", value=text, **where)
     return number
+
+
+def takes_prefix(unit: str) -> bool:
+    """Whether a prefix may stand before a unit: not before a number, nor where it would belong to one factor only."""
+    return unit[:1] not in ("", "1") and " " not in unit.split("/")[0]
+
+
+def power_for(value: float, digits: int = 4, most: int = 9) -> int:
+    """The power of ten, a multiple of three, by which a value other than zero is shown between 1 and 1000."""
+    return max(-12, min(most, 3 * math.floor(math.log10(abs(value) * (1 + 10.0**-digits)) / 3)))
+
+
+def shown(value: float, unit: str, digits: int = 4) -> str:
+    """A quantity in SI as people write it: ``4.3e-05, "m"`` as ``43 µm``, ``0.0894, "kg"`` as ``89.4 g``."""
+    if value == 0 or not math.isfinite(value) or not takes_prefix(unit):
+        return f"{_digits(value, digits)} {unit if unit != '1' else ''}".strip()
+    if unit == "kg":
+        value, unit = 1e3 * value, "g"
+    power = power_for(value, digits)
+    return f"{_digits(value / 10.0**power, digits)} {PREFIXES[power]}{unit}"
+
+
+def _digits(value: float, digits: int) -> str:
+    """So many significant digits, without a power of ten for numbers below a hundred thousand."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e5 else text
 
 
 _RUN_ON = re.compile(r",|\.\d*\.|[\d.]\s+(?!1\s*/)[\d.]|\d\s*'\s*\d")

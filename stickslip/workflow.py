@@ -12,7 +12,25 @@ from typing import Any
 
 import numpy as np
 
+from .errors import InputError, nearest
 from .runstore import Run, file_record, json_text, open_run, refuse_existing, versions
+
+
+def _check_candidates(tags: Sequence[str]) -> None:
+    """All that is wrong with a choice of effects, at once."""
+    from .effects import catalogue
+
+    if not any(tags):
+        raise InputError("no effect is named", key="--candidates", hint="leave it out, and all effects are tried")
+    known = catalogue.tags()
+    wrong = [tag for tag in tags if tag not in known]
+    if wrong:
+        hints = [f"{tag}: {nearest(tag, known)}" for tag in wrong] if len(wrong) > 1 else [nearest(wrong[0], known)]
+        raise InputError(
+            f"there is no effect {' and no effect '.join(repr(tag) for tag in wrong)}",
+            key="--candidates",
+            hint="\n  ".join(hints),
+        )
 
 
 def _code(effect_files: Sequence[str | Path]) -> str:
@@ -106,8 +124,8 @@ def diagnose_campaign(
         catalogue.load_file(Path(path))
     loaded = load_campaign(campaign)
     traces = load_traces(loaded)
-    for tag in candidates or ():
-        catalogue.get(tag)
+    if candidates is not None:
+        _check_candidates(candidates)
     inputs = [file_record(campaign), *({"file": t.provenance.file, "sha256": t.provenance.sha256} for t in traces)]
     with open_run(out, force=force, resume=True) as run:
         key = json_text(

@@ -77,7 +77,7 @@ def test_inspect_prints_the_traces_and_what_they_can_tell(capsys):
     assert run(["inspect", write()]) == 0
     out = capsys.readouterr().out
     assert "stick-slip" in out
-    assert "50 um/s" in out
+    assert "50 µm/s" in out
     assert "identifies nothing" in out
     assert "No hold" in out
 
@@ -130,7 +130,7 @@ def test_tables_fit_the_terminal_and_break_no_word(capsys, monkeypatch, columns)
     table = lines[next(i for i, line in enumerate(lines) if line.split()[:2] == ["event", "onset"]) :]
     assert [line.split()[0] for line in table[2:5]] == ["1", "2", "3"]
     assert "s" in table[1].split()
-    assert "um" in " ".join(table[:40]).split()
+    assert "µm" in " ".join(table[:40]).split()
 
 
 def test_inspect_draws_the_trace_with_characters(capsys):
@@ -176,7 +176,7 @@ def test_static_fit_gives_the_parameters_with_their_N_and_L(capsys):
     assert run(["fit", write(), "--model", "static", "--out", "fitted"]) == 0
     out = capsys.readouterr().out
     assert "N = 4096" in out
-    assert "L = 20 um" in out
+    assert "L = 20 µm" in out
     assert "guessed, not measured: friction_coefficient" in out
     assert "act only together" in out
     found = json.loads(Path("fitted/result.json").read_text())

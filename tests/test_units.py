@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.units import _simple, to_si, unit_registry
+from stickslip.units import _simple, shown, to_si, unit_registry
 
 UNITS = ("m", "s", "kg", "N", "Pa", "Hz", "m/s", "N/m", "N s/m", "m/Hz**0.5", "m/s**0.5", "1/m", "m**2", "kg/s", "K")
 PREFIXES = ("", "p", "n", "u", "m", "k", "M", "G", "d", "c", "µ", "T")
@@ -51,3 +51,22 @@ def test_a_scenario_of_plain_units_needs_neither_pint_nor_xarray():
 def test_a_decimal_comma_is_never_taken_for_something_else(text):
     with pytest.raises(InputError, match=r"(?s)decimal comma.*0\.05 mm/s"):
         to_si(text, "N")
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (4.3e-5, "m", "43 µm"),
+        (0.0894, "kg", "89.4 g"),
+        (9.99996e-7, "m", "1 µm"),
+        (-2.5e-3, "N", "-2.5 mN"),
+        (1234.5, "1", "1234"),
+        (250.0, "1/m", "250 1/m"),
+        (0.15, "N s/m", "0.15 N s/m"),
+        (5e-5, "m/s", "50 µm/s"),
+        (0.0, "m", "0 m"),
+        (3e-17, "m", "3e-05 pm"),
+    ],
+)
+def test_quantities_are_shown_with_the_prefix_that_suits(value, unit, text):
+    assert shown(value, unit) == text

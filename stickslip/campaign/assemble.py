@@ -25,7 +25,7 @@ from ..trace import SIGNALS, Drive, Provenance, Repair, Trace
 from ..units import factor_to_si
 from .load import Campaign, trace_file
 from .models import Channel, TimeColumn, TraceEntry
-from .plausible import check_size, check_travel
+from .plausible import check_size, check_travel, doubtful_resolution
 
 Array = NDArray[np.float64]
 _CHANNELS = (*SIGNALS, "normal_load", "drive_position")
@@ -64,7 +64,10 @@ class _Assembly:
         try:
             return self._trace()
         except InputError as error:
-            raise error.at(file=self.campaign.path, key=f"{self.place} ('{self.entry.label}')") from None
+            placed = error.at(file=self.campaign.path, key=f"{self.place} ('{self.entry.label}')")
+            if self.warnings:
+                placed = placed.with_hint("noticed before: " + "; ".join(self.warnings))
+            raise placed from None
 
     def _trace(self) -> Trace:
         entry = self.entry
@@ -270,6 +273,10 @@ class _Assembly:
         for name, spec in channels.items():
             values = data[name]
             count = spec.resolution if spec.resolution is not None else estimate_resolution(values)
+            if spec.resolution is not None:
+                seen, scatter = estimate_resolution(values), noise_level(values)
+                if odd := doubtful_resolution(name, spec.si, spec.resolution, seen, scatter):
+                    self.warnings.append(odd)
             if spec.wrap is not None:
                 values, done = unwrap(values, spec.wrap, name, count)
                 self.repairs += done

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..trace import Trace
-from ..units import factor_to_si
+from ..units import factor_to_si, shown
 from .models import Rig
 
 _OUTRUN = 30.0
@@ -40,6 +40,26 @@ def check_size(time: NDArray[np.float64], data: Mapping[str, NDArray[np.float64]
             )
 
 
+def doubtful_resolution(channel: str, si: str, stated: float, seen: float | None, noise: float) -> str | None:
+    """What is odd about a resolution that the campaign states.
+
+    Args:
+        channel: name of the channel.
+        si: its SI unit.
+        stated: the resolution in the campaign, SI.
+        seen: the step found in the values, or None where they lie on no grid.
+        noise: standard deviation of one sample, as its scatter has it, SI.
+    """
+    if seen is not None and not 1 / _ODD < stated / seen < _ODD:
+        found = f"the values step by {shown(seen, si, 3)}"
+    elif seen is None and noise < stated / _OUTRUN:
+        found = f"the values scatter by {shown(noise, si, 2)} only"
+    else:
+        return None
+    said = f"{channel}: the campaign states a resolution of {shown(stated, si, 3)}"
+    return f"{said}, but {found}; the campaign was followed"
+
+
 def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str]:
     """Warnings about a trace whose block and drive do not go together.
 
@@ -65,11 +85,12 @@ def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str
     moved = _moved(trace)
     if moved is None or travel <= 0:
         return [] if travel > 0 else ["the drive does not move during this run"]
+    own, drives = shown(moved, "m", 3), shown(travel, "m", 3)
     allowance = reach if reach is not None else 2 * travel
     ratio = moved / (travel + 2 * allowance)
     if ratio * (1 if reach is not None else 3) > _OUTRUN:
         raise InputError(
-            f"the block outruns the drive: it moves {moved:.3g} m while the load point moves {travel:.3g} m",
+            f"the block outruns the drive: it moves {own} while the load point moves {drives}",
             key=key,
             value=unit,
             hint=_likely(trace.leading, unit, moved / travel),
@@ -77,8 +98,8 @@ def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str
     most = _reach(trace, rig, upper=True)
     if trace.leading != "spring_force" and most is not None and travel - moved > _OUTRUN * most:
         raise InputError(
-            f"the block stays behind the drive: it moves {moved:.3g} m while the load point moves {travel:.3g} m, and "
-            f"the spring can pull no further than {most:.3g} m before the block slips",
+            f"the block stays behind the drive: it moves {own} while the load point moves {drives}, and "
+            f"the spring can pull no further than {shown(most, 'm', 3)} before the block slips",
             key=key,
             value=unit,
             hint=_likely(trace.leading, unit, moved / travel) if moved > 0 else "is it the right column?",
@@ -86,12 +107,12 @@ def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str
     behind = trace.leading != "spring_force" and most is not None and travel - moved > _ODD * most
     if ratio * (1 if reach is not None else 3) > _ODD or behind:
         return [
-            f"the block moves {moved:.3g} m while the load point moves {travel:.3g} m, which no spring allows: is the "
+            f"the block moves {own} while the load point moves {drives}, which no spring allows: is the "
             "velocity of the drive that of another run, or a unit wrong?"
         ]
     if trace.leading == "displacement" and moved < travel / _OUTRUN and (reach is None or travel > 10 * reach):
         return [
-            f"the block moves {moved:.3g} m while the load point moves {travel:.3g} m: a wrong unit, a counter that "
+            f"the block moves {own} while the load point moves {drives}: a wrong unit, a counter that "
             "wraps or is cleared ('wrap', 'resets'), or a block that is not pulled?"
         ]
     return []

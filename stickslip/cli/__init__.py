@@ -5,6 +5,7 @@ Nothing heavy is imported before a command runs, so that ``stickslip --help`` is
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -13,7 +14,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from types import FrameType
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, MissingArgumentError
 
 from .. import __version__, cache
 from ..errors import InputError, StickslipError, nearest
@@ -55,6 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is None:
         keep_interrupts()
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(errors="replace")  # a terminal that knows no µ
     code = run(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
         sys.unraisablehook = sys.__unraisablehook__
@@ -137,4 +140,8 @@ def _usage(error: CycloptsError) -> InputError:
     hint = f"stickslip {' '.join([*command, '--help'])}"
     if not command and unused:
         return InputError(f"there is no command '{unused[0]}'", hint=f"{nearest(unused[0], COMMANDS)} See {hint}")
+    if isinstance(error, MissingArgumentError) and not error.keyword and error.argument:
+        name = error.argument.name
+        name = name if error.argument.field_info.is_keyword_only else name.strip("-").upper()
+        return InputError(f"{' '.join(command)} needs {name}", hint=f"see {hint}")
     return InputError(" ".join(str(error).split()), hint=f"see {hint}")

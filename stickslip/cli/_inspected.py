@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from ..units import PREFIXES, power_for, takes_prefix
 from . import show
 from ._sketch import sketch
 
 MOST_EVENTS = 12  # rows of a table; more are in the JSON and in the report
-_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # key of an event, head of its column
 _COLUMNS = (
     ("t_onset", "onset"), ("recurrence", "since"), ("hold_time", "held"), ("slip", "slip"), ("peak_velocity", "peak"),
@@ -136,11 +136,10 @@ def _drawing(variables: Mapping[str, tuple], number: int, columns: int) -> list[
 def _scale(values: Sequence[float], unit: str) -> tuple[int, str]:
     """Power of ten and symbol of the unit that suits most of the values."""
     known = sorted(abs(v) for v in values if v is not None and math.isfinite(v) and v != 0)
-    if not known or unit[:1] in ("", "1") or " " in unit.split("/")[0]:
+    if not known or not takes_prefix(unit):
         return 0, unit
-    most = 0 if unit == "s" else 9
-    power = max(-12, min(most, 3 * math.floor(math.log10(known[len(known) // 2] * (1 + 1e-9)) / 3)))
-    return power, f"{_PREFIXES[power]}{unit}"
+    power = power_for(known[len(known) // 2], 9, 0 if unit == "s" else 9)
+    return power, f"{PREFIXES[power]}{unit}"
 
 
 def _events(row: Mapping[str, Any], columns: int) -> list[str]:

@@ -84,6 +84,5 @@ def _value(row: dict[str, Any], k: int | None = None) -> str:
     """One run's value with its standard deviation, or the difference."""
     value = row["difference"] if k is None else row["value"][k]
     std = None if k is None else row["std"][k]
-    size, unit = (1e3, "g") if row["unit"] == "kg" else (1.0, row["unit"])  # prefixes go with grams
-    shown = show.quantity(None if value is None else size * value, unit, 3 if k is None else 4)
-    return shown if not std else f"{shown} +- {show.quantity(size * std, unit, 3)}"
+    shown = show.quantity(value, row["unit"], 3 if k is None else 4)
+    return shown if not std else f"{shown} +- {show.quantity(std, row['unit'], 3)}"

@@ -192,15 +192,6 @@ def _write(run: Run, result: dict[str, Any], variables: dict[str, Any]) -> None:
     write_report(run.folder)
 
 
-def _quantity(value: float | None, unit: str, digits: int = 4) -> str:
-    """A quantity; grams, because prefixes go with them."""
-    return (
-        show.quantity(None if value is None else 1e3 * value, "g", digits)
-        if unit == "kg"
-        else show.quantity(value, unit, digits)
-    )
-
-
 def _folded(text: str) -> str:
     """Long lines broken between words on a terminal; as they are in a file."""
     if not sys.stdout.isatty():
@@ -235,7 +226,7 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
         lines += ["", result["misfit"]["sentence"]]
     if result.get("parameters"):
         rows = [
-            [name, _quantity(p["value"], p["unit"]), "+-", _quantity(p["std"], p["unit"], 3), p["note"]]
+            [name, show.quantity(p["value"], p["unit"]), "+-", show.quantity(p["std"], p["unit"], 3), p["note"]]
             for name, p in result["parameters"].items()
         ]
         lines += ["", show.table(["parameter", "value", "", "std", ""], rows)]

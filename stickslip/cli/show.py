@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from ..units import shown
+
 if TYPE_CHECKING:
     from ..scenario import Progress
 
 PATIENCE = 1.0  # s before a progress bar appears
-
-_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
 @contextmanager
@@ -34,13 +34,13 @@ def progress_bar(title: str = "simulating") -> Iterator[Callable[[Progress], Non
         transient=True,
     )
     task = bar.add_task(title, total=1.0, text="")
-    began, shown = time.monotonic(), False
+    began, visible = time.monotonic(), False
 
     def watch(progress: Progress) -> None:
-        nonlocal shown
-        if not shown and time.monotonic() - began > PATIENCE:
+        nonlocal visible
+        if not visible and time.monotonic() - began > PATIENCE:
             bar.start()
-            shown = True
+            visible = True
         share = progress.time / progress.end if progress.end > 0 else 1.0
         text = f"{progress.time:.4g} of {progress.end:.4g} s simulated, {progress.events} events"
         bar.update(task, completed=share, text=text)
@@ -48,22 +48,17 @@ def progress_bar(title: str = "simulating") -> Iterator[Callable[[Progress], Non
     try:
         yield watch
     finally:
-        if shown:
+        if visible:
             bar.stop()
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
-    """``4.3e-05, "m"`` as ``43 um``; a dash where there is no number."""
+    """``4.3e-05, "m"`` as ``43 µm``; a dash where there is no number."""
     if value is None or value != value:
         return "-"
     if value in (float("inf"), float("-inf")):
         return "unlimited" if value > 0 else "-unlimited"
-    if value == 0 or unit[:1] in ("", "1"):  # no prefix for 1/m
-        return f"{value:.{digits}g} {unit if unit != '1' else ''}".strip()
-    import math
-
-    power = max(-12, min(9, 3 * math.floor(math.log10(abs(value) * (1 + 10.0**-digits)) / 3)))
-    return f"{value / 10.0**power:.{digits}g} {_PREFIXES[power]}{unit}"
+    return shown(value, unit, digits)
 
 
 def table(header: list[str], rows: list[list[str]]) -> str:

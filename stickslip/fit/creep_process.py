@@ -12,6 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from ..segment import Dropped, Event, Segmentation, block_motion, position_at
 from ..segment.kinematics import half_window, velocity_noise
 from ..trace import Trace
+from ..units import shown
 
 Array = NDArray[np.float64]
 V_LIM = 1e-6  # m/s, where the paper ends the comparison
@@ -84,7 +85,8 @@ def creep_processes(
     most = max(int(LONGEST * float(np.median(sticks)) / step), 1)
     half = half_window(noise, step, v_lim / 10.0, most)
     if velocity_noise(noise, half, step) > 0.5 * v_lim:
-        why = f"v_lim = {v_lim:.3g} m/s cannot be seen: {noise:.2g} m of noise at {trace.sampling_rate:.3g} Hz hide it"
+        hidden = f"{shown(noise, 'm', 2)} of noise at {shown(trace.sampling_rate, 'Hz', 3)}"
+        why = f"v_lim = {shown(v_lim, 'm/s', 3)} cannot be seen: {hidden} hide it"
         return [], [Dropped("creep processes", len(segmentation.events), trace.name, why)]
     kept, dropped = [], []
     for event in segmentation.events:
@@ -117,7 +119,7 @@ def _process(
     drive = trace.drive
     speed = abs(float(drive.velocity(max(event.t_onset - 1e-9, time[0])))) if drive is not None else 0.0
     if speed <= v_lim:
-        return f"the drive ({speed:.3g} m/s) is not faster than v_lim ({v_lim:.3g} m/s)"
+        return f"the drive ({shown(speed, 'm/s', 3)}) is not faster than v_lim ({shown(v_lim, 'm/s', 3)})"
     low, high = int(np.searchsorted(time, start)), event.i_onset
     if high - low < 4 * half + 8:
         return "too few samples between ring-down and onset"
@@ -125,7 +127,7 @@ def _process(
     smooth = uniform_filter1d(event.direction * position[low:high], 2 * half + 1, mode="nearest")
     i = int(np.argmin(smooth - v_lim * (time[low:high] - time[low])))
     if i < 8 or i >= high - low - 1:
-        return f"the block never creeps through v_lim = {v_lim:.3g} m/s (sampled or sensed too coarsely)"
+        return f"the block never creeps through v_lim = {shown(v_lim, 'm/s', 3)} (sampled or sensed too coarsely)"
     moment = float(time[low + i])
     there = position_at(time, position, moment, max(half, 2))
     t, u, n = _windows(

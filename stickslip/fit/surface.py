@@ -10,6 +10,7 @@ from scipy.optimize import least_squares
 from ..campaign import Rig, Unmeasured
 from ..contact import check_saturation, rough_table, static_contact
 from ..errors import InputError
+from ..units import shown
 from .static_table import StaticRig
 
 LINES = 60
@@ -103,8 +104,8 @@ def surface_prior(rig: Rig) -> SurfacePrior | None:
         spread = Guess(float(middle.u.std(ddof=1) * share), float(1.0 / np.sqrt(2.0 * (contacts - 1))))
     guessed = " (guessed)" if {"H", "h_rms"} & set(open_ones) else ""
     text = (
-        f"Prior of the contact from the rig's H and h_rms{guessed}: u_max = {u.value * 1e6:.3g} um within a factor of "
-        f"{np.exp(u.width):.2f}, p = {p.value:.3g} within {np.exp(p.width):.2f}."
+        f"Prior of the contact from the rig's H and h_rms{guessed}: u_max = {shown(u.value, 'm', 3)} within a "
+        f"factor of {np.exp(u.width):.2f}, p = {p.value:.3g} within {np.exp(p.width):.2f}."
     )
     return SurfacePrior(u, p, spread, text)
 

@@ -15,6 +15,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from ..units import PREFIXES, power_for, takes_prefix
+
 # dark, middle and light, so that a grey print keeps them apart; the line styles differ as well
 DARK, MIDDLE, LIGHT = "#14213d", "#c8553d", "#8d99ae"
 _LOOK: Any = {
@@ -33,7 +35,6 @@ _LOOK: Any = {
     "lines.linewidth": 1.3,
     "axes.formatter.useoffset": False,
 }
-_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 
 
 def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
@@ -59,12 +60,10 @@ def scaled(values: np.ndarray, unit: str) -> tuple[float, str]:
     finite = np.abs(np.asarray(values, float))
     finite = finite[np.isfinite(finite)]
     top = float(finite.max()) if finite.size else 0.0
-    if top == 0.0 or unit[:1] in ("", "1"):  # no prefix for 1/m
+    if top == 0.0 or not takes_prefix(unit):
         return 1.0, unit
-    for size, letter in _PREFIXES:
-        if top >= size:
-            return 1.0 / size, letter + unit
-    return 1e12, "p" + unit
+    power = power_for(top, 12, 0)
+    return 10.0**-power, PREFIXES[power] + unit
 
 
 def thin(t: np.ndarray, y: np.ndarray, points: int = 4000) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,12 +9,12 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..trace import SIGNALS, Repair
+from ..units import shown
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _UNITS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
-_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k"}
 MOST_COUNTS = 2.0**53  # beyond which whole counts cannot be told from others
 
 
@@ -52,16 +51,8 @@ def unwrap(values: Array, period: float, channel: str, resolution: float | None 
     places = np.flatnonzero(turns)
     count = int(np.abs(turns).sum())
     where = f"{channel}, first at sample {int(valid[places[0] + 1])}"
-    return result, [Repair("wrap", count, where, f"the counter ran over its range of {_size(period, channel)}")]
-
-
-def _size(value: float, channel: str) -> str:
-    """A size as a person writes it: ``3.24e-05`` of a displacement as ``32.4 um``."""
-    unit = _UNITS.get(channel)
-    if unit is None:
-        return f"{value:.6g}"
-    power = max(-12, min(3, 3 * math.floor(math.log10(value) / 3)))
-    return f"{value / 10.0**power:.6g} {_PREFIXES[power]}{unit}"
+    span = shown(period, _UNITS.get(channel, "1"), 6)
+    return result, [Repair("wrap", count, where, f"the counter ran over its range of {span}")]
 
 
 def join_resets(

@@ -69,14 +69,14 @@ def _velocities(pairs: Pairs, slipping: Pairs) -> Verdict:
         return [], []
     if len(groups) == 1:
         return [], [
-            f"One drive velocity only ({shown} um/s): creep at one velocity identifies nothing, since roughness, "
+            f"One drive velocity only ({shown} µm/s): creep at one velocity identifies nothing, since roughness, "
             "friction and weakening together imitate almost every effect. Three velocities over a factor of four do."
         ]
     if len(groups) == 2 or groups[-1] < 4 * groups[0]:
-        return [f"{len(groups)} drive velocities ({shown} um/s): effects that depend on velocity show."], [
+        return [f"{len(groups)} drive velocities ({shown} µm/s): effects that depend on velocity show."], [
             "Fewer than three velocities over a factor of four: many effects will stay alike."
         ]
-    return [f"{len(groups)} drive velocities ({shown} um/s) separate what depends on velocity from what does not."], []
+    return [f"{len(groups)} drive velocities ({shown} µm/s) separate what depends on velocity from what does not."], []
 
 
 def _pace(pairs: Pairs, slipping: Pairs) -> Verdict:
@@ -92,8 +92,8 @@ def _pace(pairs: Pairs, slipping: Pairs) -> Verdict:
         turns = np.abs(way[-1] - way[0]) < 0.99 * np.sum(np.abs(np.diff(way)))
         if drive != 0 and not turns and not 1 / _OFF < block / drive < _OFF:
             bad.append(
-                f"{t.name}: from slip to slip the block moves {block * 1e6:.3g} um/s, "
-                f"the drive {drive * 1e6:.3g} um/s, and a spring cannot be stretched for ever: check "
+                f"{t.name}: from slip to slip the block moves {block * 1e6:.3g} µm/s, "
+                f"the drive {drive * 1e6:.3g} µm/s, and a spring cannot be stretched for ever: check "
                 "the drive's velocity, and the units of time and displacement."
             )
     return [], bad
@@ -219,7 +219,7 @@ def _creep(pairs: Pairs, slipping: Pairs) -> Verdict:
         kept += len(found)
         lost += dropped
     good = (
-        [f"{_count(kept, 'creep process')} can be compared with the static model (v_lim = {V_LIM * 1e6:g} um/s)."]
+        [f"{_count(kept, 'creep process')} can be compared with the static model (v_lim = {V_LIM * 1e6:g} µm/s)."]
         if kept
         else []
     )
@@ -228,7 +228,6 @@ def _creep(pairs: Pairs, slipping: Pairs) -> Verdict:
         reasons: dict[str, int] = {}
         for d in lost:
             short = re.sub(r" \([^)]*\)", "", d.reason).split(":")[0]  # numbers differ from one to the next
-            short = re.sub(r"v_lim = \S+ m/s", f"v_lim = {V_LIM * 1e6:g} um/s", short)
             reasons[short] = reasons.get(short, 0) + d.count
         text = "; ".join(f"{n} because {reason}" for reason, n in sorted(reasons.items(), key=lambda r: -r[1]))
         bad.append(f"{_count(sum(d.count for d in lost), 'creep process')} cannot: {text}.")

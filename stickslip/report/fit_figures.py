@@ -46,7 +46,7 @@ def heat_map(table: Mapping[str, Any]) -> Figure:
     for i, j in np.argwhere(np.isfinite(errors)):
         ax.text(j, i, _error(errors[i, j]), ha="center", va="center", color="white" if errors[i, j] > 10 else DARK)
     ax.set_xticks(range(len(table["phases"])), table["phases"])
-    speeds = ["" if v is None else f"  {v * 1e6:.3g} um/s" for v in table["velocities"]]
+    speeds = ["" if v is None else f"  {v * 1e6:.3g} µm/s" for v in table["velocities"]]
     ax.set_yticks(range(len(table["runs"])), [plain(n, 30) + v for n, v in zip(table["runs"], speeds, strict=True)])
     ax.grid(False)
     bar = made.colorbar(shown, ax=ax, ticks=np.log10([0.5, 1, 3, 10, 30]))

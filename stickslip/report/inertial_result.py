@@ -23,6 +23,7 @@ from ..residual import Misfit, misfit
 from ..segment import Segmentation
 from ..trace import Trace
 from ..uncertainty import flat_directions, null_directions, relative
+from ..units import shown
 from .describe import describe_trace
 from .pieces import ZOOM, Variables, middle_event, thinned, trace_pieces
 from .sentences import misfit_sentence, phase_table
@@ -89,9 +90,9 @@ def effective(fit: Fit, rig: Any, contacts: int) -> dict[str, Any] | None:
         return None
     line = effective_line(values["contact.u_max"], values["contact.p"], known)
     text = (
-        f"Effective rough line of a contact with u_max = {values['contact.u_max'] * 1e6:.3g} um and p = "
+        f"Effective rough line of a contact with u_max = {shown(values['contact.u_max'], 'm', 3)} and p = "
         f"{values['contact.p']:.3g}: H = {line.hurst:.2f} (1/(p - 1) = {line.power_law_hurst:.2f}), h_rms = "
-        f"{line.h_rms * 1e6:.3g} um, for L = {line.length * 1e6:g} um, N = {line.n_springs}, F_n = "
+        f"{shown(line.h_rms, 'm', 3)}, for L = {shown(line.length, 'm')}, N = {line.n_springs}, F_n = "
         f"{known.normal_force:.3g} N and friction {known.friction:.3g}"
         f"{' (guessed)' if known.guessed else ''}; {line.note}."
     )
@@ -138,11 +139,11 @@ def fit_sections(
         rig: of the campaign.
     """
     m, composition = problem.measurement, problem.composition
-    shown = replace(m, valid=m.valid & use[..., None])
+    seen = replace(m, valid=m.valid & use[..., None])
     stiffness = float(composition.fixed.get("rig.spring_stiffness", fit.values.get("rig.spring_stiffness", np.nan)))
     line = effective(fit, rig, composition.contacts)
     result: dict[str, Any] = {
-        "misfit": misfit_part(shown, fit.features, floor, misfit(shown, fit.features, floor)),
+        "misfit": misfit_part(seen, fit.features, floor, misfit(seen, fit.features, floor)),
         "identifiability": identifiability(fit, rig, line),
         "effective": line,
         "traces": [describe_trace(t, s) for t, s in zip(traces, segmentations, strict=True)],
@@ -161,7 +162,7 @@ def fit_sections(
             "those of the cycles after them say nothing."
         )
     found = {t.name: s for t, s in zip(traces, segmentations, strict=True)}
-    variables |= residual_arrays(shown, fit.features, floor, found, stiffness, {t.name: t for t in traces})
+    variables |= residual_arrays(seen, fit.features, floor, found, stiffness, {t.name: t for t in traces})
     variables["coordinates"] = {"phase": list(PHASES), "feature": list(m.layout.names), "run": list(m.names)}
     return result, variables
 

@@ -13,6 +13,7 @@ from scipy.ndimage import median_filter
 
 from ..segment import Segmentation, block_motion
 from ..trace import Trace
+from ..units import shown
 
 _RATE = 1000.0  # Hz, what faster records are averaged down to
 _HIGHEST = 200.0  # Hz
@@ -120,7 +121,7 @@ def _text(lines: list[dict[str, float]], trace: Trace, unit: str) -> str:
         if mains:
             part += f" (mains, {mains} Hz)"
         elif trace.drive_velocity:
-            part += f" ({line['period'] * trace.drive_velocity * 1e6:.3g} um of drive)"
+            part += f" ({shown(line['period'] * trace.drive_velocity, 'm', 3)} of drive)"
         size = f"{line['amplitude'] * 1e9:.3g} nm" if unit == "m" else f"{line['amplitude']:.3g} {unit}"
         parts.append(f"{part}, amplitude {size}")
     return "ripple while the block sticks: " + "; ".join(parts)

@@ -15,6 +15,7 @@ from ..fit.static import SATISFYING, Align, CreepFit, Form, StaticFit, fit_stati
 from ..fit.static_table import StaticRig
 from ..segment import Segmentation
 from ..trace import Trace
+from ..units import shown
 
 MOST_SHOWN = 60
 Variables = dict[str, tuple[str, np.ndarray, dict[str, Any]]]
@@ -91,16 +92,16 @@ def _creep_part(fit: StaticFit, v_lim: float) -> dict[str, Any]:
     guessed = f"; guessed, not measured: {', '.join(rig.guessed)}" if rig.guessed else ""
     mean = (
         f"over these H = {numbers['hurst']:.2f} +- {numbers['hurst_std']:.2f}, "
-        f"h_rms = {numbers['h_rms'] * 1e6:.3g} +- {numbers['h_rms_std'] * 1e6:.2g} um (mean and standard deviation)"
+        f"h_rms = {numbers['h_rms'] * 1e6:.3g} +- {numbers['h_rms_std'] * 1e6:.2g} µm (mean and standard deviation)"
         if fit.good
         else "so there is no mean to give"
     )
     text = (
         f"{len(fit.good)} of {len(fit.fits)} creep processes ({100 * fit.share:.0f} %) are described to within 2 % of "
         "their "
-        f"creep; {mean}. Lines of N = {rig.n_springs} springs and L = {rig.length * 1e6:g} um, mean of {rig.lines} "
+        f"creep; {mean}. Lines of N = {rig.n_springs} springs and L = {shown(rig.length, 'm')}, mean of {rig.lines} "
         f"lines: H and h_rms hold for this N and L only. Alignment '{fit.align}', virtual time '{fit.form}', "
-        f"v_lim = {v_lim * 1e6:g} um/s{guessed}. Median residual {100 * numbers['median_nrmse']:.2g} % of the creep."
+        f"v_lim = {shown(v_lim, 'm/s')}{guessed}. Median residual {100 * numbers['median_nrmse']:.2g} % of the creep."
     )
     hidden = sum(_noise_share(f) > 0.5 * SATISFYING for f in fit.fits)
     if hidden:

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+from ..units import shown
+
 _KNOWN: dict[str, Any] = {
     "verdict": {}, "ladder": [], "ranking": [], "parameters": {}, "equations": [], "identifiability": [], "traces": [],
     "dropped": [], "inputs": [], "versions": {}, "static": None, "misfit": None, "next_experiment": None, "can": [],
@@ -33,20 +34,7 @@ def show(value: Any, unit: str = "1", digits: int = 4) -> str:
     """``4.3e-05, "m"`` as ``43 µm``; a dash where there is no number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value) or "–" if isinstance(value, str) else "–"
-    if not math.isfinite(value):
-        return "–"
-    if value == 0 or not unit or unit.startswith("1") or " " in unit.split("/")[0]:  # no prefix for 1/m
-        return f"{_digits(value, digits)} {unit if unit not in ('1', None) else ''}".strip()
-    if unit == "kg":
-        value, unit = 1e3 * value, "g"
-    power = max(-12, min(9, 3 * math.floor(math.log10(abs(value) * (1 + 10.0**-digits)) / 3)))
-    return f"{_digits(value / 10.0**power, digits)} {_PREFIXES[power]}{unit}"
-
-
-def _digits(value: float, digits: int) -> str:
-    """So many significant digits, without a power of ten for numbers below a hundred thousand."""
-    text = f"{value:.{digits}g}"
-    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e5 else text
+    return shown(value, unit or "1", digits) if math.isfinite(value) else "–"
 
 
 def percent(value: Any, digits: int = 2) -> str:

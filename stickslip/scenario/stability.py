@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..units import shown
 from .schema import BlockTable, WeakeningTable
 
 
@@ -44,7 +45,7 @@ def steady_sliding(block: BlockTable, law: WeakeningTable, strength: float, velo
     elif stable:
         reason = _why_stable(block, speed, fastest, limit)
     else:
-        top = "at any velocity" if math.isinf(fastest) else f"below {fastest:.3g} m/s"
+        top = "at any velocity" if math.isinf(fastest) else f"below {shown(fastest, 'm/s', 3)}"
         stiff = "with any spring" if math.isinf(limit) else f"with a spring softer than {limit:.4g} N/m"
         reason = f"steady sliding is unstable: stick-slip is expected {top}, {stiff}"
     return Sliding(stable, fastest, limit, reason)
@@ -52,7 +53,7 @@ def steady_sliding(block: BlockTable, law: WeakeningTable, strength: float, velo
 
 def _why_stable(block: BlockTable, speed: float, fastest: float, limit: float) -> str:
     slow = (
-        f"with this spring the critical velocity is {fastest:.3g} m/s (the drive has {speed:.3g} m/s)"
+        f"with this spring the critical velocity is {shown(fastest, 'm/s', 3)} (the drive has {shown(speed, 'm/s', 3)})"
         if fastest > 0.0
         else "with this spring it is so at every velocity"
     )

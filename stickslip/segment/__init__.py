@@ -9,6 +9,7 @@ import numpy as np
 
 from ..readers.noise import estimate_resolution, noise_level
 from ..trace import Drive, Trace
+from ..units import shown
 from .choose import choose_settings
 from .kinematics import Array, block_motion, position_at, velocity
 from .phases import divide
@@ -149,14 +150,14 @@ def _regime(
         slipped < share * moved and middle < levels * settings.noise for share, levels in _ACCIDENTAL
     ):
         rests = [event.stick_time / max(event.duration, 1e-300) for event in events[1:]]
-        text = f"{len(events)} slip{'s' if len(events) > 1 else ''}, median {middle:.3g} {settings.unit}"
+        text = f"{len(events)} slip{'s' if len(events) > 1 else ''}, median {shown(middle, settings.unit, 3)}"
         if rests and float(np.median(rests)) < 1.0:
             return "oscillation", text + ", but the block rests for less time than it slips"
         if slipped < 0.5 * moved and len(events) > 1:
             return "oscillation", text + f", which make up only {100 * slipped / moved:.0f} % of the block's travel"
         return "stick-slip", text
     if drive is None:
-        return "no slip", f"the velocity never passes {settings.threshold:.3g} {settings.unit}/s"
+        return "no slip", f"the velocity never passes {shown(settings.threshold, settings.unit + '/s', 3)}"
     pulled = _path(np.asarray(drive.position(time)), 0.0)
     share = moved / pulled if pulled > 0 else 0.0
     if share > 0.5:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trace import Drive
+from ..units import shown
 from .kinematics import position_at
 from .records import Dropped, Event, Settings
 
@@ -128,7 +129,7 @@ def pick(
 
 
 def _too_small(limit: float, unit: str) -> str:
-    return f"smaller than the smallest slip that counts, {limit:.3g} {unit}"
+    return f"smaller than the smallest slip that counts, {shown(limit, unit, 3)}"
 
 
 def _drop_small(

@@ -191,6 +191,32 @@ def test_units_wrong_by_a_thousand(campaign, run, refuses, signal, words):
     assert only(campaign(right, rows=rows, header="time,x,v,f")).warnings == ()
 
 
+def test_a_unit_wrong_by_a_thousand_tells_what_the_header_said(campaign, run, refuses):
+    body = TIME + X.replace('"um"', '"mm"') + DRIVE
+    words = ["'um' in place of 'mm'", "noticed before", "the file says column 'x' is in um, the campaign says mm"]
+    refuses(lambda: only(campaign(body, rows=np.column_stack(run), header="time [s],x [um]")), *words)
+
+
+@pytest.mark.parametrize(
+    ("stated", "quantised", "words"),
+    [
+        ("8 um", True, "states a resolution of 8 µm, but the values step by 7.91 nm"),
+        ("0.1 nm", True, "states a resolution of 100 pm, but the values step by 7.91 nm"),
+        ("1 um", False, "states a resolution of 1 µm, but the values scatter by"),
+        ("7.91 nm", True, None),
+        ("8 nm", True, None),
+        ("8 nm", False, None),
+    ],
+)
+def test_a_resolution_that_is_not_that_of_the_values_is_pointed_out(campaign, run, stated, quantised, words):
+    t, x = run
+    if not quantised:
+        x = x + np.random.default_rng(2).normal(0, 5e-3, t.size)
+    body = TIME + X.replace(" }", f', resolution = "{stated}" }}') + DRIVE
+    warnings = only(campaign(body, rows=np.column_stack([t, x]))).warnings
+    assert warnings == () if words is None else words in warnings[0]
+
+
 def test_a_run_cut_around_one_slip_does_not_outrun_its_drive(campaign, run):
     t, x = run
     part = (t > 0.95) & (t < 1.05)

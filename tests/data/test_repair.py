@@ -67,7 +67,7 @@ def test_counter_wrap_is_undone_to_the_count(record):
 
 @pytest.mark.parametrize(
     ("channel", "period", "shown"),
-    [("displacement", 32.4e-6, "32.4 um"), ("spring_force", 2.5, "2.5 N"), ("x", 2.5, "2.5")],
+    [("displacement", 32.4e-6, "32.4 µm"), ("spring_force", 2.5, "2.5 N"), ("x", 2.5, "2.5")],
 )
 def test_the_note_of_a_wrap_has_the_channel_s_unit(channel, period, shown):
     rising = np.linspace(0.0, 3.2, 200) * period

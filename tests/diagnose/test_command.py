@@ -18,6 +18,8 @@ CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign
     ("extra", "words"),
     [
         (["--candidates", "contact-aging"], "contact-ageing"),
+        (["--candidates", "wer,tilt,contact-aging"], "'wear'?\n  contact-aging: did you mean 'contact-ageing'"),
+        (["--candidates", " , "], "no effect is named"),
         (["--holdout", "v999.csv"], "v999"),
         (["--effect", "nowhere.py"], "nowhere.py"),
     ],
@@ -29,6 +31,13 @@ def test_bad_input_is_one_message(tmp_path, capsys, extra, words):
     assert words in error
     assert "Traceback" not in error
     assert not (tmp_path / "out").exists()
+
+
+def test_what_a_command_needs_is_named(capsys):
+    assert run(["diagnose", str(CAMPAIGN)]) == 2
+    assert "diagnose needs --out" in capsys.readouterr().err
+    assert run(["simulate"]) == 2
+    assert "simulate needs SCENARIO" in capsys.readouterr().err
 
 
 def test_a_piece_is_kept_and_only_for_the_same_inputs(tmp_path):

@@ -197,7 +197,7 @@ def test_the_roughness_narrows_a_whole_fit_and_follows_from_it(short_run, tmp_pa
     for result in (without, known):
         assert f"H = {result['effective']['H']:.2f}" in result["effective"]["text"]
         assert any("h_rms" in text and "line_length" in text for text in result["identifiability"])
-    assert "Prior of the contact from the rig's H and h_rms: u_max = 0.89 um" in known["effective"]["text"]
+    assert "Prior of the contact from the rig's H and h_rms: u_max = 890 nm" in known["effective"]["text"]
     assert "Prior" not in without["effective"]["text"]
     # the load that was measured is not in the model: said, and the errors stand beside it
     assert "a: normal_load is not used by the models" in known["dropped"][0]

@@ -24,8 +24,8 @@ def test_a_block_that_does_not_keep_up_with_its_drive_is_pointed_out(said, warne
     assert bool(bad) == warned
     if warned:
         assert "v050" in bad[0]
-        assert "50 um/s" in bad[0]
-        assert f"the drive {said * 1e6:.3g} um/s" in bad[0]
+        assert "50 µm/s" in bad[0]
+        assert f"the drive {said * 1e6:.3g} µm/s" in bad[0]
 
 
 @pytest.mark.parametrize("turns", [False, True])

@@ -115,7 +115,7 @@ def test_the_command_prints_and_writes(folders, tmp_path, capsys):
     assert "static + inertia + contact-ageing" in text
     assert "The base model lacks contact-ageing." in text
     assert "+4.9" in text
-    assert "1 um +- 100 nm" in text
+    assert "1 µm +- 100 nm" in text
     assert "89.4 g" in text
     assert (tmp_path / "out" / "compare.png").read_bytes()[:4] == b"\x89PNG"
     kept = json.loads((tmp_path / "out" / "result.json").read_text())

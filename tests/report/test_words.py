@@ -58,7 +58,7 @@ def test_ripple_of_the_drive_is_found_below_the_noise():
     assert found["lines"][0]["period"] == pytest.approx(0.4, rel=0.005)
     assert found["lines"][0]["amplitude"] == pytest.approx(150e-9, rel=0.3)
     assert len(found["lines"]) == 1
-    assert "um of drive" in found["text"]
+    assert "µm of drive" in found["text"]
 
 
 @pytest.mark.parametrize("seed", range(4))
