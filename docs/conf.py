@@ -16,7 +16,8 @@ author = "the stickslip developers"
 version = release = stickslip.__version__
 copyright = author
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+# equations are drawn by files that lie beside the pages, so that these are readable without network
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
 exclude_patterns = ["_build", "jupyter_execute", "Thumbs.db", ".DS_Store"]
 default_role = "literal"
 html_theme = "furo"
