@@ -12,6 +12,7 @@ from .candidate import Candidate
 from .engine import Diagnosis, Rung
 from .experiment import TELLING, recommend
 from .menu import Conditions
+from .verdict import passed_over
 
 
 def summary(diagnosis: Diagnosis, rig: Any = None) -> dict[str, Any]:
@@ -91,7 +92,7 @@ def _ranked(c: Candidate, d: Diagnosis) -> dict[str, Any]:
         "train_error": c.train.total,
         "heldout_error": c.held.error,
         "heldout_gain": None if base is None else 1.0 - c.held.score / base.score,
-        "failures": [] if judged is None else list(judged.failures),
+        "failures": [] if judged is None else list(passed_over(judged, first.judged)),
         "forms": [{"form": e.form, "cost": e.cost} for e in sorted(forms, key=lambda e: e.cost)],
     }
     if c.amplitude is not None:

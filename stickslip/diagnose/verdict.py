@@ -162,6 +162,27 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
     return best, seen
 
 
+def passed_over(judged: Judged, others: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[str, ...]:
+    """Why `decide` does not choose a candidate: conditions it does not meet, or what is preferred to it.
+
+    Empty for the one chosen.
+    """
+    best, close = decide(others, limits)
+    if not judged.passed or best is None:
+        return judged.failures
+    if judged is best:
+        return ()
+    if _contains(judged, best):
+        return (f"it contains {best.candidate.tag}, and what it has beyond that takes too little off the cost",)
+    if judged.candidate.tag == best.candidate.tag:
+        return ("another form of it describes the data better",)
+    if any(j.candidate.tag == judged.candidate.tag for j in close):
+        return (f"the data cannot tell it from {best.candidate.tag}",)
+    if judged.cost >= limits.rival * best.cost:
+        return (f"its cost is {100 * (judged.cost / best.cost - 1):.0f} % above that of {best.candidate.tag}",)
+    return (f"{best.candidate.tag} describes the unseen cycles better",)
+
+
 def _unseen(judged: Judged) -> float:
     """Score on unseen cycles; infinite where there are none."""
     held = judged.candidate.held

@@ -155,6 +155,8 @@ def fit_sections(
     variables |= overlay(problem, runs, traces, segmentations)
     cut = [f"{name}, cycle {n + 1}" for name, run in zip(m.names, runs, strict=True) for n in run.cut]
     result["misfit"]["cut"] = cut
+    aside = (m.valid & ~use[..., None]).any(axis=(1, 2))
+    result["misfit"]["unseen"] = [name for name, some in zip(m.names, aside, strict=True) if some]
     if cut:
         result["misfit"]["sentence"] += (
             f" In {len(cut)} cycle{'s' * (len(cut) > 1)} the model could not be integrated to the arrest "

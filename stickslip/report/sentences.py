@@ -16,8 +16,8 @@ _TREND = 0.25  # exponent of the error in the velocity from which it grows or fa
 
 
 def phase_table(by_run: dict[str, dict[str, float]], velocities: dict[str, float]) -> dict[str, Any]:
-    """Error by phase (columns) and run (rows, sorted by drive velocity), as lists."""
-    runs = sorted(by_run, key=lambda name: velocities.get(name, 0.0))
+    """Error by phase (columns) and run (rows, by drive velocity), as lists; runs without an error are left out."""
+    runs = sorted((name for name, errors in by_run.items() if errors), key=lambda name: velocities.get(name, 0.0))
     phases = [p for p in PHASES if any(p in by_run[r] for r in runs)]
     return {
         "phases": phases,

@@ -22,6 +22,7 @@ from stickslip.diagnose.verdict import (
     is_complete,
     judge,
     nothing,
+    passed_over,
     weights,
     worst_phase,
 )
@@ -98,6 +99,24 @@ def candidate(tag: str, cost: float, score: float, at_bound: bool = False) -> Ca
               np.zeros((*shape, len(z))), np.ones((1, 1), bool), 1, 1)  # fmt: skip
     train = Misfit(1.0, {"creep": 1.0}, {})
     return Candidate(tag, {}, effect, 0.5, fit=fit, train=train, held=held(score))
+
+
+def test_a_candidate_that_meets_every_condition_is_told_why_it_is_not_named():
+    base = held(9.0)
+    tried = [
+        candidate("contact-ageing", 300, 0.8),
+        candidate("rate-and-state", 298, 0.8),
+        candidate("viscous-drag", 305, 0.8),
+        candidate("tilt", 600, 0.9),
+        candidate("wear", 950, 8.5),
+    ]
+    judged = [judge(c, 1000.0, base) for c in tried]
+    why = {j.candidate.tag: passed_over(j, judged) for j in judged}
+    assert why["contact-ageing"] == ()
+    assert "contains contact-ageing" in why["rate-and-state"][0]
+    assert "cannot tell it from contact-ageing" in why["viscous-drag"][0]
+    assert "100 % above that of contact-ageing" in why["tilt"][0]
+    assert why["wear"] == judged[-1].failures != ()
 
 
 def test_a_clear_winner_is_named():
