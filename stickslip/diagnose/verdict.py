@@ -129,7 +129,7 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
                 continue
             low, high = f.bounds
             if min(z - low, high - z) < 0.004 * (high - low) and abs(f.outward(float(z)) - null) > 0:
-                fails.append(f"{f.name.split('.', 1)[1]} ends at the border of its plausible range")
+                fails.append(f"its '{f.name.split('.', 1)[1]}' ends at the border of its plausible range")
                 plausible = False
     return Judged(candidate, cost, tuple(fails), plausible)
 

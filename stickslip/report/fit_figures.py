@@ -88,7 +88,9 @@ def residual_plots(data: xarray.Dataset) -> Figure:
             xlabel=text + (f" / ({shown})" if "/" in shown else f" / {shown}" if shown != "1" else ""),
             ylabel="residual / floor",
         )
-    axes[0, 0].legend(fontsize=8)
+    marks = {label: mark for ax in axes.flat for mark, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    if marks:
+        made.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=len(marks), fontsize=8)
     return made
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..features.layout import PHASES
 from ..features.measurement import Measurement
+from ..units import shown
 
 GOOD = 1.3  # error (rms over floor) up to which a phase counts as described
 FAILED = 50.0  # error from which a fit describes nothing
@@ -91,7 +92,7 @@ def _place(m: Measurement, z: np.ndarray, phase: str) -> str:
 
 
 def _seconds(value: float) -> str:
-    return f"{value * 1e3:.2g} ms" if value < 1 else f"{value:.2g} s"
+    return shown(value, "s", 2)
 
 
 def _trend(m: Measurement, z: np.ndarray, phase: str) -> str:
