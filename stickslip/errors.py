@@ -6,6 +6,8 @@ import difflib
 from collections.abc import Iterable
 from pathlib import Path
 
+_TIED = 0.1  # spellings hardly less alike than the closest are named with it
+
 
 class StickslipError(Exception):
     """Base of every error this program raises on purpose."""
@@ -81,7 +83,11 @@ class RunFolderError(InputError):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A hint that names the valid spelling closest to ``name``, or lists all of them."""
+    """A hint that names the valid spelling closest to ``name``, those about as close, or lists all of them."""
     known = sorted(known)
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"did you mean '{close[0]}'?" if close else f"one of: {', '.join(known)}"
+    close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    if not close:
+        return f"one of: {', '.join(known)}"
+    best = difflib.SequenceMatcher(None, close[0], name).ratio()
+    close = [c for c in close if difflib.SequenceMatcher(None, c, name).ratio() > best - _TIED]
+    return f"did you mean {' or '.join(repr(c) for c in close)}?"

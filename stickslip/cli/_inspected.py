@@ -32,6 +32,7 @@ _MEANINGS = {
     "ring_frequency": "ring, decay: frequency of the ring-down and time in which it falls by a factor e",
     "hold_moved": "in hold: displacement while the drive stood still",
 }
+Scales = dict[tuple[str, str], tuple[int, str]]
 _ROWS = "scatter: from event to event; sensor: what its noise alone makes"
 
 
@@ -44,8 +45,9 @@ def text(result: Mapping[str, Any], variables: Mapping[str, tuple], out: Path | 
     """Everything, as lines no longer than ``columns`` where words allow."""
     rows = result["traces"]
     lines = [f"{result['title']}: {len(rows)} trace{'s' * (len(rows) != 1)}", "", *_traces(rows, columns)]
+    scales = _scales(rows)
     for i, row in enumerate(rows):
-        lines += ["", *_fold(_heading(row), columns), *_drawing(variables, i, columns), *_events(row, columns)]
+        lines += ["", *_fold(_heading(row), columns), *_drawing(variables, i, columns), *_events(row, scales, columns)]
         said = [*(f"warning: {w}" for w in row["warnings"]), *(f"mended: {w}" for w in row["repairs"])]
         said += [f"left out: {w}" for w in row["dropped"]]
         if row.get("ripple", {}).get("lines"):
@@ -142,15 +144,31 @@ def _scale(values: Sequence[float], unit: str) -> tuple[int, str]:
     return power, f"{PREFIXES[power]}{unit}"
 
 
-def _events(row: Mapping[str, Any], columns: int) -> list[str]:
+def _scales(rows: Sequence[Mapping[str, Any]]) -> Scales:
+    """Power of ten and symbol for every column and its SI unit, the same in the tables of all traces."""
+    values: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        units = _units(row)
+        for event in _with_holds(row):
+            for key, _ in _COLUMNS:
+                if _known(event[key]):
+                    values.setdefault((key, units[key]), []).append(event[key])
+    return {column: _scale(known, column[1]) for column, known in values.items()}
+
+
+def _units(row: Mapping[str, Any]) -> dict[str, str]:
+    return {**row["units"], "hold_moved": row["units"]["hold_motion"]}
+
+
+def _events(row: Mapping[str, Any], scales_of: Scales, columns: int) -> list[str]:
     """The table of events: a row each, then median, scatter and noise."""
     events = _with_holds(row)
     if not events:
         return []
-    units = {**row["units"], "hold_moved": row["units"]["hold_motion"]}
+    units = _units(row)
     features = {**row["features"], "hold_moved": row["features"]["hold_motion"]}
     shown = _shown(events)
-    scales = {key: _scale([e[key] for e in events if _known(e[key])], units[key]) for key, _ in shown}
+    scales = {key: scales_of[key, units[key]] for key, _ in shown}
     body: list[list[str]] = []
     kept = events if len(events) <= MOST_EVENTS else events[: MOST_EVENTS - 2]
     for e in kept:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ..plots.style import DARK, LIGHT, MIDDLE, figure, remark, scaled, styled
 from .figures import plain, series
@@ -121,6 +122,8 @@ def creep_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: in
         low.plot(t, (u - model) * k, color=DARK, lw=1.0)
         low.axhline(0.0, color=LIGHT, lw=0.8)
         low.set(xlabel="time to v_lim / s", ylabel=f"residual / {unit}")
+        for ax in (top, low):
+            ax.xaxis.set_major_locator(MaxNLocator(4))  # 0.0625 is a wide label
     axes[0, 0].legend(fontsize=8, loc="upper left")
     return made
 

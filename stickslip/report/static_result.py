@@ -18,6 +18,7 @@ from ..trace import Trace
 from ..units import shown
 
 MOST_SHOWN = 60
+_APART = 0.2  # of H, a third of the range that surfaces have
 Variables = dict[str, tuple[str, np.ndarray, dict[str, Any]]]
 
 
@@ -93,6 +94,7 @@ def _creep_part(fit: StaticFit, v_lim: float) -> dict[str, Any]:
     mean = (
         f"over these H = {numbers['hurst']:.2f} +- {numbers['hurst_std']:.2f}, "
         f"h_rms = {numbers['h_rms'] * 1e6:.3g} +- {numbers['h_rms_std'] * 1e6:.2g} µm (mean and standard deviation)"
+        f"{_range(fit)}"
         if fit.good
         else "so there is no mean to give"
     )
@@ -121,6 +123,16 @@ def _creep_part(fit: StaticFit, v_lim: float) -> dict[str, Any]:
         **numbers,
         "fits": [_one(f) for f in fit.fits],
     }
+
+
+def _range(fit: StaticFit) -> str:
+    """The smallest and largest H; that one surface has but one H, where they are far apart."""
+    values = [f.hurst for f in fit.good]
+    low, high = min(values), max(values)
+    if len(values) < 2 or high - low < 0.05:
+        return ""
+    apart = ", though one surface has one H" if high - low > _APART else ""
+    return f", H from {low:.2f} to {high:.2f}{apart}"
 
 
 def _one(f: CreepFit) -> dict[str, Any]:

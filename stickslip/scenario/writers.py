@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..units import shown
 from .contact_tables import ElasticTable, RoughLineTable
 from .load import Scenario
 
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     Run = xarray.Dataset | Recording
 
 Array = np.ndarray
+_UNITS = {
+    "mass": "kg", "spring_stiffness": "N/m", "normal_force": "N", "youngs_modulus": "Pa", "line_length": "m",
+}  # fmt: skip
 # channel -> variable of the data set, unit in the file, its factor to SI
 CHANNELS = {
     "displacement": ("reading", "um", 1e-6),
@@ -63,7 +67,7 @@ def write_campaign(folder: str | Path, scenarios: Sequence[Scenario], runs: Sequ
     first = scenarios[0]
     rig = _rig(first)
     lines = ["schema = 1", f"title = {_text(first.title)}", 'note = "simulated"', "", "[rig]"]
-    lines += [f"{key} = {value!r}" for key, value in rig.items()]
+    lines += [f"{key} = {_value(key, value)}" for key, value in rig.items()]
     for number, (scenario, run) in enumerate(zip(scenarios, runs, strict=True), start=1):
         output = scenario.file.output
         name = output.trace or "trace.csv"
@@ -76,7 +80,7 @@ def write_campaign(folder: str | Path, scenarios: Sequence[Scenario], runs: Sequ
             columns[channel] = (run[variable].values / factor, unit)
         write_trace(folder / name, columns)
         own = {key: value for key, value in _rig(scenario).items() if rig.get(key) != value}
-        lines += ["", *_entry(name, scenario, run), *(f"{key} = {value!r}" for key, value in own.items())]
+        lines += ["", *_entry(name, scenario, run), *(f"{key} = {_value(key, value)}" for key, value in own.items())]
     path = folder / CAMPAIGN
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
@@ -116,9 +120,9 @@ def _entry(name: str, scenario: Scenario, run: Run) -> list[str]:
 def _counter(sensor: Any, run: Run) -> list[str]:
     if not sensor.resolution:
         return []
-    parts = [f'resolution = "{sensor.resolution * 1e9:.10g} nm"']
+    parts = [f"resolution = {_quantity(sensor.resolution, 'm')}"]
     if sensor.counter_steps:
-        parts.append(f'wrap = "{sensor.counter_steps * sensor.resolution * 1e6:.10g} um"')
+        parts.append(f"wrap = {_quantity(sensor.counter_steps * sensor.resolution, 'm')}")
     if sensor.clear_at_arrest and run.sizes["event"]:
         parts.append(f"resets = {[float(t) for t in run['arrest'].values]!r}")
     return parts
@@ -127,16 +131,25 @@ def _counter(sensor: Any, run: Run) -> list[str]:
 def _drive(scenario: Scenario, run: Run) -> str:
     drive = scenario.file.drive
     if drive.velocity is not None:
-        return f"drive_velocity = {drive.velocity:.10g}"
+        return f"drive_velocity = {_quantity(drive.velocity, 'm/s')}"
     from .drive import load_point
 
     motion = load_point(drive, scenario.folder)
     speeds = np.diff(motion.positions) / np.diff(motion.times)
     pieces = (
-        f"{{ until = {t!r}, velocity = {v!r} }}"
+        f"{{ until = {_text(f'{t:.12g} s')}, velocity = {_quantity(v, 'm/s')} }}"
         for t, v in zip(motion.times[1:].tolist(), speeds.tolist(), strict=True)
     )
     return f"drive = [{', '.join(pieces)}]"
+
+
+def _value(key: str, value: Any) -> str:
+    return _quantity(value, _UNITS[key]) if key in _UNITS else repr(value)
+
+
+def _quantity(value: float, unit: str) -> str:
+    """A quantity as a person would write it into the file, in letters that are on every keyboard."""
+    return _text(shown(value, unit, 10).replace("µ", "u"))
 
 
 def _text(value: str) -> str:
