@@ -61,13 +61,7 @@ class Run:
 
     def text(self, content: str, name: str) -> Path:
         """Write a text file, aside and renamed."""
-        path = self.path(name)
-        aside = path.with_name(path.name + ".part")
-        with aside.open("w", encoding="utf-8") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        return aside.replace(path)
+        return write_aside(self.path(name), content)
 
     def arrays(self, data: Arrays, name: str = "arrays.nc") -> Path:
         """Write a data set as NetCDF."""
@@ -77,6 +71,20 @@ class Run:
         _reserve(aside, sum(v.nbytes for v in values) + 8192 * (len(values) + 4))
         data.to_netcdf(aside, engine="h5netcdf")
         return aside.replace(path)
+
+
+def write_aside(path: Path, content: str | bytes) -> Path:
+    """Write a file aside and rename it, so that it is there as a whole or not at all; an error leaves nothing behind."""
+    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with aside.open("wb") as stream:
+            stream.write(content.encode("utf-8") if isinstance(content, str) else content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        return aside.replace(path)
+    except OSError:
+        aside.unlink(missing_ok=True)
+        raise
 
 
 def _reserve(path: Path, size: int) -> None:
@@ -116,6 +124,8 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
         if partial.exists() and not resumed:
             shutil.rmtree(partial)
         partial.mkdir(parents=True, exist_ok=True)
+        for half in partial.rglob("*.part"):  # of a process that was killed while it wrote
+            half.unlink()
         try:
             yield Run(partial, target, resumed)
         except BaseException:

@@ -9,7 +9,8 @@ import xarray
 from matplotlib.colors import to_rgb
 
 from stickslip.plots import creep_figure, effect_figure, save, series_figure, static_against_inertial, trace_figure
-from stickslip.plots.style import scaled, thin
+from stickslip.plots.style import scaled
+from stickslip.segment import thin
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import RunFolderError
-from stickslip.runstore import RESULT, file_record, json_text, open_run, read_result, versions
+from stickslip.runstore import RESULT, file_record, json_text, open_run, read_result, versions, write_aside
 
 
 def names(folder: Path) -> list[str]:
@@ -106,6 +106,25 @@ def test_a_killed_run_frees_its_lock_and_can_be_resumed(tmp_path):
         run.json({"value": 7})
     assert names(tmp_path) == ["run"]
     assert read_result(tmp_path / "run")["value"] == 7
+
+
+def test_halves_of_files_are_not_resumed(tmp_path):
+    (tmp_path / "run.partial" / "pieces").mkdir(parents=True)
+    (tmp_path / "run.partial" / "pieces" / "whole.txt").write_text("whole")
+    for name in (".result.json.4711.part", "pieces/base.part"):
+        (tmp_path / "run.partial" / name).write_text("hal")
+    write(tmp_path / "run", resume=True)
+    assert names(tmp_path / "run") == ["pieces", RESULT]
+    assert names(tmp_path / "run" / "pieces") == ["whole.txt"]
+
+
+def test_a_file_is_written_as_a_whole_or_not_at_all(tmp_path):
+    path = write_aside(tmp_path / "a.txt", "µ")
+    assert path.read_bytes() == "µ".encode()
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(OSError):
+        write_aside(tmp_path / "taken", b"x")
+    assert names(tmp_path) == ["a.txt", "taken"]
 
 
 def test_without_resume_what_was_left_behind_is_removed(tmp_path):

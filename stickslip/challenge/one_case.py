@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import socket
 import time
 import traceback
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RunFolderError, StickslipError
-from ..runstore import RESULT, json_text
+from ..runstore import RESULT, json_text, write_aside
 
 Diagnosis = Callable[[Path, Path], Any]
 WAIT = 60.0  # s for a process that was given up, but still holds the case, to finish or to end
@@ -54,10 +53,7 @@ def record_failure(runs: Path, case: str, error: BaseException, seconds: float) 
         "seconds": round(seconds, 1),
         "host": socket.gethostname(),
     }
-    path = failures_file(runs, case)
-    aside = path.with_name(f"{path.name}.{os.getpid()}.part")
-    aside.write_text(json_text([*failures(runs, case), entry]) + "\n", encoding="utf-8")
-    aside.replace(path)
+    write_aside(failures_file(runs, case), json_text([*failures(runs, case), entry]) + "\n")
     return entry
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 import uuid
 from collections import Counter
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, StickslipError
-from ..runstore import json_text, versions
+from ..runstore import json_text, versions, write_aside
 from ..workflow import diagnose_campaign
 from .cluster import cluster
 from .one_case import Diagnosis, do_case, failures, is_done
@@ -97,9 +96,7 @@ def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
     now = {"seal": seal, **options, "thresholds": asdict(THRESHOLDS), "versions": versions()}
     path = runs / PROTOCOL
     if not path.is_file():
-        aside = path.with_name(f"{path.name}.{os.getpid()}.part")
-        aside.write_text(json_text(now) + "\n", encoding="utf-8")
-        aside.replace(path)
+        write_aside(path, json_text(now) + "\n")
         return
     before = read_protocol(runs)
     for key in ("seal", "candidates", "max_effects", "thresholds"):

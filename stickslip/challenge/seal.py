@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..runstore import file_record, json_text
+from ..runstore import file_record, json_text, write_aside
 
 SEAL = "seal.json"
 TRUTH = "sealed/truth.json"
@@ -25,7 +25,7 @@ def make_seal(folder: Path, files: Iterable[Path], **more: Any) -> str:
     """Write ``seal.json`` for ``files`` below ``folder``; returns its own digest, by which it can be published."""
     found = {path.relative_to(folder).as_posix(): file_record(path)["sha256"] for path in sorted(files)}
     text = json_text({"schema": 1, **more, "files": found}) + "\n"
-    (folder / SEAL).write_text(text, encoding="utf-8", newline="\n")
+    write_aside(folder / SEAL, text)
     return digest(folder)
 
 

@@ -151,13 +151,13 @@ def _write(out: Path, found: dict[str, Any]) -> str:
     from ..challenge.table import score_text
     from ..errors import RunFolderError
     from ..plots import save
-    from ..runstore import json_text
+    from ..runstore import json_text, write_aside
 
     text = score_text(found)
     try:
         out.mkdir(exist_ok=True)
-        (out / "score.json").write_text(json_text(found) + "\n", encoding="utf-8")
-        (out / "score.txt").write_text(text, encoding="utf-8")
+        write_aside(out / "score.json", json_text(found) + "\n")
+        write_aside(out / "score.txt", text)
         save(confusion_figure(found), out / "confusion.png")
         save(confusion_by_amplitude_figure(found), out / "confusion-by-amplitude.png")
         save(amplitude_figure(found), out / "amplitude.png")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -50,10 +49,9 @@ def _write(path: Path, text: str, force: bool) -> None:
     if path.exists() and (not force or not path.is_file()):
         hint = "choose another name, or replace it with --force" if path.is_file() else "choose another name"
         raise RunFolderError("the file exists already", file=path, hint=hint)
-    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    from ..runstore import write_aside
+
     try:
-        aside.write_text(text, encoding="utf-8")
-        aside.replace(path)
+        write_aside(path, text)
     except OSError as error:
-        aside.unlink(missing_ok=True)
         raise RunFolderError(f"the file cannot be written ({error.strerror})", file=path) from None

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .style import DARK, MIDDLE, figure, remark, scaled, styled, thin
+from ..segment import thin
+from .style import DARK, MIDDLE, figure, remark, scaled, styled
 
 if TYPE_CHECKING:
     import xarray

@@ -15,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from ..runstore import write_aside
 from ..units import PREFIXES, power_for, takes_prefix
 
 # dark, middle and light, so that a grey print keeps them apart; the line styles differ as well
@@ -66,18 +67,6 @@ def scaled(values: np.ndarray, unit: str) -> tuple[float, str]:
     return 10.0**-power, PREFIXES[power] + unit
 
 
-def thin(t: np.ndarray, y: np.ndarray, points: int = 4000) -> tuple[np.ndarray, np.ndarray]:
-    """At most about ``points`` samples that keep every bucket's extremes."""
-    if t.size <= points:
-        return t, y
-    bucket = -(-t.size * 2 // points)
-    n = t.size // bucket * bucket
-    blocks = y[:n].reshape(-1, bucket)
-    start = np.arange(0, n, bucket)
-    keep = np.sort(np.concatenate([start + blocks.argmin(1), start + blocks.argmax(1), [0, t.size - 1]]))
-    return t[keep], y[keep]
-
-
 def logarithmic(axes: Axes, which: str) -> None:
     """A logarithmic axis ("x" or "y") with plain numbers at 1, 2 and 5 of every decade."""
     (axes.set_xscale if which == "x" else axes.set_yscale)("log")
@@ -102,5 +91,4 @@ def save(figure: Figure, path: str | Path, dpi: int = 130) -> Path:
     metadata: dict[str, Any] = {"Software": None}
     with rc_context(_LOOK):
         figure.savefig(buffer, format="png", dpi=dpi, metadata=metadata)
-    path.write_bytes(buffer.getvalue())
-    return path
+    return write_aside(path, buffer.getvalue())

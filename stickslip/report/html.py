@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import base64
 import io
-import os
 from collections.abc import Iterable
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import RunFolderError
-from ..runstore import RESULT, read_result
+from ..runstore import RESULT, read_result, write_aside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,14 +38,10 @@ def write_report(folder: str | Path) -> Path:
         what = f"the result does not have the form of a stickslip result ({type(error).__name__}: {error})"
         raise RunFolderError(what, file=folder / RESULT) from error
     path = folder / REPORT
-    aside = path.with_name(f".{REPORT}.{os.getpid()}.part")
     try:
-        aside.write_text(text, encoding="utf-8")
-        aside.replace(path)
+        return write_aside(path, text)
     except OSError as error:
-        aside.unlink(missing_ok=True)
         raise RunFolderError(f"the report cannot be written ({error.strerror})", file=path) from None
-    return path
 
 
 def render(result: dict[str, Any], images: Iterable[tuple[str, str, Figure]]) -> str:

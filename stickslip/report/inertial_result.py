@@ -20,12 +20,12 @@ from ..fit.static_table import StaticRig
 from ..fit.surface import sensitivity, surface_prior
 from ..forward import MOST_STEPS
 from ..residual import Misfit, misfit
-from ..segment import Segmentation
+from ..segment import Segmentation, thin
 from ..trace import Trace
 from ..uncertainty import flat_directions, null_directions, relative
 from ..units import shown
 from .describe import describe_trace
-from .pieces import ZOOM, Variables, middle_event, thinned, trace_pieces
+from .pieces import ZOOM, Variables, middle_event, trace_pieces
 from .sentences import misfit_sentence, phase_table
 
 
@@ -184,7 +184,7 @@ def overlay(
         key = f"trace{i}_model"
         t, y = (np.concatenate(part) for part in (run.times, run.readings))
         order = np.argsort(t, kind="stable")
-        t, y = thinned(t[order], y[order], ZOOM)
+        t, y = thin(t[order], y[order], ZOOM)
         out[f"{key}_time"] = (key, t, {"units": "s"})
         out[f"{key}_position"] = (key, y, {"units": "m"})
         within = found.events[: len(run.times)]
@@ -198,7 +198,7 @@ def overlay(
             ("slip", event.t_onset - 0.3 * event.duration, event.t_arrest + 1.5 * event.duration),
         ):
             low, high = np.searchsorted(trace.time, [start, stop])
-            t, y = thinned(trace.time[low:high], trace.displacement[low:high], ZOOM)
+            t, y = thin(trace.time[low:high], trace.displacement[low:high], ZOOM)
             name = f"trace{i}_{piece}"
             out[f"{name}_time"] = (name, t, {"units": "s"})
             out[f"{name}_position"] = (name, y, {"units": "m"})

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..segment import Event, Segmentation, block_motion, reduce_trace
+from ..segment import Event, Segmentation, block_motion, reduce_trace, thin
 from ..trace import SIGNALS, Trace
 
 OVERVIEW, ZOOM = 3000, 1500
@@ -29,17 +29,17 @@ def trace_pieces(trace: Trace, found: Segmentation, number: int) -> Variables:
         out[f"{key}_position"] = (key, np.asarray(values, float), {"units": unit})
 
     if trace.drive is None or unit != "m":
-        put("whole", *thinned(trace.time, position, OVERVIEW))
+        put("whole", *thin(trace.time, position, OVERVIEW))
     else:
         # a saw-tooth on a long way shows only against the load point: its tips must stay
-        t, gap = thinned(trace.time, trace.drive.position(trace.time) - position, OVERVIEW)
+        t, gap = thin(trace.time, trace.drive.position(trace.time) - position, OVERVIEW)
         put("whole", t, trace.drive.position(t) - gap)
     if found.events:
         event = middle_event(found.events)
         before = found.events[event.index - 1].t_arrest if event.index else float(trace.time[0])
-        put("creep", *thinned(*_cut(trace.time, position, before, event.t_onset), ZOOM))
+        put("creep", *thin(*_cut(trace.time, position, before, event.t_onset), ZOOM))
         ring = event.t_arrest + 1.5 * event.duration
-        put("slip", *thinned(*_cut(trace.time, position, event.t_onset - 0.3 * event.duration, ring), ZOOM))
+        put("slip", *thin(*_cut(trace.time, position, event.t_onset - 0.3 * event.duration, ring), ZOOM))
         key = f"trace{number}_event"
         out[f"{key}_onset"] = (key, np.array([e.t_onset for e in found.events]), {"units": "s"})
         out[f"{key}_arrest"] = (key, np.array([e.t_arrest for e in found.events]), {"units": "s"})
@@ -75,15 +75,3 @@ def middle_event(events: Sequence[Event]) -> Event:
 def _cut(t: np.ndarray, y: np.ndarray, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
     low, high = max(int(np.searchsorted(t, start)) - 1, 0), int(np.searchsorted(t, stop)) + 1
     return t[low:high], y[low:high]
-
-
-def thinned(t: np.ndarray, y: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """At most about ``points`` samples that keep the extremes of every bucket."""
-    if t.size <= points:
-        return t, y
-    bucket = -(-t.size * 2 // points)
-    n = t.size // bucket * bucket
-    blocks = y[:n].reshape(-1, bucket)
-    start = np.arange(0, n, bucket)
-    keep = np.unique(np.concatenate([start + blocks.argmin(1), start + blocks.argmax(1), [0, t.size - 1]]))
-    return t[keep], y[keep]

@@ -15,7 +15,7 @@ from .kinematics import Array, block_motion, position_at, velocity
 from .phases import divide
 from .pick import directions, half_of, pick
 from .records import PHASES, Dropped, Event, Phase, Segmentation, Settings
-from .reduce import reduce_trace
+from .reduce import reduce_trace, thin
 from .ringing import LAWS, Ringing
 from .shape import LEVELS, Shape, Shapes, event_shapes
 
@@ -40,6 +40,7 @@ __all__ = [
     "reduce_trace",
     "segment",
     "segment_motion",
+    "thin",
     "velocity",
 ]
 

@@ -64,3 +64,15 @@ def _log_starts(start: int, stop: int, points: int) -> NDArray[np.intp]:
     left = start + np.concatenate([[0], steps[:-1]])
     right = stop - steps[::-1]
     return np.unique(np.concatenate([left, right]))
+
+
+def thin(t: Array, y: Array, points: int = 4000) -> tuple[Array, Array]:
+    """At most about ``points`` samples that keep every bucket's extremes."""
+    if t.size <= points:
+        return t, y
+    bucket = -(-t.size * 2 // points)
+    n = t.size // bucket * bucket
+    blocks = y[:n].reshape(-1, bucket)
+    start = np.arange(0, n, bucket)
+    keep = np.sort(np.concatenate([start + blocks.argmin(1), start + blocks.argmax(1), [0, t.size - 1]]))
+    return t[keep], y[keep]
