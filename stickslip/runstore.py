@@ -74,7 +74,7 @@ class Run:
 
 
 def write_aside(path: Path, content: str | bytes) -> Path:
-    """Write a file aside and rename it, so that it is there as a whole or not at all; an error leaves nothing behind."""
+    """Write a file aside and rename it, so that it is there whole or not at all; an error leaves nothing behind."""
     aside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with aside.open("wb") as stream:

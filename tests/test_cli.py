@@ -143,7 +143,7 @@ BAD = {
         ["contact.normal_force", "above 0 N"],
     ),
     "unknown key": (["simulate", "rig.toml", "--set", "contact.umax=1um"], ["did you mean 'u_max'"]),
-    "no scenario": (["simulate", "--set", "a.b=1"], ["scenario"]),
+    "no scenario": (["simulate", "--set", "a.b=1"], ["needs SCENARIO"]),
     "two scenarios": (["simulate", "rig.toml", "rig2.toml"], ["more than one"]),
     "unknown option": (["simulate", "rig.toml", "--ot", "x"], ["--ot"]),
     "unknown command": (["simulat"], ["did you mean 'simulate'"]),
