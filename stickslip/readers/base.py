@@ -27,7 +27,7 @@ class Columns:
         ignored: columns left out and why (text, wrong shape).
         notes: what the reader mended or guessed, in words.
         first_line: line of the first row of data in a text file (1 = first), else None.
-        line_numbers: line of each row where rows and lines do not run together.
+        order: names of all columns as they stand in the file, those left out among them; default: those of ``data``.
     """
 
     data: dict[str, NDArray[np.float64]]
@@ -36,6 +36,7 @@ class Columns:
     notes: list[str] = field(default_factory=list)
     first_line: int | None = None
     reader: str = ""
+    order: list[str] = field(default_factory=list)
 
     def find(self, wanted: str | int, *, file: str | Path | None = None, key: str | None = None) -> str:
         """The name of a column asked for by name (also with its unit, or in other case) or by number from 1.
@@ -45,11 +46,13 @@ class Columns:
         """
         names = list(self.data)
         if isinstance(wanted, int) and not isinstance(wanted, bool):
-            if 1 <= wanted <= len(names):
-                return names[wanted - 1]
-            raise InputError(
-                f"there is no column {wanted}", file=file, key=key, allowed=f"1 to {len(names)}: {', '.join(names)}"
-            )
+            order = self.order or names
+            if not 1 <= wanted <= len(order):
+                allowed = f"1 to {len(order)}: {', '.join(order)}"
+                raise InputError(f"there is no column {wanted}", file=file, key=key, allowed=allowed)
+            if order[wanted - 1] in self.data:
+                return order[wanted - 1]
+            wanted = order[wanted - 1]
         text = str(wanted).strip()
         bare = split_unit(text)[0]
         for test in (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from array import array
 from collections.abc import Iterator
@@ -31,6 +32,7 @@ class _Layout:
     units: dict[str, str]
     numeric: list[int]
     ignored: dict[str, str]
+    trailing: bool  # rows end with a delimiter
 
 
 class TextReader:
@@ -60,7 +62,7 @@ class TextReader:
         if layout.decimal == ",":
             notes.append("decimal comma")
         data = {layout.names[c]: np.ascontiguousarray(table[:, k]) for k, c in enumerate(layout.numeric)}
-        columns = Columns(data, layout.units, layout.ignored, notes, layout.skip + 1)
+        columns = Columns(data, layout.units, layout.ignored, notes, layout.skip + 1, order=layout.names)
         return need_columns(columns, path)
 
 
@@ -90,7 +92,7 @@ def _layout(path: Path, head: bytes, *, whole: bool) -> _Layout:
         (
             i
             for i, line in enumerate(lines)
-            if not line.lstrip().startswith(_COMMENTS) and _is_data(_split(line, delimiter), width, decimal)
+            if not line.lstrip().startswith(_COMMENTS) and _is_data(_row(line, delimiter, width), width, decimal)
         ),
         None,
     )
@@ -102,14 +104,15 @@ def _layout(path: Path, head: bytes, *, whole: bool) -> _Layout:
             value=lines[0][:60],
             hint="is it the right file?",
         )
-    rows = [row for row in rows if len(row) == width and _is_data(row, width, decimal)]
+    rows = [row for line in sample if _is_data(row := _row(line, delimiter, width), width, decimal)]
+    ends = [len(_fields(line, delimiter)) for line in sample if delimiter and line.rstrip().endswith(delimiter)]
     numeric = [
         c for c in range(width) if sum(_number(row[c], decimal) or _empty(row[c]) for row in rows) > len(rows) / 2
     ]
     numeric = [c for c in numeric if any(_number(row[c], decimal) for row in rows)]
     names, units = _header(lines[:first], delimiter, width)
     ignored = {names[c]: f"it holds text such as '{rows[0][c]}'" for c in range(width) if c not in numeric}
-    return _Layout(encoding, delimiter, decimal, first, names, units, numeric, ignored)
+    return _Layout(encoding, delimiter, decimal, first, names, units, numeric, ignored, width + 1 in ends)
 
 
 def _separators(sample: list[str]) -> tuple[str | None, str]:
@@ -120,11 +123,12 @@ def _separators(sample: list[str]) -> tuple[str | None, str]:
             if delimiter and sum(delimiter in line for line in sample) < 0.5 * len(sample):
                 continue
             rows = [_split(line, delimiter) for line in sample[-50:]]
+            lines = len(rows)
             rows = [row for row in rows if any(_number(f, decimal) for f in row)]
             fields = sum(map(len, rows))
             good = sum(_number(f, decimal) for row in rows for f in row)
             blank = sum(_empty(f) for row in rows for f in row)
-            share = good / max(fields - blank, 1)
+            share = good / max(fields - blank, 1) * len(rows) / lines
             if delimiter is None and decimal == "," and fields == len(rows):
                 share *= 0.5  # "1,5" alone in its line is rather two columns
             if (share, good) > best[:2]:
@@ -132,11 +136,27 @@ def _separators(sample: list[str]) -> tuple[str | None, str]:
     return best[2], best[3]
 
 
-def _split(line: str, delimiter: str | None) -> list[str]:
+def _fields(line: str, delimiter: str | None) -> list[str]:
     if delimiter is None:
         return line.split()
-    fields = [field.strip().strip('"').strip() for field in line.rstrip("\r\n").split(delimiter)]
-    if len(fields) > 1 and fields[-1] == "":  # a delimiter at the end of the line
+    line = line.rstrip("\r\n")
+    quoted = '"' in line
+    parts = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True)) if quoted else line.split(delimiter)
+    return [part.strip().strip('"').strip() for part in parts]
+
+
+def _split(line: str, delimiter: str | None) -> list[str]:
+    """Fields of a line, where nothing is known of the others."""
+    fields = _fields(line, delimiter)
+    if delimiter and len(fields) > 1 and fields[-1] == "":  # a delimiter at the end of the line
+        fields.pop()
+    return fields
+
+
+def _row(line: str, delimiter: str | None, width: int) -> list[str]:
+    """Fields of a line of a table this wide, in which the last field may be empty and a last delimiter end the line."""
+    fields = _fields(line, delimiter)
+    if len(fields) == width + 1 and fields[-1] == "":
         fields.pop()
     return fields
 
@@ -207,10 +227,13 @@ def _lines(path: Path, layout: _Layout) -> Iterator[str]:
 
 
 def _fast(path: Path, layout: _Layout) -> np.ndarray:
+    chosen = layout.trailing or len(layout.numeric) < len(layout.names)
+    if chosen and layout.delimiter:
+        _check_lengths(path, layout)
     options: dict[str, Any] = {
         "delimiter": layout.delimiter,
         "comments": "#",  # more than one mark makes numpy five times slower; others are met in _careful
-        "usecols": layout.numeric,
+        "usecols": layout.numeric if chosen else None,  # without a choice numpy sees rows that are too long
         "ndmin": 2,
         "quotechar": '"',
     }
@@ -218,6 +241,16 @@ def _fast(path: Path, layout: _Layout) -> np.ndarray:
     if plain:
         return np.loadtxt(path, skiprows=layout.skip, encoding=layout.encoding, **options)
     return np.loadtxt(_lines(path, layout), **options)
+
+
+def _check_lengths(path: Path, layout: _Layout) -> None:
+    """`ValueError` where some row is longer than the others."""
+    most = len(layout.names) - (not layout.trailing)
+    assert layout.delimiter is not None
+    with path.open(encoding=layout.encoding, errors="replace") as stream:
+        for line in islice(stream, layout.skip, None):
+            if line.count(layout.delimiter) > most:
+                raise ValueError(line)
 
 
 def _careful(path: Path, layout: _Layout) -> tuple[np.ndarray, list[str]]:
@@ -229,23 +262,16 @@ def _careful(path: Path, layout: _Layout) -> tuple[np.ndarray, list[str]]:
         if not stripped or stripped.startswith(_COMMENTS):
             continue
         if short is not None:
-            raise InputError(
-                f"a row has {short[1]} fields where {len(layout.names)} are expected",
-                file=path,
-                key=f"line {short[0]}",
-                value=short[2],
-                hint="delete or complete the line",
-            )
-        row = _split(line, layout.delimiter)
+            raise _wrong_length(path, *short, layout)
+        row = _row(line, layout.delimiter, len(layout.names))
         if len(row) < needed:
-            if len(row) == len(layout.names) - 1 and line.rstrip("\r\n").endswith(layout.delimiter or "\n"):
-                row.append("")
-            else:
-                short = (number, len(row), stripped[:60])
-                continue
+            short = (number, len(row), stripped[:60])
+            continue
+        if len(row) > len(layout.names):
+            raise _wrong_length(path, number, len(row), stripped, layout)
         for c in layout.numeric:
             try:
-                values.append(float(row[c]))
+                values.append(float(row[c] if "_" not in row[c] else "no number"))
             except ValueError:
                 if not _empty(row[c]):
                     raise InputError(
@@ -263,3 +289,13 @@ def _careful(path: Path, layout: _Layout) -> tuple[np.ndarray, list[str]]:
             f"line {short[0]}, the last, is cut short ({short[1]} of {len(layout.names)} fields) and was left out"
         )
     return np.frombuffer(values, float).reshape(-1, len(layout.numeric)), notes
+
+
+def _wrong_length(path: Path, line: int, fields: int, text: str, layout: _Layout) -> InputError:
+    return InputError(
+        f"a row has {fields} fields where {len(layout.names)} are expected",
+        file=path,
+        key=f"line {line}",
+        value=text[:60],
+        hint="delete or complete the line",
+    )

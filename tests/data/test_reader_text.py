@@ -39,6 +39,62 @@ def test_every_kind_of_table_gives_the_same_numbers(tmp_path, delimiter, decimal
     assert columns.first_line == (2 if header else 1)
 
 
+def test_a_number_counts_all_columns_of_the_file(tmp_path, refuses):
+    lines = [f"12:00:0{i},{t!r},{x!r}" for i, (t, x) in enumerate(zip(T.tolist(), X.tolist(), strict=True))]
+    columns = read_columns(write(tmp_path / "a.csv", lines))
+    assert columns.find(2) == "column 2"
+    assert np.array_equal(columns.data[columns.find(3)], X)
+    refuses(lambda: columns.find(1), "'column 1' cannot be used", "text such as '12:00:0")
+    refuses(lambda: columns.find(4), "there is no column 4", "1 to 3")
+
+
+@pytest.mark.parametrize("end", ["", ","])
+def test_first_rows_may_lack_their_last_value(tmp_path, end):
+    lines = [
+        "0," + end,
+        "0.001," + end,
+        *(f"{t!r},{x!r}{end}" for t, x in zip(T.tolist()[2:], X.tolist()[2:], strict=True)),
+    ]
+    columns = read_columns(write(tmp_path / "a.csv", lines, header="t [s],x [um]" + end))
+    assert columns.units == {"t": "s", "x": "um"}
+    assert np.array_equal(columns.data["t"], T)
+    assert np.isnan(columns.data["x"][:2]).all()
+    assert np.array_equal(columns.data["x"][2:], X[2:])
+    assert "2 empty fields" in columns.notes[0]
+
+
+def test_a_text_column_and_a_last_line_cut_short(tmp_path):
+    lines = [f"{0.001 * i:.4f},{0.1 * i:.4f},ok" for i in range(300)] + ["0.3000"]
+    columns = read_columns(write(tmp_path / "a.csv", lines, header="t,x,state"))
+    assert list(columns.data) == ["t", "x"]
+    assert columns.data["t"].size == 300
+    assert any("line 302, the last, is cut short" in note for note in columns.notes)
+
+
+@pytest.mark.parametrize("extra", ["", ",ok"])
+def test_a_row_too_long_is_refused_and_named(tmp_path, refuses, extra):
+    lines = [f"{row}{extra}" for row in rows(",")]
+    lines[3] += ",7,7"
+    refuses(
+        lambda: read_columns(write(tmp_path / "a.csv", lines, header="t,x" + extra)),
+        "line 5",
+        "fields where",
+        "complete",
+    )
+
+
+def test_a_delimiter_within_quotes_divides_nothing(tmp_path):
+    columns = read_columns(write(tmp_path / "a.csv", rows(","), header='"Time, elapsed [s]","x [um]"'))
+    assert columns.units == {"Time, elapsed": "s", "x": "um"}
+    assert np.array_equal(columns.data["x"], X)
+
+
+def test_a_number_has_no_underscores(tmp_path, refuses):
+    lines = rows(",")
+    lines[2] = "0.002,1_000"
+    refuses(lambda: read_columns(write(tmp_path / "a.csv", lines, header="t,x")), "not a number", "line 4", "1_000")
+
+
 def test_decimal_comma_between_blanks(tmp_path):
     columns = read_columns(write(tmp_path / "a.txt", rows(" ", ",")))
     assert np.array_equal(columns.data["column 2"], X)
