@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -115,7 +116,7 @@ class _Assembly:
         entry = self.entry
         if entry.time is None:
             assert entry.sampling_rate is not None  # one of the two, by the model's check
-            size = next(iter(columns.data.values())).size
+            size = self._size(columns)
             self.used["time"] = f"sampling rate {entry.sampling_rate:g} Hz"
             return np.arange(size) / entry.sampling_rate
         try:
@@ -127,6 +128,15 @@ class _Assembly:
                     error.what, file=error.file, key=error.key, value=error.value, allowed=error.allowed, hint=hint
                 ) from None
             raise
+
+    def _size(self, columns: Columns) -> int:
+        """Samples of the first channel that is in this file; which other arrays are there does not matter."""
+        for name in _CHANNELS:
+            spec = getattr(self.entry, name)
+            if spec is not None and spec.file is None:
+                with suppress(InputError):  # a column that is not there is met with its key later
+                    return columns.data[columns.find(spec.column)].size
+        return next(iter(columns.data.values())).size
 
     def _scaled(self, columns: Columns, path: Path, name: str, spec: TimeColumn | Channel) -> Array:
         """A column in SI."""
@@ -281,13 +291,20 @@ class _Assembly:
                 values, done = unwrap(values, spec.wrap, name, count)
                 self.repairs += done
             level = noise_level(values, count)
-            values, done = join_resets(time, values, name, spec.resets, count, level)
+            values, done = join_resets(time, values, name, self._within(spec.resets), count, level)
             self.repairs += done
             if self.entry.spikes:
                 values, done = despike(values, name, time, max(level, count or 0.0))
                 self.repairs += done
             data[name], resolution[name], noise[name] = values, count, level
         return resolution, noise
+
+    def _within(self, resets: Sequence[float] | bool) -> Sequence[float] | bool:
+        """Those that are not cut off with the rest of the record."""
+        if isinstance(resets, bool):
+            return resets
+        start, stop = self.entry.start, self.entry.stop
+        return [t for t in resets if (start is None or t > start) and (stop is None or t <= stop)]
 
     def _drive(
         self, time: Array, data: dict[str, Array], resolution: dict[str, float | None], noise: dict[str, float]

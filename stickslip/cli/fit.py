@@ -105,14 +105,17 @@ def fit(
 
 
 def _gains(traces: list[Trace], found: list[Segmentation]) -> tuple[list[Segmentation], list[str]]:
-    """Events of traces of spring force, with the force's scale set right where the sticks show that it is wrong."""
-    from ..report.describe import stick_gain
+    """Events of traces of spring force, with the force's scale set right where the sticks show that it is wrong.
+
+    A force that rises too slowly is left as it is: a block that creeps along makes the same.
+    """
+    from ..report.describe import gain_is_wrong, stick_gain
     from ..segment import segment
 
     out, notes = [], []
     for trace, old in zip(traces, found, strict=True):
         gain = stick_gain(trace, old)
-        if gain is None or trace.spring_stiffness is None or abs(gain["value"] - 1.0) < max(0.02, 3 * gain["std"]):
+        if gain is None or trace.spring_stiffness is None or not gain_is_wrong(gain):
             out.append(old)
             continue
         out.append(segment(trace, spring_stiffness=trace.spring_stiffness * gain["value"]))

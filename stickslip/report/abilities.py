@@ -12,7 +12,7 @@ from ..fit.creep_process import V_LIM, creep_processes
 from ..fit.normalised import is_ramp
 from ..segment import LAWS, Segmentation, Shapes, event_shapes
 from ..trace import Trace
-from .describe import stick_gain
+from .describe import gain_is_wrong, stick_gain
 
 _RING_RATE = 5000.0  # Hz: a contact resonance of some 500 Hz needs ten samples a period
 _PACED = 4  # slips from which the mean velocity of the block is that of its drive
@@ -143,14 +143,21 @@ def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
     good: list[str] = []
     for t, s in pairs:
         gain = stick_gain(t, s)
-        if gain is not None and abs(gain["value"] - 1.0) > max(0.02, 3 * gain["std"]):
-            share = 100 * (gain["value"] - 1.0)
-            bad.append(
+        if gain is not None and abs(share := 100 * (gain["value"] - 1.0)) > 100 * max(0.02, 3 * gain["std"]):
+            rises = (
                 f"{t.name}: while the block sticks the force rises {gain['value']:.3f} (+-{gain['std']:.3f}) times as "
-                f"fast as stiffness times drive, which no motion of the block explains"
-                f"{'' if share < 0 else ' (creep can only lower it)'}: sensor-gain of about {share:+.0f} %, or the "
-                "stiffness or the drive's velocity is wrong by as much."
+                "fast as stiffness times drive"
             )
+            scale = (
+                f"sensor-gain of about {share:+.0f} %, or the stiffness or the drive's velocity is wrong by as much."
+            )
+            if gain_is_wrong(gain):
+                bad.append(f"{rises}, which no motion of the block explains (creep can only lower it): {scale}")
+            else:
+                bad.append(
+                    f"{rises}: the block creeps along at {-share:.0f} % of the drive's velocity, or {scale} Force alone "
+                    "cannot tell the two apart: measure the block's position as well."
+                )
         if s.settings.unit != "m":
             bad.append(f"{t.name}: neither stiffness nor drive is known, so lengths are in seconds of loading.")
     return good, bad

@@ -166,6 +166,11 @@ def describe_trace(trace: Trace, found: Segmentation) -> dict[str, Any]:
     }
 
 
+def gain_is_wrong(gain: Mapping[str, float]) -> bool:
+    """Whether the scale of the force must be wrong (see `stick_gain`): it rises faster than the drive can stretch."""
+    return gain["value"] - 1.0 > max(0.02, 3 * gain["std"])
+
+
 def stick_gain(trace: Trace, found: Segmentation) -> dict[str, float] | None:
     """Slope of the spring's force in early stick over stiffness times drive, for traces of force alone.
 

@@ -91,6 +91,24 @@ def test_sampling_rate_in_place_of_time(campaign, run):
     assert trace.time == pytest.approx(t)
 
 
+def test_a_sampling_rate_is_for_the_signal_and_not_for_what_else_is_in_the_file(campaign, run, tmp_path):
+    _, x = run
+    path = campaign('sampling_rate = "10 kHz"\n' + X + DRIVE, rows=np.zeros((2, 2)))
+    np.savez(tmp_path / "a.npz", calibration=np.ones(3), x=x)
+    path.write_text(path.read_text().replace("a.csv", "a.npz"))
+    assert only(path).time.size == x.size
+
+
+def test_resets_outside_what_is_read_are_cut_with_it(campaign, run):
+    t, x = run
+    cleared = x.copy()
+    for moment in (1.0, 2.5):
+        cleared[t >= moment] -= cleared[t >= moment][0]
+    body = 'start = "0.1 s"\nstop = "2 s"\n' + TIME + X.replace('"um"', '"um", resets = ["1 s", "2.5 s"]') + DRIVE
+    trace = only(campaign(body, rows=np.column_stack([t, cleared])))
+    assert [repair.count for repair in trace.repairs if repair.kind == "reset"] == [1]
+
+
 def test_all_repairs_together_are_counted_and_exact(campaign, run):
     t, x = run
     bad = (x + 16.2) % (4096 * LSB) - 16.2

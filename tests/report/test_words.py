@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from stickslip.cli.fit import _gains
 from stickslip.features.layout import PHASES, Layout
 from stickslip.report import abilities, misfit_sentence, phase_table
 from stickslip.report.describe import describe_trace, stick_gain
@@ -50,6 +51,19 @@ def test_a_force_sensor_that_reads_too_much_is_named_with_its_size():
     assert "sensor-gain of about +10 %" in text
     trace = sawtooth(gain=1.0, creep=8e-6)
     assert "sensor-gain" not in " ".join(abilities([trace], [segment(trace)]).cannot)
+
+
+def test_a_force_that_rises_too_slowly_may_be_creep_and_is_left_as_it_is():
+    trace = sawtooth(gain=0.9, creep=8e-6)
+    found = segment(trace)
+    assert not gain_is_wrong(stick_gain(trace, found))
+    text = " ".join(abilities([trace], [found]).cannot)
+    assert "creeps along at 10 % of the drive's velocity, or sensor-gain of about -10 %" in text
+    assert _gains([trace], [found]) == ([found], [])
+    fast = sawtooth(gain=1.1, creep=8e-6)
+    (mended,), (note,) = _gains([fast], [segment(fast)])
+    assert "sensor-gain of +10" in note
+    assert mended.events[3].slip < 0.95 * segment(fast).events[3].slip
 
 
 def test_ripple_of_the_drive_is_found_below_the_noise():
