@@ -71,6 +71,9 @@ class Measurement:
         )
 
 
+_FORWARDS = 'for runs in that direction write  unit = "-1 um"  or the like, and the drive\'s velocity as positive'
+
+
 def measure(
     traces: Sequence[Trace],
     segmentations: Sequence[Segmentation],
@@ -106,6 +109,11 @@ def measure(
             hint="record longer, drive slower or with a softer spring; --model static fits single creep processes"
             + doubts(traces),
         )
+    one_way = [_one_way(t, s) for t, s in pairs]
+    dropped += [text for _, text in one_way if text]
+    pairs = [(t, s) for (t, s), _ in one_way if s.events]
+    if not pairs:
+        raise InputError("every run is pulled backwards, which the dynamic model does not follow", hint=_FORWARDS)
     whole = [_integrable(t, s) for t, s in pairs]
     dropped += [text for _, text in whole if text]
     pairs = [(t, s) for (t, s), _ in whole if s.events]
@@ -114,6 +122,11 @@ def measure(
             f"every run begins with a cycle of more than {LONGEST:.3g} s, for which the dynamic model has no steps",
             hint="drive faster, or fit single creep processes with --model static",
         )
+    dropped += [
+        f"{t.name}: {most_cycles} of {len(s.events)} slips are used, the first ones"
+        for t, s in pairs
+        if len(s.events) > most_cycles
+    ]
     durations = np.concatenate([[e.duration for e in s.events] for _, s in pairs])
     settling = float(2.2 * np.median(durations))
     layout = Layout(settling, float(max(0.13 * np.median(durations), 2.0 * ring_period)))
@@ -135,6 +148,19 @@ def measure(
         np.array([s.settings.speed for _, s in pairs]),
         tuple(dropped),
     )
+
+
+def _one_way(trace: Trace, found: Segmentation) -> tuple[tuple[Trace, Segmentation], str]:
+    """A run as long as its slips go forwards, and what is to be said of the others."""
+    back = next((n for n, e in enumerate(found.events) if e.direction < 0), None)
+    if back is None:
+        return (trace, found), ""
+    count = len(found.events) - back
+    text = (
+        f"{trace.name}: slips from number {back + 1} on ({count} of {len(found.events)}) are left out, because there "
+    )
+    text += f"the block is pulled backwards. To mend: {_FORWARDS}"
+    return (trace, replace(found, events=found.events[:back])), text
 
 
 def doubts(traces: Sequence[Trace]) -> str:

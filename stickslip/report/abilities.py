@@ -155,8 +155,8 @@ def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
                 bad.append(f"{rises}, which no motion of the block explains (creep can only lower it): {scale}")
             else:
                 bad.append(
-                    f"{rises}: the block creeps along at {-share:.0f} % of the drive's velocity, or {scale} Force alone "
-                    "cannot tell the two apart: measure the block's position as well."
+                    f"{rises}: the block creeps along at {-share:.0f} % of the drive's velocity, or {scale} Force "
+                    "alone cannot tell the two apart: measure the block's position as well."
                 )
         if s.settings.unit != "m":
             bad.append(f"{t.name}: neither stiffness nor drive is known, so lengths are in seconds of loading.")

@@ -29,6 +29,32 @@ def test_noise_of_slip_times_is_noise_over_velocity(stick_slip):
     assert np.all((ratio > 0.6) & (ratio < 1.7)), ratio
 
 
+def test_a_run_pulled_backwards_is_never_taken_for_one_forwards(stick_slip, refuses):
+    model = stick_slip()
+    t = np.arange(0, model.stop, 1e-4)
+    x = model.position(t)
+    forth = Trace("forth", t, displacement=x, drive=Drive.constant(model.v0, 0.0, model.stop))
+    back = Trace("back", t, displacement=-x, drive=Drive.constant(-model.v0, 0.0, model.stop))
+    found = [segment(forth), segment(back)]
+    assert {e.direction for e in found[1].events} == {-1}
+    m = measure([forth, back], found, ring_period=2e-3)
+    assert m.names == ("forth",)
+    assert any(text.startswith("back: slips from number 1 on") and "backwards" in text for text in m.dropped)
+    refuses(lambda: measure([back], found[1:], ring_period=2e-3), "pulled backwards", 'unit = "-1 um"')
+
+
+def test_slips_beyond_the_most_that_are_used_are_counted(stick_slip):
+    model = stick_slip()
+    t = np.arange(0, model.stop, 1e-4)
+    trace = Trace("a", t, displacement=model.position(t), drive=Drive.constant(model.v0, 0.0, model.stop))
+    found = segment(trace)
+    n = len(found.events)
+    assert measure([trace], [found], ring_period=2e-3, most_cycles=n).dropped == ()
+    assert measure([trace], [found], ring_period=2e-3, most_cycles=2).dropped == (
+        f"a: 2 of {n} slips are used, the first ones",
+    )
+
+
 def test_without_noise_a_fiftieth_of_a_sample_is_left(stick_slip):
     """What sampling alone makes of the times of a slip: against the same motion sampled forty times as often."""
     coarse, fine = (measured(stick_slip(events=3), rate, 0.0, 0) for rate in (1e4, 4e5))

@@ -8,7 +8,7 @@ import pytest
 from stickslip.cli.fit import _gains
 from stickslip.features.layout import PHASES, Layout
 from stickslip.report import abilities, misfit_sentence, phase_table
-from stickslip.report.describe import describe_trace, stick_gain
+from stickslip.report.describe import describe_trace, gain_is_wrong, stick_gain
 from stickslip.report.ripple import stick_ripple
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
