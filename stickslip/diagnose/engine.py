@@ -117,7 +117,8 @@ def diagnose(
         campaign, traces, segmentations: the measurement.
         candidates: tags to try; default the whole catalogue.
         max_effects: at most so many are added one after the other.
-        holdout: runs no fit may see; default a middle velocity and the later part of runs with holds.
+        holdout: runs no fit may see; default those whose role in the campaign is "held-out", or, where there are none,
+            a middle velocity and the later part of runs with holds, of those whose role is not "train".
         jobs: parallel processes; default the number of cores.
         store: keeps finished pieces.
         limits: thresholds of the verdict.
@@ -140,7 +141,8 @@ def diagnose(
     if heard is None:
         dropped.append(UNHEARD)
     data = measure(traces, segmentations, ring_period=heard or FALLBACK_PERIOD, most_cycles=MOST_CYCLES)
-    train = training_cycles(data, holdout)
+    holdout = holdout or [t.name for t in traces if t.role == "held-out" and t.name in data.names]
+    train = training_cycles(data, holdout, [t.name for t in traces if t.role == "train"])
     floor = floors(data)
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]
     jobs = (os.cpu_count() or 1) if jobs is None else jobs

@@ -10,7 +10,7 @@ from ..errors import InputError, nearest
 from ..features.measurement import Measurement
 
 
-def training_cycles(measurement: Measurement, holdout: Sequence[str] = ()) -> np.ndarray:
+def training_cycles(measurement: Measurement, holdout: Sequence[str] = (), keep: Sequence[str] = ()) -> np.ndarray:
     """Cycles a fit may use, shape (R, n).
 
     By default the run of the middle velocity is held out if three or more velocities remain known without it, and the
@@ -19,6 +19,7 @@ def training_cycles(measurement: Measurement, holdout: Sequence[str] = ()) -> np
     Args:
         measurement: the data.
         holdout: names of runs to hold out instead.
+        keep: names of runs that the choice by default leaves to be fitted.
     """
     m = measurement
     used = np.asarray(m.cycles.used)
@@ -35,18 +36,19 @@ def training_cycles(measurement: Measurement, holdout: Sequence[str] = ()) -> np
             raise InputError("every run is held out", key="--holdout", hint="leave runs to fit")
         return train
     holds = m.valid[..., m.layout.slices()["hold"]].any(axis=(1, 2))
+    open_to = np.array([name not in keep for name in m.names])
     steady = np.flatnonzero(~holds)
     speeds = np.unique(np.round(m.velocities[steady], 12))
     if speeds.size >= 3:
         middle = steady[np.argsort(m.velocities[steady])[steady.size // 2]]
-        train[middle] = False
-    for r in np.flatnonzero(holds).tolist():
+        train[middle] &= not open_to[middle]
+    for r in np.flatnonzero(holds & open_to).tolist():
         at = np.flatnonzero(m.valid[r][:, m.layout.slices()["hold"]].any(axis=1))
         # up to the hold that begins the later half of them
         cut = int(at[(at.size + 1) // 2]) if at.size > 1 else int(used[r].sum() * 0.6)
         train[r, max(cut, 3) :] = False
     if (train == used).all():
-        for r in range(m.runs):
+        for r in np.flatnonzero(open_to).tolist():
             n = int(used[r].sum())
             train[r, max(n - max(n // 3, 1), 1) :] = False
     return train

@@ -66,6 +66,16 @@ def test_a_middle_velocity_and_the_later_hold_are_held_out():
     assert not train[4, 5]
 
 
+def test_runs_to_be_fitted_are_not_held_out_by_default():
+    data = measurement()
+    middle = next(r for r in range(4) if not training_cycles(data)[r].any())
+    kept = training_cycles(data, keep=[f"run{middle}"])
+    assert kept[middle].all()
+    assert not kept[4, 5]
+    every = training_cycles(data, keep=[f"run{r}" for r in range(5)])
+    assert every.all()
+
+
 def test_named_runs_are_held_out_and_unknown_names_refused():
     train = training_cycles(measurement(), ["run1.csv"])
     assert not train[1].any()

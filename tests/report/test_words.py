@@ -62,7 +62,7 @@ def test_a_force_that_rises_too_slowly_may_be_creep_and_is_left_as_it_is():
     assert _gains([trace], [found]) == ([found], [])
     fast = sawtooth(gain=1.1, creep=8e-6)
     (mended,), (note,) = _gains([fast], [segment(fast)])
-    assert "sensor-gain of +10" in note
+    assert "sensor-gain of +9.8 %" in note
     assert mended.events[3].slip < 0.95 * segment(fast).events[3].slip
 
 
