@@ -8,12 +8,20 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import InputError, nearest
 from .runstore import Run, file_record, json_text, open_run, refuse_existing, versions
+
+if TYPE_CHECKING:
+    from .campaign import Campaign
+
+
+def input_records(loaded: Campaign) -> list[dict[str, str]]:
+    """Name and SHA-256 of the campaign file and of every file with measured numbers."""
+    return [file_record(path) for path in (loaded.path, *loaded.files)]
 
 
 def _check_candidates(tags: Sequence[str]) -> None:
@@ -115,7 +123,7 @@ def diagnose_campaign(
     from .effects import catalogue
     from .fit.problem import Problem
     from .report import write_report
-    from .report.describe import unused_channels
+    from .report.describe import left_out
     from .report.inertial_result import fit_sections
     from .report.missing_force import missing_sections
     from .segment import segment
@@ -126,7 +134,7 @@ def diagnose_campaign(
     traces = load_traces(loaded)
     if candidates is not None:
         _check_candidates(candidates)
-    inputs = [file_record(campaign), *({"file": t.provenance.file, "sha256": t.provenance.sha256} for t in traces)]
+    inputs = input_records(loaded)
     with open_run(out, force=force, resume=True) as run:
         key = json_text(
             {
@@ -157,7 +165,7 @@ def diagnose_campaign(
             "inputs": inputs,
             "versions": versions(),
         }
-        result["dropped"] = [*(f"{t.name}: {c}" for t in traces for c in unused_channels(t)), *result["dropped"]]
+        result["dropped"] = [*left_out(traces, segmentations), *result["dropped"]]
         top = next((r for r in reversed(found.ladder) if r.fit is not None), None)
         if top is not None and top.fit is not None and top.composition is not None:
             problem = Problem(top.composition, found.measurement)

@@ -158,6 +158,19 @@ def test_inspect_counts_what_was_mended(capsys):
     assert any("nan" in line for line in found["dropped"])
 
 
+def test_what_the_reader_left_out_is_said_in_every_output(capsys):
+    path = write()
+    lines = Path("a.csv").read_text().splitlines()
+    lines = [lines[0] + ",state", *(line + ",ok" for line in lines[1:]), "99"]
+    Path("a.csv").write_text("\n".join(lines))
+    assert run(["inspect", path, "--out", "seen"]) == 0
+    out, report = capsys.readouterr().out, Path("seen/report.html").read_text()
+    for words in ("cut short", "column 'state' is left out: it holds text"):
+        assert words in " ".join(out.split())
+        assert words.replace("'", "&#39;") in report
+    assert "read as text: time from" in report
+
+
 def test_inspect_writes_a_run_folder(capsys):
     assert run(["inspect", write(), "--out", "seen"]) == 0
     assert {p.name for p in Path("seen").iterdir()} == {"result.json", "arrays.nc", "report.html", "trace1.png"}

@@ -77,7 +77,7 @@ class _Assembly:
             self.notes.append("outside the campaign folder")
         columns = read_columns(path, entry.reader)
         reader = columns.reader
-        self.notes += columns.notes
+        self.notes += _noted(columns)
         channels = {name: getattr(entry, name) for name in _CHANNELS if getattr(entry, name) is not None}
         time = self._time(columns, path)
         data = {name: self._values(columns, path, name, spec, time) for name, spec in channels.items()}
@@ -204,6 +204,7 @@ class _Assembly:
         if spec.time is None and self.entry.time is None:
             raise InputError("a channel of another file needs its own 'time'", key=f"{self.place}.{name}.time")
         further = read_columns(other, spec.reader)
+        self.notes += [f"{spec.file}: {note}" for note in _noted(further)]
         own = self._scaled(further, other, f"{name}.time", spec.time or self.entry.time)  # type: ignore[arg-type]
         values = self._scaled(further, other, name, spec)
         self.used[name] += f" of {spec.file} (sha256 {file_sha256(other)})"
@@ -329,6 +330,12 @@ class _Assembly:
             tolerance = max(1.5 * count, 4 * noise["drive_position"], 1e-9 * span, 1e-15)
             return Drive.from_samples(time, position, tolerance)
         return None
+
+
+def _noted(columns: Columns, most: int = 8) -> list[str]:
+    """What the reader guessed or mended, and the columns it left out."""
+    left = [f"column '{name}' is left out: {why}" for name, why in columns.ignored.items()]
+    return [*columns.notes, *left[:most], *([f"... and {len(left) - most} columns more"] if len(left) > most else [])]
 
 
 def file_sha256(path: Path) -> str:

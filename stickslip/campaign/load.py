@@ -43,6 +43,12 @@ class Campaign:
         """Names of the traces, in order."""
         return [entry.label for entry in self.entries]
 
+    @property
+    def files(self) -> list[Path]:
+        """All files with measured numbers, each once."""
+        names = [name for entry in self.entries for name in (entry.file, *(name for _, name in _further(entry)))]
+        return [self.folder / name for name in dict.fromkeys(names)]
+
     def entry(self, name: str) -> TraceEntry:
         """The entry of a trace; `InputError` naming the nearest where there is none."""
         for entry in self.entries:

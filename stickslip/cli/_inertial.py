@@ -64,6 +64,11 @@ def fit_inertial(
             hint="give drive_velocity (and spring_stiffness where only the force is measured)",
         )
     own, segments = [t for t, _ in usable], [s for _, s in usable]
+    unusable = [
+        f"{t.name}: {'no drive' if t.drive is None else 'no displacement in metres'} in it, so it is not fitted"
+        for t in traces
+        if all(t is not kept for kept in own)
+    ]
     heard = ringing(own, segments)
     if heard is None:
         notes.append(UNHEARD)
@@ -101,7 +106,7 @@ def fit_inertial(
             "cycles": int(train.sum()),
         },
         "notes": notes,
-        "dropped": [*m.dropped, *(f"{t.name}: {d}" for t, s in zip(traces, found, strict=True) for d in s.dropped)],
+        "dropped": [*unusable, *m.dropped],
     }
     return result, variables
 

@@ -48,7 +48,8 @@ def text(result: Mapping[str, Any], variables: Mapping[str, tuple], out: Path | 
     scales = _scales(rows)
     for i, row in enumerate(rows):
         lines += ["", *_fold(_heading(row), columns), *_drawing(variables, i, columns), *_events(row, scales, columns)]
-        said = [*(f"warning: {w}" for w in row["warnings"]), *(f"mended: {w}" for w in row["repairs"])]
+        said = [*(f"warning: {w}" for w in row["warnings"]), *(f"read: {w}" for w in row["notes"])]
+        said += [f"mended: {w}" for w in row["repairs"]]
         said += [f"left out: {w}" for w in row["dropped"]]
         if row.get("ripple", {}).get("lines"):
             said.append(row["ripple"]["text"])
@@ -147,13 +148,22 @@ def _scale(values: Sequence[float], unit: str) -> tuple[int, str]:
 def _scales(rows: Sequence[Mapping[str, Any]]) -> Scales:
     """Power of ten and symbol for every column and its SI unit, the same in the tables of all traces."""
     values: dict[tuple[str, str], list[float]] = {}
+    sensor: dict[tuple[str, str], float] = {}
     for row in rows:
         units = _units(row)
+        for key, facts in row["features"].items():
+            if _known(facts.get("sensor")):
+                column = (key, units.get(key, ""))
+                sensor[column] = max(sensor.get(column, 0.0), facts["sensor"])
         for event in _with_holds(row):
             for key, _ in _COLUMNS:
                 if _known(event[key]):
                     values.setdefault((key, units[key]), []).append(event[key])
-    return {column: _scale(known, column[1]) for column, known in values.items()}
+    # values below what the sensor can tell are shown on its scale
+    return {
+        column: _scale([max(abs(v), sensor.get(column, 0.0)) for v in known], column[1])
+        for column, known in values.items()
+    }
 
 
 def _units(row: Mapping[str, Any]) -> dict[str, str]:

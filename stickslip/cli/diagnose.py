@@ -93,6 +93,8 @@ def _print(result: dict[str, Any], out: Path) -> None:
     from rich.markup import escape
     from rich.table import Table
 
+    from .show import told
+
     console = Console(width=None if sys.stdout.isatty() else 110)
     table = Table(title="Ladder of models: error in units of what the data can tell (1 is as good as they allow)")
     table.add_column("model")
@@ -111,7 +113,7 @@ def _print(result: dict[str, Any], out: Path) -> None:
     console.print(f"[bold]{verdict['kind']}[/bold]: {escape(verdict['text'])}{sure}", highlight=False)
     if result["next_experiment"]:
         console.print(f"next experiment: {escape(result['next_experiment']['text'])}", highlight=False)
-    mended = [f"mended: {t['name']}: {text}" for t in result.get("traces", ()) for text in t["repairs"]]
+    mended = told(result)
     lost = [f"left out: {text}" for text in result["dropped"]]
     for text in [*mended, *lost[:8], *([f"... and {len(lost) - 8} more"] if len(lost) > 8 else [])]:
         console.print(escape(text), highlight=False)

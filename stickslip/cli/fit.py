@@ -76,7 +76,7 @@ def fit(
     force:
         Replace an existing run folder.
     """
-    from ..report.describe import unused_channels
+    from ..report.describe import left_out
     from ..units import to_si
 
     speed = to_si(v_lim, "m/s", key="--v-lim")
@@ -96,7 +96,7 @@ def fit(
     result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
     result["notes"] = [*notes, *result.get("notes", ())]
     # ahead of the events: of these only the first few are printed
-    result["dropped"] = [*(f"{t.name}: {c}" for t in traces for c in unused_channels(t)), *result["dropped"]]
+    result["dropped"] = [*left_out(traces, found), *result["dropped"]]
     if out is not None:
         with open_run(out, force=force) as run:
             _write(run, result, variables)
@@ -237,11 +237,11 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
         lines += ["", result["effective"]["text"]]
     lines += [f"- {text}" for text in result.get("identifiability", ())]
     lines += [p["text"] for p in result.get("profiles", ())]
-    lines += ["", *(f"mended: {t['name']}: {text}" for t in result.get("traces", ()) for text in t["repairs"])]
+    lines += ["", *show.told(result)]
     lost = result.get("dropped", ())
     lines += ["", *(f"left out: {text}" for text in lost[:8])]
     if len(lost) > 8:
-        lines.append(f"... and {len(lost) - 8} more")
+        lines.append(f"... and {len(lost) - 8} more: --json, or the report of --out")
     lines.append(f"{result['seconds']:.1f} s")
     if out is not None:
         lines.append(f"written to {out}: report.html, result.json, arrays.nc")

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from ..runstore import file_record, json_text, open_run, refuse_existing, versions
+from ..runstore import json_text, open_run, refuse_existing, versions
+from ..workflow import input_records
 
 if TYPE_CHECKING:
     from ..campaign import Campaign
@@ -69,23 +70,13 @@ def load_and_segment(path: Path) -> tuple[Campaign, list[Trace], list[Segmentati
 
 def head(loaded: Campaign, kind: str) -> dict[str, Any]:
     """What every ``result.json`` made from a campaign begins with."""
-    files = {file_record(loaded.path)["file"]: file_record(loaded.path)}
-    for entry in loaded.entries:
-        for name in dict.fromkeys([entry.file, *_channel_files(entry)]):
-            record = file_record(loaded.folder / name)
-            files[record["file"]] = record
     return {
         "schema": 1,
         "kind": kind,
         "title": loaded.title or loaded.path.stem,
-        "inputs": list(files.values()),
+        "inputs": input_records(loaded),
         "versions": versions(),
     }
-
-
-def _channel_files(entry: Any) -> list[str]:
-    channels = ("displacement", "velocity", "spring_force", "normal_load", "drive_position")
-    return [c.file for name in channels if (c := getattr(entry, name)) is not None and c.file]
 
 
 def inspection(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..units import shown
 
@@ -65,6 +65,16 @@ def table(header: list[str], rows: list[list[str]]) -> str:
     """Plain text columns, right aligned."""
     widths = [max(len(row[i]) for row in [header, *rows]) for i in range(len(header))]
     return "\n".join("  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in [header, *rows])
+
+
+def told(result: Mapping[str, Any]) -> list[str]:
+    """What was noticed, read in a certain way, and mended, trace by trace."""
+    return [
+        f"{word}: {t['name']}: {text}"
+        for key, word in (("warnings", "warning"), ("notes", "read"), ("repairs", "mended"))
+        for t in result.get("traces", ())
+        for text in t[key]
+    ]
 
 
 def warn(text: str) -> None:

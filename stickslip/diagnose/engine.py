@@ -129,12 +129,14 @@ def diagnose(
     """
     tell = progress or (lambda text, share: None)
     segmentations = [segment(t) for t in traces] if segmentations is None else segmentations
-    usable = [(t, s) for t, s in zip(traces, segmentations, strict=True) if t.displacement is not None]
+    pairs = zip(traces, segmentations, strict=True)
+    usable = [(t, s) for t, s in pairs if t.displacement is not None and t.drive is not None]
     dropped = [f"{t.name}: no displacement in it" for t in traces if t.displacement is None]
+    dropped += [f"{t.name}: no drive is given" for t in traces if t.displacement is not None and t.drive is None]
     if not usable:
         raise InputError(
-            "a diagnosis needs the displacement of the block", key="trace.displacement",
-            hint="traces of spring force alone can be inspected and fitted with --model static",
+            "a diagnosis needs the displacement of the block and the motion of the drive", key="trace.displacement",
+            hint="others can be inspected and fitted with --model static",
         )  # fmt: skip
     traces, segmentations = zip(*usable, strict=True)
     heard = ringing(traces, segmentations)

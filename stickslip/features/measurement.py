@@ -157,8 +157,8 @@ def _one_way(trace: Trace, found: Segmentation) -> tuple[tuple[Trace, Segmentati
         return (trace, found), ""
     count = len(found.events) - back
     text = (
-        f"{trace.name}: slips from number {back + 1} on ({count} of {len(found.events)}) are left out, because the block "
-        f"is pulled backwards there. To mend: {_FORWARDS}"
+        f"{trace.name}: slips from number {back + 1} on ({count} of {len(found.events)}) are left out, because there "
+        f"the block is pulled backwards. To mend: {_FORWARDS}"
     )
     return (trace, replace(found, events=found.events[:back])), text
 

@@ -111,6 +111,15 @@ def _why(name: str, shapes: Shapes, events: int) -> str:
     return shapes.missing.get(keys.get(name, name), "no event allows it")
 
 
+def left_out(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> list[str]:
+    """What of the traces no fit uses, and why: channels and slips, each with the trace's name."""
+    return [
+        f"{t.name}: {text}"
+        for t, s in zip(traces, segmentations, strict=True)
+        for text in (*unused_channels(t), *map(str, s.dropped))
+    ]
+
+
 def unused_channels(trace: Trace) -> list[str]:
     """Channels that were measured and that no model takes up, in words."""
     if trace.normal_load is None:
