@@ -8,9 +8,13 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+import warnings
+import zlib
 from pathlib import Path
+from typing import Any
 
 OFF = "STICKSLIP_NO_CACHE"
+_ZSTANDARD = b"\x28\xb5\x2f\xfd"
 _SETTINGS = {
     "JAX_COMPILATION_CACHE_DIR": "",
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
@@ -42,7 +46,59 @@ def enable() -> Path | None:
         jax.config.update("jax_compilation_cache_dir", str(folder))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
         jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    heal(folder)
     return folder
+
+
+def heal(folder: Path) -> None:
+    """Have entries removed that cannot be read, and say once where none can be written.
+
+    JAX writes an entry straight under its name and never replaces it: one that was cut short by a kill or a full disk
+    would be met with a warning at every start.
+    """
+    before, said = warnings.showwarning, False
+
+    def shown(message: Warning | str, *args: Any, **kwargs: Any) -> None:
+        nonlocal said
+        text = str(message)
+        if text.startswith("Error reading persistent compilation cache"):
+            remove_broken(folder)
+        elif text.startswith("Error writing persistent compilation cache"):
+            if not said:
+                said = True
+                print(f"stickslip: warning: compiled code cannot be kept in {folder} ({text})", file=sys.stderr)
+        else:
+            before(message, *args, **kwargs)
+
+    warnings.showwarning = shown
+
+
+def remove_broken(folder: Path) -> int:
+    """Remove entries of the cache that end too early; returns how many."""
+    count = 0
+    for path in folder.glob("*-cache"):
+        try:
+            _unpack(path.read_bytes())
+        except (zlib.error, ValueError, EOFError):
+            path.unlink(missing_ok=True)
+            count += 1
+        except OSError:
+            continue
+    return count
+
+
+def _unpack(content: bytes) -> None:
+    if content[:4] == _ZSTANDARD:
+        try:
+            import zstandard
+        except ImportError:
+            return
+        try:
+            zstandard.ZstdDecompressor().decompress(content)
+        except zstandard.ZstdError as error:
+            raise ValueError(str(error)) from None
+    else:
+        zlib.decompress(content)
 
 
 def _folder() -> Path | None:

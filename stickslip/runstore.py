@@ -78,13 +78,24 @@ def write_aside(path: Path, content: str | bytes) -> Path:
     aside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with aside.open("wb") as stream:
-            stream.write(content.encode("utf-8") if isinstance(content, str) else content)
+            stream.write(content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content)
             stream.flush()
             os.fsync(stream.fileno())
         return aside.replace(path)
-    except OSError:
+    except BaseException:
         aside.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def alone(target: Path) -> Iterator[None]:
+    """Nobody else may work on a folder meanwhile.
+
+    Raises:
+        RunFolderError: somebody does.
+    """
+    with _speaking(target), _locked(target):
+        yield
 
 
 def _reserve(path: Path, size: int) -> None:
@@ -111,10 +122,11 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
         RunFolderError: it exists, another run is writing it, or the disk is read-only or full.
     """
     target = Path(target)
-    name = target.name or target.resolve().name
-    if name in ("", ".", ".."):
+    if target.is_symlink() or target.name in ("", "..", "."):
+        target = target.resolve()  # the folder itself is what is locked and written
+    name = target.name
+    if not name:
         raise RunFolderError("not a name for a run folder", file=target)
-    target = target.resolve() if target.is_symlink() else target
     refuse_existing(target, force)
     partial = target.with_name(f"{name}.partial")
     with _speaking(target), _locked(target):

@@ -10,11 +10,15 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from stickslip import cli
+from stickslip.cache import heal
 from stickslip.cli import COMMANDS, run
 
 SCENARIO = """
@@ -383,6 +387,62 @@ def test_an_effect_of_ones_own_is_listed(tmp_path, capsys):
     assert run(["effects", "my-push", "--effect", str(tmp_path / "push.py")]) == 0
     assert "a constant push" in capsys.readouterr().out
     assert run(["effects", "--effect", str(tmp_path / "none.py")]) == 2
+
+
+@pytest.mark.parametrize("value", ["nan", "1e400"])
+def test_a_series_of_no_numbers_is_refused(scenario, capsys, value):
+    assert run(["simulate", scenario, "--sweep", f"drive.velocity={value}"]) == 2
+    assert "drive.velocity" in capsys.readouterr().err
+
+
+def test_titles_with_formula_signs_are_drawn_as_they_stand(scenario, tmp_path, capsys):
+    text = Path(scenario).read_text().replace('"small"', r"'$\foo$ 50 %'")
+    Path(scenario).write_text(text)
+    assert run(["creep", scenario, "--out", str(tmp_path / "creep")]) == 0
+    assert run(["simulate", scenario, "--out", str(tmp_path / "run")]) == 0
+    assert (tmp_path / "run" / "trace.png").is_file()
+
+
+def test_the_folder_one_is_in_is_no_new_run_folder(scenario, tmp_path, monkeypatch, capsys):
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    monkeypatch.chdir(inside)
+    code = run(["creep", scenario, "--out", "."])
+    assert code in (0, 2)
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_broken_entries_of_the_cache_are_removed(tmp_path, capsys):
+    (tmp_path / "good-cache").write_bytes(zlib.compress(b"code" * 100))
+    (tmp_path / "cut-cache").write_bytes(zlib.compress(b"code" * 100)[:-8])
+    (tmp_path / "other").write_bytes(b"x")
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        heal(tmp_path)
+        warnings.warn("Error reading persistent compilation cache entry for 'jit_f': zlib.error", stacklevel=1)
+        warnings.warn("Error writing persistent compilation cache entry for 'jit_f': full", stacklevel=1)
+        warnings.warn("Error writing persistent compilation cache entry for 'jit_g': full", stacklevel=1)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["good-cache", "other"]
+    assert capsys.readouterr().err.count("compiled code cannot be kept") == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        ("JaxRuntimeError", "RESOURCE_EXHAUSTED: Out of memory allocating 8 bytes", "too much for this machine"),
+        ("TerminatedWorkerError", "A worker process managed by the executor", "did memory run out"),
+    ],
+)
+def test_memory_that_runs_out_in_a_library_is_one_message(monkeypatch, capsys, kind, text, words):
+    def fail() -> None:
+        raise type(kind, (RuntimeError,), {})(text)
+
+    monkeypatch.setattr(cli, "make_app", fail)
+    assert run([]) == 1
+    assert words in capsys.readouterr().err
+    monkeypatch.setattr(cli, "make_app", lambda: (_ for _ in ()).throw(RuntimeError("a fault of our own")))
+    with pytest.raises(RuntimeError):
+        run([])
 
 
 def test_a_picture_of_an_effect(tmp_path, capsys):

@@ -108,6 +108,32 @@ def test_a_killed_run_frees_its_lock_and_can_be_resumed(tmp_path):
     assert read_result(tmp_path / "run")["value"] == 7
 
 
+def test_a_link_and_what_it_leads_to_are_one_folder(tmp_path):
+    (tmp_path / "x").mkdir()
+    (tmp_path / "y").mkdir()
+    (tmp_path / "y" / "a").symlink_to(tmp_path / "x" / "real")
+    with open_run(tmp_path / "y" / "a") as run:
+        assert run.folder == tmp_path / "x" / "real.partial"
+        with pytest.raises(RunFolderError, match="another run"):
+            write(tmp_path / "x" / "real")
+        run.json({"value": 2})
+        write(tmp_path / "x" / "a")
+    assert read_result(tmp_path / "x" / "real")["value"] == 2
+
+
+def test_the_current_folder_can_be_named(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    write(Path(), 3)
+    assert read_result(tmp_path / "here")["value"] == 3
+
+
+def test_names_that_are_no_text_are_written(tmp_path):
+    with open_run(tmp_path / "run") as run:
+        run.json({"file": "a\udcff.csv"})
+    assert read_result(tmp_path / "run")["file"] == "a\udcff.csv"
+
+
 def test_halves_of_files_are_not_resumed(tmp_path):
     (tmp_path / "run.partial" / "pieces").mkdir(parents=True)
     (tmp_path / "run.partial" / "pieces" / "whole.txt").write_text("whole")

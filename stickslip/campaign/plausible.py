@@ -26,7 +26,7 @@ def check_size(time: NDArray[np.float64], data: Mapping[str, NDArray[np.float64]
     """Refuse what no instrument measures, such as the 9.9e37 by which some mark an overload.
 
     Raises:
-        InputError: a time beyond 1e12 s, or a value of a channel (SI) beyond 1e30.
+        InputError: a time beyond 1e12 s, samples closer than 1e-12 s, or a value of a channel (SI) beyond 1e30.
     """
     for name, values, most in (("time", time, 1e12), *((name, values, 1e30) for name, values in data.items())):
         low, high = float(np.min(values)), float(np.max(values))
@@ -38,6 +38,11 @@ def check_size(time: NDArray[np.float64], data: Mapping[str, NDArray[np.float64]
                 key=f"sample {row}",
                 hint="a mark of an overload? Delete these rows, leave the field empty, or check the unit",
             )
+    if time[-1] - time[0] < 1e-12 * time.size:
+        raise InputError(
+            f"{time.size} samples lie within {time[-1] - time[0]:.3g} s, closer than 1e-12 s",
+            hint="check the unit of time, or the sampling rate",
+        )
 
 
 def doubtful_resolution(channel: str, si: str, stated: float, seen: float | None, noise: float) -> str | None:

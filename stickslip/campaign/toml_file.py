@@ -77,7 +77,11 @@ def _bytes(path: Path, kind: Kind) -> bytes:
             raise InputError(f"not a {kind} file but a folder", file=path, hint="name the .toml file in it")
         if path.stat().st_size > _MOST_BYTES:
             raise InputError(f"too large for a {kind} file", file=path, hint=_wanted(path, kind))
-        return path.read_bytes()
+        with path.open("rb") as stream:  # of a device, too, no more is read than a file may have
+            raw = stream.read(_MOST_BYTES + 1)
+        if len(raw) > _MOST_BYTES:
+            raise InputError(f"too large for a {kind} file", file=path, hint=_wanted(path, kind))
+        return raw
     except FileNotFoundError:
         beside = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
         hint = nearest(path.name, beside) if beside else f"stickslip new {kind} FILE writes one to start from"

@@ -57,6 +57,8 @@ def make_challenge(
             "cases": [made[case.name] for case in planned],
         }
         path = run.json(truth, TRUTH)
+        for left in set((run.folder / CASES).iterdir()) - {run.folder / CASES / case.name for case in planned}:
+            shutil.rmtree(left)  # of a making with another plan that was interrupted
         files = [path, *(p for p in (run.folder / CASES).rglob("*") if p.is_file())]
         seal = make_seal(run.folder, files, cases=cases, versions=versions())
         shutil.rmtree(run.folder / MADE)

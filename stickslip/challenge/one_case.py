@@ -85,6 +85,8 @@ def do_case(campaign: str, runs: str, case: str, diagnosis: Diagnosis, session: 
             if not is_done(folder, case):
                 raise RunFolderError("the diagnosis wrote no result.json", file=folder / case)
         except RunFolderError as fault:
+            if is_done(folder, case):
+                continue
             # a worker that the scheduler gave up may live on and hold the case
             if time.monotonic() - began < WAIT and _held(folder, case):
                 time.sleep(1.0)

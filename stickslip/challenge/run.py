@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, StickslipError
-from ..runstore import json_text, versions, write_aside
+from ..runstore import alone, json_text, versions, write_aside
 from ..workflow import diagnose_campaign
 from .cluster import cluster
 from .one_case import Diagnosis, do_case, failures, is_done
@@ -67,23 +67,23 @@ def run_challenge(
 
     Raises:
         SealError: a campaign is not as sealed. InputError: other settings than before; no scheduler answers.
+        RunFolderError: another run is at this challenge.
         StickslipError: the cluster was lost.
     """
     folder = Path(folder).resolve()
     seal = check_seal(folder, truth=False)
     runs = folder / RUNS
-    runs.mkdir(exist_ok=True)
     tags = None if candidates is None else list(candidates)
-    _protocol(runs, digest(folder), {"candidates": tags, "max_effects": max_effects})
-    cases = case_names(seal)
-    waiting = [c for c in cases if not is_done(runs, c) and (retry or not failures(runs, c))]
-    if waiting:
-        if diagnosis is None:
-            diagnosis = partial(
-                diagnose_campaign, jobs=1, candidates=tags, max_effects=max_effects, missing_force=False
-            )
-        with cluster(scheduler, workers) as client:
-            _work(client, folder, waiting, len(cases), diagnosis, tell)
+    if diagnosis is None:
+        diagnosis = partial(diagnose_campaign, jobs=1, candidates=tags, max_effects=max_effects, missing_force=False)
+    with alone(runs):
+        runs.mkdir(exist_ok=True)
+        _protocol(runs, digest(folder), {"candidates": tags, "max_effects": max_effects})
+        cases = case_names(seal)
+        waiting = [c for c in cases if not is_done(runs, c) and (retry or not failures(runs, c))]
+        if waiting:
+            with cluster(scheduler, workers) as client:
+                _work(client, folder, waiting, len(cases), diagnosis, tell)
     done = sum(is_done(runs, c) for c in cases)
     failed = sum(not is_done(runs, c) and bool(failures(runs, c)) for c in cases)
     return {"done": done, "failed": failed, "open": len(cases) - done - failed}

@@ -113,6 +113,11 @@ def run(arguments: Sequence[str]) -> int:
         return INTERRUPTED
     except (MemoryError, RecursionError) as error:
         return _fail(StickslipError(f"this is too much for this machine ({str(error) or type(error).__name__})"))
+    except RuntimeError as error:
+        found = _of_libraries(error)
+        if found is None:
+            raise
+        return _fail(found)
     except BrokenPipeError:  # such as  stickslip effects | head
         _mute()
         return 1
@@ -120,6 +125,19 @@ def run(arguments: Sequence[str]) -> int:
         _mute()
         where = f"{error.filename}: " if error.filename else ""
         return _fail(InputError(f"{where}the system refused ({error.strerror or error})"))
+
+
+def _of_libraries(error: RuntimeError) -> StickslipError | None:
+    """What JAX and joblib raise where memory runs out, as the program's own error; None for all else."""
+    kind = type(error).__name__
+    if kind in ("JaxRuntimeError", "XlaRuntimeError") and "RESOURCE_EXHAUSTED" in str(error):
+        return StickslipError(f"this is too much for this machine ({str(error).splitlines()[0][:200]})")
+    if kind in ("TerminatedWorkerError", "BrokenProcessPool"):
+        return StickslipError(
+            "a worker process was ended by the system; did memory run out?"
+            "\n  to mend: the same command again goes on from the finished pieces; --jobs 1 takes the least memory"
+        )
+    return None
 
 
 def _mute() -> None:

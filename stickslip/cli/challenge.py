@@ -122,7 +122,8 @@ def seal(folder: Path) -> int:
 
 @challenge.command
 def score(
-    folder: Path, *, seal: str | None = None, json: Annotated[bool, Parameter(negative="")] = False
+    folder: Path, *, seal: str | None = None, json: Annotated[bool, Parameter(negative="")] = False,
+    force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:  # fmt: skip
     """Compare the answers with the truth; refuses a folder whose seal does not match.
 
@@ -136,9 +137,17 @@ def score(
         The seal as it was published when the challenge was made; the score is refused for any other.
     json:
         Print the score as JSON.
+    force:
+        Replace a score that is there already.
     """
     from ..challenge.score import score_challenge
+    from ..errors import RunFolderError
     from ..runstore import json_text
+
+    if (folder / "score" / "score.json").exists() and not force:
+        raise RunFolderError(
+            "there is a score already", file=folder / "score", hint="move it away, or replace it with --force"
+        )
 
     found = score_challenge(folder, expected=seal)
     text = _write(folder / "score", found)

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..runstore import file_record, open_run, refuse_existing, versions
+from ..runstore import open_run, refuse_existing, versions
 from . import show
 
 
@@ -46,7 +46,7 @@ def creep(
     force:
         Replace an existing run folder.
     """
-    from .simulate import scenario_arguments
+    from .simulate import input_records, outside, scenario_arguments
 
     path, changes = scenario_arguments(scenario, more, set)
     if not 2 <= points <= 1_000_000:
@@ -64,7 +64,7 @@ def creep(
             curve = static_creep(loaded, points, average, time)
         except InputError as error:
             raise error.at(file=path) from None
-    notes = [str(w.message) for w in caught if issubclass(w.category, UserWarning)]
+    notes = [*outside(loaded), *(str(w.message) for w in caught if issubclass(w.category, UserWarning))]
     for text in notes:
         show.warn(text)
     rows = zip(*(column.tolist() for column in curve), strict=True)
@@ -79,7 +79,7 @@ def creep(
         "title": loaded.title,
         "scenario": loaded.file.model_dump(by_alias=True, exclude_none=True),
         "changes": [f"{key}={value}" for key, value in loaded.changes],
-        "inputs": [file_record(path)],
+        "inputs": input_records(loaded),
         "versions": versions(),
         "seeds": {"lines": getattr(table, "seed", None)},
         "N": getattr(table, "springs", None),

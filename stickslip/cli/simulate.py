@@ -69,7 +69,7 @@ def simulate(
     series = loaded.file.sweep
     with open_run(out, force=force) if out is not None else nullcontext() as run:
         work = _single(loaded, run) if series is None else _series(loaded, series, run)
-        work["warnings"] = [*_outside(loaded), *work["warnings"]]
+        work["warnings"] = [*outside(loaded), *work["warnings"]]
         result = {**_head(loaded), **work, "seconds": round(time.perf_counter() - began, 3)}
         if run is not None:
             run.json(result)
@@ -109,17 +109,13 @@ def scenario_arguments(scenario: str, more: tuple[str, ...], changes: tuple[str,
 
 def _head(scenario: Scenario) -> dict[str, Any]:
     file = scenario.file
-    inputs = [file_record(scenario.path)] if scenario.path else []
-    for part in (file.drive.file, getattr(file.contact, "file", None)):
-        if part:
-            inputs.append(file_record(scenario.folder / part))
     return {
         "schema": 1,
         "kind": "simulate",
         "title": scenario.title,
         "scenario": file.model_dump(by_alias=True, exclude_none=True),
         "changes": [f"{key}={value}" for key, value in scenario.changes],
-        "inputs": inputs,
+        "inputs": input_records(scenario),
         "versions": versions(),
         "seeds": {
             "lines": getattr(file.contact, "seed", None),
@@ -128,7 +124,14 @@ def _head(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def _outside(scenario: Scenario) -> list[str]:
+def input_records(scenario: Scenario) -> list[dict[str, str]]:
+    """Name and SHA-256 of the scenario file and of those it names."""
+    inputs = [file_record(scenario.path)] if scenario.path else []
+    parts = (scenario.file.drive.file, getattr(scenario.file.contact, "file", None))
+    return inputs + [file_record(scenario.folder / part) for part in parts if part]
+
+
+def outside(scenario: Scenario) -> list[str]:
     """Files that the scenario names and that do not lie in its folder or below: read, but said."""
     home = scenario.folder.resolve()
     files = [part for part in (scenario.file.drive.file, getattr(scenario.file.contact, "file", None)) if part]

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..segment import thin
-from .style import DARK, MIDDLE, figure, remark, scaled, styled
+from .style import DARK, MIDDLE, figure, plain, remark, scaled, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def creep_figure(tau: np.ndarray, u: np.ndarray, t: np.ndarray, title: str) -> Figure:
     """Displacement (m) against load and against virtual time (s); all shape (n,)."""
     made, axes = figure(1, 2, width=10.0, height=4.2)
-    made.suptitle(title, fontsize=11)
+    made.suptitle(plain(title), fontsize=11)
     k, unit = scaled(u, "m")
     axes[0, 0].plot(tau, u * k, color=DARK)
     axes[0, 0].set(xlabel="share of full friction", ylabel=f"displacement / {unit}", title="static curve")
@@ -46,7 +46,7 @@ def static_against_inertial(runs: Sequence[Run], labels: Sequence[str]) -> Figur
 
 
 def _pair(top: Axes, low: Axes, data: Run, label: str, *, legend: bool) -> None:
-    top.set_title(label)
+    top.set_title(plain(label))
     u, moment = data["static_displacement"].values, data["static_time"].values
     t, x = data["time"].values, data["displacement"].values
     end = float(data["onset"].values[0]) if data.sizes["event"] else float(t[-1])

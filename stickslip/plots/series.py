@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .style import DARK, LIGHT, figure, logarithmic, remark, scaled, styled
+from .style import DARK, LIGHT, figure, logarithmic, plain, remark, scaled, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -38,7 +38,8 @@ def series_figure(table: xarray.Dataset) -> Figure:
     for panel, (name, si, text) in zip(axes.flat, _PANELS, strict=True):
         _panel(panel, value * k, table[name].values, table[f"{name}_std"].values, si, text, spread)
         panel.set_xlabel(f"{table.attrs['key']}" + (f" / {_bracketed(shown)}" if shown not in ("1", "") else ""))
-    made.suptitle(f"{table.attrs['title']}: {int((table['events'].values > 0).sum())} of {value.size} runs slip")
+    slipping = int((table["events"].values > 0).sum())
+    made.suptitle(plain(f"{table.attrs['title']}: {slipping} of {value.size} runs slip"))
     return made
 
 

@@ -56,6 +56,12 @@ def figure(rows: int = 1, columns: int = 1, *, width: float = 7.0, height: float
     return made, np.asarray(made.subplots(rows, columns, squeeze=False))
 
 
+def plain(text: object, most: int = 120) -> str:
+    """Text from a file as matplotlib shows it literally, without its formula signs."""
+    shown = str(text).replace("\\", "/").replace("$", r"\$")
+    return shown if len(shown) <= most else shown[:most] + "..."
+
+
 def scaled(values: np.ndarray, unit: str) -> tuple[float, str]:
     """The factor and the unit text that show values (in the SI ``unit``) as numbers between 1 and 1000."""
     finite = np.abs(np.asarray(values, float))

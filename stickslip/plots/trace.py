@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..segment import thin
-from .style import DARK, LIGHT, MIDDLE, figure, remark, scaled, styled
+from .style import DARK, LIGHT, MIDDLE, figure, plain, remark, scaled, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def trace_figure(data: Run) -> Figure:
     """Four panels of a data set of `simulate`."""
     made, axes = figure(2, 2, width=11.0, height=7.6)
-    made.suptitle(f"{data.attrs['title']}: {data.attrs['verdict']}", fontsize=11, wrap=True)
+    made.suptitle(plain(f"{data.attrs['title']}: {data.attrs['verdict']}", 240), fontsize=11, wrap=True)
     whole(axes[0, 0], data)
     creep(axes[0, 1], data)
     slip(axes[1, 0], data)

@@ -8,6 +8,8 @@ from ..errors import InputError
 from .base import Columns, add_array, need_columns
 from .guard import guard
 
+_MOST_LINKS = 8  # one to the next
+
 
 class NetcdfReader:
     """NetCDF 3 and 4."""
@@ -55,7 +57,11 @@ def _elsewhere(path: Path) -> list[str]:
     found = []
     with h5py.File(path, "r") as file:
         for name in file:
-            item = file.get(name)
+            link = file.get(name, getlink=True)  # a link into another file is not followed
+            for _ in range(_MOST_LINKS):
+                if isinstance(link, h5py.SoftLink):
+                    link = file.get(link.path, getlink=True)
+            item = None if isinstance(link, h5py.ExternalLink) else file.get(name)
             if (
                 item is None
                 or item.file.filename != file.filename

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, remark, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, plain, remark, styled
 from .compare import MOST
-from .figures import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

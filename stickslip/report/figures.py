@@ -8,19 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, remark, scaled, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, remark, scaled, styled
 
 if TYPE_CHECKING:
     import xarray
 
 HIDDEN = 0.1  # share of the way below which the distance to the load point is drawn in place of both
 CROWD = 40  # slips beyond which marks would cover the trace
-
-
-def plain(text: object, most: int = 120) -> str:
-    """Text from a file as matplotlib shows it literally, without its formula signs."""
-    shown = str(text).replace("\\", "/").replace("$", r"\$")
-    return shown if len(shown) <= most else shown[:most] + "..."
 
 
 def series(data: xarray.Dataset, key: str, name: str) -> np.ndarray | None:

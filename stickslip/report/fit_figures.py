@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, remark, scaled, styled
-from .figures import plain, series
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, remark, scaled, styled
+from .figures import series
 
 if TYPE_CHECKING:
     import xarray

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, remark, scaled, styled
-from .figures import plain, series
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, plain, remark, scaled, styled
+from .figures import series
 
 if TYPE_CHECKING:
     import xarray

@@ -153,13 +153,15 @@ def load_run(folder: str | Path, effects: Sequence[str | Path] = (), *, learned:
             hint="stickslip diagnose and stickslip fit --model inertial leave one; older runs must be made again",
         )
     try:
-        return FittedRun(folder, result, from_record(section))
+        found = FittedRun(folder, result, from_record(section))
+        scenario_content(found.fitted, "", {}, found._spring())  # whether every parameter is there
+        return found
     except InputError as error:
         hint = f"{error.hint or ''} An effect of your own: name its file (--effect).".strip()
         raise InputError(
             error.what, file=folder / RESULT, key=error.key, value=error.value, allowed=error.allowed, hint=hint
         ) from None
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         what = f"the fitted model is damaged ({type(error).__name__}: {error})"
         raise RunFolderError(what, file=folder / RESULT, hint="make the run again") from None
 

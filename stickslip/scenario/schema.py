@@ -137,6 +137,8 @@ class OutputTable(Table):
             return self
         if "/" in self.trace or "\\" in self.trace or self.trace.startswith("."):
             raise fault(InputError("'trace' is a file name in the run folder, without folders", value=self.trace))
+        if not self.trace.isprintable():
+            raise fault(InputError("'trace' is no name of a file", value=self.trace))
         if not self.trace.lower().endswith(ENDINGS) or self.trace.lower() == "arrays.nc":
             raise fault(
                 InputError("unknown ending of the trace", value=self.trace, allowed=f"a name with {' '.join(ENDINGS)}")

@@ -48,7 +48,7 @@ def scenarios_of(scenario: Scenario, sweep: SweepTable) -> list[tuple[float, Sce
     values = sweep_values(sweep.key, sweep.start, sweep.stop, sweep.points, sweep.values)
     found = []
     for value in values:
-        number = int(value) if value == int(value) and name in _INTEGERS else value
+        number = int(value) if name in _INTEGERS and float(value).is_integer() else value
         found.append((value, scenario.with_changes([(sweep.key, number)])))
     return found
 

@@ -141,6 +141,8 @@ def _looks(scenario: Scenario, setup: Setup, sliding: Sliding) -> list[float]:
     period = 2.0 * drop / (stiffness * speed) + math.pi * math.sqrt(file.block.mass / stiffness)
     wanted = 2 if sliding.stable else file.drive.events or 1
     step = max(period / 5.0, loading / 50.0)
+    if not math.isfinite(wanted * period + loading):
+        raise InputError("the drive is too slow ever to reach a slip", key="drive.velocity", value=speed)
     return [loading + step * i for i in range(math.ceil((2.0 * wanted * period + loading) / step) + 2)]
 
 

@@ -164,6 +164,10 @@ def test_making_is_deterministic_sealed_and_resumed(tmp_path: Path, monkeypatch:
     assert not (tmp_path / "second").exists()
     made.clear()
     made.append("go on")
+    # what another plan has left behind does not get under the seal
+    stray = tmp_path / "second.partial" / CASES / "case-009"
+    stray.mkdir()
+    (stray / "campaign.toml").write_text("half")
     assert make_challenge(tmp_path / "second", 3, 11, jobs=1) == seal
     assert made == ["go on", "case-002", "case-003"]
     for name in files:

@@ -248,7 +248,9 @@ def test_command_writes_text_json_and_pictures(folder: Path, capsys: pytest.Capt
     assert max(map(len, text.splitlines())) <= 150
     for name in ("confusion.png", "confusion-by-amplitude.png", "amplitude.png"):
         assert (folder / "score" / name).read_bytes().startswith(b"\x89PNG")
-    assert run(["challenge", "score", str(folder), "--json"]) == 0
+    assert run(["challenge", "score", str(folder)]) == 2
+    assert "a score already" in capsys.readouterr().err
+    assert run(["challenge", "score", str(folder), "--json", "--force"]) == 0
     assert json.loads(capsys.readouterr().out) == found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import re
 from pathlib import Path
@@ -94,6 +95,8 @@ def test_numbers_in_another_file_are_not_followed(elsewhere, ending, how):
     path = elsewhere / f"a{ending}"
     if ending == ".nc":
         xarray.Dataset({"x": ("time", X)}, {"time": ("time", T)}).to_netcdf(path, engine="h5netcdf")
+    if ending == ".mat":
+        h5py.File(path, "w", userblock_size=512).close()
     with h5py.File(path, "a") as file:
         if ending != ".nc":
             file["x"], file["time"] = X, T
@@ -110,14 +113,9 @@ def test_numbers_in_another_file_are_not_followed(elsewhere, ending, how):
         if how == "link" and ending != ".mat":  # and the file by itself would follow it
             assert np.array_equal(file["link"][()], X)
     if ending == ".mat":
-        content = path.read_bytes()
         head = b"MATLAB 7.3 MAT-file".ljust(116) + b" " * 8 + b"\x00\x02IM"
-        with h5py.File(path, "w", userblock_size=512) as file:
-            file["x"], file["time"] = X, T
-            file["link"] = h5py.ExternalLink("../other.h5", "/secret")
         with path.open("r+b") as stream:
             stream.write(head)
-        assert content
     assert set(read_columns(path).data) == {"x", "time"}
 
 
@@ -149,6 +147,29 @@ def test_a_scenario_says_what_it_reads_from_outside(tmp_path, capsys):
     (inside / "s.toml").write_text(text[: text.index("[[effect]]")])
     assert run(["simulate", str(inside / "s.toml")]) == 0
     assert "../a.csv lies outside the scenario's folder" in capsys.readouterr().err
+
+
+def test_a_static_curve_says_it_too_and_records_the_file(tmp_path, capsys):
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    table = np.column_stack([np.arange(256) * 1e-7, np.random.default_rng(1).normal(0, 1e-6, 256)])
+    np.savetxt(tmp_path / "line.csv", table, delimiter=",", header="x,z", comments="")
+    contact = """kind = "heights"
+file = "../line.csv"
+position = { column = "x", unit = "m" }
+height = { column = "z", unit = "m" }
+contacts = 4
+normal_force = "0.31 N"
+friction_coefficient = 0.21
+youngs_modulus = "210 GPa"
+poisson_ratio = 0.3
+"""
+    start, stop = SCENARIO.index('kind = "rough-line"'), SCENARIO.index("[weakening]")
+    (inside / "s.toml").write_text(SCENARIO[:start] + contact + SCENARIO[stop : SCENARIO.index("[[effect]]")])
+    assert run(["creep", str(inside / "s.toml"), "--out", str(tmp_path / "out")]) == 0
+    assert "../line.csv lies outside the scenario's folder" in capsys.readouterr().err
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert [Path(i["file"]).name for i in result["inputs"]] == ["s.toml", "line.csv"]
 
 
 def test_an_effect_file_is_run_only_when_named(tmp_path, capsys):
