@@ -39,7 +39,7 @@ class Composition:
     """A family of models: the base with some effects, and which of their parameters are free.
 
     Attributes:
-        mass: of the block (kg).
+        mass: of the block (kg), unless it is free (``rig.mass``).
         contacts: number of contacts.
         bins: Jenkins elements of the bank.
         free: the free parameters, base first.
@@ -94,7 +94,7 @@ class Composition:
         )
         spring = jnp.where(jnp.isnan(stiffness), v["rig.spring_stiffness"], stiffness)
         block = Block(
-            mass=given.mass,
+            mass=v.get("rig.mass", given.mass),
             spring_stiffness=spring,
             damping=v["rig.damping"],
         )

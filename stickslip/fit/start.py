@@ -69,6 +69,16 @@ def _shared_rig(campaign: Campaign, names: Sequence[str]) -> Rig:
             )
         if found:
             shared[key] = found[0]
+    guesses = [rig.spring_stiffness for rig in rigs if isinstance(rig.spring_stiffness, Unmeasured)]
+    if any(guess != guesses[0] for guess in guesses):
+        raise InputError(
+            "the runs have different guesses of 'spring_stiffness', of which the dynamic model fits one",
+            file=campaign.path,
+            key="trace.spring_stiffness",
+            hint="state it where it is known, and one guess for all other runs, or fit them one by one",
+        )
+    if guesses:
+        shared["spring_stiffness"] = guesses[0]
     return campaign.rig.model_copy(update=shared)
 
 
@@ -87,7 +97,7 @@ def base_composition(
         InputError: the mass is not given; the roughness is given by halves, or without load and friction.
     """
     rig, m, s = _shared_rig(campaign, measurement.names), measurement, measurement.layout.slices()
-    mass, _, _, _, _ = _known(rig.mass, np.nan, 0.0)
+    mass, mass_width, lightest, heaviest, weighed = _known(rig.mass, np.nan, 0.0)
     if not np.isfinite(mass):
         raise InputError(
             "the dynamic model needs the mass of the block",
@@ -110,8 +120,9 @@ def base_composition(
     duration = float(np.median(times[:, -1] - times[:, 0])) / 0.83
     if not measured and not stated.size:
         stiffness = float(np.clip(mass * (np.pi / duration) ** 2, low or 1e-3, high or 1e9))
-    load = _known(rig.normal_force, np.nan, 0.0)[0]
+    load, load_width, _, _, _ = _known(rig.normal_force, np.nan, 0.0)
     friction, friction_width, _, _, _ = _known(rig.friction_coefficient, np.nan, 0.15)
+    strength_width = max(float(np.hypot(friction_width, load_width)), 0.1)
     first = np.asarray(m.cycles.virgin)
     each = np.where(np.isfinite(own), own, stiffness)
     seen = (m.values[:, 0, 0] * m.velocities * each)[first]
@@ -144,7 +155,7 @@ def base_composition(
         return Free(name, unit, "log", start, start if prior is None else prior, width, lower, upper, doc)
 
     free = [
-        log("contact.strength", "N", strength, max(friction_width, 0.1), nominal / 4, nominal * 4,
+        log("contact.strength", "N", strength, strength_width, nominal / 4, nominal * 4,
             "friction force of all contacts at full strength", nominal),
         log("weakening.drop", "1", drop, 0.7, 0.003, 0.95, "1 - kinetic over static friction"),
         log("weakening.slip_distance", "m", 1e-6, 1.0, 1e-8, 1e-4, "slip over which strength is lost"),
@@ -164,6 +175,9 @@ def base_composition(
             log("rig.spring_stiffness", "N/m", stiffness, stiffness_width, low or stiffness / 10,
                 high or stiffness * 10, "stiffness of the driving spring", prior)
         )  # fmt: skip
+    if not weighed:
+        assert lightest is not None and heaviest is not None
+        free.append(log("rig.mass", "kg", mass, mass_width, lightest, heaviest, "mass of the block", mass))
     for r in np.flatnonzero(~np.asarray(m.cycles.virgin)).tolist():
         doc = f"how far beyond full strength the load point is at the first slip of run {m.names[r]}"
         # the model slips a little before its full strength; a tenth of the elongation is far more than that

@@ -49,7 +49,8 @@ def parameters(composition: Composition, fit: Fit) -> dict[str, dict[str, Any]]:
             "doc": "",
             "note": "given",
         }
-    out["rig.mass"] = {"value": composition.mass, "std": 0.0, "unit": "kg", "doc": "mass of the block", "note": "given"}
+    given = {"value": composition.mass, "std": 0.0, "unit": "kg", "doc": "mass of the block", "note": "given"}
+    out.setdefault("rig.mass", given)
     return out
 
 

@@ -177,7 +177,7 @@ def scenario_content(found: Fitted, title: str, drive: Mapping[str, Any], spring
         "schema": 1,
         "title": title,
         "block": {
-            "mass": c.mass,
+            "mass": v.get("rig.mass", c.mass),
             "spring_stiffness": v["rig.spring_stiffness"] if spring is None else spring,
             "damping": v["rig.damping"],
         },

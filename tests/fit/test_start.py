@@ -32,9 +32,9 @@ def start(tmp_path):
         x += 24.75 * (1 - np.cos(np.pi * np.clip((t - end + 0.03) / 0.03, 0, 1)))
     np.savetxt(tmp_path / "a.csv", np.column_stack([t, x]), delimiter=",", fmt="%.9g")
 
-    def compose(rig, *traces):
+    def compose(more, *traces, rig=RIG):
         path = tmp_path / "c.toml"
-        path.write_text(RIG + rig + "".join(TRACE.format(name=f"t{i}") + extra for i, extra in enumerate(traces)))
+        path.write_text(rig + more + "".join(TRACE.format(name=f"t{i}") + extra for i, extra in enumerate(traces)))
         loaded = load_campaign(path)
         found = load_traces(loaded)
         return base_composition(loaded, measure(found, [segment(t) for t in found], ring_period=2e-3))
@@ -62,6 +62,37 @@ def test_where_no_spring_is_stated_the_slips_tell_it(start):
     (stiffness,) = [f for f in found.free if f.name == "rig.spring_stiffness"]
     # half a period of the block on its spring, stretched by how a slip is timed
     assert stiffness.start == pytest.approx(0.0894 * (np.pi / 0.03) ** 2, rel=0.3)
+
+
+def test_a_guessed_mass_is_fitted_within_its_bounds(start):
+    weighed = start(SPRING, "")
+    text = '{ guess = "90 g", lower = "80 g", upper = "100 g" }'
+    found = start(SPRING, "", rig=RIG.replace('"89.4 g"', text))
+    (mass,) = [f for f in found.free if f.name == "rig.mass"]
+    assert (mass.start, mass.lower, mass.upper) == pytest.approx((0.09, 0.08, 0.1))
+    assert not [f for f in weighed.free if f.name == "rig.mass"]
+    z, nodes = np.array([f.inward(f.start) for f in found.free]), (np.array([0.0, 1.0]), np.array([0.0, 5e-5]))
+    assert float(found.model(z, np.zeros(2), nodes, np.nan).mass()) == pytest.approx(0.09)
+    z[[f.name for f in found.free].index("rig.mass")] = mass.inward(0.085)
+    assert float(found.model(z, np.zeros(2), nodes, np.nan).mass()) == pytest.approx(0.085)
+
+
+def test_a_guess_of_the_load_widens_that_of_the_strength(start):
+    def width(rig):
+        return next(f for f in start(SPRING, "", rig=rig).free if f.name == "contact.strength").width
+
+    guess = '{ guess = "0.31 N", lower = "0.1 N", upper = "1 N" }'
+    assert width(RIG.replace('"0.31 N"', guess)) == pytest.approx(np.log(10.0) / 4.0)
+    assert width(RIG) == 0.1
+
+
+def test_a_guess_of_a_spring_in_a_trace_counts(start):
+    guess = 'spring_stiffness = { guess = "2500 N/m", lower = "2000 N/m", upper = "3500 N/m" }\n'
+    found = start("", SPRING, guess)
+    (stiffness,) = [f for f in found.free if f.name == "rig.spring_stiffness"]
+    assert (stiffness.lower, stiffness.upper, stiffness.prior) == pytest.approx((2000.0, 3500.0, 2500.0))
+    with pytest.raises(InputError, match="different guesses"):
+        start("", guess, guess.replace("2500", "2600"))
 
 
 def test_the_roughness_is_the_prior_of_the_contact(start):
