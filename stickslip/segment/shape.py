@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trace import Trace
-from .kinematics import block_motion
+from .kinematics import block_motion, velocity_noise
 from .records import Event, Segmentation
 from .ringing import Ringing, ringing
 
@@ -162,6 +162,23 @@ def _noise(found: Segmentation, shapes: list[Shape], duration: float, rate: floa
     ends = noise / np.sqrt(2 * max(1, round(found.settings.window * rate / 3)) + 1)
     rest = noise / np.sqrt(max(rate * REST_WIDTH * duration, 1.0))
     out = {"slip": float(np.sqrt(2.0) * ends), "overshoot": float(np.hypot(ends, rest))}
+    out["creep"] = out["slip"]
+    # of the velocity by which onsets are told, and of the moment it passes a threshold as a half cosine begins
+    step = 1.0 / rate
+    fast = velocity_noise(noise, max(1, round(found.settings.window * rate)), step)
+    peak = float(np.median([e.peak_velocity for e in found.events]))
+    out["peak_velocity"] = fast
+    onset = float(np.hypot(fast * duration / (np.pi * max(peak, 1e-300)), step / np.sqrt(12.0)))
+    out["recurrence"] = float(np.sqrt(2.0) * min(onset, duration))
+    held = [stop - start for e in found.events for start, stop in e.holds]
+    if held:
+        out["hold_motion"] = float(noise * np.sqrt(2.0 / max(rate * EDGE * np.median(held), 1.0)))
+    known = [s.ring for s in shapes if s.ring is not None and np.isfinite(s.ring.decay_time) and s.ring.amplitude > 0]
+    if known:
+        # the least a decaying sine in white noise allows (Cramer and Rao)
+        lasts, loud = (float(np.median([getattr(r, name) for r in known])) for name in ("decay_time", "amplitude"))
+        turn = noise / loud * np.sqrt(8.0 / (rate * lasts**3))
+        out["ring_frequency"], out["decay_time"] = float(turn / (2.0 * np.pi)), float(turn * lasts**2)
     times = np.array([s.slip_times for s in shapes])
     if np.isfinite(times).any():
         middle = np.nanmedian(times, axis=0)

@@ -5,7 +5,7 @@ import pytest
 
 from stickslip.features.layout import LEVELS
 from stickslip.features.measurement import measure
-from stickslip.segment import segment
+from stickslip.segment import event_shapes, segment
 from stickslip.trace import Drive, Trace
 
 
@@ -72,3 +72,24 @@ def test_ringing_needs_four_samples_a_period(stick_slip, rate, claimed):
     assert later[:, s["size"]].all()
     assert later[:, s["ring"]].any() == claimed
     assert later[:, s["frequency"]].any() == claimed
+
+
+def test_what_the_sensor_makes_of_every_feature_of_an_event(stick_slip):
+    """The scatter of 25 records that differ in their noise alone, against what is stated for each feature."""
+    model, noise = stick_slip(ring=600e-9, events=4), 20e-9
+    t = np.arange(0, model.stop, 1e-4)
+    found: dict[str, list[float]] = {}
+    for seed in range(25):
+        x = model.position(t) + np.random.default_rng(seed).normal(0, noise, t.size)
+        whole = Trace("a", t, displacement=x, drive=Drive.constant(model.v0, 0.0, model.stop), noise=noise)
+        events = segment(whole)
+        shapes = event_shapes(whole, events)
+        event, shape = events.events[2], shapes.events[2]
+        for name, value in (
+            ("slip", event.slip), ("recurrence", event.recurrence), ("peak_velocity", event.peak_velocity),
+            ("overshoot", shape.overshoot), ("rise_time", shape.slip_times[-1] - shape.slip_times[0]),
+            ("creep", shape.creep[8]), ("ring_frequency", shape.ring.frequency), ("decay_time", shape.ring.decay_time),
+        ):  # fmt: skip
+            found.setdefault(name, []).append(float(value))
+    ratio = {name: np.std(values, ddof=1) / shapes.noise[name] for name, values in found.items()}
+    assert all(0.4 < r < 2.5 for r in ratio.values()), ratio
