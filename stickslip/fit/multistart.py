@@ -68,8 +68,11 @@ def best_of(
             break
     if best is None:
         raise failure or FitError("the fit was given no start")
-    for _ in range(AGAIN):
-        more = fit(problem, floor, z=best.z, events=best.events, use=use, stages=FURTHER)
+    for again in range(AGAIN):
+        more = fit(
+            problem, floor, z=best.z, events=best.events, use=use, stages=FURTHER,
+            progress=lambda text, again=again: tell(f"the best start again ({again + 1}), {text}", 0.99),
+        )  # fmt: skip
         arrived = more.cost > SETTLED * best.cost
         best = more if more.cost < best.cost else best
         if arrived:

@@ -154,6 +154,8 @@ def test_simulate_takes_a_run_folder(folder, tmp_path, capsys):
     [
         (lambda r: r.pop(KEY), "no fitted model"),
         (lambda r: r[KEY]["free"][0].pop("value"), "damaged"),
+        (lambda r: r[KEY]["free"][0].update(name="contact.strenght"), "damaged"),
+        (lambda r: r[KEY].update(contacts=float("inf")), "damaged"),
         (lambda r: r[KEY].update(covariance=[[1.0]]), "damaged"),
         (lambda r: r[KEY]["effects"][0].update(type="my-own"), "--effect"),
     ],
