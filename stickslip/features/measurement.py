@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ..errors import InputError
 from ..forward import LONGEST, Cycles
@@ -18,6 +19,7 @@ from .curve import SampledCurve
 from .evaluate import Anchors, features
 from .layout import CREEP_POINTS, HOLD, LEVELS, SETTLE, Layout
 
+SLIP_SAMPLES, LEAST_SAMPLES = 50.0, 8.0  # of a slip, below which samples are put between, if there are so many
 RING_COUNTS = 1.0  # rms of the ringing, in counts, below which nothing is said of it
 RING_RATE = 4.0  # samples a period of the ringing below which nothing is said of it
 
@@ -194,26 +196,47 @@ def _run(trace: Trace, found: Segmentation, layout: Layout, ring_period: float, 
     """Nodes of the load point and one record for every cycle of a run."""
     assert trace.displacement is not None
     assert trace.drive is not None
-    t, y = trace.time, trace.displacement
+    t, y, finer = _refined(trace, found)
     nodes = (np.asarray(trace.drive.times, float), np.asarray(trace.drive.positions, float))
     width = 0.18 * ring_period
     events = found.events[:most]
     tops = []
     for e in events:
-        near = slice(max(e.i_onset - 5, 0), e.i_arrest + 60)
+        near = slice(max(e.i_onset - 5, 0) * finer, (e.i_arrest + 60) * finer)
         curve = SampledCurve(t[near], y[near], e.t_arrest, width)
         tops.append(curve.top)
     begins = [(float(t[0]), float(y[0])), *tops]
     noise = float(trace.noise or 0.0)
     count = float(trace.resolution or 0.0)
+    rate = 1.0 / float(np.median(np.diff(trace.time)))
     records = []
     for n in range(len(events)):
         start, position = begins[n]
         stop = tops[n][0]
-        records.append(_cycle(t, y, start, position, stop, found, n, layout, ring_period, width, noise, count, trace))
+        records.append(
+            _cycle(t, y, start, position, stop, found, n, layout, ring_period, width, noise, count, trace, rate, finer)
+        )
     onsets = np.array([e.t_onset for e in events[1:] or events])
     stretch = float(np.median(np.interp(onsets, *nodes) - np.interp(onsets, t, y)))
     return nodes, records, bool(trace.virgin), trace.spring_stiffness, stretch
+
+
+def _refined(trace: Trace, found: Segmentation) -> tuple[np.ndarray, np.ndarray, int]:
+    """Times and positions of a run, and how many there are for each sample.
+
+    Features are taken on straight lines between samples. Where a slip has few, its curvature would be lost, and samples
+    are put between them on a cubic spline (on a straight line where some are missing).
+    """
+    t, y = trace.time, np.asarray(trace.displacement)
+    samples = float(np.median([e.duration for e in found.events])) * trace.sampling_rate
+    finer = int(np.ceil(SLIP_SAMPLES / samples)) if LEAST_SAMPLES <= samples < SLIP_SAMPLES else 1
+    if finer == 1:
+        return t, y, 1
+    number = np.arange((t.size - 1) * finer + 1)
+    fine = np.interp(number / finer, np.arange(t.size), t)
+    steps = np.diff(t)
+    broken = np.append(np.repeat(steps > 1.5 * np.median(steps), finer), False)
+    return fine, np.where(broken, np.interp(fine, t, y), CubicSpline(t, y)(fine)), finer
 
 
 def _cycle(
@@ -230,11 +253,13 @@ def _cycle(
     noise: float,
     count: float,
     trace: Trace,
+    rate: float,
+    finer: int,
 ) -> dict[str, Any]:
     """Anchors, features, validity and sensor noise of the cycle that ends with event ``n``."""
     event = found.events[n]
     a = max(int(np.searchsorted(t, start)) - 2, 0)
-    b = min(int(np.searchsorted(t, stop)) + 80, t.size)
+    b = min(int(np.searchsorted(t, stop)) + 80 * finer, t.size)
     curve = SampledCurve(t[a:b], y[a:b], event.t_arrest, width)
     settling = layout.settling
     rest = float(curve.mean(np.array([start + 1.15 * settling]), 0.3 * settling)[0])
@@ -266,7 +291,6 @@ def _cycle(
         valid[s["ring"]] = False
     if virgin and not trace.virgin and first - start < 1.6 * settling:
         valid[:] = False  # the record begins too late to see where this slip started
-    rate = 1.0 / float(np.median(np.diff(t)))
     if rate * ring_period < RING_RATE:
         valid[s["ring"]] = valid[s["frequency"]] = False
     if count > 0 and float(values[s["ring"]][0]) < RING_COUNTS * count:

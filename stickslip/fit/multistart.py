@@ -69,10 +69,11 @@ def best_of(
     if best is None:
         raise failure or FitError("the fit was given no start")
     for again in range(AGAIN):
-        more = fit(
-            problem, floor, z=best.z, events=best.events, use=use, stages=FURTHER,
-            progress=lambda text, again=again: tell(f"the best start again ({again + 1}), {text}", 0.99),
-        )  # fmt: skip
+
+        def last(text: str, again: int = again) -> None:
+            tell(f"the best start again ({again + 1}), {text}", 0.99)
+
+        more = fit(problem, floor, z=best.z, events=best.events, use=use, stages=FURTHER, progress=last)
         arrived = more.cost > SETTLED * best.cost
         best = more if more.cost < best.cost else best
         if arrived:

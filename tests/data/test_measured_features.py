@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from stickslip.features import measurement
 from stickslip.features.layout import LEVELS
 from stickslip.features.measurement import measure
 from stickslip.segment import event_shapes, segment
@@ -62,6 +63,20 @@ def test_without_noise_a_fiftieth_of_a_sample_is_left(stick_slip):
     assert coarse.sensor[0, 1, times] == pytest.approx(2e-6, rel=1e-3)
     off = coarse.values[0, 1, times] - fine.values[0, 1, times]
     assert np.abs(off).max() < 3 * 2e-6, off
+
+
+@pytest.mark.parametrize("rate", [500.0, 1e3, 1.5e3])
+def test_few_samples_of_a_slip_are_joined_by_a_curve(stick_slip, rate, monkeypatch):
+    """Against the same motion sampled at 400 kHz: straight lines between 15 to 45 samples a slip bend its course."""
+    model = stick_slip(events=4)
+    dense = measured(model, 4e5, 0.0, 0)
+    curved = measured(model, rate, 0.0, 0)
+    monkeypatch.setattr(measurement, "SLIP_SAMPLES", 0.0)
+    straight = measured(model, rate, 0.0, 0)
+    for name in ("times", "creep"):
+        part = dense.layout.slices()[name]
+        off = [np.abs((m.values - dense.values)[0, 1:3, part]).max() for m in (curved, straight)]
+        assert off[0] < 0.6 * off[1], (name, off)
 
 
 @pytest.mark.parametrize(("rate", "claimed"), [(1e3, False), (1.9e3, False), (4e3, True)])
