@@ -289,9 +289,9 @@ def caption(f: dict[str, Any]) -> str:
         f"{f['seconds']} s. **1** One of five runs, {f['slips']} slips at {f['velocity_um_s']} µm/s. **2** The static "
         f"model, fitted to the first creep, describes it to {s['residual_percent']} % (H = {s['H']}) and fails after "
         f"it: the second slip comes after {s['second_stick_s']} s, the model needs {s['model_stick_s']} s for every "
-        f"stick and ends without a slip. **3** {f['tried']} effects were scored and {f['refitted']} of them "
-        f"refitted, those that came closest to the end; verdict `{f['verdict']}`, effects named: {named} (cost {f['costs'][0]}{second}). **4** Error on fitted "
-        f"runs {arrow.join(_digits(v) for v in f['fitted'])}, on unseen ones "
+        f"stick and ends without a slip. **3** {f['tried']} effects were scored and {f['refitted']} of them refitted, "
+        f"those that came closest to the end; verdict `{f['verdict']}`, effects named: {named} (cost {f['costs'][0]}"
+        f"{second}). **4** Error on fitted runs {arrow.join(_digits(v) for v in f['fitted'])}, on unseen ones "
         f"{arrow.join(_digits(v) for v in f['unseen'])}, in floors: 1 is as good as noise and scatter allow.*"
     )
     return textwrap.fill(text, 120, break_long_words=False, break_on_hyphens=False)
