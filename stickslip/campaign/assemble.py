@@ -65,10 +65,11 @@ class _Assembly:
         try:
             return self._trace()
         except InputError as error:
-            placed = error.at(file=self.campaign.path, key=f"{self.place} ('{self.entry.label}')")
-            if self.warnings:
-                placed = placed.with_hint("noticed before: " + "; ".join(self.warnings))
-            raise placed from None
+            raise self._placed(error) from None
+
+    def _placed(self, error: InputError) -> InputError:
+        placed = error.at(file=self.campaign.path, key=f"{self.place} ('{self.entry.label}')")
+        return placed.with_hint("noticed before: " + "; ".join(self.warnings)) if self.warnings else placed
 
     def _trace(self) -> Trace:
         entry = self.entry
