@@ -82,11 +82,13 @@ def imbalance(model: Model, s) -> float:
     """Largest energy that is missing or too much, over the work of the spring.
 
     Left out are single steps that go over a whole stick and slip: longer than the contact takes to answer, and farther
-    than it holds. What happens within such a step has no balance.
+    than it holds, weakened as it is then. What happens within such a step has no balance.
     """
     strength, k = float(np.sum(model.bank.strength)), float(np.sum(model.bank.stiffness) + model.block.spring_stiffness)
     answer = max(2.0 * np.pi * np.sqrt(float(model.block.mass) / k), float(model.block.damping) / k)
-    leap = (np.diff(s.t) > answer) & (np.abs(np.diff(s.x)) > strength / k)
+    ratio = float(model.weakening.ratio)
+    held = strength * (ratio + (1.0 - ratio) * np.minimum(s.psi[1:], s.psi[:-1]))
+    leap = (np.diff(s.t) > answer) & (np.abs(np.diff(s.x)) > held / k)
     gap = np.diff(s.spring_work + s.body_work - s.stored - s.friction_work - s.viscous_work)
     scale = np.max(np.abs(s.spring_work)) + np.max(np.abs(s.stored))
     return float(np.max(np.abs(np.cumsum(np.where(leap, 0.0, gap)))) / scale) if scale > 0 else 0.0
@@ -140,7 +142,7 @@ def test_the_laws_hold_wherever_the_solver_gets_which_is_most_of_the_range():
     assert len(finished) > 100
     assert np.mean(finished) > 0.5
     assert np.mean(excused) < 0.1
-    assert np.mean(coarse) < 0.05
+    assert np.mean(coarse) < 0.05, (np.mean(finished), np.mean(excused), np.mean(coarse))
 
 
 @settings(max_examples=40, **EXAMPLES)

@@ -123,7 +123,7 @@ def test_too_stiff_a_spring_slides_and_names_the_critical_one():
 def test_above_the_critical_velocity_it_slides_and_names_it():
     data = simulate(make_scenario(rig(drive={"velocity": 3e-3, "duration": 1.5})))
     assert "slides" in data.attrs["verdict"]
-    assert f"critical velocity is {data.attrs['critical_velocity']:.3g} m/s" in data.attrs["verdict"]
+    assert f"critical velocity is {1e6 * data.attrs['critical_velocity']:.3g} µm/s" in data.attrs["verdict"]
     assert data["velocity"].values[-1] == pytest.approx(3e-3, rel=0.02)
 
 
