@@ -21,6 +21,7 @@ from .one_case import Diagnosis, do_case, failures, is_done
 from .seal import CASES, RUNS, case_names, check_seal, digest
 
 PROTOCOL = "protocol.json"
+POLL = 0.2  # s after which tasks are asked again
 ANSWER = 10.0  # s for the answer of a finished case to arrive
 RESUBMITTED = 20  # times a case may be handed out before the cluster is given up
 
@@ -135,8 +136,6 @@ def _work(
     """Have the cases done. What the files say counts: a result on a worker that dies is lost, and dask blames a death
     also on the cases that were only queued there.
     """
-    from distributed import as_completed
-
     runs, session = folder / RUNS, uuid.uuid4().hex
     before = {case: len(failures(runs, case)) for case in waiting}
     given = Counter(waiting)
@@ -146,30 +145,36 @@ def _work(
         return client.submit(do_case, campaign, str(runs), case, diagnosis, session, pure=False)
 
     began = time.monotonic()
-    futures = {submit(case): case for case in waiting}
-    completed = as_completed(list(futures), loop=client.loop)
+    at_work = {case: submit(case) for case in waiting}
+    unanswered: dict[str, float] = {}  # since when a case is finished whose answer has not come
     count, first = 0, total - len(waiting)
     try:
-        for future in completed:
-            case = futures[future]
-            told = _outcome(future, runs, case, before[case])
-            if told is None and given[case] <= RESUBMITTED and client.status == "running":
-                given[case] += 1
-                again = submit(case)
-                futures[again] = case
-                completed.add(again)
-                continue
-            if told is None:
-                raise StickslipError(
-                    f"the cluster was lost while {case} was running; what is finished is kept"
-                    "\n  to mend: run the same command again"
-                )
-            count += 1
-            if tell is not None:
-                left = (time.monotonic() - began) / count * (len(waiting) - count)
-                tell(Progress(**told, done=first + count, total=total, left=left))
+        while at_work:
+            # dask may forget to tell of a task whose answer was lost with its worker, so each is asked again and again
+            time.sleep(POLL)
+            for case, future in list(at_work.items()):
+                if future.status == "pending":
+                    if not is_done(runs, case) and len(failures(runs, case)) <= before[case]:
+                        continue
+                    if time.monotonic() - unanswered.setdefault(case, time.monotonic()) < ANSWER:
+                        continue
+                told = _outcome(future, runs, case, before[case])
+                if told is None and given[case] <= RESUBMITTED and client.status == "running":
+                    given[case] += 1
+                    at_work[case] = submit(case)
+                    continue
+                if told is None:
+                    raise StickslipError(
+                        f"the cluster was lost while {case} was running; what is finished is kept"
+                        "\n  to mend: run the same command again"
+                    )
+                del at_work[case]
+                count += 1
+                if tell is not None:
+                    left = (time.monotonic() - began) / count * (len(waiting) - count)
+                    tell(Progress(**told, done=first + count, total=total, left=left))
     except BaseException:
-        client.cancel(list(futures))
+        client.cancel(list(at_work.values()))
         raise
 
 
