@@ -11,6 +11,8 @@ from .base import Columns, add_array, need_columns
 from .guard import guard
 from .hdf import read_hdf
 
+_MOST_CELLS = 1000  # of a cell array
+
 
 class MatReader:
     """MATLAB .mat of every version."""
@@ -51,7 +53,9 @@ def _add(columns: Columns, name: str, value: object, depth: int = 0) -> None:
         for part in fields:
             _add(columns, f"{name}.{part}", getattr(value, part), depth + 1)
     elif isinstance(value, np.ndarray) and value.dtype == object and depth < 8:  # a cell or a struct array
-        for number, item in enumerate(value.ravel()[:1000], start=1):
+        for number, item in enumerate(value.ravel()[:_MOST_CELLS], start=1):
             _add(columns, f"{name}:{number}", item, depth + 1)
+        if value.size > _MOST_CELLS:
+            columns.notes.append(f"of the {value.size} cells of '{name}' the first {_MOST_CELLS} were read")
     elif not isinstance(value, str):
         add_array(columns, name, value)

@@ -43,12 +43,12 @@ def trace_pieces(trace: Trace, found: Segmentation, number: int) -> Variables:
         key = f"trace{number}_event"
         out[f"{key}_onset"] = (key, np.array([e.t_onset for e in found.events]), {"units": "s"})
         out[f"{key}_arrest"] = (key, np.array([e.t_arrest for e in found.events]), {"units": "s"})
-    if trace.drive is not None:
+    if trace.drive is not None and unit == "m":
         key = f"trace{number}_whole"
         at = out[f"{key}_time"][1]
         drive = trace.drive.position(at)
         start = out[f"{key}_position"][1][0] - drive[0]
-        out[f"{key}_drive"] = (key, drive + start, {"units": unit if unit == "m" else "m"})
+        out[f"{key}_drive"] = (key, drive + start, {"units": "m"})
     return out
 
 

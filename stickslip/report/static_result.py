@@ -74,7 +74,7 @@ def static_result(
     variables: Variables = {}
     if processes:
         fit = fit_static(processes, rigs, align=align, form=form, progress=progress)
-        result["static"] = _creep_part(fit, v_lim)
+        result["static"] = _creep_part(fit, v_lim, rigs)
         result["identifiability"] = _words(fit)
         for i, one in enumerate(fit.fits[:MOST_SHOWN]):
             key, p = f"creep{i}", one.process
@@ -88,7 +88,7 @@ def static_result(
     return result, variables
 
 
-def _creep_part(fit: StaticFit, v_lim: float) -> dict[str, Any]:
+def _creep_part(fit: StaticFit, v_lim: float, rigs: Sequence[StaticRig]) -> dict[str, Any]:
     numbers, rig = fit.summary(), fit.rig
     guessed = f"; guessed, not measured: {', '.join(rig.guessed)}" if rig.guessed else ""
     mean = (
@@ -105,6 +105,8 @@ def _creep_part(fit: StaticFit, v_lim: float) -> dict[str, Any]:
         f"lines: H and h_rms hold for this N and L only. Alignment '{fit.align}', virtual time '{fit.form}', "
         f"v_lim = {shown(v_lim, 'm/s')}{guessed}. Median residual {100 * numbers['median_nrmse']:.2g} % of the creep."
     )
+    if len({(r.n_springs, r.length) for r in rigs}) > 1:
+        text += " Traces have rigs of their own; N and L are those of the first."
     hidden = sum(_noise_share(f) > 0.5 * SATISFYING for f in fit.fits)
     if hidden:
         text += f" In {hidden} processes counts and noise of the sensor alone make 1 % of the creep or more."
