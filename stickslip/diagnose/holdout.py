@@ -20,6 +20,9 @@ def training_cycles(measurement: Measurement, holdout: Sequence[str] = (), keep:
         measurement: the data.
         holdout: names of runs to hold out instead.
         keep: names of runs that the choice by default leaves to be fitted.
+
+    Raises:
+        InputError: no such run, every run is held out, or nothing is.
     """
     m = measurement
     used = np.asarray(m.cycles.used)
@@ -33,7 +36,7 @@ def training_cycles(measurement: Measurement, holdout: Sequence[str] = (), keep:
                 )
             train[m.names.index(found[0])] = False
         if not train.any():
-            raise InputError("every run is held out", key="--holdout", hint="leave runs to fit")
+            raise InputError("every run is held out", key="--holdout, role", hint="leave runs to fit")
         return train
     holds = m.valid[..., m.layout.slices()["hold"]].any(axis=(1, 2))
     open_to = np.array([name not in keep for name in m.names])
@@ -51,4 +54,10 @@ def training_cycles(measurement: Measurement, holdout: Sequence[str] = (), keep:
         for r in np.flatnonzero(open_to).tolist():
             n = int(used[r].sum())
             train[r, max(n - max(n // 3, 1), 1) :] = False
+    if (train == used).all():
+        raise InputError(
+            "no cycle is left that no fit sees, and without one no effect can be named",
+            key="role",
+            hint='leave role = "train" out of some runs, name one with --holdout, or record more slips',
+        )
     return train
