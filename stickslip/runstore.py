@@ -15,7 +15,7 @@ import platform
 import shutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol, TextIO
@@ -92,9 +92,11 @@ def alone(target: Path) -> Iterator[None]:
     """Nobody else may work on a folder meanwhile.
 
     Raises:
-        RunFolderError: somebody does.
+        RunFolderError: somebody does, or the lock cannot be made.
     """
-    with _speaking(target), _locked(target):
+    with ExitStack() as held:
+        with _speaking(target):  # of the lock only: what goes wrong in the work is no fault of the folder
+            held.enter_context(_locked(target))
         yield
 
 

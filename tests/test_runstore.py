@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import RunFolderError
-from stickslip.runstore import RESULT, file_record, json_text, open_run, read_result, versions, write_aside
+from stickslip.runstore import RESULT, alone, file_record, json_text, open_run, read_result, versions, write_aside
 
 
 def names(folder: Path) -> list[str]:
@@ -119,6 +119,15 @@ def test_a_link_and_what_it_leads_to_are_one_folder(tmp_path):
         run.json({"value": 2})
         write(tmp_path / "x" / "a")
     assert read_result(tmp_path / "x" / "real")["value"] == 2
+
+
+def test_work_alone_on_a_folder_keeps_its_own_errors(tmp_path):
+    with pytest.raises(ConnectionError, match="no answer"), alone(tmp_path / "runs"):
+        with pytest.raises(RunFolderError, match="another run"), alone(tmp_path / "runs"):
+            pass
+        raise ConnectionError("no answer")
+    with alone(tmp_path / "runs"):
+        pass
 
 
 def test_the_current_folder_can_be_named(tmp_path, monkeypatch):
