@@ -18,13 +18,15 @@ from typing import Any
 import numpy as np
 import xarray
 from matplotlib.figure import Figure
+from scipy.optimize import least_squares
 from scipy.stats import binomtest
 
 from stickslip import __version__
 from stickslip.campaign.template import campaign_text
 from stickslip.cli import run as command
-from stickslip.contact import power_law_bank, rough_table, static_contact
+from stickslip.contact import default_loads, power_law_bank, rough_table, static_contact
 from stickslip.fit.creep_process import V_LIM, CreepProcess, creep_processes
+from stickslip.fit.effective import effective_line
 from stickslip.fit.static import CreepFit, StaticFit, fit_static
 from stickslip.fit.static_table import StaticRig, static_table, virtual_curve
 from stickslip.plots import save
@@ -266,6 +268,18 @@ def summary(fit: StaticFit) -> dict[str, Any]:
     return out
 
 
+def weakening() -> list[dict[str, float]]:
+    """What the weakening of friction does to static fits: mean lines and an exact sensor, so nothing scatters."""
+    scenario, rows = load_scenario(RIGS / "statistics.toml"), []
+    exact = contacts(scenario, "mean", 0).changed(sensor__resolution=0.0, sensor__white=0.0, sensor__random_walk=0.0)
+    for ratio, distance in ((0.85, 1e-6), (0.95, 1e-6), (0.98, 1e-6), (0.85, 4e-6), (0.95, 4e-6)):
+        data = simulate(exact.changed(weakening__ratio=ratio, weakening__slip_distance=distance))
+        trace = trace_of(data, 5e-5, f"{ratio}, {distance}")
+        fit, _ = fitted([trace], [segment(trace)], 0, rig_of(scenario), PROCEDURES["consistent"])
+        rows.append({"ratio": ratio, "slip_distance_um": distance * 1e6, **one(fit.fits[0])})
+    return rows
+
+
 @styled
 def _statistics(scatter: dict[str, StaticFit]) -> Figure:
     made, axes = figure(2, 3, width=12.5, height=7.2)
@@ -346,10 +360,13 @@ def extended() -> dict[str, Any]:
     force = np.asarray(bank.backbone(grid))
     return {
         "true": {
+            **own_line(runs[0], velocities[0], rig_of(scenario)),
             "stiffness_N_um": float(np.mean([d.attrs["contact_stiffness"] for d in runs]) * 1e-6),
             "u_half_nm": float(np.mean([half_way(d, v) for d, v in zip(runs, velocities, strict=True)]) * 1e9),
         },
         "dynamic": {
+            "hurst": dynamic["effective"]["H"],
+            "h_rms_um": dynamic["effective"]["h_rms"] * 1e6,
             "stiffness_N_um": float(np.asarray(bank.total_stiffness) * 1e-6),
             "u_half_nm": float(np.interp(0.5, force / values["contact.strength"], grid) * 1e9),
         },
@@ -359,6 +376,20 @@ def extended() -> dict[str, Any]:
             name: static_part(result, rig_of(scenario)) for name, result in (("paper", paper), ("consistent", static))
         },
     }
+
+
+def own_line(data: xarray.Dataset, velocity: float, rig: StaticRig) -> dict[str, float]:
+    """The rough line that the lines of a run behave like together: what a perfect fit would find."""
+    u, t = data["static_displacement"].values, data["static_time"].values
+    tau = default_loads(400)[8:-8]
+    curve = np.interp(tau, 1000.0 * (velocity * t - u) / data.attrs["friction_force"], u)
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        return (np.exp(x[0]) * (1.0 - (1.0 - tau) ** (1.0 / x[1])) - curve) / curve[-1]
+
+    u_max, p = least_squares(residual, [np.log(curve[-1]), 3.0]).x
+    line = effective_line(float(np.exp(u_max)), float(p), rig)
+    return {"hurst": line.hurst, "h_rms_um": line.h_rms * 1e6}
 
 
 def half_way(data: xarray.Dataset, velocity: float) -> float:
@@ -386,6 +417,7 @@ def static_part(result: dict[str, Any], rig: StaticRig) -> dict[str, Any]:
         "processes": len(later),
         "satisfying": sum(bool(f["satisfying"]) for f in later),
         "hurst": float(np.median([f["hurst"] for f in later])),
+        "h_rms_um": float(np.median([f["h_rms"] for f in later]) * 1e6),
         "stiffness_N_um": float(np.median([rig.friction_force * table.tau[1] / u[1] for u in curves]) * 1e-6),
         "u_half_nm": float(np.median([np.interp(0.5, table.tau, u) for u in curves]) * 1e9),
     }
@@ -395,7 +427,7 @@ def main() -> None:
     OUT.mkdir(exist_ok=True)
     began = time.perf_counter()
     result: dict[str, Any] = {"version": __version__, "paper": PAPER, "v_lim_um_s": V_LIM * 1e6}
-    for part in (fig2, fig4, fig5, alignment, realisations, statistics, extended):
+    for part in (fig2, fig4, fig5, alignment, realisations, statistics, weakening, extended):
         start = time.perf_counter()
         result[part.__name__] = part()
         print(f"{part.__name__}: {time.perf_counter() - start:.1f} s")

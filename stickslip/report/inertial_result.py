@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,9 +12,10 @@ from ..errors import InputError
 from ..features.layout import PHASES
 from ..features.measurement import Measurement
 from ..fit.composition import START, Composition
-from ..fit.effective import effective_line
+from ..fit.effective import EffectiveLine, effective_line
 from ..fit.inertial import Fit
 from ..fit.overlay import ModelledRun, modelled_runs
+from ..fit.parameters import to_si
 from ..fit.problem import Problem
 from ..fit.static_table import StaticRig
 from ..fit.surface import sensitivity, surface_prior
@@ -27,6 +28,8 @@ from ..units import shown
 from .describe import describe_trace
 from .pieces import ZOOM, Variables, middle_event, trace_pieces
 from .sentences import misfit_sentence, phase_table
+
+CONTACT = ("contact.u_max", "contact.p", "contact.spread")
 
 
 def parameters(composition: Composition, fit: Fit) -> dict[str, dict[str, Any]]:
@@ -83,30 +86,60 @@ def identifiability(fit: Fit, rig: Any, line: dict[str, Any] | None) -> list[str
 
 
 def effective(fit: Fit, rig: Any, contacts: int) -> dict[str, Any] | None:
-    """(H, h_rms) implied by the fitted (u_max, p); None where load or friction is not known at all."""
+    """(H, h_rms) implied by the fitted (u_max, p, spread); None where load or friction is not known at all.
+
+    Standard deviations are those of the fit alone: how other lines of the same surface would differ is not in them.
+    """
     values = fit.values
     try:
         known = StaticRig.of(rig, spring_stiffness=1.0)
     except InputError:
         return None
-    line = effective_line(values["contact.u_max"], values["contact.p"], known)
+    known = replace(known, contacts=contacts)
+
+    def line_of(values: dict[str, float]) -> EffectiveLine:
+        u_max, p, spread = (values.get(name, 0.0) for name in CONTACT)
+        return effective_line(u_max, p, known, spread)
+
+    line = line_of(values)
+    hurst_std, rms_std = _line_std(fit, line_of)
+    unequal = f", spread over {contacts} contacts by {values[CONTACT[2]]:.2g}" if CONTACT[2] in values else ""
     text = (
         f"Effective rough line of a contact with u_max = {shown(values['contact.u_max'], 'm', 3)} and p = "
-        f"{values['contact.p']:.3g}: H = {line.hurst:.2f} (1/(p - 1) = {line.power_law_hurst:.2f}), h_rms = "
-        f"{shown(line.h_rms, 'm', 3)}, for L = {shown(line.length, 'm')}, N = {line.n_springs}, F_n = "
-        f"{known.normal_force:.3g} N and friction {known.friction:.3g}"
+        f"{values['contact.p']:.3g}{unequal}: H = {line.hurst:.2f} +- {hurst_std:.2f}, h_rms = "
+        f"{shown(line.h_rms, 'm', 3)} +- {shown(rms_std, 'm', 2)}, for L = {shown(line.length, 'm')}, "
+        f"N = {line.n_springs}, F_n = {known.normal_force:.3g} N and friction {known.friction:.3g}"
         f"{' (guessed)' if known.guessed else ''}; {line.note}."
     )
     prior = surface_prior(rig)
     return {
         "text": text if prior is None else f"{text} {prior.text}",
         "H": line.hurst,
+        "H_std": hurst_std,
         "h_rms": line.h_rms,
+        "h_rms_std": rms_std,
         "N": line.n_springs,
         "L": line.length,
         "mismatch": line.mismatch,
         "contacts": contacts,
     }
+
+
+def _line_std(fit: Fit, line_of: Callable[[dict[str, float]], EffectiveLine]) -> tuple[float, float]:
+    """Standard deviations of H and h_rms (m): differences one deviation to either side on the covariance's axes."""
+    at = [i for i, f in enumerate(fit.free) if f.name in CONTACT]
+    low, high = np.array([fit.free[i].bounds for i in at]).T
+    variances, axes = np.linalg.eigh(fit.covariance[np.ix_(at, at)])
+    total = np.zeros(2)
+    for variance, axis in zip(np.maximum(variances, 0.0), axes.T, strict=True):
+        ends = []
+        for sign in (-1.0, 1.0):
+            z = np.array(fit.z, float)
+            z[at] = np.clip(z[at] + sign * np.sqrt(variance) * axis, low, high)
+            line = line_of(to_si(fit.free, z))
+            ends.append((line.hurst, line.h_rms))
+        total += (0.5 * (np.array(ends[1]) - ends[0])) ** 2
+    return float(np.sqrt(total[0])), float(np.sqrt(total[1]))
 
 
 def misfit_part(measurement: Measurement, model: np.ndarray, floor: np.ndarray, found: Misfit) -> dict[str, Any]:

@@ -188,6 +188,27 @@ def test_effective_line_of_a_backbone_that_is_a_line_s(hurst):
     assert line.mismatch < 0.01
 
 
+def test_effective_line_is_of_the_curve_of_all_contacts():
+    u_max, p, spread = 6.6e-7, 3.0, 0.23
+    together = effective_line(u_max, p, RIG, spread)
+    # each contact stretched by its own factor, summed on a grid, compared with the mean line without the package's code
+    stretch = np.exp(spread * np.array([-1.3628, -0.3775, 0.3775, 1.3628]))
+    u = np.linspace(0.0, u_max * stretch.max(), 20001)
+    force = np.mean([1.0 - np.clip(1.0 - u / (u_max * s), 0.0, None) ** p for s in stretch], axis=0)
+    table = static_table()
+    part = (table.tau > 0.02) & (table.tau < 0.98)
+    wanted = np.interp(table.tau[part], force, u)
+    off = table.displacement(RIG, together.hurst, together.h_rms)[part] - wanted
+    assert np.sqrt(np.mean(off**2)) / u_max == pytest.approx(together.mismatch, rel=0.05)
+    alone = effective_line(u_max, p, RIG)
+    worse = table.displacement(RIG, alone.hurst, alone.h_rms)[part] - wanted
+    assert np.sqrt(np.mean(worse**2)) > 10 * np.sqrt(np.mean(off**2))
+    # unequal contacts slide one after the other, as the springs of a line of smaller H
+    assert together.hurst < alone.hurst
+    single = StaticRig(RIG.normal_force, RIG.friction, 1, RIG.spring_stiffness)
+    assert effective_line(u_max, p, single, spread).hurst == pytest.approx(alone.hurst, abs=1e-6)
+
+
 def test_effective_line_says_when_there_is_none():
     assert "edge" in effective_line(1e-6, 20.0, RIG).note
 
