@@ -41,7 +41,7 @@ def _errors(ax: Any, found: Mapping[str, Any]) -> None:
                 ax.bar(place, y, 0.17, color=colour, alpha=share, label=f"{name}, {text}")
     ax.axhline(1.0, color=LIGHT, ls=":", lw=1.2)
     logarithmic(ax, "y")
-    ax.set_xticks(x, [r["phase"] for r in rows], rotation=20, ha="right")
+    ax.set_xticks(x, [plain(r["phase"], 30) for r in rows], rotation=20, ha="right")
     ax.set_ylabel("residual / floor")
     ax.legend(fontsize=8)
 

@@ -46,7 +46,7 @@ def heat_map(table: Mapping[str, Any]) -> Figure:
     shown = ax.imshow(np.log10(np.clip(errors, 0.3, 100.0)), cmap="OrRd", vmin=-0.3, vmax=1.6, aspect="auto")
     for i, j in np.argwhere(np.isfinite(errors)):
         ax.text(j, i, _error(errors[i, j]), ha="center", va="center", color="white" if errors[i, j] > 10 else DARK)
-    ax.set_xticks(range(len(table["phases"])), table["phases"])
+    ax.set_xticks(range(len(table["phases"])), [plain(p, 30) for p in table["phases"]])
     speeds = ["" if v is None else f"  {v * 1e6:.3g} µm/s" for v in table["velocities"]]
     ax.set_yticks(range(len(table["runs"])), [plain(n, 30) + v for n, v in zip(table["runs"], speeds, strict=True)])
     ax.grid(False)
@@ -76,7 +76,7 @@ def residual_plots(data: xarray.Dataset) -> Figure:
         for j, phase in enumerate(phases):
             mark, colour = _MARKS.get(phase, ("x", DARK))
             ok = np.isfinite(error[:, j]) & (error[:, j] > 0)
-            ax.plot(x[ok] * k, error[ok, j], mark, ms=4, color=colour, label=phase, alpha=0.85)
+            ax.plot(x[ok] * k, error[ok, j], mark, ms=4, color=colour, label=plain(phase, 30), alpha=0.85)
         ax.axhline(1.0, color=LIGHT, lw=1.0, ls="--")
         ax.set_yscale("log")
         if name == "velocity" and np.nanmax(x) > 3 * max(np.nanmin(x), 1e-300):
@@ -170,7 +170,7 @@ def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
         y = np.array(
             [np.nan if (v := (step.get("by_phase") or {}).get(phase)) is None else v for step in ladder], float
         )
-        axes[0, 1].plot(x, y, marker=mark, color=colour, label=phase)
+        axes[0, 1].plot(x, y, marker=mark, color=colour, label=plain(phase, 30))
     for ax in axes.flat:
         ax.axhline(1.0, color=LIGHT, ls=":", lw=1.0)
         if ax.get_lines()[:-1]:

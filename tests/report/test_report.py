@@ -111,7 +111,7 @@ class Reader(HTMLParser):
 
 def folder(tmp_path, result=DIAGNOSIS, arrays=True):
     where = tmp_path / "run"
-    where.mkdir()
+    where.mkdir(parents=True)
     (where / "result.json").write_text(json_text(result))
     if arrays:
         t = np.linspace(0.0, 10.0, 200)
@@ -125,6 +125,23 @@ def folder(tmp_path, result=DIAGNOSIS, arrays=True):
         }
         xarray.Dataset(data, coords={"phase": ["creep", "slip"]}).to_netcdf(where / "arrays.nc", engine="h5netcdf")
     return where
+
+
+def with_markup(value):
+    """A result with markup in every text that may be in it, names of parameters and phases too."""
+    if isinstance(value, dict):
+        return {f"{k}{EVIL}" if "." in k else k: v if k == "kind" else with_markup(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [with_markup(v) for v in value]
+    return f"{value}{EVIL}" if isinstance(value, str) else value
+
+
+def test_markup_in_every_text_of_a_result_stays_text(tmp_path):
+    page = Reader(write_report(folder(tmp_path, with_markup(DIAGNOSIS))).read_text())
+    assert "script" not in page.tags
+    assert page.handlers == []
+    shown = page.text.count('<script>document.title="bad"</script>')
+    assert shown > 2 * Reader(write_report(folder(tmp_path / "plain")).read_text()).text.count("<script>")
 
 
 def test_what_files_say_stays_text(tmp_path):
