@@ -24,7 +24,11 @@ from .solve.stepper import ContactStepper, Tolerance
 
 LARGEST_STEP = 0.01  # s
 MOST_STEPS = 3072  # of one cycle; ordinary stick-slip takes 300 to 1200, a hold a hundred more each second
-LONGEST = LARGEST_STEP * MOST_STEPS  # s; a longer cycle cannot be integrated to its end
+
+
+def longest(most_steps: int) -> float:
+    """Duration (s) of a cycle that so many steps take to its end, if it is quiet."""
+    return LARGEST_STEP * most_steps
 
 
 class Cycles(NamedTuple):
@@ -60,7 +64,7 @@ class Cycles(NamedTuple):
 
 
 class Track(NamedTuple):
-    """Accepted steps of one cycle, shape (MOST_STEPS,), padded with the last one.
+    """Accepted steps of one cycle, shape (most_steps,), padded with the last one.
 
     Attributes:
         t, x, v, reading: time (s), displacement (m), velocity (m/s), reading (m).
@@ -81,7 +85,7 @@ class Track(NamedTuple):
 def cut_short(tracks: Track, cycles: Cycles) -> np.ndarray:
     """Which used cycles broke off before the arrest and before the limit, shape (n,).
 
-    They wanted more than MOST_STEPS steps, or a step became too small: what the track says of such a cycle, and of
+    They wanted more steps than they were given, or a step became too small: what the track says of such a cycle, and of
     those after it, is not what the model says. Taken from the finished tracks, so that the compiled program stays as
     it is (another output would change its rounding).
     """

@@ -45,6 +45,7 @@ class Options:
     starts: int
     scatter: float | None
     most_events: int
+    most_steps: int
 
 
 def fit_inertial(
@@ -74,12 +75,12 @@ def fit_inertial(
         notes.append(UNHEARD)
     period = heard or FALLBACK_PERIOD
     try:
-        m = measure(own, segments, ring_period=period, most_cycles=options.most_events)
+        m = measure(own, segments, ring_period=period, most_cycles=options.most_events, most_steps=options.most_steps)
     except InputError as error:
         raise error.at(file=loaded.path) from None
     m = replace(m, new_lines=options.scatter)
     floor = floors(m)
-    base = base_composition(loaded, m)
+    base = replace(base_composition(loaded, m), most_steps=options.most_steps)
     _check_names(options.profiles, base, effects)
     train = _training(m, traces)
     with working("fitting") as tell:

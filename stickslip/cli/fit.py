@@ -38,6 +38,7 @@ def fit(
     sampling: Literal["log", "uniform"] = "log",
     new_lines: Annotated[bool, Parameter(negative="")] = False,
     most_events: int = 8,
+    most_steps: int = 3072,
     json: Annotated[bool, Parameter(negative="")] = False,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -71,6 +72,9 @@ def fit(
         Dynamic: the surfaces meet anew at every event; default is what the scatter of the events says.
     most_events:
         Dynamic: so many events of a run are used, the first ones.
+    most_steps:
+        Dynamic: so many steps of integration are made in one cycle; more for ringing that hardly anything damps, and
+        for cycles of more than 30 s.
     json:
         Print the result as JSON.
     force:
@@ -80,7 +84,7 @@ def fit(
     from ..units import to_si
 
     speed = to_si(v_lim, "m/s", key="--v-lim")
-    _check(model, add, profile, starts, most_events, speed)
+    _check(model, add, profile, speed, starts=starts, most_events=most_events, most_steps=most_steps)
     if out is not None:
         refuse_existing(out, force)
     began = _now()
@@ -91,7 +95,7 @@ def fit(
     else:
         from ._inertial import Options, fit_inertial
 
-        options = Options(add, effect, profile, starts, 1.0 if new_lines else None, most_events)
+        options = Options(add, effect, profile, starts, 1.0 if new_lines else None, most_events, most_steps)
         result, variables = fit_inertial(loaded, traces, found, options)
     result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
     result["notes"] = [*notes, *result.get("notes", ())]
@@ -131,15 +135,14 @@ def _now() -> float:
     return clock.perf_counter()
 
 
-def _check(
-    model: str, add: tuple[str, ...], profile: tuple[str, ...], starts: int, most_events: int, speed: float
-) -> None:
+def _check(model: str, add: tuple[str, ...], profile: tuple[str, ...], speed: float, **counts: int) -> None:
     if model == "static" and (add or profile):
         what = "--add" if add else "--profile"
         raise InputError(f"{what} belongs to the dynamic model", key=what, hint="leave it out, or use --model inertial")
-    for name, value, most in (("--starts", starts, 100), ("--most-events", most_events, 200)):
-        if not 1 <= value <= most:
-            raise InputError("out of range", key=name, value=value, allowed=f"1 to {most}")
+    for name, (least, most) in {"starts": (1, 100), "most_events": (1, 200), "most_steps": (512, 100_000)}.items():
+        if not least <= counts[name] <= most:
+            key = "--" + name.replace("_", "-")
+            raise InputError("out of range", key=key, value=counts[name], allowed=f"{least} to {most}")
     if speed <= 0:
         raise InputError("the speed must be positive", key="--v-lim", value=speed)
 

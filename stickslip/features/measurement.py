@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..errors import InputError
-from ..forward import LONGEST, Cycles
+from ..forward import MOST_STEPS, Cycles, longest
 from ..segment import Segmentation
 from ..trace import Trace
 from .curve import SampledCurve
@@ -82,6 +82,7 @@ def measure(
     *,
     ring_period: float,
     most_cycles: int = 8,
+    most_steps: int = MOST_STEPS,
 ) -> Measurement:
     """Features of every cycle of every run.
 
@@ -89,6 +90,7 @@ def measure(
         traces, segmentations: of the runs, in the same order; runs without a slip are left out and named.
         ring_period: expected period of the contact resonance (s).
         most_cycles: at most so many cycles of a run are used, the first ones.
+        most_steps: that the model will have for one cycle; runs end before a longer one.
 
     Raises:
         InputError: there are fewer than two slips in all runs.
@@ -116,13 +118,15 @@ def measure(
     pairs = [(t, s) for (t, s), _ in one_way if s.events]
     if not pairs:
         raise InputError("every run is pulled backwards, which the dynamic model does not follow", hint=_FORWARDS)
-    whole = [_integrable(t, s) for t, s in pairs]
+    whole = [_integrable(t, s, longest(most_steps)) for t, s in pairs]
     dropped += [text for _, text in whole if text]
     pairs = [(t, s) for (t, s), _ in whole if s.events]
     if not pairs:
         raise InputError(
-            f"every run begins with a cycle of more than {LONGEST:.3g} s, for which the dynamic model has no steps",
-            hint="drive faster, or fit single creep processes with --model static",
+            f"every run begins with a cycle of more than {longest(most_steps):.3g} s, for which the dynamic model has "
+            "no steps",
+            hint="drive faster, or give a fit more steps (--most-steps), or fit single creep processes with --model "
+            "static",
         )
     dropped += [
         f"{t.name}: {most_cycles} of {len(s.events)} slips are used, the first ones"
@@ -171,16 +175,16 @@ def doubts(traces: Sequence[Trace]) -> str:
     return "".join(f". {line}" for line in said[:4])
 
 
-def _integrable(trace: Trace, found: Segmentation) -> tuple[tuple[Trace, Segmentation], str]:
+def _integrable(trace: Trace, found: Segmentation, most: float) -> tuple[tuple[Trace, Segmentation], str]:
     """A run up to its first cycle that takes more steps than a cycle may have, and what is to be said of the others."""
     begins = [float(trace.time[0]), *(e.t_arrest for e in found.events)]
-    long = [n for n, e in enumerate(found.events) if e.t_arrest - begins[n] > LONGEST]
+    long = [n for n, e in enumerate(found.events) if e.t_arrest - begins[n] > most]
     if not long:
         return (trace, found), ""
     first, lasts = long[0], found.events[long[0]].t_arrest - begins[long[0]]
     text = (
         f"{trace.name}: slips from number {first + 1} on ({len(found.events) - first} of {len(found.events)}) are left "
-        f"out, because the cycle before lasts {lasts:.3g} s, more than the {LONGEST:.3g} s that the dynamic model can "
+        f"out, because the cycle before lasts {lasts:.3g} s, more than the {most:.3g} s that the dynamic model can "
         "be taken through"
     )
     return (trace, replace(found, events=found.events[:first])), text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ from jax import Array
 
 from ..contact import power_law_bank
 from ..effects.base import Effect
+from ..forward import MOST_STEPS
 from ..model import Block, LoadPoint, Model, Weakening
 from .parameters import Free
 
@@ -45,6 +46,7 @@ class Composition:
         free: the free parameters, base first.
         fixed: SI values of base parameters that are not free.
         effects: instances; their free fields are overwritten from the vector.
+        most_steps: of the integration of one cycle.
     """
 
     mass: float
@@ -53,6 +55,7 @@ class Composition:
     free: tuple[Free, ...]
     fixed: dict[str, float] = field(default_factory=dict)
     effects: tuple[Effect, ...] = ()
+    most_steps: int = MOST_STEPS
 
     def given(self) -> Given:
         """What is not free, as arrays."""
@@ -129,17 +132,16 @@ class Composition:
 
     def with_effect(self, effect: Effect, free: Sequence[Free]) -> Composition:
         """The same with one effect more."""
-        return Composition(
-            self.mass, self.contacts, self.bins, (*self.free, *free), self.fixed, (*self.effects, effect)
-        )
+        return replace(self, free=(*self.free, *free), effects=(*self.effects, effect))
 
     def without(self, tag: str) -> Composition:
         """The same without an effect and its parameters."""
         free = tuple(f for f in self.free if not f.name.startswith(f"{tag}."))
         effects = tuple(e for e in self.effects if e.tag != tag)
-        return Composition(self.mass, self.contacts, self.bins, free, self.fixed, effects)
+        return replace(self, free=free, effects=effects)
 
     def key(self) -> tuple[Any, ...]:
         """What decides about a compilation: everything but the numbers of :meth:`given` and the free ones."""
         names = tuple((f.name, f.scale) for f in self.free)
-        return self.contacts, self.bins, names, tuple(sorted(self.fixed)), jax.tree.structure(self.effects)
+        fixed, effects = tuple(sorted(self.fixed)), jax.tree.structure(self.effects)
+        return self.contacts, self.bins, self.most_steps, names, fixed, effects

@@ -52,7 +52,11 @@ def modelled_runs(problem: Problem, z: Array, events: Array) -> list[ModelledRun
     def tracks(z: jax.Array, event: jax.Array, cycles: Cycles) -> Track:
         start = (cycles.run, cycles.virgin, cycles.stretch)
         return run_cycles(
-            lambda e, nodes: composition.model(z, e, nodes, cycles.stiffness, start=start), event, cycles, tolerance
+            lambda e, nodes: composition.model(z, e, nodes, cycles.stiffness, start=start),
+            event,
+            cycles,
+            tolerance,
+            composition.most_steps,
         )
 
     out = []

@@ -216,6 +216,7 @@ def _tracks(key: _Key) -> Any:
             events,
             cycles,
             tolerance,
+            composition.most_steps,
         )
 
     return jax.jit(one_run)

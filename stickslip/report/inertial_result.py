@@ -19,7 +19,6 @@ from ..fit.parameters import to_si
 from ..fit.problem import Problem
 from ..fit.static_table import StaticRig
 from ..fit.surface import sensitivity, surface_prior
-from ..forward import MOST_STEPS
 from ..residual import Misfit, misfit
 from ..segment import Segmentation, thin
 from ..trace import Trace
@@ -194,8 +193,9 @@ def fit_sections(
     if cut:
         result["misfit"]["sentence"] += (
             f" In {len(cut)} cycle{'s' * (len(cut) > 1)} the model could not be integrated to the arrest "
-            f"({'; '.join(cut[:4])}{' ...' if len(cut) > 4 else ''}; at most {MOST_STEPS} steps), so their errors and "
-            "those of the cycles after them say nothing."
+            f"({'; '.join(cut[:4])}{' ...' if len(cut) > 4 else ''}; at most {composition.most_steps} steps), so their "
+            "errors and those of the cycles after them say nothing; a fit with --most-steps "
+            f"{4 * composition.most_steps} goes further."
         )
     found = {t.name: s for t, s in zip(traces, segmentations, strict=True)}
     variables |= residual_arrays(seen, fit.features, floor, found, stiffness, {t.name: t for t in traces})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from dataclasses import replace
 
 import jax
@@ -9,10 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from stickslip.cli import fit as cli_fit
 from stickslip.contact import power_law_bank
 from stickslip.errors import InputError
 from stickslip.features.measurement import measure
-from stickslip.forward import LONGEST, Cycles, Track, cut_short, run_cycle
+from stickslip.forward import MOST_STEPS, Cycles, Track, cut_short, longest, run_cycle
 from stickslip.model import Block, LoadPoint, Model, Weakening
 from stickslip.segment.records import Segmentation
 from stickslip.solve import Tolerance
@@ -86,7 +88,7 @@ def recorded(*sticks: float) -> tuple[Trace, Segmentation]:
 
 
 def test_a_run_is_used_up_to_a_cycle_that_is_too_long_and_says_so():
-    short, long = recorded(1.0, 1.0, 5.0), recorded(1.0, 1.0, LONGEST + 5.0)
+    short, long = recorded(1.0, 1.0, 5.0), recorded(1.0, 1.0, longest(MOST_STEPS) + 5.0)
     assert len(short[1].events) == len(long[1].events) == 3
     whole = measure([short[0]], [short[1]], ring_period=2e-3)
     assert np.asarray(whole.cycles.used).sum() == 3
@@ -95,10 +97,32 @@ def test_a_run_is_used_up_to_a_cycle_that_is_too_long_and_says_so():
     assert np.asarray(part.cycles.used).sum() == 2
     (said,) = part.dropped
     assert said.startswith("run: slips from number 3 on (1 of 3) are left out")
+    # with more steps it is used
+    more = measure([long[0]], [long[1]], ring_period=2e-3, most_steps=2 * MOST_STEPS)
+    assert np.asarray(more.cycles.used).sum() == 3
+    assert more.dropped == ()
+
+
+def test_a_composition_decides_how_many_steps_a_cycle_has():
+    from stickslip.fit.overlay import modelled_runs
+    from stickslip.fit.problem import Problem
+    from tests.fit import synthetic
+
+    m = synthetic.measured(synthetic.traces((2e-4,), slips=2.6))
+    events = np.zeros((1, np.asarray(m.cycles.used).shape[1], 2))
+
+    whole, cut = (Problem(replace(synthetic.composition(), most_steps=most), m) for most in (MOST_STEPS, 512))
+    right, wrong = (problem.features(synthetic.truth(), events) for problem in (whole, cut))
+    assert not np.allclose(right, wrong, equal_nan=True)
+    (run,) = modelled_runs(cut, synthetic.truth(), events)
+    assert run.cut
+    assert max(t.size for t in run.times) <= 512
+    default = inspect.signature(cli_fit.fit).parameters["most_steps"].default  # a literal: help does without jax
+    assert default == MOST_STEPS
 
 
 def test_a_campaign_of_such_cycles_only_is_refused():
-    trace, found = recorded(LONGEST + 5.0, 1.0)
+    trace, found = recorded(longest(MOST_STEPS) + 5.0, 1.0)
     assert len(found.events) == 2
     with pytest.raises(InputError, match=r"begins with a cycle of more than 30\.7 s"):
         measure([trace], [found], ring_period=2e-3)
