@@ -210,7 +210,7 @@ def _run(trace: Trace, found: Segmentation, layout: Layout, ring_period: float, 
         curve = SampledCurve(t[near], y[near], e.t_arrest, width)
         tops.append(curve.top)
     begins = [(float(t[0]), float(y[0])), *tops]
-    noise = float(trace.noise or 0.0)
+    noise = float(found.settings.noise if trace.noise is None else trace.noise)
     count = float(trace.resolution or 0.0)
     rate = 1.0 / float(np.median(np.diff(trace.time)))
     records = []

@@ -132,6 +132,10 @@ def _pyuff(block: bytes, *, header_only: bool = False) -> dict[str, Any]:
     """What pyuff makes of a data set without its closing mark."""
     import pyuff
 
+    try:
+        block.decode()
+    except UnicodeDecodeError:  # units like µm and m/s² from writers that know one byte a letter
+        block = block.decode("latin-1").encode()
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "set.uff"
         file.write_bytes(block + (b"" if block.endswith((b"\n", b"\r")) else b"\n") + b"    -1\n")

@@ -5,7 +5,7 @@ A block on 64 Jenkins elements whose strength falls with velocity, 5 s of drive 
 Data are made, and the peers' model is run, by a leapfrog of every element that shares nothing with the solver. The
 peers fit the trace point by point, which is what a tool that knows nothing of events can do.
 
-    python -m tests.benchmark.fit_peers [--limit SECONDS]
+    python -m tests.benchmark.fit_peers [--limit SECONDS] [--damping 10]
 
 lmfit and PINTS are no dependencies of the project: `pip install lmfit pints` in a spare environment.
 """
@@ -26,11 +26,11 @@ import numpy as np
 from .measuring import head, row
 
 ELEMENTS, DURATION, DT, EVERY = 64, 5.0, 2e-5, 50  # 1, s, s, steps a sample
-MASS, DAMPING, VELOCITY, WEAKENING_VELOCITY = 0.09, 0.0, 5e-5, 1e-3  # kg, N s/m, m/s, m/s
+MASS, VELOCITY, WEAKENING_VELOCITY = 0.09, 5e-5, 1e-3  # kg, m/s, m/s
 STIFFNESS = np.full(ELEMENTS, 7e5 / ELEMENTS)  # N/m
 _SPREAD = np.linspace(0.05, 1.0, ELEMENTS)
 CAP = _SPREAD / _SPREAD.sum()  # share of the strength
-MOST_STEPS = 24576  # nothing damps the contact: it rings through every stick
+MOST_STEPS = 24576  # without damping the contact rings through every stick
 NOISE = 2e-8  # m
 NAMES = ("strength", "ratio", "spring_stiffness")
 TRUTH = np.array([0.26, 0.70, 3000.0])  # N, 1, N/m
@@ -57,11 +57,11 @@ def _march(strength, ratio, c_s, n, dt, every, stiffness, share, mass, damping, 
     return out
 
 
-def displacement(parameters: np.ndarray) -> np.ndarray:
-    """Displacement (m) at every sample, by leapfrog."""
+def displacement(parameters: np.ndarray, damping: float) -> np.ndarray:
+    """Displacement (m) at every sample, by leapfrog; ``damping`` in N s/m."""
     f, ratio, c_s = (float(p) for p in parameters)
     return _march(
-        f, ratio, c_s, round(DURATION / DT), DT, EVERY, STIFFNESS, CAP, MASS, DAMPING, VELOCITY, WEAKENING_VELOCITY
+        f, ratio, c_s, round(DURATION / DT), DT, EVERY, STIFFNESS, CAP, MASS, damping, VELOCITY, WEAKENING_VELOCITY
     )
 
 
@@ -70,9 +70,9 @@ def times() -> np.ndarray:
     return DT * EVERY * (1.0 + np.arange(round(DURATION / DT) // EVERY))
 
 
-def record(seed: int = 0) -> np.ndarray:
+def record(seed: int, damping: float) -> np.ndarray:
     """The measured displacement (m)."""
-    clean = displacement(TRUTH)
+    clean = displacement(TRUTH, damping)
     return clean + np.random.default_rng(seed).normal(0.0, NOISE, clean.size)
 
 
@@ -105,7 +105,7 @@ class Way:
     fit: Callable[[np.ndarray], tuple[np.ndarray, int]]
 
 
-def own(measured: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
+def own(measured: np.ndarray, damping: float) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
     """The project's model and its fit from several starts, the first of them the one given."""
     import jax.numpy as jnp
 
@@ -128,7 +128,7 @@ def own(measured: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
         def model(self, z, event, nodes, stiffness, given=None, start=None):
             strength, drop, c_s = (jnp.exp(x) for x in z)
             return Model(
-                Block(mass=MASS, spring_stiffness=c_s, damping=DAMPING),
+                Block(mass=MASS, spring_stiffness=c_s, damping=damping),
                 Bank(jnp.asarray(STIFFNESS), strength * CAP),
                 Weakening(ratio=1.0, slip_distance=1e-6, healing_time=0.01),
                 LoadPoint(nodes[0], nodes[1]),
@@ -136,7 +136,7 @@ def own(measured: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
             )
 
         def key(self):
-            return "benchmark of fits", self.most_steps
+            return "benchmark of fits", self.most_steps, damping
 
     class Same(Problem):
         """The contact does not vary from event to event."""
@@ -175,7 +175,7 @@ def own(measured: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
     return run
 
 
-def lmfit_ways(measured: np.ndarray) -> Iterator[Way]:
+def lmfit_ways(measured: np.ndarray, damping: float) -> Iterator[Way]:
     """Least squares of the trace, point by point, by lmfit."""
     import lmfit
 
@@ -185,7 +185,7 @@ def lmfit_ways(measured: np.ndarray) -> Iterator[Way]:
             sought.add(name, value=float(value), min=float(low), max=float(high))
 
         def residual(p: Any) -> np.ndarray:
-            return (displacement(np.array([p[name].value for name in NAMES])) - measured) / NOISE
+            return (displacement(np.array([p[name].value for name in NAMES]), damping) - measured) / NOISE
 
         found = lmfit.minimize(residual, sought, epsfcn=1e-6)
         return np.array([found.params[name].value for name in NAMES]), int(found.nfev)
@@ -193,7 +193,7 @@ def lmfit_ways(measured: np.ndarray) -> Iterator[Way]:
     yield Way(f"lmfit {lmfit.__version__} leastsq, pointwise", run)
 
 
-def pints_ways(measured: np.ndarray) -> Iterator[Way]:
+def pints_ways(measured: np.ndarray, damping: float) -> Iterator[Way]:
     """The same by PINTS: CMA-ES within bounds, and Nelder-Mead."""
     import pints
 
@@ -202,7 +202,7 @@ def pints_ways(measured: np.ndarray) -> Iterator[Way]:
             return 3
 
         def simulate(self, parameters, times):
-            return displacement(parameters)
+            return displacement(parameters, damping)
 
     error = pints.SumOfSquaresError(pints.SingleOutputProblem(Forward(), times(), measured))
 
@@ -226,14 +226,14 @@ def pints_ways(measured: np.ndarray) -> Iterator[Way]:
         )
 
 
-def ways(measured: np.ndarray) -> Iterator[Way]:
+def ways(measured: np.ndarray, damping: float) -> Iterator[Way]:
     """All ways of fitting there are here; says which peers are not installed."""
-    yield Way("own fit", own(measured))
+    yield Way("own fit", own(measured, damping))
     for package, made in (("lmfit", lmfit_ways), ("pints", pints_ways)):
         if importlib.util.find_spec(package) is None:
             row(package, "not installed: pip install " + package, *[""] * 5)
         else:
-            yield from made(measured)
+            yield from made(measured, damping)
 
 
 def outcomes(way: Way, limit: float, seed: int = 0) -> list[Outcome]:
@@ -252,15 +252,17 @@ def outcomes(way: Way, limit: float, seed: int = 0) -> list[Outcome]:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.benchmark.fit_peers", description=__doc__.splitlines()[0])
     parser.add_argument("--limit", type=float, default=60.0, help="seconds after which no further start is begun")
+    parser.add_argument("--damping", type=float, default=0.0, help="of the block, N s/m")
     parser.add_argument("--seed", type=int, default=0, help="of the noise and the starts")
     arguments = parser.parse_args()
-    measured = record(arguments.seed)
+    measured = record(arguments.seed, arguments.damping)
     print(
         f"Three parameters (strength, kinetic over static friction, spring) from {STARTS} starts within {AWAY:.0%}; "
-        f"{measured.size} samples, {NOISE * 1e9:g} nm of noise. Error: the worst of the three parameters."
+        f"{measured.size} samples, {NOISE * 1e9:g} nm of noise, damping {arguments.damping:g} N s/m. "
+        "Error: the worst of the three parameters."
     )
     head("fit", "starts", "within 1 %", "within 5 %", "median error", "median wall s", "median runs of the model")
-    for way in ways(measured):
+    for way in ways(measured, arguments.damping):
         found = outcomes(way, arguments.limit, arguments.seed)
         errors = np.array([o.error for o in found])
         row(

@@ -169,6 +169,27 @@ def test_letters_beyond_ascii_in_the_header(tmp_path, encoding, binary):
     assert read_columns(path).data["Vib Displacement"] == pytest.approx(X, rel=1e-11, abs=1e-18)
 
 
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_text_as_catman_writes_it(tmp_path, encoding, newline):
+    """Lines of 80 letters, three digits in the exponents of the header, units in the writer's own encoding."""
+    rows = [f"{x * 1e6:13.5E}" for x in X]
+    lines = [
+        "    -1", "    58", "1x : µm", "UFF58 file created by HBM catman", "30-Apr-20 19:12:52", "NONE", "NONE",
+        "    1         0    0         0 NONE               0   0 NONE               0   0",
+        f"         2{X.size:10d}         1 0.00000E+000 2.50000E-004 0.00000E+000",
+        f"        17    0    0    0 {'Time':<20} {'s':<20}", f"         8    0    0    0 {'1x':<20} {'µm':<20}",
+        *[f"         0    0    0    0 {'NONE':<20} {'NONE':<20}"] * 2,
+        *["".join(rows[i : i + 6]) for i in range(0, X.size, 6)], "    -1",
+    ]  # fmt: skip
+    path = tmp_path / "a.uff"
+    path.write_bytes("".join(line.ljust(80) + newline for line in lines).encode(encoding))
+    columns = read_columns(path)
+    assert columns.units == {"1x : µm": "um", "time": "s"}
+    assert columns.data["time"] == pytest.approx(T, abs=1e-12)
+    assert columns.data["1x : µm"] == pytest.approx(1e6 * X, rel=1e-5)
+
+
 @pytest.mark.parametrize("rest", [b"", b"\n", b" " * 80, b"\0" * 12])
 def test_no_closing_mark(tmp_path, rest):
     payload = struct.pack(f"<{X.size}d", *X)

@@ -8,10 +8,21 @@ import pytest
 from tests.benchmark import fit_peers
 
 
+def errors(seed: int, damping: float) -> np.ndarray:
+    """Of the worst parameter, from every start."""
+    fit = fit_peers.Way("own", fit_peers.own(fit_peers.record(seed, damping), damping))
+    found = np.array([o.error for o in fit_peers.outcomes(fit, 1500.0, seed)])
+    assert found.size == fit_peers.STARTS
+    return found
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 10])
-def test_nine_of_ten_starts_end_within_a_hundredth(seed):
-    fit = fit_peers.Way("own", fit_peers.own(fit_peers.record(seed)))
-    errors = np.array([o.error for o in fit_peers.outcomes(fit, 600.0, seed)])
-    assert errors.size == fit_peers.STARTS
-    assert np.sum(errors < 0.01) >= 9, errors
+def test_nine_of_ten_starts_end_within_a_hundredth_with_a_little_damping(seed):
+    assert np.sum(errors(seed, 10.0) < 0.01) >= 9
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_without_damping_all_end_within_a_twentieth():
+    assert np.all(errors(0, 0.0) < 0.05)
