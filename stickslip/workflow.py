@@ -161,7 +161,7 @@ def diagnose_campaign(
         result: dict[str, Any] = {
             "kind": "diagnose",
             "title": loaded.title,
-            **summary(found, loaded.rig),
+            **summary(found, loaded.rig, candidates or ()),
             "inputs": inputs,
             "versions": versions(),
         }

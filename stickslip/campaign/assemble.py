@@ -69,7 +69,8 @@ class _Assembly:
 
     def _placed(self, error: InputError) -> InputError:
         placed = error.at(file=self.campaign.path, key=f"{self.place} ('{self.entry.label}')")
-        return placed.with_hint("noticed before: " + "; ".join(self.warnings)) if self.warnings else placed
+        noticed = "first look at what was noticed before: " + "; ".join(self.warnings)
+        return placed.with_hint(noticed, first=True) if self.warnings else placed
 
     def _trace(self) -> Trace:
         entry = self.entry

@@ -32,6 +32,7 @@ from ..uncertainty import profile
 from .working import Tell, working
 
 REFIT = ((2.5, 4), (1.0, 8))  # of a profile's points, from the neighbouring optimum
+AGAIN = ((3.0, 4), (1.0, 12))  # of a model, from where the same with one effect more arrived
 PIN = 1e-3  # width of the prior that holds a profiled parameter, on the search scale
 
 
@@ -165,6 +166,12 @@ def _climb(
         found = try_effect(effect, composition, optimum, m, floor, train, threads=problem.threads, progress=tell)
         if found.fit is None or found.composition is None:
             raise FitError(f"{effect.tag} could not be fitted: {found.note or 'no finite model with it'}")
+        # a model less converged than the one with the effect would make a gain of nothing
+        tell(f"the model without {effect.tag} once more")
+        before, k = Problem(composition, m), len(composition.free)
+        again = fit(before, floor, z=found.fit.z[:k], events=found.fit.events, stages=AGAIN, use=train)
+        if again.cost < optimum.cost:
+            ladder[-1] = _step(before, again, floor, train, ladder[-1]["model"], ladder[-1]["added"])
         composition, optimum = found.composition, found.fit
         step = _step(Problem(composition, m), optimum, floor, train, [*ladder[-1]["model"], effect.tag], effect.tag)
         ladder.append(step)
@@ -181,6 +188,8 @@ def _step(
     return {
         "model": model,
         "added": added,
+        "cost": optimum.cost,
+        "parameters": len(optimum.free),
         "train_error": fitted.total,
         "heldout_error": None if held is None else held.error,
         "by_phase": fitted.by_phase,

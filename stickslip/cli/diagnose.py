@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from ..runstore import json_text
 from ..workflow import diagnose_campaign
+from .working import EVERY
 
 UNRESOLVED = 3
 
@@ -76,13 +77,16 @@ def diagnose(
 
 
 def _teller(began: float) -> Any:
-    """Progress on stderr: what was finished, the share of the round, the time left."""
+    """Progress on stderr: what was finished, the share of the stage, the time left; for a log only now and then."""
+    last = began
 
     def tell(text: str, share: float) -> None:
-        if not sys.stderr.isatty():
+        nonlocal last
+        now = time.perf_counter()
+        if not sys.stderr.isatty() and now - last < EVERY:
             return
-        spent = time.perf_counter() - began
-        left = f", about {spent * (1 - share) / share:.0f} s left in this round" if share > 0.05 else ""
+        last, spent = now, now - began
+        left = f", about {spent * (1 - share) / share:.0f} s left of this stage" if 0.05 < share < 1.0 else ""
         print(f"{spent:6.0f} s  {text} ({100 * share:.0f} %{left})", file=sys.stderr, flush=True)
 
     return tell
@@ -93,26 +97,32 @@ def _print(result: dict[str, Any], out: Path) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from .show import told
+    from .show import quantity, told
 
     console = Console(width=None if sys.stdout.isatty() else 110)
     table = Table(title="Ladder of models: error in units of what the data can tell (1 is as good as they allow)")
     table.add_column("model")
-    phases = sorted({p for rung in result["ladder"] for p in rung["by_phase"]})
-    for name in ("fitted", "unseen", *phases):
+    phases = list(dict.fromkeys(p for rung in result["ladder"] for p in rung["by_phase"]))
+    table.add_column("cycles")
+    for name in ("all", *phases):
         table.add_column(name, justify="right", no_wrap=True)
     for rung in result["ladder"]:
         label = "static" if rung["added"] is None else f"+ {rung['added']}"
-        held = rung["heldout_error"]
-        cells = [f"{rung['train_error']:.2f}", "" if held is None else f"{held:.2f}"]
-        cells += [f"{rung['by_phase'][p]:.2f}" if p in rung["by_phase"] else "" for p in phases]
-        table.add_row(label, *cells)
+        for which, total, parts in (
+            ("fitted", rung["train_error"], rung["by_phase"]),
+            ("unseen", rung["heldout_error"], rung["heldout_by_phase"]),
+        ):
+            if total is not None:
+                table.add_row(label, which, quantity(total, "1", 3), *(quantity(parts.get(p), "1", 3) for p in phases))
+            label = ""
     console.print(table)
     verdict = result["verdict"]
     sure = "" if verdict["confidence"] is None else f" ({100 * verdict['confidence']:.0f} % if it is in the catalogue)"
     console.print(f"[bold]{verdict['kind']}[/bold]: {escape(verdict['text'])}{sure}", highlight=False)
     if result["next_experiment"]:
         console.print(f"next experiment: {escape(result['next_experiment']['text'])}", highlight=False)
+    for text in result["caution"]:
+        console.print(escape(text), highlight=False)
     mended = told(result)
     lost = [f"left out: {text}" for text in result["dropped"]]
     for text in [*mended, *lost[:8], *([f"... and {len(lost) - 8} more"] if len(lost) > 8 else [])]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import textwrap
 import time as clock
@@ -210,6 +211,16 @@ def _folded(text: str) -> str:
     return "\n".join(lines)
 
 
+def _gains_of_effects(ladder: list[dict[str, Any]]) -> list[str]:
+    """What each added effect takes off the cost, and for how many parameters."""
+    return [
+        f"{step['added']} takes the cost (robust chi-square, priors included) from {before['cost']:.1f} to "
+        f"{step['cost']:.1f}, with {step['parameters'] - before['parameters']} more free parameters"
+        for before, step in itertools.pairwise(ladder)
+        if before.get("cost") is not None and step["added"] != "inertia"
+    ]
+
+
 def _text(result: dict[str, Any], out: Path | None) -> str:
     """What is printed."""
     lines = [f"{result['title']}: {result['model']} model", *result["notes"]]
@@ -221,7 +232,7 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
             [" + ".join(step["model"]), *(show.quantity(step[k], "1", 3) for k in ("train_error", "heldout_error"))]
             for step in result["ladder"]
         ]
-        lines += ["", show.table(["model", "error", "on unseen runs"], rows)]
+        lines += ["", show.table(["model", "error", "on unseen runs"], rows), *_gains_of_effects(result["ladder"])]
     if result.get("misfit"):
         table = result["misfit"]["table"]
         rows = [

@@ -249,7 +249,8 @@ def _report(result: dict[str, Any], out: Path | None) -> str:
     if result["kind"] == "series":
         lines += ["", _series_table(result)]
         unit = result["units"]["value"]
-        odd = [part for part in result["runs"] if not part["verdict"].startswith("stick-slip")]
+        plain = "stick-slip: "  # and nothing to be said of sliding
+        odd = [r for r in result["runs"] if not r["verdict"].startswith(plain) or "slides" in r["verdict"]]
         lines += [f"{show.quantity(part['value'], unit)}: {part['verdict']}" for part in odd]
     elif result["events"]:
         lines += ["", _event_table(result)]
@@ -289,7 +290,7 @@ def _facts(facts: dict[str, Any]) -> str:
     line += f", L = {q(facts['L'], 'm')}" if facts["L"] == facts["L"] else ""
     return (
         f"full friction {q(facts['friction_force'], 'N')}, contact stiffness {q(facts['contact_stiffness'], 'N/m')}, "
-        f"u_max {q(facts['u_max'], 'm')}, resonance {q(facts['contact_resonance'], 'Hz')}\n"
+        f"mean u_max {q(facts['u_max'], 'm')}, resonance {q(facts['contact_resonance'], 'Hz')}\n"
         f"{_stick_slip_range(facts)}{line}\n"
         f"{facts['steps']} steps, {facts['rejected']} rejected, energy balance to {facts['energy_error']:.1e}"
     )

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from ..effects import catalogue
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
 from ..floors import scatter_factor
 from .candidate import Candidate
+from .caution import cautions
 from .engine import Diagnosis, Rung
 from .experiment import TELLING, recommend
 from .menu import Conditions
 from .verdict import passed_over
 
 
-def summary(diagnosis: Diagnosis, rig: Any = None) -> dict[str, Any]:
+def summary(diagnosis: Diagnosis, rig: Any = None, asked: Sequence[str] = ()) -> dict[str, Any]:
     """The verdict, the ladder, the ranking, parameters with units, what to measure next, and the last model.
 
     Args:
         diagnosis: what was found.
         rig: ``[rig]`` of the campaign, for the load on a contact.
+        asked: tags the user wanted tried.
     """
     d = diagnosis
+    used = np.asarray(d.measurement.cycles.used)
     last = next((r for r in reversed(d.ladder) if r.fit is not None), None)
     return {
         "schema": 1,
@@ -34,11 +40,15 @@ def summary(diagnosis: Diagnosis, rig: Any = None) -> dict[str, Any]:
             "reasons": list(d.verdict.reasons),
             "confidence": d.verdict.confidence,
         },
+        "caution": cautions(d, asked),
         "ladder": [_rung(r) for r in d.ladder],
         "ranking": [_ranked(c, d) for c in _order(d)],
+        "ranking_base": _ranking_base(d),
         "parameters": {} if last is None else _parameters(last),
         "next_experiment": next_experiment(d),
-        "held_out": {n: [int(k) for k in (~d.train[r]).nonzero()[0]] for r, n in enumerate(d.measurement.names)},
+        "held_out": {
+            n: [int(k) for k in (~d.train[r] & used[r]).nonzero()[0]] for r, n in enumerate(d.measurement.names)
+        },
         "dropped": list(d.dropped),
         **({} if last is None else _model(last, d, rig)),
     }
@@ -68,8 +78,18 @@ def _rung(rung: Rung) -> dict[str, Any]:
 
 def _order(d: Diagnosis) -> list[Candidate]:
     """Candidates of the first round, the best first; those that were not refitted last."""
-    first = d.rounds[0].candidates if d.rounds else ()
+    first = [c for c in d.rounds[0].candidates if c.tag not in d.rounds[0].base.model] if d.rounds else []
     return sorted(first, key=lambda c: (bool(c.note), -c.promise if c.note else c.cost))
+
+
+def _ranking_base(d: Diagnosis) -> dict[str, Any] | None:
+    """What the candidates of the first round were added to."""
+    if not d.rounds:
+        return None
+    base = d.rounds[0].base
+    assert base.fit is not None
+    held = None if base.held is None else base.held.error
+    return {"model": list(base.model), "cost": base.fit.cost, "train_error": base.train.total, "heldout_error": held}
 
 
 def _ranked(c: Candidate, d: Diagnosis) -> dict[str, Any]:
@@ -97,7 +117,8 @@ def _ranked(c: Candidate, d: Diagnosis) -> dict[str, Any]:
     }
     if c.amplitude is not None:
         name = c.amplitude.name
-        out["amplitude"] = {"value": c.fit.values[name], "std": c.fit.std()[name], "unit": c.amplitude.unit}
+        std = c.fit.std()[name]
+        out["amplitude"] = {"name": name, "value": c.fit.values[name], "std": std, "unit": c.amplitude.unit}
     return out
 
 

@@ -36,8 +36,9 @@ class ViscousDrag(BodyForce):
         0.0, unit="N", lower=0.0, upper=0.05, null=0.0, symbol="F_1", doc="force at a speed of 1 mm/s"
     )
     exponent: Array = parameter(
-        1.0, unit="1", lower=0.3, upper=2.5, grid=(0.5, 1.0, 2.0), symbol="q", doc="power of the speed"
-    )
+        1.0, unit="1", lower=0.3, upper=2.5, grid=(0.5, 1.0, 2.0), symbol="q",
+        doc="power of the speed; at 1 it is the damping of the base model",
+    )  # fmt: skip
 
     def force(self, state: Any, motion: Motion, contact: Contact) -> Array:
         squared = (motion.v**2 + SLOW**2) / SPEED**2

@@ -59,7 +59,8 @@ def creep(axes: Axes, data: Run) -> None:
     zero = x[part][0]
     k, unit = scaled(x[part] - zero, "m")
     shown = reading[part] - reading[part][0]
-    axes.plot(*thin(t[part] - end, shown * k), color=LIGHT, lw=1.0, label="vibrometer")
+    if not np.allclose(shown, x[part] - zero, rtol=0.0, atol=1e-3 * np.ptp(x[part]) + 1e-15):
+        axes.plot(*thin(t[part] - end, shown * k), color=LIGHT, lw=1.0, label="vibrometer")
     axes.plot(*thin(t[part] - end, (x[part] - zero) * k), color=DARK, label="block")
     low, high = (x[part] - zero).min() * k, (x[part] - zero).max() * k
     axes.set_ylim(low - 0.15 * (high - low) - 1e-12, high + 0.15 * (high - low) + 1e-12)
@@ -79,8 +80,11 @@ def slip(axes: Axes, data: Run) -> None:
     if not data.sizes["event"]:
         remark(axes, "no slip event")
         return
-    onset, arrest = float(data["onset"].values[-1]), float(data["arrest"].values[-1])
     t = data["time"].values
+    onsets, arrests = data["onset"].values, data["arrest"].values
+    followed = np.flatnonzero(arrests + 0.8 * (arrests - onsets) <= t[-1])  # a run may end with its last slip
+    chosen = int(followed[-1]) if followed.size else -1
+    onset, arrest = float(onsets[chosen]), float(arrests[chosen])
     part = (t >= onset - 0.3 * (arrest - onset)) & (t <= arrest + 0.8 * (arrest - onset))
     if part.sum() < 3:
         remark(axes, "too few samples in the slip: raise output.sampling_rate")
@@ -97,13 +101,16 @@ def slip(axes: Axes, data: Run) -> None:
     other.grid(False)
     other.spines["right"].set_visible(True)
     lines = [*axes.get_lines(), *other.get_lines()]
-    axes.legend(lines, [str(line.get_label()) for line in lines], loc="center right", bbox_to_anchor=(1.0, 0.66))
     # a slip ends when it no longer outruns the drive; with a fast drive the block comes to rest only after that
     rests = np.flatnonzero((t >= arrest) & (data["velocity"].values * np.sign(x[-1] - x[0]) <= 0.0))
     begin = t[rests[0]] if rests.size else arrest
     after = (t >= begin + 0.03 * (arrest - onset)) & (t <= arrest + 0.8 * (arrest - onset))
+    names = [str(line.get_label()) for line in lines]
     if after.sum() > 8:
         _ring(axes, t[after] - onset, data["displacement"].values[after])
+        axes.legend(lines, names, loc="center right", bbox_to_anchor=(1.0, 0.66))
+    else:
+        axes.legend(lines, names, loc="upper left" if x[-1] > x[0] else "lower left")
 
 
 def _ring(axes: Axes, t: np.ndarray, x: np.ndarray) -> None:

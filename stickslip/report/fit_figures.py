@@ -41,7 +41,8 @@ def _error(value: float) -> str:
 def heat_map(table: Mapping[str, Any]) -> Figure:
     """Errors of runs (rows, by velocity) and phases (columns), logarithmic colours from 1 to 30 floors."""
     errors = np.array([[np.nan if e is None else e for e in row] for row in table["errors"]], float)
-    made, axes = figure(1, 1, width=6.5, height=1.4 + 0.38 * len(table["runs"]))
+    longest = max((min(len(str(name)), 30) for name in table["runs"]), default=0)
+    made, axes = figure(1, 1, width=6.0 + 0.09 * longest, height=1.4 + 0.38 * len(table["runs"]))
     ax = axes[0, 0]
     shown = ax.imshow(np.log10(np.clip(errors, 0.3, 100.0)), cmap="OrRd", vmin=-0.3, vmax=1.6, aspect="auto")
     for i, j in np.argwhere(np.isfinite(errors)):

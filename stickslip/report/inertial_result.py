@@ -95,6 +95,9 @@ def effective(fit: Fit, rig: Any, contacts: int) -> dict[str, Any] | None:
     except InputError:
         return None
     known = replace(known, contacts=contacts)
+    fitted = known.guessed == ("friction_coefficient",)
+    if fitted:
+        known = replace(known, friction=values["contact.strength"] / (contacts * known.normal_force))
 
     def line_of(values: dict[str, float]) -> EffectiveLine:
         u_max, p, spread = (values.get(name, 0.0) for name in CONTACT)
@@ -108,7 +111,7 @@ def effective(fit: Fit, rig: Any, contacts: int) -> dict[str, Any] | None:
         f"{values['contact.p']:.3g}{unequal}: H = {line.hurst:.2f} +- {hurst_std:.2f}, h_rms = "
         f"{shown(line.h_rms, 'm', 3)} +- {shown(rms_std, 'm', 2)}, for L = {shown(line.length, 'm')}, "
         f"N = {line.n_springs}, F_n = {known.normal_force:.3g} N and friction {known.friction:.3g}"
-        f"{' (guessed)' if known.guessed else ''}; {line.note}."
+        f"{' (from the fitted strength)' if fitted else ' (guessed)' if known.guessed else ''}; {line.note}."
     )
     prior = surface_prior(rig)
     return {
@@ -188,8 +191,7 @@ def fit_sections(
     variables |= overlay(problem, runs, traces, segmentations)
     cut = [f"{name}, cycle {n + 1}" for name, run in zip(m.names, runs, strict=True) for n in run.cut]
     result["misfit"]["cut"] = cut
-    aside = (m.valid & ~use[..., None]).any(axis=(1, 2))
-    result["misfit"]["unseen"] = [name for name, some in zip(m.names, aside, strict=True) if some]
+    result["misfit"]["unseen"] = _kept_aside(m, use)
     if cut:
         result["misfit"]["sentence"] += (
             f" In {len(cut)} cycle{'s' * (len(cut) > 1)} the model could not be integrated to the arrest "
@@ -201,6 +203,17 @@ def fit_sections(
     variables |= residual_arrays(seen, fit.features, floor, found, stiffness, {t.name: t for t in traces})
     variables["coordinates"] = {"phase": list(PHASES), "feature": list(m.layout.names), "run": list(m.names)}
     return result, variables
+
+
+def _kept_aside(m: Measurement, use: np.ndarray) -> list[str]:
+    """Runs, and cycles of runs (counted from 1), that were not fitted."""
+    out = []
+    for name, there, seen in zip(m.names, np.asarray(m.cycles.used), use, strict=True):
+        aside = np.flatnonzero(there & ~seen) + 1
+        if aside.size:
+            cycles = f"cycle{'s' * (aside.size > 1)} {', '.join(map(str, aside))} of {name}"
+            out.append(name if aside.size == there.sum() else cycles)
+    return out
 
 
 def overlay(

@@ -12,7 +12,8 @@ _KNOWN: dict[str, Any] = {
     "verdict": {}, "ladder": [], "ranking": [], "parameters": {}, "equations": [], "identifiability": [], "traces": [],
     "dropped": [], "inputs": [], "versions": {}, "static": None, "misfit": None, "next_experiment": None, "can": [],
     "cannot": [], "effective": None, "profiles": [], "ramps": None, "notes": [], "title": "", "kind": "run",
-    "seconds": None, "summary": "", "missing_force": None, "learned_residual": None,
+    "seconds": None, "summary": "", "caution": [], "ranking_base": None, "missing_force": None,
+    "learned_residual": None,
 }  # fmt: skip
 
 
@@ -35,6 +36,13 @@ def show(value: Any, unit: str = "1", digits: int = 4) -> str:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value) or "–" if isinstance(value, str) else "–"
     return shown(value, unit or "1", digits) if math.isfinite(value) else "–"
+
+
+def lasting(seconds: Any) -> str:
+    """A duration for a person: seconds up to five minutes, then minutes."""
+    if not isinstance(seconds, (int, float)):
+        return ""
+    return f"{seconds:.3g} s" if seconds < 300 else f"{seconds / 60:.0f} min"
 
 
 def percent(value: Any, digits: int = 2) -> str:

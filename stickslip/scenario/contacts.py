@@ -82,7 +82,8 @@ class PowerLaw(eqx.Module):
 
     @property
     def u_max(self) -> Array:
-        return (self.length * self._mixed()[1])[None]
+        scores = jnp.asarray(physics.normal_scores(self.contacts))
+        return jnp.asarray(self.length * jnp.exp(self.spread * scores))
 
 
 Part = Elastic | MeanLine | PowerLaw

@@ -254,9 +254,9 @@ def _verdict(scenario: Scenario, setup: Setup, trajectory: Trajectory, events: E
         if sliding.stable and setup.motion.first_velocity != 0.0 and end - events.arrest[-1] > 2.0 * usual:
             return f"{counted} at the start, then the block slides{beyond}: {sliding.reason}"
         text = f"stick-slip: {counted} in {end:.4g} s"
-        return (
-            f"{text}, though steady sliding is stable{beyond}: {sliding.reason}" if sliding.stable and n > 1 else text
-        )
+        if sliding.stable and n > 1:
+            return f"{text}, from rest; once it slides it would go on sliding{beyond}: {sliding.reason}"
+        return text
     if sliding.stable:
         return f"no slip event, the block slides{beyond}: {sliding.reason}"
     speed = setup.motion.speed

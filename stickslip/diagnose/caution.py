@@ -1,0 +1,47 @@
+"""What a verdict does not say: how far it may be believed, and what to do before acting on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..effects import catalogue
+from .engine import Diagnosis
+from .thresholds import THRESHOLDS, Thresholds
+
+
+def cautions(d: Diagnosis, asked: Sequence[str] = (), limits: Thresholds = THRESHOLDS) -> list[str]:
+    """Sentences to stand beside the verdict.
+
+    Args:
+        d: what was found.
+        asked: tags the user wanted tried.
+        limits: that the verdict rests on.
+    """
+    out = []
+    if d.verdict.kind == "complete":
+        out.append(_complete(asked, limits))
+    if d.verdict.kind == "missing":
+        out.append(
+            "A name is a suspicion, not a finding: that the cause is in the catalogue at all, and in the form tried, "
+            "is taken for granted by the confidence and cannot be told from these data. In blind tests on foreign data "
+            "names were often wrong (documentation, 'The blind challenge')."
+        )
+        out += [line for tag in d.verdict.effects for line in _checks(tag)]
+    return out
+
+
+def _complete(asked: Sequence[str], limits: Thresholds) -> str:
+    which = ", ".join(f"{phase} {most:g}" for phase, most in limits.complete.items())
+    tried = f"The candidates {', '.join(asked)} were" if asked else "No effect of the catalogue was"
+    return (
+        f"{tried} {'not ' if asked else ''}tried, because the base model stays within its limits in every phase, on "
+        f"fitted and on unseen cycles (floors: {which}). An effect that changes the features by less, or as friction, "
+        "weakening, damping and roughness of the base can, is not excluded. To look for one that you suspect: "
+        f"stickslip fit CAMPAIGN --add {asked[0] if asked else 'contact-ageing'}."
+    )
+
+
+def _checks(tag: str) -> list[str]:
+    """What an effect may be taken for, and the experiments that separate the two."""
+    found = catalogue.get(tag).confused_with
+    return [f"{tag} may be taken for {other}; to separate them: {what}." for other, what in found.items()]

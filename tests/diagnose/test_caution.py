@@ -1,0 +1,42 @@
+"""What stands beside a verdict, so that it is not believed further than it goes."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from stickslip.diagnose.caution import cautions
+from stickslip.diagnose.thresholds import Thresholds
+from stickslip.diagnose.verdict import finished, nothing
+from stickslip.effects import catalogue
+
+
+def said(verdict, asked=(), **more):
+    return cautions(SimpleNamespace(verdict=verdict), asked, **more)
+
+
+def test_complete_says_that_nothing_was_tried_and_by_which_limits():
+    (line,) = said(finished([]), limits=Thresholds(complete={"creep": 1.7, "slip": 2.5}))
+    assert "No effect of the catalogue was tried" in line
+    assert "creep 1.7, slip 2.5" in line
+    assert "not excluded" in line
+    (line,) = said(finished([]), ["wear", "tilt"])
+    assert "The candidates wear, tilt were not tried" in line
+    assert "--add wear" in line
+
+
+@pytest.mark.parametrize("tag", catalogue.tags())
+def test_a_name_comes_with_what_it_may_be_taken_for(tag):
+    first, *checks = said(finished([tag]))
+    assert "a suspicion, not a finding" in first
+    known = catalogue.get(tag).confused_with
+    assert len(checks) == len(known)
+    for (other, what), line in zip(known.items(), checks, strict=True):
+        assert line.startswith(f"{tag} may be taken for {other}")
+        assert what in line
+
+
+def test_where_nothing_is_named_nothing_is_cautioned_against():
+    rung = SimpleNamespace(train=SimpleNamespace(by_phase={"creep": 9.0}, alike={}, total=9.0), held=None)
+    assert said(nothing([], [], rung)) == []
