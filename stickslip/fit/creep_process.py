@@ -115,7 +115,7 @@ def _process(
     if event.holds:
         return "the drive stood still before this slip: virtual time needs a steady pull"
     if first is None:
-        return "the record begins within this stick"
+        return "the record begins within this stick (with freshly set down contacts: virgin = true)"
     drive = trace.drive
     speed = abs(float(drive.velocity(max(event.t_onset - 1e-9, time[0])))) if drive is not None else 0.0
     if speed <= v_lim:

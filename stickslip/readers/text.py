@@ -60,7 +60,8 @@ class TextReader:
         except ValueError:
             table, notes = _careful(path, layout)
         if layout.decimal == ",":
-            notes.append("decimal comma")
+            between = {";": "a semicolon", "\t": "a tab", None: "blanks"}[layout.delimiter]
+            notes.append(f"decimal comma, {between} between the columns")
         data = {layout.names[c]: np.ascontiguousarray(table[:, k]) for k, c in enumerate(layout.numeric)}
         columns = Columns(data, layout.units, layout.ignored, notes, layout.skip + 1, order=layout.names)
         return need_columns(columns, path)
