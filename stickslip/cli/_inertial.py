@@ -32,7 +32,7 @@ from ..uncertainty import profile
 from .working import Tell, working
 
 REFIT = ((2.5, 4), (1.0, 8))  # of a profile's points, from the neighbouring optimum
-AGAIN = ((3.0, 4), (1.0, 12))  # of a model, from where the same with one effect more arrived
+AGAIN = ((1.0, 12),)  # of a model, from where the same with one effect more arrived
 PIN = 1e-3  # width of the prior that holds a profiled parameter, on the search scale
 
 

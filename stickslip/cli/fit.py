@@ -213,12 +213,17 @@ def _folded(text: str) -> str:
 
 def _gains_of_effects(ladder: list[dict[str, Any]]) -> list[str]:
     """What each added effect takes off the cost, and for how many parameters."""
-    return [
-        f"{step['added']} takes the cost (robust chi-square, priors included) from {before['cost']:.1f} to "
-        f"{step['cost']:.1f}, with {step['parameters'] - before['parameters']} more free parameters"
-        for before, step in itertools.pairwise(ladder)
-        if before.get("cost") is not None and step["added"] != "inertia"
-    ]
+    lines = []
+    for before, step in itertools.pairwise(ladder):
+        if before.get("cost") is None:
+            continue
+        gain = before["cost"] - step["cost"]
+        lines.append(
+            f"{step['added']} takes {f'{gain:.1f}' if gain > 0.05 else 'nothing'} off the cost (robust chi-square, priors "
+            f"included): {before['cost']:.1f} without, {step['cost']:.1f} with it and "
+            f"{step['parameters'] - before['parameters']} more free parameters"
+        )
+    return lines
 
 
 def _text(result: dict[str, Any], out: Path | None) -> str:

@@ -41,5 +41,12 @@ def test_the_model_without_the_effect_is_fitted_again_from_where_it_arrived(monk
     assert [step.get("cost") for step in ladder] == [None, base, 514.0]
     assert asked["z"].size == 2
     (line,) = _gains_of_effects(ladder)
-    assert line.startswith(f"viscous-drag takes the cost (robust chi-square, priors included) from {base} to 514.0")
-    assert "2 more free parameters" in line
+    gain = {514.2: "0.2", 537.8: "23.8"}[base]
+    assert line.startswith(f"viscous-drag takes {gain} off the cost")
+    assert line.endswith(f"{base} without, 514.0 with it and 2 more free parameters")
+
+
+def test_an_effect_that_takes_nothing_off_is_said_to():
+    ladder = [{"added": None}, {"added": "inertia", "cost": 512.4, "parameters": 8},
+              {"added": "wear", "cost": 513.9, "parameters": 9}]  # fmt: skip
+    assert _gains_of_effects(ladder)[0].startswith("wear takes nothing off the cost")
