@@ -220,7 +220,8 @@ def _gains_of_effects(ladder: list[dict[str, Any]]) -> list[str]:
         gain = before["cost"] - step["cost"]
         off = f"{gain:.1f}" if gain > 0.05 else "nothing"
         lines.append(
-            f"{step['added']} takes {off} off the cost (robust chi-square, priors included): {before['cost']:.1f} without, {step['cost']:.1f} with it and "
+            f"{step['added']} takes {off} off the cost (robust chi-square, priors included): "
+            f"{before['cost']:.1f} without, {step['cost']:.1f} with it and "
             f"{step['parameters'] - before['parameters']} more free parameters"
         )
     return lines
