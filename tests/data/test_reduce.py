@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -76,11 +77,17 @@ print(trace.time.size, len(found.events), short.time.size, time.process_time() -
 """
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("ending", "seconds"), [("npy", 15), ("csv", 45)])
-def test_ten_million_samples(tmp_path, stick_slip, ending, seconds):
-    """Read, segmented and reduced in seconds of processor time and less than 1 GB."""
-    n, model = 10_000_000, stick_slip(period=1.5, events=130)
+INSPECT = """
+import resource, subprocess, sys
+done = subprocess.run([sys.executable, "-m", "stickslip.cli", "inspect", sys.argv[1]], stdout=subprocess.DEVNULL)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(done.returncode, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024)
+"""
+
+
+def long_record(folder: Path, stick_slip, ending: str, n: int) -> Path:
+    """A campaign of one record of so many samples at 50 kHz."""
+    model = stick_slip(period=1.5, events=130)
     t = np.arange(n) / 50e3
     one = np.arange(0, 1.5, 2e-5)
     cycle = model.position(one)
@@ -89,22 +96,40 @@ def test_ten_million_samples(tmp_path, stick_slip, ending, seconds):
         * 7.91e-3
     )
     if ending == "npy":
-        np.save(tmp_path / "a.npy", np.column_stack([t, x]))
+        np.save(folder / "a.npy", np.column_stack([t, x]))
     else:
-        with (tmp_path / "a.csv").open("w") as stream:
+        with (folder / "a.csv").open("w") as stream:
             stream.write("time [s],x [um]\n")
             for i in range(0, n, 200_000):
                 np.savetxt(stream, np.column_stack([t[i : i + 200_000], x[i : i + 200_000]]), fmt="%.5f,%.5f")
-    (tmp_path / "c.toml").write_text(
+    path = folder / "c.toml"
+    path.write_text(
         f'schema = 1\n[[trace]]\nfile = "a.{ending}"\ntime = {{ column = 1, unit = "s" }}\n'
         'displacement = { column = 2, unit = "um" }\ndrive_velocity = "50 um/s"\n'
     )
-    done = subprocess.run(
-        [sys.executable, "-c", LONG, str(tmp_path / "c.toml")], capture_output=True, text=True, check=True
-    )
-    size, events, short, spent, memory = done.stdout.split()
-    assert int(size) == n
-    assert int(events) == 133
-    assert int(short) < n / 5
-    assert float(memory) < 1e9
-    assert float(spent) < seconds
+    return path
+
+
+def numbers(script: str, path: Path) -> list[float]:
+    """What a script prints of a campaign, in a process of its own."""
+    command = [sys.executable, "-c", script, str(path)]
+    return [float(word) for word in subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("ending", "seconds"), [("npy", 15), ("csv", 45)])
+def test_ten_million_samples(tmp_path, stick_slip, ending, seconds):
+    """Read, segmented and reduced in seconds of processor time and less than 1 GB; inspected likewise."""
+    n = 10_000_000
+    path = long_record(tmp_path, stick_slip, ending, n)
+    size, events, short, spent, memory = numbers(LONG, path)
+    assert size == n
+    assert events == 133
+    assert short < n / 5
+    assert memory < 1e9
+    assert spent < seconds
+    code, spent, memory = numbers(INSPECT, path)
+    print(f"inspect {ending}: {spent:.1f} s of processor time, {memory / 2**20:.0f} MiB")
+    assert code == 0
+    assert memory < 1e9
+    assert spent < seconds
