@@ -32,7 +32,7 @@ def enable() -> Path | None:
         The folder, or None where it is switched off (``STICKSLIP_NO_CACHE=1``), cannot be written, or JAX has its own
         setting already.
     """
-    if os.environ.get(OFF, "").strip() not in ("", "0") or "JAX_COMPILATION_CACHE_DIR" in os.environ:
+    if _off() or "JAX_COMPILATION_CACHE_DIR" in os.environ:
         return None
     folder = _folder()
     if folder is None:
@@ -101,11 +101,20 @@ def _unpack(content: bytes) -> None:
         zlib.decompress(content)
 
 
-def _folder() -> Path | None:
+def folder_for(name: str) -> Path | None:
+    """A folder in the user's cache, made if need be; None where caches are switched off or nothing can be written."""
+    return None if _off() else _folder(name)
+
+
+def _off() -> bool:
+    return os.environ.get(OFF, "").strip() not in ("", "0")
+
+
+def _folder(name: str = "compiled") -> Path | None:
     """The cache folder, made if need be; None where nothing can be written there."""
     import platformdirs
 
-    folder = Path(platformdirs.user_cache_dir("stickslip", appauthor=False)) / "compiled"
+    folder = Path(platformdirs.user_cache_dir("stickslip", appauthor=False)) / name
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

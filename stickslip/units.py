@@ -7,6 +7,7 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from .cache import folder_for
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -15,10 +16,21 @@ if TYPE_CHECKING:
 
 @cache
 def unit_registry() -> pint.UnitRegistry:
-    """The one pint registry of the program (building it takes half a second, so only when needed)."""
+    """The one pint registry of the program (building it takes half a second, so only when needed).
+
+    What pint keeps of it names files of its installation. So each installation has a folder of its own; pint's common
+    one would stop working for all others once one of them is removed.
+    """
+    import hashlib
+
     import pint
 
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=":auto:")
+    place = hashlib.sha256(f"{pint.__file__} {pint.__version__}".encode()).hexdigest()[:16]
+    folder = folder_for(f"units/{place}")
+    try:
+        return pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=folder)
+    except Exception:  # whatever a damaged cache makes pint raise
+        return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
 _SIMPLE = re.compile(r"([+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?) ?([^\d\s].*)")

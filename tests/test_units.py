@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import subprocess
 import sys
 
@@ -24,6 +25,27 @@ def test_plain_units_are_read_as_pint_reads_them(unit):
             assert found == pytest.approx(unit_registry().Quantity(text).to(unit).magnitude, rel=1e-15)
     assert to_si(f"3 {unit}", unit) == 3.0
     assert (_simple(f"3 {unit}", unit) == 3.0) == unit[0].isalpha()
+
+
+ASK = "from stickslip.units import to_si; print(to_si('3 mm per minute', 'm/s'))"
+
+
+@pytest.mark.parametrize("damage", ["whole", "another installation", "cut", "garbage"])
+def test_what_pint_keeps_of_another_installation_or_in_pieces_does_no_harm(tmp_path, damage):
+    """Its cache names files of the installation it was made by, which may be gone."""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "STICKSLIP_NO_CACHE": "0"}
+    ask = [sys.executable, "-c", ASK]
+    assert float(subprocess.run(ask, env=environment, capture_output=True, check=True).stdout) == pytest.approx(5e-5)
+    kept = [path for path in (tmp_path / "stickslip" / "units").rglob("*") if path.is_file()]
+    assert any(path.suffix == ".pickle" for path in kept)
+    for path in kept:
+        content = path.read_bytes()
+        if damage == "another installation":
+            gone = content.replace(b"site-packages", b"site-packageX")
+            path.write_bytes(gone)
+        elif damage != "whole":
+            path.write_bytes(content[: len(content) // 2] if damage == "cut" else b"garbage")
+    assert float(subprocess.run(ask, env=environment, capture_output=True, check=True).stdout) == pytest.approx(5e-5)
 
 
 def test_a_prefix_is_not_taken_out_of_a_power_or_a_quotient():
