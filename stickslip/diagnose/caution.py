@@ -8,6 +8,11 @@ from ..effects import catalogue
 from .engine import Diagnosis
 from .thresholds import THRESHOLDS, Thresholds
 
+TRIED = (
+    "Effects were tried, and none explains the little that is left (see the candidates). One that acts otherwise than the "
+    "catalogue has it, or that the base can imitate, is not excluded."
+)
+
 
 def cautions(d: Diagnosis, asked: Sequence[str] = (), limits: Thresholds = THRESHOLDS) -> list[str]:
     """Sentences to stand beside the verdict.
@@ -19,7 +24,7 @@ def cautions(d: Diagnosis, asked: Sequence[str] = (), limits: Thresholds = THRES
     """
     out = []
     if d.verdict.kind == "complete":
-        out.append(_complete(asked, limits))
+        out.append(TRIED if d.rounds else _complete(asked, limits))
     if d.verdict.kind == "missing":
         out.append(
             "A name is a suspicion, not a finding: that the cause is in the catalogue at all, and in the form tried, "

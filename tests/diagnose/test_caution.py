@@ -13,7 +13,7 @@ from stickslip.effects import catalogue
 
 
 def said(verdict, asked=(), **more):
-    return cautions(SimpleNamespace(verdict=verdict), asked, **more)
+    return cautions(SimpleNamespace(verdict=verdict, rounds=()), asked, **more)
 
 
 def test_complete_says_that_nothing_was_tried_and_by_which_limits():
@@ -24,6 +24,13 @@ def test_complete_says_that_nothing_was_tried_and_by_which_limits():
     (line,) = said(finished([]), ["wear", "tilt"])
     assert "The candidates wear, tilt were not tried" in line
     assert "--add wear" in line
+
+
+def test_complete_after_a_round_does_not_say_that_nothing_was_tried():
+    tried = SimpleNamespace(verdict=finished([]), rounds=(SimpleNamespace(candidates=(1, 2, 3)),))
+    (line,) = cautions(tried, ["wear"])
+    assert line.startswith("Effects were tried")
+    assert "not tried" not in line
 
 
 @pytest.mark.parametrize("tag", catalogue.tags())
