@@ -9,8 +9,8 @@ from .engine import Diagnosis
 from .thresholds import THRESHOLDS, Thresholds
 
 TRIED = (
-    "Effects were tried, and none explains the little that is left (see the candidates). One that acts otherwise than the "
-    "catalogue has it, or that the base can imitate, is not excluded."
+    "Effects were tried, and none explains the little that is left (see the candidates). One that acts otherwise than "
+    "the catalogue has it, or that the base can imitate, is not excluded."
 )
 
 

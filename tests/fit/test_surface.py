@@ -198,6 +198,8 @@ def test_the_roughness_narrows_a_whole_fit_and_follows_from_it(short_run, tmp_pa
         found = result["effective"]
         assert abs(found["H"] - together.hurst) < 2 * found["H_std"]
         assert abs(found["h_rms"] - together.h_rms) < 2 * found["h_rms_std"]
+    assert known["effective"]["H"] == pytest.approx(together.hurst, abs=0.1)
+    assert known["effective"]["h_rms"] == pytest.approx(together.h_rms, rel=0.2)
     assert known["effective"]["H_std"] < without["effective"]["H_std"] < 0.5
     for result in (without, known):
         assert f"H = {result['effective']['H']:.2f}" in result["effective"]["text"]
