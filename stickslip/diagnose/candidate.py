@@ -22,7 +22,7 @@ from ..params import specs
 from ..residual import Misfit
 from .heldout import HeldOut, held_out
 from .linear import Linear
-from .periods import periods, phasor
+from .periods import periods, phasor, within_record
 
 START = 0.02  # of the amplitude's range; scaled until its effect on the features is moderate
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
@@ -83,21 +83,25 @@ class Candidate:
         return np.inf if self.fit is None else self.fit.cost
 
 
-def starts(effect: Effect, found: list[float] | None = None) -> list[dict[str, float]]:
+def starts(
+    effect: Effect, found: list[float] | None = None, bounds: tuple[float, float] | None = None
+) -> list[dict[str, float]]:
     """Values of the effect's inner parameters to begin a search from: their grid.
 
     Args:
         effect: with its form chosen.
         found: periods the data hint at, for an effect that is periodic, the strongest first; they replace the grid's.
+        bounds: of its period or frequency, where the record allows less than the effect.
     """
     table = specs(effect)
     inner = {k: s.grid for k, s in table.items() if k != effect.amplitude and s.grid}
     if effect.periodic is not None:
         name = effect.periodic[0]
         inner.pop("phase", None)
-        low, high = table[name].lower, table[name].upper
+        low, high = bounds or (table[name].lower, table[name].upper)
         at = tuple(v for v in (1.0 / p if name == "frequency" else p for p in found or ()) if low < v < high)
-        inner[name] = at[:MOST_STARTS] or inner.get(name, ())
+        inner[name] = at[:MOST_STARTS] or tuple(v for v in inner.get(name, ()) if low < v < high)
+        inner[name] = inner[name] or (float(np.sqrt(low * high)),)
     grid = [dict(zip(inner, values, strict=True)) for values in product(*inner.values())]
     if len(grid) <= MOST_STARTS:
         return grid
@@ -236,7 +240,7 @@ def ease(optimum: Fit, measurement: Measurement, floor: np.ndarray) -> float:
 
 
 def _score(effect, form, base, optimum, measurement, floor, train, threads, tell) -> Candidate:
-    free = effect_parameters(effect)
+    free = within_record(effect, effect_parameters(effect), measurement)
     composition = base.with_effect(effect, free)
     problem = Problem(composition, measurement, threads=threads).coarser()
     k = len(base.free)
@@ -245,15 +249,16 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
     factor = ease(optimum, measurement, floor)
     linear = Linear(problem, optimum, measurement, floor, valid, factor)
     hints: list[float] = []
+    limits: tuple[float, float] | None = None
     if effect.periodic is not None:
-        spec = specs(effect)[effect.periodic[0]]
-        bounds = (spec.lower, spec.upper)
+        period = next(f for f in free if f.name == f"{effect.tag}.{effect.periodic[0]}")
+        bounds = limits = (period.lower, period.upper)
         if effect.periodic[0] == "frequency":
-            bounds = (1.0 / spec.upper, 1.0 / spec.lower)
+            bounds = (1.0 / period.upper, 1.0 / period.lower)
         hints = periods(effect.periodic[1], measurement, optimum.features - optimum.offsets, use, bounds)
     search = _Search(problem, optimum, floor, valid, factor, free, k, effect)
     explained, likely = 0.0, {}
-    for values in starts(effect, hints):
+    for values in starts(effect, hints, limits):
         share = search.along(values, linear)
         if share >= explained:
             explained, likely = share, values

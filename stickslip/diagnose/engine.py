@@ -44,6 +44,7 @@ from .verdict import (
 )
 
 MOST_CYCLES = 14
+BASE_AGAIN = ((3.0, 4), (1.0, MORE)), ((1.0, MORE),)  # stages: by way of wide floors, and straight on
 FURTHER_FITS, ARRIVED = 4, 0.97  # of a model with a named effect, until one takes less than 3 % off its cost
 
 
@@ -253,8 +254,10 @@ def _round(
     if best is None or best.fit is None:
         return rung, done
     k = len(rung.composition.free)
-    begin, stages = replace(rung.fit, z=best.fit.z[:k], events=best.fit.events), ((3.0, 4), (1.0, MORE))
-    return _further(rung, begin, stages, data, floor, train, store, f"{name}-again"), done
+    begin = replace(rung.fit, z=best.fit.z[:k], events=best.fit.events)
+    for i, stages in enumerate(BASE_AGAIN):
+        rung = _further(rung, begin, stages, data, floor, train, store, f"{name}-again{i + 1}")
+    return rung, done
 
 
 def _further(

@@ -6,17 +6,22 @@ still makes is a sine of the *measured* onset, however far that is from where th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..effects.base import Effect
 from ..features.measurement import Measurement
+from ..fit.parameters import Free
 
 Variable = Literal["time", "load point", "displacement"]
 MOST = 20_000  # frequencies tried
 KEPT = 5
 FEWEST = 6  # slips
+LONGEST = 1.5  # times the record: a longer wave is a trend, which other effects describe
 FAR = 5.0  # standard deviations, from the median of the absolute deviations, at which a deviation is cut
 
 
@@ -61,6 +66,44 @@ def periods(
         if len(out) == KEPT:
             break
     return out
+
+
+def within_record(effect: Effect, free: Sequence[Free], measurement: Measurement) -> list[Free]:
+    """The effect's free parameters; if it is periodic, with no period beyond LONGEST times the longest run."""
+    if effect.periodic is None:
+        return list(free)
+    name, variable = effect.periodic
+    longest = LONGEST * _span(variable, measurement)
+    return [_limited(f, name, longest) if f.name == f"{effect.tag}.{name}" else f for f in free]
+
+
+def _limited(free: Free, name: str, longest: float) -> Free:
+    if not longest > 0.0:
+        return free
+    low, high = free.lower, free.upper
+    if name == "frequency":
+        low = min(max(low, 1.0 / longest), 0.5 * high)
+    else:
+        high = max(min(high, longest), 2.0 * low)
+    prior = float(np.clip(free.prior, low, high))
+    return replace(free, lower=low, upper=high, prior=prior).starting(free.start)
+
+
+def _span(variable: Variable, m: Measurement) -> float:
+    """Length of the longest run (s or m)."""
+    used = np.asarray(m.cycles.used)
+    s = m.layout.slices()
+    begin, end = m.values.copy(), m.values
+    begin[..., s["recurrence"].start] = 0.0
+    first, last = _at(variable, m, begin), _at(variable, m, end)
+    if variable == "displacement":
+        last = last + end[..., s["size"].start]
+    runs = [
+        float(np.nanmax(b[u]) - np.nanmin(a[u]))
+        for a, b, u in zip(first, last, used & np.isfinite(last), strict=True)
+        if u.any()
+    ]
+    return max(runs, default=0.0)
 
 
 def phasor(

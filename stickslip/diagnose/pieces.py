@@ -16,6 +16,7 @@ from ..fit.parameters import Free, effect_parameters
 from ..fit.problem import Problem
 from .candidate import Candidate
 from .heldout import held_out
+from .periods import within_record
 
 _ARRAYS = ("z", "events", "features", "offsets", "covariance", "columns", "use")
 
@@ -66,7 +67,7 @@ def candidate_from(
     """The inverse of :func:`candidate_arrays`; errors are computed again from the features kept."""
     head = json.loads(str(arrays["head"]))
     effect = catalogue.get(head["tag"])(**head["form"])
-    composition = base.with_effect(effect, effect_parameters(effect))
+    composition = base.with_effect(effect, within_record(effect, effect_parameters(effect), measurement))
     others = tuple(zip(arrays["others_z"], arrays["others_events"], strict=True))
     candidate = Candidate(**head, effect=effect, composition=composition, others=others)
     if "z" not in arrays:

@@ -10,17 +10,19 @@ from ..params import parameter, variant
 from .base import Contact, Memory, Motion, Stiffness, Threshold
 from .catalogue import register
 
+LEAST = 0.01  # of what drifts, that always remains
+
 
 @register
 class Wear(Memory, Threshold, Stiffness):
-    """Caps, or thresholds at constant caps, change by a factor exp(eps g) with the path s.
+    """Caps, or thresholds at constant caps, change by a factor 1 + eps g with the path s (never below a hundredth).
 
     g = s/s_1, ln(1 + s/s_1) or 1 - exp(-s/s_1).
     """
 
     tag = "wear"
     summary = "run-in: friction or thresholds drift with the accumulated slip"
-    equation = r"\mu \;\mathrm{or}\; u_{max} \to (\cdot)\,e^{\varepsilon g(s/s_1)},\quad \dot s = |\dot x|"
+    equation = r"\mu \;\mathrm{or}\; u_{max} \to (\cdot)\,[1 + \varepsilon\, g(s/s_1)],\quad \dot s = |\dot x|"
     signature = "monotone drift of slip size and recurrence (or of creep) with accumulated slip, not with time"
     confused_with = {
         "position-dependent-friction": "go back over the same track",
@@ -68,4 +70,4 @@ class Wear(Memory, Threshold, Stiffness):
     def _factor(self, state: Array) -> Array:
         s = state / self.path
         grown = {"linear": lambda: s, "logarithmic": lambda: jnp.log1p(s), "saturating": lambda: -jnp.expm1(-s)}
-        return jnp.exp(self.drift * grown[self.course]())
+        return jnp.maximum(1.0 + self.drift * grown[self.course](), LEAST)

@@ -29,8 +29,8 @@ from ..solve.stepper import Tolerance
 from .common import Common
 from .composition import START, Composition, Given
 
-FINE = Tolerance(1.5e-3, 6e-12, 6e-9)  # errors below a floor, of onsets in slow runs up to two
-COARSE = Tolerance(5e-3, 2e-11, 2e-8)  # of two to three: for floors that are widened more than that
+FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)  # errors below a floor
+COARSE = Tolerance(2e-3, 2e-11, 2e-8, 1.2e-2, 3e-7)  # of one to two: for floors that are widened more than that
 STEP = 0.01  # of a difference, on the search scale, until it is known better
 TINY = 0.1  # share of a step that is taken beyond a border where there is no room to either side
 BROKEN = 0.3  # change of a slip's size within such a step that can only be another event
@@ -204,7 +204,7 @@ class _Key:
         return isinstance(other, _Key) and self._key == other._key
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=128)
 def _tracks(key: _Key) -> Any:
     """The compiled integration of one run. What the features ask of it is compiled apart, once for all models."""
     composition = key.composition

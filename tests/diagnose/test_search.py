@@ -8,10 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from stickslip.diagnose.candidate import starts
 from stickslip.diagnose.linear import Linear
-from stickslip.diagnose.periods import periods, phasor
+from stickslip.diagnose.periods import periods, phasor, within_record
+from stickslip.effects import catalogue
 from stickslip.fit.inertial import Fit
-from stickslip.fit.parameters import Free
+from stickslip.fit.parameters import Free, effect_parameters
 from stickslip.floors import EVENT_WIDTHS
 
 from .test_rules import measurement
@@ -76,6 +78,47 @@ def test_a_period_in_the_residual_is_found(variable, scale):
     found = periods(variable, data, model, np.ones((1, n), bool), (1.5 * scale, 100 * scale))
     assert found[0] == pytest.approx(true, rel=0.05)
     assert len(found) <= 5
+
+
+@pytest.mark.parametrize(
+    ("tag", "name"),
+    [
+        ("position-dependent-friction", "wavelength"),
+        ("drive-ripple", "pitch"),
+        ("load-modulation", "frequency"),
+        ("base-vibration", "frequency"),
+    ],
+)
+def test_no_wave_is_longer_than_one_and_a_half_records(tag, name):
+    effect = catalogue.make(tag)
+    assert effect.periodic is not None
+    data = measurement((1e-4,), 7, ())
+    n = data.values.shape[1]
+    values = data.values.copy()
+    values[0, :, 0], values[0, :, 1] = 0.4, 4e-5  # a recurrence, a slip
+    start = 0.4 * np.arange(n)[None]
+    nodes = np.array([[0.0, 1.0]]), np.array([[0.0, 1e-4]])
+    cycles = data.cycles._replace(
+        start=start, position=4e-5 * np.arange(n)[None], load_times=nodes[0], load_positions=nodes[1]
+    )
+    data = replace(data, cycles=cycles, values=values)
+    cycles_used = int(np.asarray(cycles.used).sum())
+    record = {"time": 0.4 * cycles_used, "load point": 4e-5 * cycles_used, "displacement": 4e-5 * cycles_used}
+    longest = 1.5 * record[effect.periodic[1]]
+    own, limited = effect_parameters(effect), within_record(effect, effect_parameters(effect), data)
+    for before, after in zip(own, limited, strict=True):
+        if not after.name.endswith(name):
+            assert after == before
+        elif name == "frequency":
+            assert after.lower == pytest.approx(max(1.0 / longest, before.lower), rel=1e-6)
+            assert after.upper == before.upper
+        else:
+            assert after.upper == pytest.approx(min(longest, before.upper), rel=1e-6)
+            assert after.lower == before.lower
+        assert after.lower <= after.start <= after.upper
+    limits = next((f.lower, f.upper) for f in limited if f.name.endswith(name))
+    for values_ in starts(effect, [], limits):
+        assert limits[0] <= values_[name] <= limits[1]
 
 
 def test_too_few_slips_hint_at_nothing():

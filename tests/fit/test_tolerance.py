@@ -1,0 +1,77 @@
+"""The tolerance of a fit: ringing is resolved as far as features ask, slips and creep as before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from stickslip.features.layout import PHASES
+from stickslip.fit.problem import COARSE, FINE, Problem, _Key, _tracks
+from stickslip.floors import floors
+from stickslip.solve import Tolerance
+
+from .synthetic import composition, measured, traces, truth
+
+STRICT = Tolerance(5e-5, 6e-14, 6e-11)
+
+
+@pytest.fixture(scope="module")
+def data():
+    return measured(traces())
+
+
+def errors(data, tolerance):
+    """Root mean square of the solver's error in every phase (floors), at the truth."""
+    exact = Problem(replace(composition(), most_steps=40_000), data, STRICT, threads=1)
+    given = Problem(composition(), data, tolerance, threads=1)
+    events = np.zeros((*np.asarray(data.cycles.used).shape, 2))
+    off = (given.features(truth(), events) - exact.features(truth(), events)) / floors(data)
+    seen = data.valid & np.asarray(data.cycles.used)[..., None]
+    phase = data.layout.phase_index()
+    each = {p: off[..., phase == i][seen[..., phase == i]] for i, p in enumerate(PHASES)}
+    return {p: float(np.sqrt(np.mean(e**2))) for p, e in each.items() if e.size}
+
+
+def steps(data, tolerance):
+    events = np.zeros((*np.asarray(data.cycles.used).shape, 2))
+    run = _tracks(_Key(composition()))
+    total = 0
+    for r in range(data.runs):
+        cycles, _ = Problem(composition(), data, threads=1)._data[r]
+        track = run(jnp.asarray(truth()), jnp.asarray(events[r]), cycles, composition().given(), tolerance)
+        total += int(np.asarray(track.steps)[np.asarray(cycles.used)].sum())
+    return total
+
+
+def test_the_error_of_a_fit_is_below_the_floors_in_every_phase(data):
+    fine, coarse = errors(data, FINE), errors(data, COARSE)
+    assert set(fine) >= {"creep", "slip", "ring-down", "recurrence"}
+    assert max(fine.values()) < 1.0
+    assert max(coarse.values()) < 2.0
+
+
+def test_unresolved_ringing_saves_steps_and_costs_slips_and_creep_nothing(data):
+    resolved = Tolerance(FINE.relative, FINE.displacement, FINE.velocity)
+    assert steps(data, FINE) < 0.6 * steps(data, resolved)
+    with_all, without = errors(data, resolved), errors(data, FINE)
+    for phase in ("slip", "recurrence", "creep"):
+        assert without[phase] < with_all[phase] + 0.2
+
+
+def test_only_ringing_on_a_held_block_is_eased():
+    h, k, c_s = 5e-5, 1e7, 1e4  # s, 1/s^2, 1/s^2
+    amplitude, phase = 3e-5, np.sqrt(k) * h  # m/s
+    relative = Tolerance(ringing=6e-3)
+    ringing = relative.ring(amplitude * np.cos(phase), 0.0, -amplitude * np.sqrt(k) * np.sin(phase), h, k, c_s)
+    expected = (1 - 50 * c_s / k) * (6e-3 * amplitude * np.hypot(np.sin(phase), np.sin(phase) / phase))
+    assert float(ringing[1]) == pytest.approx(expected, rel=0.02)
+    assert float(ringing[0]) == pytest.approx(float(ringing[1]) / np.sqrt(k))
+    slipping = FINE.ring(1e-3, 0.1, 0.09, h, 2 * c_s, c_s)
+    assert [float(v) for v in slipping] == [0.0, 0.0]
+    # creep that speeds up by a tenth a second, at a tenth of the velocity that is inaudible
+    creeping = FINE.ring(1e-8, 1e-9, 1e-9, 1e-3, k, c_s)
+    assert float(creeping[1]) < 1e-3 * float(FINE.velocity)
+    assert [float(v) for v in Tolerance().ring(1e-5, 0.1, -0.1, h, k, c_s)] == [0.0, 0.0]
