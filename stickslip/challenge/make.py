@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,13 @@ Tell = Callable[[str, float], None]
 
 
 def make_challenge(
-    folder: str | Path, cases: int = 100, seed: int = 0, *, jobs: int | None = None, tell: Tell | None = None
+    folder: str | Path,
+    cases: int = 100,
+    seed: int = 0,
+    *,
+    own: Sequence[Case] | None = None,
+    jobs: int | None = None,
+    tell: Tell | None = None,
 ) -> str:
     """Write the campaigns, the truth apart from them, and the seal of both.
 
@@ -31,6 +37,8 @@ def make_challenge(
 
     Args:
         folder: must not exist, or be empty.
+        cases, seed: see :func:`stickslip.challenge.mix.plan`.
+        own: cases of one's own in place of the mix.
         jobs: parallel processes; default the number of cores.
         tell: told the case that was finished and the share done.
 
@@ -46,13 +54,13 @@ def make_challenge(
             "something is there already, and a challenge is never replaced", file=folder, hint="choose another folder"
         )
     _need_numba()
-    planned = plan(cases, seed)
+    planned = plan(cases, seed) if own is None else list(own)
     with open_run(folder, resume=True) as run:
         made = _make_all(run, planned, seed, os.cpu_count() or 1 if jobs is None else jobs, tell)
         truth = {
             "schema": 1,
             "seed": seed,
-            "mix": MIX,
+            "mix": MIX if own is None else "cases of one's own",
             "versions": versions(),
             "cases": [made[case.name] for case in planned],
         }
@@ -60,7 +68,7 @@ def make_challenge(
         for left in set((run.folder / CASES).iterdir()) - {run.folder / CASES / case.name for case in planned}:
             shutil.rmtree(left)  # of a making with another plan that was interrupted
         files = [path, *(p for p in (run.folder / CASES).rglob("*") if p.is_file())]
-        seal = make_seal(run.folder, files, cases=cases, versions=versions())
+        seal = make_seal(run.folder, files, cases=len(planned), versions=versions())
         shutil.rmtree(run.folder / MADE)
     return seal
 

@@ -1,0 +1,146 @@
+"""How often a diagnosis is right on campaigns of the independent simulator: what docs/diagnosis tabulates.
+
+``python -m tests.diagnose.development FOLDER PART --seed S`` makes the campaigns of a part, diagnoses each (going on
+where it was stopped), and prints the answers as a table and the rate. Parts: ``one`` (every effect that can be seen,
+once with the same lines at every event and once with new ones), ``nothing``, ``two``, and ``left-out`` (as ``one``
+with the same lines, but the effect and laws that contain it are not in the catalogue that is tried).
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.challenge.answers import Answer, is_exact, is_right, read_answer
+from stickslip.challenge.detection import amplitude, largest_multiple, visible_forms
+from stickslip.challenge.generator import CATALOGUED, EFFECTS
+from stickslip.challenge.make import make_challenge
+from stickslip.challenge.mix import Case, Hidden, case_seed
+from stickslip.challenge.run import Progress, run_challenge
+from stickslip.challenge.seal import RUNS, read_seal, read_truth
+from stickslip.workflow import diagnose_campaign
+
+MULTIPLE = 10.0  # of detection, or the largest at which the block slips
+VELOCITIES, HOLDS = (5e-5, 1e-4, 2e-4, 4e-4), (1.0, 5.0)  # m/s, s
+PARTS = {"one": "one", "nothing": "nothing", "two": "two", "left-out": "outside"}
+
+
+def visible() -> list[str]:
+    """Effects of the catalogue that can be seen in their textbook form."""
+    return [tag for tag in CATALOGUED if not EFFECTS[tag].decoy and _textbook(tag)]
+
+
+def _textbook(tag: str) -> list[str]:
+    return [form.name for form in visible_forms(EFFECTS[tag]) if not form.own]
+
+
+def hidden(tag: str, sign: float) -> Hidden:
+    """An effect in its first textbook form at MULTIPLE times detection."""
+    form = _textbook(tag)[0]
+    multiple = min(MULTIPLE, largest_multiple(EFFECTS[tag], form))
+    return Hidden(tag, multiple, amplitude(EFFECTS[tag], form, multiple, sign), form)
+
+
+def cases(part: str, seed: int, number: int) -> list[Case]:
+    """The campaigns of a part; those with nothing or two effects as many as ``number``."""
+    rng = np.random.default_rng([seed, list(PARTS).index(part)])
+    sets: Iterator[tuple[tuple[str, ...], bool]]
+    if part == "nothing":
+        sets = (((), bool(i % 2)) for i in range(number))
+    elif part == "two":
+        pairs = [rng.choice(visible(), 2, replace=False) for _ in range(number)]
+        sets = ((tuple(str(t) for t in pair), bool(i % 2)) for i, pair in enumerate(pairs))
+    else:
+        sets = (((tag,), new) for tag in visible() for new in ((False,) if part == "left-out" else (False, True)))
+    made = []
+    for i, (tags, new_lines) in enumerate(sets, start=1):
+        effects = tuple(hidden(tag, 1.0 if rng.random() < 0.5 else -1.0) for tag in tags)
+        spring_known, virgin = part != "nothing" or bool(i // 2 % 2), bool(rng.random() < 0.5)
+        made.append(
+            Case(
+                f"case-{i:03d}", PARTS[part], effects, spring_known, virgin, new_lines, VELOCITIES, HOLDS, "plain",
+                case_seed(seed, i),
+            )
+        )  # fmt: skip
+    return made
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Diagnosis without the hidden effect of each case."""
+
+    hidden: dict[str, str]
+
+    def __call__(self, campaign: Path, out: Path) -> Any:
+        from stickslip.effects import catalogue
+
+        tag = self.hidden[campaign.parent.name]
+        tried = [t for t, cls in catalogue.all().items() if t != tag and tag not in cls.generalises]
+        return diagnose_campaign(campaign, out, jobs=1, missing_force=False, candidates=tried)
+
+
+def table(folder: Path) -> str:
+    """The answers and how many are right."""
+    rows, right, exact, number = (
+        ["| hidden | lines | times detection | said | unseen error |", "|---|---|---|---|---|"],
+        0,
+        0,
+        0,
+    )
+    for truth in read_truth(folder)["cases"]:
+        answer = read_answer(folder / RUNS, truth["name"])
+        if answer.kind == "not run":
+            continue
+        tags = tuple(e["tag"] for e in truth["effects"])
+        number += 1
+        right += is_right(truth["kind"], tags, answer)
+        exact += is_exact(truth["kind"], tags, answer)
+        times = ", ".join(f"{e['multiple']:.3g}" for e in truth["effects"])
+        lines = "new" if truth["new_lines"] else "same"
+        rows.append(f"| {', '.join(tags) or 'nothing'} | {lines} | {times} | {_said(answer)} | {_errors(answer)} |")
+    return "\n".join([*rows, "", f"{number} answered: {exact} exact, {right} right"])
+
+
+def _said(answer: Answer) -> str:
+    return f"`{answer.kind}` {', '.join(answer.set or answer.named)}".strip()
+
+
+def _errors(answer: Answer) -> str:
+    return " -> ".join(f"{e:.2f}" for e in (answer.base, answer.final) if e is not None)
+
+
+def tell(p: Progress) -> None:
+    """One line for a finished case."""
+    print(
+        f"{p.done}/{p.total} {p.case} {p.state}: {p.message} ({p.seconds:.0f} s, {p.left / 60:.0f} min left)",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("part", choices=PARTS)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--number", type=int, default=100)
+    parser.add_argument("--workers", type=int)
+    options = parser.parse_args()
+    folder = options.folder
+    if not folder.exists():
+        print("seal", make_challenge(folder, seed=options.seed, own=cases(options.part, options.seed, options.number)))
+    read_seal(folder)
+    diagnosis = None
+    if options.part == "left-out":
+        diagnosis = LeftOut({case["name"]: case["effects"][0]["tag"] for case in read_truth(folder)["cases"]})
+    run_challenge(folder, workers=options.workers, diagnosis=diagnosis, tell=tell)
+    print(table(folder))
+
+
+if __name__ == "__main__":
+    main()
