@@ -37,7 +37,7 @@ def prepared(composition: Composition, z: np.ndarray, conditions: Conditions, ex
     a self-affine line; Pohrt, Popov and Filippov 2012).
     """
     nodes = _nodes([(1.0, 0.0)])
-    model = composition.model(jnp.asarray(z), jnp.zeros(2), nodes, jnp.asarray(conditions.stiffness))
+    model = composition.model(np.asarray(z), jnp.zeros(2), nodes, jnp.asarray(conditions.stiffness))
     if experiment.load != 1.0:
         p = {**composition.fixed, **to_si(composition.free, z)}["contact.p"]
         stiffer = experiment.load ** (1.0 - 1.0 / p)

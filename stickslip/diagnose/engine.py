@@ -13,7 +13,7 @@ from ..effects import catalogue
 from ..errors import InputError
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
-from ..fit.inertial import Fit, errors, fit
+from ..fit.inertial import Fit, certain, errors, fit
 from ..fit.multistart import FURTHER, best_of
 from ..fit.problem import Problem
 from ..fit.start import FALLBACK_PERIOD, UNHEARD, base_composition, ringing
@@ -227,6 +227,11 @@ def diagnose(
             verdict = replace(finished(left), reasons=verdict.reasons)
     if verdict.kind in ("missing", "ambiguous"):
         verdict = replace(verdict, confidence=sure)
+    top = ladder[-1]
+    if top.fit is not None and top.composition is not None and top.fit is not optimum:
+        tell("standard deviations", 1.0)
+        last, composition = top.fit, top.composition
+        ladder[-1] = replace(top, fit=_kept(store, "last", lambda: certain(Problem(composition, data), floor, last)))
     return Diagnosis(verdict, tuple(ladder), tuple(rounds), data, floor, train, (*data.dropped, *dropped))
 
 

@@ -10,29 +10,92 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from ..contact import power_law_bank
 from ..effects.base import Effect
 from ..forward import MOST_STEPS
 from ..model import Block, LoadPoint, Model, Weakening
-from .parameters import Free
+from .parameters import Free, to_si, vector
 
 START = "start."  # with the number of a run: when its first slip comes, where the record does not begin virgin
 
 
-class Given(NamedTuple):
-    """The numbers of a composition that a fit does not move; apart, so that one compiled program serves them all.
+class Numbers(NamedTuple):
+    """The numbers of a model, whether a fit moves them or not: one compiled program serves them all.
 
     Attributes:
-        mass: of the block (kg).
-        fixed: SI values of base parameters that are not free.
-        effects: instances; their free fields are overwritten.
+        values: SI value of every parameter of the base and of the effects, by name.
+        effects: instances, whose fields ``values`` overwrites.
     """
 
-    mass: Any
-    fixed: dict[str, Any]
+    values: dict[str, Any]
     effects: tuple[Effect, ...]
+
+
+class Family(NamedTuple):
+    """What decides about a compiled program: of a composition all but its numbers and which of them are free.
+
+    Attributes:
+        contacts, bins, most_steps: as of :class:`Composition`.
+        names: of all parameters.
+        structure: of the effects.
+    """
+
+    contacts: int
+    bins: int
+    most_steps: int
+    names: tuple[str, ...]
+    structure: Any
+
+    def model(
+        self,
+        numbers: Numbers,
+        event: Array,
+        nodes: Any,
+        stiffness: Array,
+        start: tuple[Any, Any, Any] | None = None,
+    ) -> Model:
+        """The model of one cycle.
+
+        Args:
+            numbers: of the composition.
+            event: ln factors on u_max and p in this cycle, shape (2,).
+            nodes: times and positions of the load point.
+            stiffness: of the spring where the run has its own, else nan (N/m).
+            start: how much later than at its full strength the contact first slips (m of the load point's travel),
+                whether the run starts virgin, and load point less block at its onsets (m); default virgin.
+        """
+        v = numbers.values
+        bank = power_law_bank(
+            v["contact.strength"],
+            v["contact.u_max"] * jnp.exp(event[0]),
+            1.0 + (v["contact.p"] - 1.0) * jnp.exp(event[1]),
+            v["contact.spread"],
+            contacts=self.contacts,
+            n=self.bins,
+        )
+        spring = jnp.where(jnp.isnan(stiffness), v["rig.spring_stiffness"], stiffness)
+        block = Block(mass=v["rig.mass"], spring_stiffness=spring, damping=v["rig.damping"])
+        weakening = Weakening(
+            ratio=1.0 - v["weakening.drop"],
+            slip_distance=v["weakening.slip_distance"],
+            healing_time=v["weakening.healing_time"],
+        )
+        stretch = jnp.zeros(())
+        if start is not None:
+            later, virgin, seen = start
+            stretch = jnp.where(virgin, 0.0, v["contact.strength"] / spring - seen + later)
+        load_point = LoadPoint(nodes[0], nodes[1], stretch)
+        return Model(block, bank, weakening, load_point, tuple(_set(e, v) for e in numbers.effects))
+
+
+def _set(effect: Effect, values: dict[str, Array]) -> Effect:
+    mine = {k.split(".", 1)[1]: v for k, v in values.items() if k.split(".", 1)[0] == effect.tag}
+    for name, value in mine.items():
+        effect = eqx.tree_at(attrgetter(name), effect, value)
+    return effect
 
 
 @dataclass(frozen=True)
@@ -57,78 +120,30 @@ class Composition:
     effects: tuple[Effect, ...] = ()
     most_steps: int = MOST_STEPS
 
-    def given(self) -> Given:
-        """What is not free, as arrays."""
-        return Given(
-            jnp.asarray(self.mass), {name: jnp.asarray(value) for name, value in self.fixed.items()}, self.effects
-        )
+    def family(self) -> Family:
+        """What compiles to one program."""
+        names = tuple(sorted(self._fixed() | self._moved()))
+        return Family(self.contacts, self.bins, self.most_steps, names, jax.tree.structure(self.effects))
 
-    def model(
-        self,
-        z: Array,
-        event: Array,
-        nodes: Any,
-        stiffness: Array,
-        given: Given | None = None,
-        start: tuple[Any, Any, Any] | None = None,
-    ) -> Model:
-        """The model of one cycle.
+    def numbers(self, z: np.ndarray) -> Numbers:
+        """All numbers, the free ones at ``z`` on the search scale, shape (n,)."""
+        values = self._fixed() | self._moved(z)
+        return Numbers({name: np.float64(value) for name, value in sorted(values.items())}, self.effects)
 
-        Args:
-            z: free parameters on the search scale, shape (n,).
-            event: ln factors on u_max and p in this cycle, shape (2,).
-            nodes: times and positions of the load point.
-            stiffness: of the spring where the run has its own, else nan (N/m).
-            given: the numbers that are not free; default this composition's own.
-            start: number of the run, whether it starts virgin, and load point less block at its onsets (m);
-                default virgin.
-        """
-        given = self.given() if given is None else given
-        v = given.fixed | {
-            f.name: jnp.exp(x) if f.scale == "log" else x * float(f.scale) for f, x in zip(self.free, z, strict=True)
-        }
-        bank = power_law_bank(
-            v["contact.strength"],
-            v["contact.u_max"] * jnp.exp(event[0]),
-            1.0 + (v["contact.p"] - 1.0) * jnp.exp(event[1]),
-            v["contact.spread"],
-            contacts=self.contacts,
-            n=self.bins,
-        )
-        spring = jnp.where(jnp.isnan(stiffness), v["rig.spring_stiffness"], stiffness)
-        block = Block(
-            mass=v.get("rig.mass", given.mass),
-            spring_stiffness=spring,
-            damping=v["rig.damping"],
-        )
-        weakening = Weakening(
-            ratio=1.0 - v["weakening.drop"],
-            slip_distance=v["weakening.slip_distance"],
-            healing_time=v["weakening.healing_time"],
-        )
-        return Model(
-            block,
-            bank,
-            weakening,
-            LoadPoint(nodes[0], nodes[1], self._stretch(v, spring, start)),
-            tuple(self._set(e, v) for e in given.effects),
-        )
+    def _fixed(self) -> dict[str, float]:
+        return {"rig.mass": self.mass, **self.fixed}
 
-    def _stretch(self, v: dict[str, Array], spring: Array, start: tuple[Any, Any, Any] | None) -> Array:
-        """Elongation of the spring at the start of the record: the contact slips first at its full strength, or a
-        little (``start.<run>``) of the load point's travel later."""
-        if start is None:
-            return jnp.zeros(())
-        run, virgin, seen = start
-        own = [(int(f.name[len(START) :]), v[f.name]) for f in self.free if f.name.startswith(START)]
-        later = sum((jnp.where(run == r, value, 0.0) for r, value in own), jnp.zeros(()))
-        return jnp.where(virgin, 0.0, v["contact.strength"] / spring - seen + later)
+    def _moved(self, z: np.ndarray | None = None) -> dict[str, float]:
+        moved = to_si(self.free, vector(self.free) if z is None else z)
+        return {name: value for name, value in moved.items() if not name.startswith(START)}
 
-    def _set(self, effect: Effect, values: dict[str, Array]) -> Effect:
-        mine = {k.split(".", 1)[1]: v for k, v in values.items() if k.split(".", 1)[0] == effect.tag}
-        for name, value in mine.items():
-            effect = eqx.tree_at(attrgetter(name), effect, value)
-        return effect
+    def later(self, z: np.ndarray, run: int) -> float:
+        """How much later than at full strength a run that does not begin virgin first slips (m of the drive's way)."""
+        return to_si(self.free, z).get(f"{START}{run}", 0.0)
+
+    def model(self, z: np.ndarray, event: Array, nodes: Any, stiffness: Array) -> Model:
+        """The model of a cycle of a virgin contact; arguments as of :meth:`Family.model`."""
+        return self.family().model(self.numbers(z), event, nodes, stiffness)
 
     def with_effect(self, effect: Effect, free: Sequence[Free]) -> Composition:
         """The same with one effect more."""
@@ -139,9 +154,3 @@ class Composition:
         free = tuple(f for f in self.free if not f.name.startswith(f"{tag}."))
         effects = tuple(e for e in self.effects if e.tag != tag)
         return replace(self, free=free, effects=effects)
-
-    def key(self) -> tuple[Any, ...]:
-        """What decides about a compilation: everything but the numbers of :meth:`given` and the free ones."""
-        names = tuple((f.name, f.scale) for f in self.free)
-        fixed, effects = tuple(sorted(self.fixed)), jax.tree.structure(self.effects)
-        return self.contacts, self.bins, self.most_steps, names, fixed, effects

@@ -27,6 +27,7 @@ FARTHEST = (0.2, 0.5)  # step on the search scale along a direction that moves l
 LEAST, LARGEST = 1e-3, (0.05, 0.5)  # such a step on the search scale; the largest of a logarithm, of another scale
 DISPERSION = 16.0  # of costs, over that of noise alone: events share what a bank of three parameters cannot describe
 MODEL_ERROR = 2.0  # on standard deviations: a bank of three parameters is no rough line (tests/fit/test_recovery.py)
+PASSES = 2  # over all directions, until derivatives are certain
 WIDE = 2.4  # factor on the floors from which a coarser tolerance of the solver does
 STAGES = ((30.0, 6), (7.0, 8), (2.5, 8), (1.0, 20))  # factor on the floors, most evaluations at it
 
@@ -253,6 +254,19 @@ class _Residuals:
         slopes = self._side_by_side(np.nan_to_num(columns)[self.valid], np.nan_to_num(event)[self.valid]) / width
         return np.clip(np.vstack([slopes, self._prior_slopes()]), -1e7, 1e7)
 
+    def covariance(self, x: np.ndarray) -> np.ndarray:
+        """Covariance of z, what varies from event to event marginalised, shape (k, k)."""
+        scale = np.concatenate([[min(f.width, 1.0) for f in self.free], self.widths])
+        slopes = self.information(x) * scale
+        soft = self.problem.coupled()
+        back = np.diag(scale[: self.k])
+        if soft is not None:  # the strength goes with the spring's stiffness
+            slopes[:, soft[0]] += slopes[:, soft[1]] * scale[soft[0]] / scale[soft[1]]
+            back[soft[1], soft[0]] = scale[soft[0]]
+        spread = np.linalg.pinv(slopes.T @ slopes)[: self.k, : self.k]
+        covariance: np.ndarray = back @ spread @ back.T
+        return covariance
+
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low, high = zip(*(f.bounds for f in self.free), strict=True)
         reach = 4.0 * self.widths
@@ -365,12 +379,6 @@ def fit(
     raw = res.evaluate(x)
     offsets = -res.common(1.0).offsets(res.misfit(x))
     data, prior = res.data(x, 1.0), res.priors(x)
-    slopes = inward(res.information(x))
-    spread = np.linalg.pinv(slopes.T @ slopes)[: res.k, : res.k]
-    back = np.diag(scale[: res.k])
-    if soft is not None:
-        back[soft[1], soft[0]] = scale[soft[0]]
-    covariance = back @ spread @ back.T
     return Fit(
         x[: res.k],
         res.events(x),
@@ -378,13 +386,31 @@ def fit(
         robust(data),
         raw + offsets,
         offsets,
-        covariance,
+        res.covariance(x),
         problem.composition.free,
         res.columns(x),
         res.used,
         res.evaluations,
         res.jacobians,
     )
+
+
+def certain(problem: Problem, floor: np.ndarray, found: Fit) -> Fit:
+    """The same optimum with derivatives and covariance taken once more, along principal directions.
+
+    Derivatives that a search has carried on, or that were taken by a difference for each parameter, hold the solver's
+    noise in the directions that the features hardly tell, and noise looks like knowledge: it makes standard deviations
+    too small, by a factor of three in the worst case seen.
+    """
+    res = _Residuals(problem, floor, 1.0, found.use)
+    x = np.concatenate([found.z, found.events[res.used].ravel()])
+    features, columns = res.evaluate(x), found.columns
+    for _ in range(PASSES):  # the first on steps that noise has made too short
+        columns = res._along(x, features, columns)
+    res.start(x, columns)
+    evaluations = found.evaluations + PASSES * columns.shape[-1]
+    jacobians = found.jacobians + PASSES
+    return replace(found, covariance=res.covariance(x), columns=columns, evaluations=evaluations, jacobians=jacobians)
 
 
 def _box(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ..errors import FitError
-from .inertial import STAGES, Fit, errors, fit, robust
+from .inertial import STAGES, Fit, certain, errors, fit, robust
 from .parameters import vector
 from .problem import Problem
 
@@ -78,7 +78,8 @@ def best_of(
         best = more if more.cost < best.cost else best
         if arrived:
             break
-    return best
+    tell("standard deviations", 0.99)
+    return certain(problem, floor, best)
 
 
 def _cost(found: Fit, problem: Problem, floor: np.ndarray, factor: float) -> float:

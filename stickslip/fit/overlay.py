@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from ..forward import Cycles, Track, cut_short, run_cycles
+from ..forward import cut_short
 from .problem import Problem
 
 Array = NDArray[np.float64]
@@ -46,23 +45,10 @@ class ModelledRun:
 
 def modelled_runs(problem: Problem, z: Array, events: Array) -> list[ModelledRun]:
     """The model through every run at parameters ``z`` (search scale) and event-wise factors ``events`` (R, n, 2)."""
-    composition, tolerance = problem.composition, problem.tolerance
-
-    @jax.jit
-    def tracks(z: jax.Array, event: jax.Array, cycles: Cycles) -> Track:
-        start = (cycles.run, cycles.virgin, cycles.stretch)
-        return run_cycles(
-            lambda e, nodes: composition.model(z, e, nodes, cycles.stiffness, start=start),
-            event,
-            cycles,
-            tolerance,
-            composition.most_steps,
-        )
-
     out = []
     for r in range(problem.measurement.runs):
         cycles = jax.tree.map(lambda a, r=r: a[r], problem.measurement.cycles)
-        found = tracks(jnp.asarray(z), jnp.asarray(events[r]), cycles)
+        found = problem.track(np.asarray(z), np.asarray(events), r)
         used = np.flatnonzero(np.asarray(cycles.used))
         t, y, n = (np.asarray(a) for a in (found.t, found.reading, found.steps))
         ends = [max(int(n[i]), 2) for i in used]

@@ -27,7 +27,7 @@ from ..features.measurement import Measurement
 from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
 from .common import Common
-from .composition import START, Composition, Given
+from .composition import START, Composition, Family, Numbers
 
 FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)  # errors below a floor
 COARSE = Tolerance(2e-3, 2e-11, 2e-8, 1.2e-2, 3e-7)  # of one to two: for floors that are widened more than that
@@ -129,6 +129,17 @@ class Problem:
         jump = np.abs(out[:, :, at] * np.array(taken)) > BROKEN * np.abs(base[:, :, at, None])
         return np.where(jump, 0.0, out)
 
+    def track(self, z: np.ndarray, events: np.ndarray, run: int) -> Track:
+        """The model through one run at ``z`` with the event-wise factors ``events`` (R, n, 2)."""
+        return self._track(self.composition.numbers(z), z, events, run)
+
+    def _track(self, numbers: Numbers, z: np.ndarray, events: np.ndarray, run: int) -> Track:
+        cycles = self._data[run][0]
+        later = np.float64(self.composition.later(z, int(cycles.run)))
+        program = _tracks(self.composition.family())
+        found: Track = program(numbers, jnp.asarray(events[run]), cycles, later, self.tolerance)
+        return found
+
     def coupled(self) -> tuple[int, int] | None:
         """Positions of the spring's stiffness and the contact's strength where both are free.
 
@@ -164,16 +175,13 @@ class Problem:
         """Features of every lane; a lane that concerns one run only has those of ``base`` in the others."""
         m = self.measurement
         only = only or [None] * len(lanes)
-        tracks = _tracks(_Key(self.composition))
-        given = self.composition.given()
+        numbers = [self.composition.numbers(z) for z, _ in lanes]
         times = jnp.asarray([m.layout.settling, m.layout.shortest])
 
         def one(task: tuple[int, int]) -> np.ndarray:
             lane, r = task
             z, events = lanes[lane]
-            cycles, anchors = self._data[r]
-            run = tracks(jnp.asarray(z), jnp.asarray(events[r]), cycles, given, self.tolerance)
-            return np.asarray(_features(run, anchors, times))
+            return np.asarray(_features(self._track(numbers[lane], z, events, r), self._data[r][1], times))
 
         # the longest runs first, so that no thread is left with one at the end
         order = np.argsort([-np.count_nonzero(m.cycles.used[r]) for r in range(m.runs)])
@@ -190,33 +198,18 @@ class Problem:
         return out
 
 
-class _Key:
-    """Compositions that compile to the same program are equal."""
-
-    def __init__(self, composition: Composition) -> None:
-        self.composition = composition
-        self._key = composition.key()
-
-    def __hash__(self) -> int:
-        return hash(self._key)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self._key == other._key
-
-
 @lru_cache(maxsize=128)
-def _tracks(key: _Key) -> Any:
+def _tracks(family: Family) -> Any:
     """The compiled integration of one run. What the features ask of it is compiled apart, once for all models."""
-    composition = key.composition
 
-    def one_run(z: Array, events: Array, cycles: Cycles, given: Given, tolerance: Tolerance) -> Track:
-        start = (cycles.run, cycles.virgin, cycles.stretch)
+    def one_run(numbers: Numbers, events: Array, cycles: Cycles, later: Any, tolerance: Tolerance) -> Track:
+        start = (later, cycles.virgin, cycles.stretch)
         return run_cycles(
-            lambda event, nodes: composition.model(z, event, nodes, cycles.stiffness, given, start),
+            lambda event, nodes: family.model(numbers, event, nodes, cycles.stiffness, start),
             events,
             cycles,
             tolerance,
-            composition.most_steps,
+            family.most_steps,
         )
 
     return jax.jit(one_run)

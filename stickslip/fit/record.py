@@ -87,7 +87,7 @@ class Fitted:
         """
         own = jnp.asarray(np.nan if stiffness is None else stiffness)
         nodes = (load_point.times, load_point.positions)
-        return self.composition.model(jnp.asarray(self.z), jnp.zeros(2), nodes, own)
+        return self.composition.model(np.asarray(self.z), jnp.zeros(2), nodes, own)
 
     def effects(self) -> tuple[Effect, ...]:
         """The effects with their fitted parameters."""

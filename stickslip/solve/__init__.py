@@ -2,11 +2,12 @@
 
 from .derivatives import Slips, slip_derivatives
 from .integrate import integrate
-from .stepper import ContactStepper, Tolerance
+from .stepper import ContactStepper, Increments, Tolerance
 from .trajectory import Stats, Steps, Trajectory
 
 __all__ = [
     "ContactStepper",
+    "Increments",
     "Slips",
     "Stats",
     "Steps",

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -23,7 +22,7 @@ from ..contact import Bank
 from ..errors import SolveError
 from ..model import Model, State
 from .integrate import integrate
-from .stepper import ContactStepper, Step, Tolerance, hermite
+from .stepper import ContactStepper, Increments, Step, Tolerance, hermite
 from .trajectory import Trajectory
 
 STRETCHED = 8  # steps at the end of a piece that give way
@@ -243,4 +242,4 @@ def _step(model: Model, bank: Bank, stepper: ContactStepper, seen: _Seen, h: Arr
     )
 
 
-_TERM = diffrax.ODETerm(lambda t, y, args: y)  # never called, see `integrate`
+_TERM = Increments()

@@ -17,14 +17,14 @@ from ..effects.base import Motion
 from ..errors import InputError, SolveError
 from ..model import Model, State
 from ..params import check
-from .stepper import ContactStepper, Step, Tolerance
+from .stepper import ContactStepper, Increments, Step, Tolerance
 from .trajectory import Stats, Steps, Trajectory, energy_error
 
 PIECE = 4096  # steps between two looks at the clock; bounds the memory of one compiled call
 SMALLEST_STEP = 1e-10  # s; four orders below the period of any contact resonance a vibrometer could see
 LEAST_ADVANCE = 1e-2  # of the contact's period in PIECE steps; the tightest tolerance takes a hundred times as much
 
-_TERM = diffrax.ODETerm(lambda t, y, args: y)  # never called: the solver takes the model through an increment itself
+_TERM = Increments()
 
 
 def error_norm(error: State) -> jax.Array:
