@@ -164,11 +164,11 @@ def candidates(axes: Axes, result: dict[str, Any]) -> None:
     axes.annotate(
         "with none of them",
         (base, len(shown) - 0.3),
-        (4, 0),
+        (-4, 0),
         textcoords="offset points",
         color=DARK,
         fontsize=9,
-        ha="left",
+        ha="right",  # what is named lies far to the left of it
     )
     axes.set_ylim(-0.7, len(shown) + 0.3)
     _log(axes, "x", [r[k] for r in shown for k in ("train_error", "heldout_error")] + [base])
@@ -179,7 +179,7 @@ def candidates(axes: Axes, result: dict[str, Any]) -> None:
             text.set_color(MIDDLE)
     axes.set(xlabel="error / what the data can tell")
     axes.set_title(f"3  Named: {', '.join(result['verdict']['effects']) or result['verdict']['kind']}")
-    axes.legend(loc="center right", handletextpad=0.2)
+    axes.legend(loc="lower left", handletextpad=0.2)  # those refused lie to the right, at the base
 
 
 # --- 4: the ladder ----------------------------------------------------------------------------------------------------
