@@ -113,7 +113,7 @@ def own(measured: np.ndarray, damping: float) -> Callable[[np.ndarray], tuple[np
     from stickslip.effects.velocity_weakening import VelocityWeakening
     from stickslip.features.measurement import measure
     from stickslip.fit.common import Common
-    from stickslip.fit.composition import Composition
+    from stickslip.fit.composition import Composition, Family
     from stickslip.fit.multistart import best_of
     from stickslip.fit.parameters import Free
     from stickslip.fit.problem import Problem
@@ -122,21 +122,24 @@ def own(measured: np.ndarray, damping: float) -> Callable[[np.ndarray], tuple[np
     from stickslip.segment import segment
     from stickslip.trace import Drive, Trace
 
-    class Known(Composition):
-        """Three unknowns; the bank's stiffness and the distribution of its caps are known."""
+    class KnownContact(Family):
+        """The bank's stiffness and the distribution of its caps are known."""
 
-        def model(self, z, event, nodes, stiffness, given=None, start=None):
-            strength, drop, c_s = (jnp.exp(x) for x in z)
+        def model(self, numbers, event, nodes, stiffness, start=None):
+            v = numbers.values
             return Model(
-                Block(mass=MASS, spring_stiffness=c_s, damping=damping),
-                Bank(jnp.asarray(STIFFNESS), strength * CAP),
+                Block(mass=v["rig.mass"], spring_stiffness=v["rig.spring_stiffness"], damping=v["rig.damping"]),
+                Bank(jnp.asarray(STIFFNESS), v["contact.strength"] * CAP),
                 Weakening(ratio=1.0, slip_distance=1e-6, healing_time=0.01),
                 LoadPoint(nodes[0], nodes[1]),
-                (VelocityWeakening(drop=drop, velocity=jnp.asarray(WEAKENING_VELOCITY)),),
+                (VelocityWeakening(drop=v["velocity-weakening.drop"], velocity=jnp.asarray(WEAKENING_VELOCITY)),),
             )
 
-        def key(self):
-            return "benchmark of fits", self.most_steps, damping
+    class Known(Composition):
+        """Three unknowns."""
+
+        def family(self):
+            return KnownContact(*super().family())
 
     class Same(Problem):
         """The contact does not vary from event to event."""
@@ -166,7 +169,8 @@ def own(measured: np.ndarray, damping: float) -> Callable[[np.ndarray], tuple[np
             Free(name, unit, "log", float(v), float(v), np.inf, float(a), float(b))
             for (name, unit), v, a, b in zip(names, first, low, high, strict=True)
         )
-        problem = Same(Known(MASS, 1, ELEMENTS, free, most_steps=MOST_STEPS), data)
+        known = Known(MASS, 1, ELEMENTS, free, {"rig.damping": damping}, most_steps=MOST_STEPS)
+        problem = Same(known, data)
         found = best_of(problem, floor, np.asarray(data.cycles.used))
         strength, drop, c_s = np.exp(found.z)
         return np.array([strength, 1.0 - drop, c_s]), problem.runs_done
