@@ -39,8 +39,7 @@ TINY = 1e-30
 class Increments(diffrax.AbstractTerm):
     """Stands where diffrax wants a vector field: the solver takes the model through increments itself.
 
-    diffrax asks it for nothing but shapes; an ODETerm would promote the state's types leaf by leaf for that, which
-    takes longer than all else that is traced.
+    diffrax asks it for nothing but shapes; an ODETerm would promote the state's types leaf by leaf for that.
     """
 
     def vf(self, t: Any, y: Any, args: Any) -> Any:

@@ -21,4 +21,7 @@ def errors(seed: int, damping: float) -> np.ndarray:
 @pytest.mark.parametrize("damping", [0.0, 10.0])
 @pytest.mark.parametrize("seed", [0, 10])
 def test_nine_of_ten_starts_end_within_a_hundredth(seed, damping):
-    assert np.sum(errors(seed, damping) < 0.01) >= 9
+    found = errors(seed, damping)
+    assert np.sum(found < 0.01) >= 9
+    if (seed, damping) == (0, 0.0):
+        assert np.all(found < 0.05)

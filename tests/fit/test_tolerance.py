@@ -49,7 +49,7 @@ def test_the_error_of_a_fit_is_below_the_floors_in_every_phase(data):
     assert max(coarse.values()) < 2.0
 
 
-def test_unresolved_ringing_saves_steps_and_costs_slips_and_creep_nothing(data):
+def test_unresolved_ringing_saves_steps_and_costs_slips_and_creep_little(data):
     resolved = Tolerance(FINE.relative, FINE.displacement, FINE.velocity)
     assert steps(data, FINE) < 0.6 * steps(data, resolved)
     with_all, without = errors(data, resolved), errors(data, FINE)
@@ -84,5 +84,5 @@ def test_standard_deviations_do_not_hang_on_the_solvers_noise(data):
     noise = 0.2 * floor[..., None] * np.random.default_rng(2).standard_normal(rough.columns.shape)
     for begun in (rough, replace(rough, columns=rough.columns + noise)):
         found = certain(problem, floor, begun).std()
-        for name, std in expected.items():
-            assert 1 / 1.7 < found[name] / std < 1.7 or name == "contact.spread", name
+        for name in expected.keys() - {"contact.spread"}:  # which two cycles tell least: known to a factor of three
+            assert 1 / 1.7 < found[name] / expected[name] < 1.7, name
