@@ -17,7 +17,7 @@ from ..effects import catalogue
 from ..errors import FitError, InputError, nearest
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
-from ..fit.inertial import DISPERSION, Fit, certain, errors, fit
+from ..fit.inertial import DISPERSION, Fit, errors, fit
 from ..fit.multistart import best_of
 from ..fit.problem import Problem
 from ..fit.record import KEY, fitted, record
@@ -87,9 +87,6 @@ def fit_inertial(
     with working("fitting") as tell:
         composition, optimum, ladder = _climb(m, base, effects, floor, train, options.starts, tell)
         problem = Problem(composition, m)
-        if effects:
-            tell("standard deviations")
-            optimum = certain(problem, floor, optimum)
         profiles = [_profile(name, problem, optimum, floor, tell) for name in options.profiles]
         tell("drawing the model through the data")
         sections, variables = fit_sections(problem, optimum, traces, found, floor, train, loaded.rig)

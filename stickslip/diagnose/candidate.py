@@ -14,7 +14,7 @@ from ..errors import StickslipError
 from ..features.measurement import Measurement
 from ..fit.common import Common
 from ..fit.composition import Composition
-from ..fit.inertial import Fit, errors, fit, robust
+from ..fit.inertial import Fit, certain, errors, fit, robust
 from ..fit.parameters import Free, effect_parameters
 from ..fit.problem import Problem
 from ..floors import event_widths
@@ -196,7 +196,10 @@ def settle(
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Candidate:
-    """The same candidate refined to the end, from where it is and from its other starts; the best of them."""
+    """The same candidate refined to the end, from where it is and from its other starts; the best of them.
+
+    Its standard deviations are those of :func:`stickslip.fit.inertial.certain`.
+    """
 
     def go(candidate: Candidate, most: int) -> Candidate:
         return refine(candidate, measurement, floor, train, most, threads=threads, progress=progress)
@@ -214,7 +217,9 @@ def settle(
         best = go(best, MOST)
         if best.cost > SETTLED * before:
             break
-    return best
+    if best.fit is None or best.composition is None:
+        return best
+    return replace(best, fit=certain(Problem(best.composition, measurement, threads=threads), floor, best.fit))
 
 
 def _silent(text: str) -> None:

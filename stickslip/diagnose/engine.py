@@ -228,7 +228,8 @@ def diagnose(
     if verdict.kind in ("missing", "ambiguous"):
         verdict = replace(verdict, confidence=sure)
     top = ladder[-1]
-    if top.fit is not None and top.composition is not None and top.fit is not optimum:
+    settled = [optimum, *(c.fit for r in rounds for c in r.candidates)]  # their standard deviations are known
+    if top.fit is not None and top.composition is not None and not any(top.fit is f for f in settled):
         tell("standard deviations", 1.0)
         last, composition = top.fit, top.composition
         ladder[-1] = replace(top, fit=_kept(store, "last", lambda: certain(Problem(composition, data), floor, last)))
