@@ -122,6 +122,7 @@ def diagnose_campaign(
     from .diagnose.summary import summary
     from .effects import catalogue
     from .fit.problem import Problem
+    from .motion import true_gains, with_displacements
     from .report import write_report
     from .report.describe import left_out
     from .report.inertial_result import fit_sections
@@ -145,7 +146,8 @@ def diagnose_campaign(
                 "code": _code(effect_files),
             }
         )
-        segmentations = [segment(t) for t in traces]
+        segmentations, notes = true_gains(traces, [segment(t) for t in traces])
+        traces, implied = with_displacements(traces, segmentations)
         pieces = Pieces(run, key)
         found = diagnose(
             loaded,
@@ -165,6 +167,7 @@ def diagnose_campaign(
             "inputs": inputs,
             "versions": versions(),
         }
+        result["notes"] = [*notes, *implied]
         result["dropped"] = [*left_out(traces, segmentations), *result["dropped"]]
         top = next((r for r in reversed(found.ladder) if r.fit is not None), None)
         if top is not None and top.fit is not None and top.composition is not None:

@@ -24,9 +24,10 @@ from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
 from ..fit.start import FALLBACK_PERIOD, UNHEARD, base_composition, ringing
 from ..floors import floors, scatter_factor
+from ..motion import with_displacements
 from ..report.inertial_result import fit_sections, parameters
 from ..residual import misfit
-from ..segment import Segmentation, block_motion
+from ..segment import Segmentation
 from ..trace import Trace
 from ..uncertainty import profile
 from .working import Tell, working
@@ -56,8 +57,7 @@ def fit_inertial(
     for path in options.files:
         catalogue.load_file(path)
     effects = [forms_of(catalogue.get(tag).tag)[0] for tag in options.add if tag != "inertia"]
-    notes: list[str] = []
-    traces = [_with_displacement(t, s, notes) for t, s in zip(traces, found, strict=True)]
+    traces, notes = with_displacements(traces, found)
     usable = [(t, s) for t, s in zip(traces, found, strict=True) if t.displacement is not None and t.drive is not None]
     if not usable:
         raise InputError(
@@ -111,19 +111,6 @@ def fit_inertial(
         "dropped": [*unusable, *m.dropped],
     }
     return result, variables
-
-
-def _with_displacement(trace: Trace, found: Segmentation, notes: list[str]) -> Trace:
-    """A trace of velocity or spring force with the displacement it implies."""
-    if trace.displacement is not None:
-        return trace
-    position, drive, gain, unit = block_motion(trace, gain=found.settings.gain)
-    if unit != "m":
-        return trace
-    notes.append(f"{trace.name}: the displacement is {'drive - F/c_s' if gain else 'the integral of the velocity'}")
-    scale = found.settings.noise
-    count = None if trace.resolution is None or gain is None else trace.resolution / gain
-    return trace.replace(displacement=np.array(position), noise=scale, resolution=count, drive=drive)
 
 
 def _check_names(names: tuple[str, ...], base: Composition, effects: list[Any]) -> None:

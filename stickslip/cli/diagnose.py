@@ -121,7 +121,7 @@ def _print(result: dict[str, Any], out: Path) -> None:
     console.print(f"[bold]{verdict['kind']}[/bold]: {escape(verdict['text'])}{sure}", highlight=False)
     if result["next_experiment"]:
         console.print(f"next experiment: {escape(result['next_experiment']['text'])}", highlight=False)
-    for text in result["caution"]:
+    for text in [*result["notes"], *result["caution"]]:
         console.print(escape(text), highlight=False)
     mended = told(result)
     lost = [f"left out: {text}" for text in result["dropped"]]

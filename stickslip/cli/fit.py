@@ -81,6 +81,7 @@ def fit(
     force:
         Replace an existing run folder.
     """
+    from ..motion import true_gains
     from ..report.describe import left_out
     from ..units import to_si
 
@@ -90,7 +91,7 @@ def fit(
         refuse_existing(out, force)
     began = _now()
     loaded, traces, found = load_and_segment(campaign)
-    found, notes = _gains(traces, found)
+    found, notes = true_gains(traces, found)
     if model == "static":
         result, variables = _static(loaded, traces, found, align, time, speed, sampling)
     else:
@@ -107,29 +108,6 @@ def fit(
             _write(run, result, variables)
     print(json_text(result) if json else _folded(_text(result, out)))
     return 0
-
-
-def _gains(traces: list[Trace], found: list[Segmentation]) -> tuple[list[Segmentation], list[str]]:
-    """Events of traces of spring force, with the force's scale set right where the sticks show that it is wrong.
-
-    A force that rises too slowly is left as it is: a block that creeps along makes the same.
-    """
-    from ..report.describe import gain_is_wrong, stick_gain
-    from ..segment import segment
-
-    out, notes = [], []
-    for trace, old in zip(traces, found, strict=True):
-        gain = stick_gain(trace, old)
-        if gain is None or trace.spring_stiffness is None or not gain_is_wrong(gain):
-            out.append(old)
-            continue
-        out.append(segment(trace, spring_stiffness=trace.spring_stiffness * gain["value"]))
-        notes.append(
-            f"{trace.name}: sensor-gain of {100 * (gain['value'] - 1):+.1f} % (+-{100 * gain['std']:.1f} %): while the "
-            f"block sticks, the force rises {gain['value']:.3f} times as fast as stiffness times drive. The force was "
-            "divided by it; stiffness or drive velocity may be what is wrong instead."
-        )
-    return out, notes
 
 
 def _now() -> float:

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.cli.fit import _gains
 from stickslip.features.layout import PHASES, Layout
+from stickslip.motion import true_gains
 from stickslip.report import abilities, misfit_sentence, phase_table
 from stickslip.report.describe import describe_trace, gain_is_wrong, stick_gain
 from stickslip.report.ripple import stick_ripple
@@ -59,9 +59,9 @@ def test_a_force_that_rises_too_slowly_may_be_creep_and_is_left_as_it_is():
     assert not gain_is_wrong(stick_gain(trace, found))
     text = " ".join(abilities([trace], [found]).cannot)
     assert "creeps along at 10 % of the drive's velocity, or sensor-gain of about -10 %" in text
-    assert _gains([trace], [found]) == ([found], [])
+    assert true_gains([trace], [found]) == ([found], [])
     fast = sawtooth(gain=1.1, creep=8e-6)
-    (mended,), (note,) = _gains([fast], [segment(fast)])
+    (mended,), (note,) = true_gains([fast], [segment(fast)])
     assert "sensor-gain of +9.8 %" in note
     assert mended.events[3].slip < 0.95 * segment(fast).events[3].slip
 

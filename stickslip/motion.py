@@ -1,0 +1,53 @@
+"""The block's displacement where it was not measured: from the velocity, or from drive and spring force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .report.describe import gain_is_wrong, stick_gain
+from .segment import Segmentation, block_motion, segment
+from .trace import Trace
+
+
+def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Segmentation], list[str]]:
+    """Events of traces of spring force, with the force's scale set right where the sticks show that it is wrong.
+
+    A force that rises too slowly is left as it is: a block that creeps along makes the same.
+
+    Returns:
+        The events of every trace, and a sentence for each whose scale was set right.
+    """
+    out, notes = [], []
+    for trace, old in zip(traces, found, strict=True):
+        gain = stick_gain(trace, old)
+        if gain is None or trace.spring_stiffness is None or not gain_is_wrong(gain):
+            out.append(old)
+            continue
+        out.append(segment(trace, spring_stiffness=trace.spring_stiffness * gain["value"]))
+        notes.append(
+            f"{trace.name}: sensor-gain of {100 * (gain['value'] - 1):+.1f} % (+-{100 * gain['std']:.1f} %): while the "
+            f"block sticks, the force rises {gain['value']:.3f} times as fast as stiffness times drive. The force was "
+            "divided by it; stiffness or drive velocity may be what is wrong instead."
+        )
+    return out, notes
+
+
+def with_displacements(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Trace], list[str]]:
+    """Traces of velocity or spring force with the displacement (m) they imply; others as they are.
+
+    Returns:
+        The traces, and a sentence for each that was given a displacement.
+    """
+    out, notes = [], []
+    for trace, events in zip(traces, found, strict=True):
+        position, drive, gain, unit = block_motion(trace, gain=events.settings.gain)
+        if trace.displacement is not None or unit != "m":
+            out.append(trace)
+            continue
+        notes.append(f"{trace.name}: the displacement is {'drive - F/c_s' if gain else 'the integral of the velocity'}")
+        count = None if trace.resolution is None or gain is None else trace.resolution / gain
+        noise = events.settings.noise
+        out.append(trace.replace(displacement=np.array(position), noise=noise, resolution=count, drive=drive))
+    return out, notes

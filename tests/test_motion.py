@@ -1,0 +1,76 @@
+"""The displacement that spring force or velocity imply, and that a diagnosis is given it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.diagnose import engine
+from stickslip.motion import true_gains, with_displacements
+from stickslip.segment import segment
+from stickslip.trace import Drive, Trace
+from stickslip.workflow import diagnose_campaign
+
+STIFFNESS, SPEED = 168.0, 42e-6  # N/m, m/s
+
+
+def moved() -> tuple[np.ndarray, np.ndarray]:
+    """Times and displacement of a block that slips by a half cosine of 40 ms every 1.5 s (s, m)."""
+    t = np.arange(0.0, 31.0, 5e-4)
+    x = np.zeros_like(t)
+    for onset in 1.5 * np.arange(1, 20):
+        x += 0.5 * SPEED * 1.5 * (1.0 - np.cos(np.pi * np.clip((t - onset) / 0.04, 0.0, 1.0)))
+    return t, x
+
+
+def forces(gain: float = 1.0) -> tuple[Trace, np.ndarray]:
+    t, x = moved()
+    pulled = Drive.constant(SPEED, 0.0, t[-1])
+    noise = 1e-7 * np.random.default_rng(1).standard_normal(t.size)
+    force = gain * STIFFNESS * (pulled.position(t) - x + noise)
+    trace = Trace("force", t, spring_force=force, drive=pulled, spring_stiffness=STIFFNESS, noise=STIFFNESS * 1e-7)
+    return trace, x
+
+
+@pytest.mark.parametrize("gain", [1.0, 1.1])
+def test_the_spring_force_tells_where_the_block_is(gain):
+    trace, x = forces(gain)
+    found, notes = true_gains([trace], [segment(trace)])
+    (seen,), implied = with_displacements([trace], found)
+    off = seen.displacement - x
+    assert np.std(off) < 1.5e-7 + 0.005 * SPEED * 1.5  # noise, and the gain to half a per cent of a stick's loading
+    assert len(notes) == (gain != 1.0)
+    assert implied == ["force: the displacement is drive - F/c_s"]
+    assert seen.noise == pytest.approx(1e-7, rel=0.3)
+
+
+def test_the_velocity_tells_where_the_block_is_and_a_measured_displacement_stays():
+    t, x = moved()
+    given = Trace("v", t, velocity=np.gradient(x, t), drive=Drive.constant(SPEED, 0.0, t[-1]), noise=1e-9)
+    (seen,), implied = with_displacements([given], [segment(given)])
+    assert np.max(np.abs(seen.displacement - x)) < 2e-8
+    assert implied == ["v: the displacement is the integral of the velocity"]
+    assert with_displacements([seen], [segment(seen)]) == ([seen], [])
+
+
+def test_a_diagnosis_of_spring_force_is_given_the_displacement(tmp_path, monkeypatch):
+    trace, x = forces(1.1)
+    np.savetxt(tmp_path / "f.csv", np.stack([trace.time, trace.spring_force], 1), delimiter=",", header="t [s],F [N]")
+    (tmp_path / "c.toml").write_text(
+        'schema = 1\n[rig]\nmass = "30 g"\ncontacts = 1\nnormal_force = "0.3 N"\nfriction_coefficient = 0.3\n'
+        f'spring_stiffness = "{STIFFNESS} N/m"\n[[trace]]\nfile = "f.csv"\ntime = {{ column = 1, unit = "s" }}\n'
+        f'spring_force = {{ column = 2, unit = "N" }}\ndrive_velocity = "{1e6 * SPEED} um/s"\n'
+    )
+
+    class Seen(Exception):
+        pass
+
+    def diagnose(campaign, traces, segmentations, **options):
+        raise Seen(traces[0].displacement, segmentations[0])
+
+    monkeypatch.setattr(engine, "diagnose", diagnose)
+    with pytest.raises(Seen) as seen:
+        diagnose_campaign(tmp_path / "c.toml", tmp_path / "out")
+    displacement, events = seen.value.args
+    assert np.std(displacement - x) < 1.5e-7 + 0.005 * SPEED * 1.5
+    assert len(events.events) == pytest.approx(19, abs=1)
