@@ -15,6 +15,8 @@ from .candidate import Candidate
 from .heldout import HeldOut
 from .thresholds import THRESHOLDS, Thresholds
 
+BORDER = 0.004  # share of a parameter's range: nearer to an end of it than this a fit has not stopped by itself
+
 
 class _Errors(Protocol):
     """What a step of the ladder leaves."""
@@ -128,7 +130,9 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
             if not f.name.startswith(f"{candidate.tag}."):
                 continue
             low, high = f.bounds
-            if min(z - low, high - z) < 0.004 * (high - low) and abs(f.outward(float(z)) - null) > 0:
+            # near its null an amplitude is small, not implausible: whether it is there at all is judged by its gain
+            ends = [end for end in (f.lower, f.upper) if not (f.amplitude and end == null)]
+            if any(abs(z - f.inward(end)) < BORDER * (high - low) for end in ends):
                 fails.append(f"its '{f.name.split('.', 1)[1]}' ends at the border of its plausible range")
                 plausible = False
     return Judged(candidate, cost, tuple(fails), plausible)

@@ -206,6 +206,18 @@ def test_every_condition_can_refuse_a_name(made, why):
     assert decide([judged]) == (None, [])
 
 
+def test_a_small_amplitude_is_not_implausible():
+    """A high-pass at 8e-5 Hz moves creep by thirty floors, and 8e-5 Hz is next to nothing in a range up to 5 Hz."""
+    small = candidate("sensor-high-pass", 10, 0.8)
+    assert small.fit is not None
+    (cutoff,) = (i for i, f in enumerate(small.fit.free) if f.amplitude)
+    z = small.fit.z.copy()
+    z[cutoff] = small.fit.free[cutoff].inward(8e-5)
+    assert judge(replace(small, fit=replace(small.fit, z=z)), 1000.0, held(9.0)).passed
+    z[cutoff] = small.fit.free[cutoff].bounds[1]
+    assert not judge(replace(small, fit=replace(small.fit, z=z)), 1000.0, held(9.0)).passed
+
+
 @pytest.mark.parametrize(("general", "special"), [(310, 300), (300, 310)])
 def test_the_special_case_is_named_where_the_general_law_is_no_better(general, special):
     tried = [candidate("rate-and-state", general, 0.8), candidate("contact-ageing", special, 0.8)]
