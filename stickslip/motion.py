@@ -6,9 +6,32 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .errors import InputError
 from .report.describe import gain_is_wrong, stick_gain
+from .report.pace import pace
 from .segment import Segmentation, block_motion, segment
 from .trace import Trace
+
+
+def check_pace(traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[str]:
+    """A sentence for each trace whose block and drive do not keep up with each other from slip to slip.
+
+    Raises:
+        InputError: they are so far apart that a unit must be wrong.
+    """
+    notes = []
+    for trace, events in zip(traces, found, strict=True):
+        seen = pace(trace, events)
+        if seen is None or not seen.off:
+            continue
+        if seen.impossible:
+            raise InputError(
+                f"{trace.name}: {seen}", key="trace.drive_velocity",
+                hint="check the drive's velocity, the units of time and displacement, and whether a counter wraps or "
+                "is cleared ('wrap', 'resets')",
+            )  # fmt: skip
+        notes.append(f"{trace.name}: {seen}: check the drive's velocity, and the units of time and displacement.")
+    return notes
 
 
 def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Segmentation], list[str]]:

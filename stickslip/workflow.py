@@ -122,7 +122,7 @@ def diagnose_campaign(
     from .diagnose.summary import summary
     from .effects import catalogue
     from .fit.problem import Problem
-    from .motion import true_gains, with_displacements
+    from .motion import check_pace, true_gains, with_displacements
     from .report import write_report
     from .report.describe import left_out
     from .report.inertial_result import fit_sections
@@ -136,6 +136,11 @@ def diagnose_campaign(
     if candidates is not None:
         _check_candidates(candidates)
     inputs = input_records(loaded)
+    events = [segment(t) for t in traces]
+    try:
+        notes = check_pace(traces, events)
+    except InputError as error:
+        raise error.at(file=loaded.path) from None
     with open_run(out, force=force, resume=True) as run:
         key = json_text(
             {
@@ -146,7 +151,7 @@ def diagnose_campaign(
                 "code": _code(effect_files),
             }
         )
-        segmentations, notes = true_gains(traces, [segment(t) for t in traces])
+        segmentations, mended = true_gains(traces, events)
         traces, implied = with_displacements(traces, segmentations)
         pieces = Pieces(run, key)
         found = diagnose(
@@ -167,7 +172,7 @@ def diagnose_campaign(
             "inputs": inputs,
             "versions": versions(),
         }
-        result["notes"] = [*notes, *implied]
+        result["notes"] = [*notes, *mended, *implied]
         result["dropped"] = [*left_out(traces, segmentations), *result["dropped"]]
         top = next((r for r in reversed(found.ladder) if r.fit is not None), None)
         if top is not None and top.fit is not None and top.composition is not None:

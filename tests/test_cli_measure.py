@@ -458,3 +458,36 @@ def test_a_log_hears_of_long_work_now_and_then(capsys, monkeypatch):
         "diagnosing: b (31 s, about 31 s left of this stage)",
         "diagnosing: d (65 s, about 65 s left of this stage)",
     ]
+
+
+def test_inspect_says_what_a_fit_will_ask_the_rig_for(capsys):
+    assert run(["inspect", write(), "--json"]) == 0
+    assert not any("only when" in line for line in json.loads(capsys.readouterr().out)["cannot"])
+    bare = RIG.replace('mass = "89.4 g"\n', "").replace('normal_force = "0.31 N"\n', "")
+    assert run(["inspect", write(rig=bare), "--json"]) == 0
+    said = [line for line in json.loads(capsys.readouterr().out)["cannot"] if "only when" in line]
+    assert said == [
+        "The static model can be fitted only when the campaign has rig.normal_force: measured, or a guess.",
+        "The dynamic model can be fitted only when the campaign has rig.mass: measured, or a guess.",
+    ]
+    assert "rig.normal_force" in refused(capsys, "fit", "c.toml", "--model", "static")
+    assert "rig.mass" in refused(capsys, "fit", "c.toml")
+
+
+def test_force_without_a_stiffness_states_the_one_it_was_read_with(capsys):
+    t, x = motion()
+    force = 1000.0 * (50.0 * t - x)  # uN
+    body = TRACE.replace('displacement = { column = "x", unit = "um", resolution = "8 nm" }',
+                         'spring_force = { column = "x", unit = "uN" }')  # fmt: skip
+    assert (
+        run(["inspect", write(body, RIG.replace('spring_stiffness = "1000 N/m"\n', ""), rows=(t, force)), "--json"])
+        == 0
+    )
+    (said,) = (line for line in json.loads(capsys.readouterr().out)["cannot"] if "stiffness is not given" in line)
+    assert said.endswith("early in a stick: c_s = 1 kN/m.")
+
+
+def test_held_out_creep_is_fitted_by_the_static_model_and_said(capsys):
+    assert run(["fit", write(TRACE + 'role = "held-out"\n'), "--model", "static", "--json"]) == 0
+    assert any("creep of held-out runs (a)" in note for note in json.loads(capsys.readouterr().out)["notes"])
+    assert "c.toml" in refused(capsys, "fit", "c.toml")

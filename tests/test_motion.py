@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stickslip.cli import run
 from stickslip.diagnose import engine
-from stickslip.motion import true_gains, with_displacements
+from stickslip.motion import check_pace, true_gains, with_displacements
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
 from stickslip.workflow import diagnose_campaign
@@ -74,3 +75,32 @@ def test_a_diagnosis_of_spring_force_is_given_the_displacement(tmp_path, monkeyp
     displacement, events = seen.value.args
     assert np.std(displacement - x) < 1.5e-7 + 0.005 * SPEED * 1.5
     assert len(events.events) == pytest.approx(19, abs=1)
+
+
+@pytest.mark.parametrize(("time", "drive"), [(1e-3, 1.0), (1.0, 1e-3), (1e3, 1.0), (1.0, 1e3)])
+@pytest.mark.parametrize("command", [("fit", "--model", "static"), ("fit",), ("diagnose",)])
+def test_a_drive_or_a_clock_wrong_by_a_thousand_is_refused(tmp_path, capsys, time, drive, command):
+    """However short the record: the block keeps up with its drive from slip to slip."""
+    t, x = moved()
+    first = t < 10.0
+    rows = np.stack([time * t[first], 1e6 * x[first]], 1)
+    np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header="t [s],x [um]", comments="")
+    (tmp_path / "c.toml").write_text(
+        'schema = 1\n[rig]\nmass = "30 g"\ncontacts = 4\nnormal_force = "0.3 N"\nfriction_coefficient = 0.3\n'
+        f'spring_stiffness = "1000 N/m"\n[[trace]]\nfile = "x.csv"\ntime = {{ column = "t" }}\n'
+        f'displacement = {{ column = "x" }}\ndrive_velocity = "{drive * 1e6 * SPEED} um/s"\n'
+    )
+    out = tmp_path / "out"
+    assert run([command[0], str(tmp_path / "c.toml"), *command[1:], "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert "drive" in said
+    assert "to mend" in said
+    assert not out.exists()
+
+
+def test_a_block_a_little_ahead_of_its_drive_is_pointed_out_and_fitted():
+    t, x = moved()
+    trace = Trace("x", t, displacement=x, drive=Drive.constant(0.6 * SPEED, 0.0, t[-1]), noise=1e-9)
+    (said,) = check_pace([trace], [segment(trace)])
+    assert "x: from slip to slip the block moves 42 µm/s, the drive 25.2 µm/s" in said
+    assert check_pace([trace.replace(drive=Drive.constant(SPEED, 0.0, t[-1]))], [segment(trace)]) == []

@@ -83,7 +83,10 @@ def fit_inertial(
     floor = floors(m)
     base = replace(base_composition(loaded, m), most_steps=options.most_steps)
     _check_names(options.profiles, base, effects)
-    train = _training(m, traces)
+    try:
+        train = _training(m, traces)
+    except InputError as error:
+        raise error.at(file=loaded.path) from None
     with working("fitting") as tell:
         composition, optimum, ladder = _climb(m, base, effects, floor, train, options.starts, tell)
         problem = Problem(composition, m)

@@ -81,7 +81,7 @@ def fit(
     force:
         Replace an existing run folder.
     """
-    from ..motion import true_gains
+    from ..motion import check_pace, true_gains
     from ..report.describe import left_out
     from ..units import to_si
 
@@ -91,7 +91,11 @@ def fit(
         refuse_existing(out, force)
     began = _now()
     loaded, traces, found = load_and_segment(campaign)
-    found, notes = true_gains(traces, found)
+    try:
+        notes = check_pace(traces, found)
+    except InputError as error:
+        raise error.at(file=loaded.path) from None
+    found, mended = true_gains(traces, found)
     if model == "static":
         result, variables = _static(loaded, traces, found, align, time, speed, sampling)
     else:
@@ -100,7 +104,7 @@ def fit(
         options = Options(add, effect, profile, starts, 1.0 if new_lines else None, most_events, most_steps)
         result, variables = fit_inertial(loaded, traces, found, options)
     result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
-    result["notes"] = [*notes, *result.get("notes", ())]
+    result["notes"] = [*notes, *mended, *result.get("notes", ())]
     # ahead of the events: of these only the first few are printed
     result["dropped"] = [*left_out(traces, found), *result["dropped"]]
     if out is not None:
@@ -160,6 +164,10 @@ def _static(
             )
         except InputError as error:
             raise error.at(file=loaded.path) from None
+    kept = [t.name for t in traces if t.role == "held-out"]
+    if kept:
+        text = f"creep of held-out runs ({', '.join(kept)}) is fitted as well: every creep process is fitted by itself"
+        result["notes"] = [text]
     result["traces"] = [describe_trace(t, s) for t, s in zip(traces, found, strict=True)]
     for i, (t, s) in enumerate(zip(traces, found, strict=True)):
         variables |= trace_pieces(t, s, i)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from ..errors import InputError
 from ..runstore import json_text, open_run, refuse_existing, versions
 from ..workflow import input_records
 
@@ -98,15 +99,33 @@ def inspection(
         variables |= trace_pieces(trace, segmentation, i)
         rows.append(row)
     able = abilities(traces, found)
+    cannot = [*able.cannot, *_lacking(loaded, traces, found)]
     dropped = [f"{t['name']}: {text}" for t in rows for text in (*t["repairs"], *t["dropped"])]
     result = {
         **head(loaded, "inspect"),
         "traces": rows,
         "can": list(able.can),
-        "cannot": list(able.cannot),
+        "cannot": cannot,
         "dropped": dropped,
     }
     return result, variables
+
+
+def _lacking(loaded: Campaign, traces: list[Trace], found: list[Segmentation]) -> list[str]:
+    """What the campaign does not say of the rig and a fit will ask for."""
+    from ..fit.normalised import is_ramp
+    from ..fit.static_table import StaticRig
+
+    slipping = [t for t, s in zip(traces, found, strict=True) if s.events and not is_ramp(t)]
+    said = []
+    for trace in slipping:
+        try:
+            StaticRig.of(loaded.rig_of(trace.name), spring_stiffness=trace.spring_stiffness)
+        except InputError as error:
+            said.append(f"The static model can be fitted only when the campaign has {error.key}: measured, or a guess.")
+    if slipping and loaded.rig.mass is None:
+        said.append("The dynamic model can be fitted only when the campaign has rig.mass: measured, or a guess.")
+    return list(dict.fromkeys(said))
 
 
 def _write(out: Path, force: bool, result: dict[str, Any], variables: dict[str, tuple]) -> None:

@@ -104,6 +104,8 @@ class SampledCurve:
     def rise(self, levels: Any, after: Any) -> np.ndarray:
         first = int(np.searchsorted(self.t, after))
         y, t = self.y[first:], self.t[first:]
+        if y.size < 2:  # the cycle is over before that
+            return np.full(np.shape(levels), np.nan)
         top = max(int(np.searchsorted(t, self.top[0], side="right")), 1)
         times = []
         for level in np.asarray(levels):

@@ -19,6 +19,7 @@ from .base import HEAD_BYTES, Columns, need_columns, split_unit, unique
 _COMMENTS = ("#", "%", "//", "!")
 _NOTHING = {"", "nan", "na", "n/a", "null", "none", "-", "--", "---", "#n/a", "overflow", "ovl"}
 _UNIT_WORD = re.compile(r"^[\[(]?\s*[A-Za-zµμ%°\-][\w µμ%°/*^.\-]{0,11}\s*[\])]?$")
+_THOUSAND = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _UNITS = {"s", "ms", "us", "m", "mm", "um", "nm", "v", "mv", "n", "mn", "un", "kn", "m/s", "mm/s", "um/s", "-", "1"}
 
 
@@ -33,6 +34,7 @@ class _Layout:
     numeric: list[int]
     ignored: dict[str, str]
     trailing: bool  # rows end with a delimiter
+    doubts: list[str]  # whether it was understood
 
 
 class TextReader:
@@ -62,6 +64,7 @@ class TextReader:
         if layout.decimal == ",":
             between = {";": "a semicolon", "\t": "a tab", None: "blanks"}[layout.delimiter]
             notes.append(f"decimal comma, {between} between the columns")
+            notes += layout.doubts
         data = {layout.names[c]: np.ascontiguousarray(table[:, k]) for k, c in enumerate(layout.numeric)}
         columns = Columns(data, layout.units, layout.ignored, notes, layout.skip + 1, order=layout.names)
         return need_columns(columns, path)
@@ -112,8 +115,9 @@ def _layout(path: Path, head: bytes, *, whole: bool) -> _Layout:
     ]
     numeric = [c for c in numeric if any(_number(row[c], decimal) for row in rows)]
     names, units = _header(lines[:first], delimiter, width)
+    doubts = _thousands(path, rows, [names[c] for c in numeric], numeric) if decimal == "," else []
     ignored = {names[c]: f"it holds text such as '{rows[0][c]}'" for c in range(width) if c not in numeric}
-    return _Layout(encoding, delimiter, decimal, first, names, units, numeric, ignored, width + 1 in ends)
+    return _Layout(encoding, delimiter, decimal, first, names, units, numeric, ignored, width + 1 in ends, doubts)
 
 
 def _separators(sample: list[str]) -> tuple[str | None, str]:
@@ -180,6 +184,30 @@ def _is_data(row: list[str], width: int, decimal: str) -> bool:
 
 def _mostly(row: list[str], decimal: str) -> bool:
     return 2 * sum(_number(f, decimal) or _empty(f) for f in row) >= len(row)
+
+
+def _thousands(path: Path, rows: list[list[str]], names: list[str], numeric: list[int]) -> list[str]:
+    """Doubts about commas that may stand between thousands.
+
+    Raises:
+        InputError: points are decimal in some column, so that commas in another cannot be.
+    """
+    marks = [{mark for row in rows for mark in ".," if mark in row[c]} for c in numeric]
+    commas = [name for name, found in zip(names, marks, strict=True) if found == {","}]
+    if commas and len(commas) < len(names) and {"."} in marks:
+        raise InputError(
+            f"column '{commas[0]}' has commas and another one decimal points", file=path,
+            hint="commas between thousands are to be left out; decimal marks must be the same in all columns",
+        )  # fmt: skip
+    said = []
+    for name, c in zip(names, numeric, strict=True):
+        fields = [row[c] for row in rows if "," in row[c]]
+        if len(fields) > 1 and all(_THOUSAND.fullmatch(field) for field in fields):
+            said.append(
+                f"'{name}' has three digits behind every comma, as in {fields[0]}: it was read as a decimal comma, and "
+                "commas between thousands are to be left out"
+            )
+    return said
 
 
 def _commonest(values: list[int]) -> int:

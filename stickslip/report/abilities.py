@@ -12,12 +12,11 @@ from ..fit.creep_process import V_LIM, creep_processes
 from ..fit.normalised import is_ramp
 from ..segment import LAWS, Segmentation, Shapes, event_shapes
 from ..trace import Trace
+from ..units import shown
 from .describe import gain_is_wrong, stick_gain
+from .pace import pace
 
 _RING_RATE = 5000.0  # Hz: a contact resonance of some 500 Hz needs ten samples a period
-_PACED = 4  # slips from which the mean velocity of the block is that of its drive
-_WAY = 1000  # points at which a drive is looked at for turning round
-_OFF = 1.4  # factor between them beyond which one is wrong
 _NEAR = 1.25  # drive velocities closer than this factor count as one
 
 
@@ -83,19 +82,9 @@ def _pace(pairs: Pairs, slipping: Pairs) -> Verdict:
     """From slip to slip a block on a spring keeps up with its load point, whatever the spring."""
     bad = []
     for t, s in slipping:
-        if t.drive is None or t.displacement is None or len(s.events) < _PACED:
-            continue
-        ends = np.array([s.events[0].t_onset, s.events[-1].t_onset])
-        block = float(np.diff(np.interp(ends, t.time, t.displacement))[0]) / float(np.ptp(ends))
-        way = t.drive.position(np.linspace(float(ends[0]), float(ends[1]), _WAY))
-        drive = float(way[-1] - way[0]) / float(np.ptp(ends))
-        turns = np.abs(way[-1] - way[0]) < 0.99 * np.sum(np.abs(np.diff(way)))
-        if drive != 0 and not turns and not 1 / _OFF < block / drive < _OFF:
-            bad.append(
-                f"{t.name}: from slip to slip the block moves {block * 1e6:.3g} µm/s, "
-                f"the drive {drive * 1e6:.3g} µm/s, and a spring cannot be stretched for ever: check "
-                "the drive's velocity, and the units of time and displacement."
-            )
+        found = pace(t, s)
+        if found is not None and found.off:
+            bad.append(f"{t.name}: {found}: check the drive's velocity, and the units of time and displacement.")
     return [], bad
 
 
@@ -158,6 +147,11 @@ def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
                     f"{rises}: the block creeps along at {-share:.0f} % of the drive's velocity, or {scale} Force "
                     "alone cannot tell the two apart: measure the block's position as well."
                 )
+        if t.name in force and t.spring_stiffness is None and s.settings.unit == "m" and s.settings.gain:
+            bad.append(
+                f"{t.name}: the spring's stiffness is not given. Lengths are as if the block stood still early in a "
+                f"stick: c_s = {shown(s.settings.gain, 'N/m', 3)}."
+            )
         if s.settings.unit != "m":
             bad.append(f"{t.name}: neither stiffness nor drive is known, so lengths are in seconds of loading.")
     return good, bad

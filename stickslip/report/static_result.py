@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -64,11 +65,11 @@ def static_result(
             rigs += [rig_of(trace)] * len(kept)
             processes += kept
     if not processes and not ramps:
-        why = "; ".join(dict.fromkeys(dropped)) or "no trace holds a slip"
+        why = shorten("; ".join(dict.fromkeys(dropped)) or "no trace holds a slip", 600, placeholder=" ...")
+        coarse = any(words in why for words in ("cannot be seen", "sensed too coarsely"))
+        larger = ". A coarse sensor needs a larger --v-lim" if coarse else ""
         raise InputError(
-            "nothing here can be compared with the static model",
-            value=None,
-            hint=f"{why[:600]}. A coarse sensor needs a larger --v-lim{doubts(traces)}",
+            "nothing here can be compared with the static model", value=None, hint=f"{why}{larger}{doubts(traces)}"
         )
     result: dict[str, Any] = {"dropped": dropped}
     variables: Variables = {}

@@ -227,3 +227,13 @@ def test_any_bytes_are_read_or_refused_but_never_crash(tmp_path_factory, content
             read_columns(path)
         except InputError as error:
             assert path.name in str(error)
+
+
+def test_commas_between_thousands_are_not_read_as_decimal_commas(tmp_path, refuses):
+    mixed = write(tmp_path / "a.tsv", ["0.000\t2,000", "0.001\t25,750", "0.002\t1,025,750"], header="time [s]\tx [nm]")
+    refuses(lambda: read_columns(mixed), "column 'x' has commas and another one decimal points", "thousands")
+    whole = write(tmp_path / "b.tsv", ["0\t2,000", "1\t25,750", "2\t1,025"], header="time [ms]\tx [nm]")
+    (said,) = (note for note in read_columns(whole).notes if "three digits" in note)
+    assert "'x' has three digits behind every comma, as in 2,000" in said
+    clear = write(tmp_path / "c.tsv", ["0,000\t2,000", "0,001\t25,75", "0,002\t1,025"], header="time [s]\tx [nm]")
+    assert not any("three digits" in note for note in read_columns(clear).notes)
