@@ -57,11 +57,11 @@ def test_intervals_hold_the_truth(tmp_path):
     """95 % intervals of the parameters with a true value, over 20 campaigns with noise and lines of their own."""
     rows = [deviations(tmp_path / str(seed), seed) for seed in range(FIRST, FIRST + CAMPAIGNS)]
     z = np.array([v for row in rows for v in row.values()])
-    inside = np.abs(z) <= TWO_SIDED
+    held = {}
     for name in sorted({n for row in rows for n in row}):
         own = np.array([row[name] for row in rows if name in row])
-        held = np.mean(np.abs(own) <= TWO_SIDED)
-        print(f"{name:26s} {held:5.2f} of {own.size}, median |z| {np.median(np.abs(own)):.2f}")
-    assert 0.85 <= np.mean(inside) <= 1.0
+        held[name] = np.mean(np.abs(own) <= TWO_SIDED)
+        print(f"{name:26s} {held[name]:5.2f} of {own.size}, median |z| {np.median(np.abs(own)):.2f}")
+    assert min(held.values()) >= 0.85
     # intervals so wide that they say nothing would hold the truth as well
     assert np.median(np.abs(z)) > 0.2
