@@ -293,9 +293,13 @@ class _Assembly:
             if spec.wrap is not None:
                 values, done = unwrap(values, spec.wrap, name, count)
                 self.repairs += done
+                if not done:
+                    self.notes.append(f"{name}: no jump of half of 'wrap', so nothing was unwrapped")
             level = noise_level(values, count)
             values, done = join_resets(time, values, name, self._within(spec.resets), count, level)
             self.repairs += done
+            if spec.resets is True and not done:
+                self.notes.append(f"{name}: 'resets' is true, and the counter never jumps to zero")
             if self.entry.spikes:
                 values, done = despike(values, name, time, max(level, count or 0.0))
                 self.repairs += done

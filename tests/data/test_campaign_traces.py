@@ -345,3 +345,12 @@ def test_a_load_that_no_model_takes_up_is_said_to_be_left_out(campaign, run, cap
         assert ("left out: normal_load is not used by the models" in capsys.readouterr().out) == bool(more)
     assert not any("normal_load" in text for text in told[0])
     assert any("normal_load" in text and "mean 0.31 N, 0.3 to 0.32 N" in text for text in told[1])
+
+
+def test_a_repair_that_was_asked_for_and_found_nothing_is_said(campaign, run):
+    rows = np.column_stack(run)
+    body = TIME + X.replace('"um"', '"um", wrap = "32.4 mm", resets = true') + DRIVE
+    assert only(campaign(body, rows=rows)).provenance.notes == (
+        "displacement: no jump of half of 'wrap', so nothing was unwrapped",
+        "displacement: 'resets' is true, and the counter never jumps to zero",
+    )
