@@ -219,7 +219,9 @@ def settle(
             break
     if best.fit is None or best.composition is None:
         return best
-    return replace(best, fit=certain(Problem(best.composition, measurement, threads=threads), floor, best.fit))
+    sure = certain(Problem(best.composition, measurement, threads=threads), floor, best.fit)
+    # its errors were taken with the derivatives it has
+    return replace(best, fit=replace(best.fit, covariance=sure.covariance))
 
 
 def _silent(text: str) -> None:
