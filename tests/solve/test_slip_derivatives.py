@@ -41,8 +41,8 @@ def test_derivatives_of_every_slip_in_every_parameter_agree_with_differences_by_
 
 
 def test_derivatives_are_those_of_the_tied_steps():
-    """The same discrete solution on the same steps."""
-    _climb(10.0, (1e-5, 0.01), (1e-6, 2e-3), (1e-7, 1e-3))
+    """The same discrete solution on the same steps; coarser rungs average what ripple is left."""
+    _climb(10.0, (3e-4, 0.03), (1e-5, 0.01), (1e-6, 2e-3), (1e-7, 1e-3))
 
 
 def test_derivatives_are_those_of_finer_tied_steps_more_closely():
