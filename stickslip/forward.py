@@ -94,11 +94,12 @@ def cut_short(tracks: Track, cycles: Cycles) -> np.ndarray:
     return np.asarray(cycles.used) & ~np.asarray(tracks.arrested) & early
 
 
-def _observe(t: Any, y: State, args: Any) -> tuple[Array, Array, Array, Array]:
+def _observe(t: Any, y: State, args: Any) -> tuple[Array, ...]:
     model, *_ = args
     lead = model.lead(t)
     still = Motion(t + 0.0 * y.x, 1e-12 + 0.0 * y.x, y.x, y.v, 0.0 * y.x, 0.0 * y.x, lead)
-    return t + 0.0 * y.x, y.x, y.v, model.read(y, still, jnp.sum(y.force))
+    seen = t + 0.0 * y.x, y.x, y.v, model.read(y, still, jnp.sum(y.force))
+    return (*seen, model.rising(y)) if model.late else seen
 
 
 class _CycleStepper(ContactStepper):
@@ -115,14 +116,16 @@ class _CycleStepper(ContactStepper):
 
 
 def _arrested(t: Any, y: State, args: Any, **kwargs: Any) -> Array:
-    _, _, x0, least_slip = args
-    return (y.v <= 0.0) & (y.x - x0 > least_slip)
+    model, _, x0, least_slip = args
+    return (model.rising(y) <= 0.0) & (y.x - x0 > least_slip)
 
 
 def run_cycle(
     model: Model, y: State, t0: Array, limit: Array, least_slip: Array, tolerance: Tolerance, most_steps: int
 ) -> tuple[Track, State, Array]:
-    """Integrate one cycle until the block stands still after a slip, or until ``limit`` (s).
+    """Integrate one cycle until the reading stands still after a slip, or until ``limit`` (s).
+
+    The data know an arrest as the top of the reading. Without a sensor that is late that is where the block stands.
 
     Returns:
         The track, the state at its end, and the time of that end (s).
@@ -149,16 +152,17 @@ def run_cycle(
         event=diffrax.Event(_arrested),
     )
     n = solution.stats["num_accepted_steps"]
-    (t, x, v, reading), leaves = solution.ys
+    (t, x, v, reading, *rising), leaves = solution.ys
     end = jax.tree.unflatten(jax.tree.structure(y), [leaf[0] for leaf in leaves])
     last = jnp.maximum(n - 1, 0)
     padded = jnp.arange(most_steps) < n
     t, x, v, reading = (jnp.where(padded, a, a[last]) for a in (t, x, v, reading))
-    arrested = (end.v <= 0.0) & (end.x - y.x > least_slip)
+    arrested = (model.rising(end) <= 0.0) & (end.x - y.x > least_slip)
     before = jnp.maximum(n - 2, 0)
-    fall = jnp.where(arrested, v[before] - v[last], 1.0)
-    # velocity is nearly linear in time around its zero: two steps share the crossing
-    arrest = jnp.where(arrested, t[last] + (t[last] - t[before]) * v[last] / fall, t[last])
+    (rate,) = rising or (v,)
+    fall = jnp.where(arrested, rate[before] - rate[last], 1.0)
+    # the rate is nearly linear in time around its zero: two steps share the crossing
+    arrest = jnp.where(arrested, t[last] + (t[last] - t[before]) * rate[last] / fall, t[last])
     return Track(t, x, v, reading, arrest, arrested, n), end, t[last]
 
 
@@ -212,8 +216,9 @@ def run_cycles(
             model, y, t0 + past, jnp.where(used, limit, t0 + past + 1e-6), least_slip, tolerance, most_steps
         )
         late = now - track.arrest
-        # the velocity is nearly linear around its zero: how far the block has come back since the arrest
-        back = 0.5 * track.v[-1] * late
+        # the velocity is nearly linear around its zero: how far the block has come back since the arrest; a reading
+        # that is late is flat there
+        back = 0.0 if model.late else 0.5 * track.v[-1] * late
         return (end, late, end.x - track.reading[-1] + back, model.bank.strength), track
 
     zero = jnp.zeros(())

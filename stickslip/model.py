@@ -267,10 +267,26 @@ class Model(eqx.Module):
     def read(self, state: State, motion: Motion, contact_force: Array) -> Array:
         """Displacement (m) that the sensor shows: its effects in the order of their places in the chain."""
         reading = motion.x
-        chain = [(e, m) for e, m in zip(self.effects, state.memory, strict=True) if isinstance(e, Sensor)]
-        for e, m in sorted(chain, key=lambda link: link[0].place):
+        for e, m in self._sensors(state):
             reading = e.read(m, reading, motion, contact_force)
         return reading
+
+    def rising(self, state: State) -> Array:
+        """A number of the sign of the reading's rate: the velocity (m/s), unless a sensor is late."""
+        rate = state.v
+        for e, m in self._sensors(state):
+            rate = e.rising(m, rate)
+        return rate
+
+    @property
+    def late(self) -> bool:
+        """Whether the reading may still rise when the block stands."""
+        return any(isinstance(e, Sensor) and type(e).rising is not Sensor.rising for e in self.effects)
+
+    def _sensors(self, state: State) -> list[tuple[Sensor, Any]]:
+        """The sensors and their memories, in the order of their places in the chain."""
+        chain = [(e, m) for e, m in zip(self.effects, state.memory, strict=True) if isinstance(e, Sensor)]
+        return sorted(chain, key=lambda link: link[0].place)
 
     def stored(self, state: State) -> Array:
         """Kinetic energy plus what is stored in the Jenkins elements (J)."""

@@ -22,7 +22,7 @@ from .pieces import candidate_arrays, candidate_from
 PROMISING, EXPLAINING = 7, 3  # candidates that are refitted: by the best point seen, and by the linear score
 LEAST = 4  # of those that get more than the first steps
 NEAR = 1.3  # times the leader's cost: candidates that the data may not tell from it are followed to the end
-WORTH = 0.75  # times the base's cost: a leader below it is compared with all it may be taken for
+WORTH = 0.9  # times the base's cost: a leader below it may get a name, and is compared with all it may be taken for
 LEADERS = 5
 LIKE = 2  # of those a leader may be taken for that are followed to the end, however far from it they seem
 

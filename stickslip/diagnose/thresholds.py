@@ -20,7 +20,10 @@ class Thresholds:
         overall: largest error over all phases together, training and held-out, at which it is: an effect may be spread
             so thinly that no single phase shows it.
         gain: an effect must take off at least this share of the training cost.
-        unseen: and this share of the score on unseen cycles, which few cycles tell poorly.
+        ample: from this share on the unseen cycles need but agree (``unseen``, ``standard_errors``); what takes
+            off less must be plain there (``plain``, ``clearly``).
+        unseen: share of the score on unseen cycles that must go, which few cycles tell poorly.
+        plain: the same where the gain on the fitted cycles is not ample.
         adequate: factor on the limits of ``complete`` and ``alike`` that the model with the named effect must meet;
             above it something else is missing.
         remainder: factor on them up to which a misfit that no effect explains is called a small one.
@@ -29,7 +32,8 @@ class Thresholds:
         failed: a base fit with a larger error (floors) is not ranked.
         standard_errors: least gain on held-out cycles over its standard error.
         clearly: by how many of them a rival must be worse on unseen cycles to be left out: what fits as well stays a
-            rival until the unseen cycles speak plainly.
+            rival until the unseen cycles speak plainly. And the least gain over its standard error where that on the
+            fitted cycles is not ample.
     """
 
     complete: Mapping[str, float] = field(
@@ -37,13 +41,15 @@ class Thresholds:
     )
     alike: float = 3.0
     overall: float = 1.1
-    gain: float = 0.25
+    gain: float = 0.1
+    ample: float = 0.25
     adequate: float = 2.0
     remainder: float = 1.3
     significant: float = 3.0
     rival: float = 1.15
     failed: float = 300.0
     unseen: float = 0.1
+    plain: float = 0.25
     standard_errors: float = 1.0
     clearly: float = 2.0
 

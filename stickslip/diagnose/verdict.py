@@ -110,16 +110,19 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
     assert candidate.train is not None
     assert candidate.held is not None
     cost = candidate.fit.cost
-    if cost > (1.0 - limits.gain) * base_cost:
-        share = 1 - cost / base_cost
+    share = 1.0 - cost / base_cost
+    ample = share >= limits.ample
+    if share < limits.gain:
         fails.append(f"takes {f'only {100 * share:.0f} %' if share > 0 else 'nothing'} off the training cost")
     gain = base_held.per_cycle - candidate.held.per_cycle
     if gain.size:
         error = np.std(gain, ddof=1) / np.sqrt(gain.size) if gain.size > 1 else 0.0
-        if candidate.held.score > (1.0 - limits.unseen) * base_held.score:
-            fails.append("the error on unseen cycles does not fall enough")
-        elif np.mean(gain) < limits.standard_errors * error:
-            fails.append("the gain on unseen cycles is not significant")
+        fall, errors_of_it = (limits.unseen, limits.standard_errors) if ample else (limits.plain, limits.clearly)
+        for_little = "" if ample else " for so little on the fitted ones"
+        if candidate.held.score > (1.0 - fall) * base_held.score:
+            fails.append(f"the error on unseen cycles does not fall enough{for_little}")
+        elif np.mean(gain) < errors_of_it * error:
+            fails.append(f"the gain on unseen cycles is not significant{for_little and ' enough' + for_little}")
     amplitude = candidate.amplitude
     if amplitude is not None:
         null = catalogue.amplitude(candidate.effect).null or 0.0

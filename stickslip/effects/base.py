@@ -210,3 +210,11 @@ class Sensor(Effect):
     @abc.abstractmethod
     def read(self, state: Any, reading: Array, motion: Motion, contact_force: Array) -> Array:
         """Reading (m) made of the ``reading`` of the sensors before it (m) and the contact's force (N)."""
+
+    def rising(self, state: Any, rate: Array) -> Array:
+        """A number of the sign of the reading's rate, made of that of the sensors before it (at first the velocity).
+
+        What is measured of an arrest is the top of the reading. To be overridden by a sensor that is late: its reading
+        still rises when the block stands.
+        """
+        return rate

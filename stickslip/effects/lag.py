@@ -9,6 +9,8 @@ from jax import Array
 
 from .base import Motion
 
+SHORTEST = 1e-12  # s: a time constant below it is none
+
 
 def velocities(motion: Motion) -> tuple[Array, Array]:
     """Velocity (m/s) at the start and acceleration (m/s2) of the parabola with the increment's way and end velocity."""
@@ -35,7 +37,7 @@ def trail(value: Array, time_constant: Array, motion: Motion) -> Array:
     those of the motion.
     """
     start, acceleration = velocities(motion)
-    positive = time_constant > 1e-12
+    positive = time_constant > SHORTEST
     fade = jnp.where(positive, jnp.exp(-motion.dt / jnp.where(positive, time_constant, 1.0)), 0.0)
     ahead = time_constant * (start - time_constant * acceleration)
     behind = time_constant * (motion.v - time_constant * acceleration)

@@ -9,7 +9,7 @@ from ..contact import Bank
 from ..params import parameter
 from .base import Contact, Memory, Motion, Sensor
 from .catalogue import register
-from .lag import trail
+from .lag import SHORTEST, trail
 
 
 @register
@@ -39,6 +39,9 @@ class SensorLowPass(Memory, Sensor):
 
     def advance(self, state: Array, motion: Motion, contact: Contact) -> Array:
         return trail(state, self.time_constant, motion)
+
+    def rising(self, state: Array, rate: Array) -> Array:
+        return jnp.where(self.time_constant > SHORTEST, state, rate)
 
     def read(self, state: Array, reading: Array, motion: Motion, contact_force: Array) -> Array:
         return reading - state

@@ -206,6 +206,33 @@ def test_every_condition_can_refuse_a_name(made, why):
     assert decide([judged]) == (None, [])
 
 
+@pytest.mark.parametrize(
+    ("cost", "score", "errors", "passes"),
+    [
+        (740, 0.85, 1.5, True),  # ample on the fitted cycles: the unseen ones need but agree
+        (760, 0.85, 2.5, False),
+        (760, 0.70, 1.5, False),
+        (760, 0.70, 2.5, True),
+        (910, 0.70, 2.5, False),
+    ],
+)
+def test_what_takes_little_off_the_fitted_cycles_must_be_plain_on_the_unseen_ones(cost, score, errors, passes):
+    """Small effects hide among the many features that only noise decides; on cycles no fit has seen nothing is hidden.
+
+    ``errors``: gain on unseen cycles over its standard error.
+    """
+    off = np.array([1.0, -1.0] * 4)
+    gain = 1.0 - score
+    scatter = off * gain / errors * np.sqrt(off.size) / np.std(off, ddof=1)
+    base = HeldOut(1.0, 1.0, {"creep": 1.0}, np.ones(8))
+    seen = replace(
+        candidate("contact-damping", cost, score),
+        held=HeldOut(np.sqrt(score), score, {"creep": 1.0}, 1.0 - gain - scatter),
+    )
+    judged = judge(seen, 1000.0, base)
+    assert judged.passed is passes, judged.failures
+
+
 def test_a_small_amplitude_is_not_implausible():
     """A high-pass at 8e-5 Hz moves creep by thirty floors, and 8e-5 Hz is next to nothing in a range up to 5 Hz."""
     small = candidate("sensor-high-pass", 10, 0.8)

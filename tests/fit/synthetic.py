@@ -5,6 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 
+from stickslip.effects.base import Effect
 from stickslip.features.measurement import Measurement, measure
 from stickslip.fit.composition import Composition
 from stickslip.fit.parameters import Free
@@ -41,17 +42,20 @@ def truth() -> np.ndarray:
     return np.log([value for _, value in TRUTH.values()])
 
 
-def traces(velocities: tuple[float, ...] = (1e-4, 2e-4), slips: float = 3.6, rate: float = 1e4) -> list[Trace]:
-    """Runs from a virgin start, sampled without noise."""
+def traces(
+    velocities: tuple[float, ...] = (1e-4, 2e-4), slips: float = 3.6, rate: float = 1e4, effect: Effect | None = None
+) -> list[Trace]:
+    """Runs from a virgin start, sampled without noise, with ``effect``."""
+    family = composition() if effect is None else composition().with_effect(effect, ())
     out = []
     for v in velocities:
         stop = 0.26 / (1000.0 * v) + slips * 52e-6 / v
         nodes = (jnp.array([0.0, 1.0]), jnp.array([0.0, v]))
-        model = composition().model(jnp.asarray(truth()), jnp.zeros(2), nodes, jnp.asarray(np.nan))
+        model = family.model(jnp.asarray(truth()), jnp.zeros(2), nodes, jnp.asarray(np.nan))
         run, _ = integrate(model, stop, tolerance=Tolerance(1e-3, 1e-12, 1e-8), largest_step=0.005)
         t = np.arange(0.0, stop, 1.0 / rate)
         drive = Drive.constant(v, 0.0, stop)
-        out.append(Trace(name=f"v{v * 1e6:.0f}", time=t, displacement=run.at(t).x, drive=drive, virgin=True))
+        out.append(Trace(name=f"v{v * 1e6:.0f}", time=t, displacement=run.at(t).reading, drive=drive, virgin=True))
     return out
 
 
