@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -240,6 +241,7 @@ class _Assembly:
         entry = self.entry
         keep, lost = drop_nan(time, data)
         self.repairs += lost
+        twice = "; those left out because they are not a number are among them" if lost else ""
         if keep is not None:
             time, data = time[keep], {name: values[keep] for name, values in data.items()}
         if time.size < 2:
@@ -261,7 +263,7 @@ class _Assembly:
             if cut:
                 self.repairs.append(Repair("cut", cut, "all channels", "outside 'start' and 'stop', as asked for"))
             time, data = time[low:high].copy(), {name: values[low:high].copy() for name, values in data.items()}
-        self.repairs += find_gaps(time)[1]
+        self.repairs += [replace(gap, reason=f"{gap.reason}{twice}") for gap in find_gaps(time)[1]]
         return time, data
 
     def _empty(self, data: dict[str, Array], lost: list[Repair]) -> InputError:

@@ -244,7 +244,7 @@ def _number(value: Any, power: int, digits: int = 4) -> str:
     if scaled == 0:
         return "0"
     if abs(scaled) < 1e-3:
-        return f"{scaled:.0e}"
+        return f"{scaled:.3f}"  # far below what its column is about
     return f"{scaled:.{max(min(digits - 1 - math.floor(math.log10(abs(scaled))), 6), 0)}f}"
 
 

@@ -189,9 +189,8 @@ def learn(
         free, which = [bounded[i] for i in kept], [*range(k), *(k + i for i in kept)]
         z, events, columns = begin.fit.z[which], begin.fit.events, begin.fit.columns[..., which]
         wide = 1.0
-    problem = Problem(base.with_effect(blank(seen(measurement, train), optimum), free), measurement)
-    if begin is None:
-        problem = problem.coarser()  # a picture
+    fine = Problem(base.with_effect(blank(seen(measurement, train), optimum), free), measurement)
+    problem = fine.coarser() if begin is None else fine
     stages = ((wide, evaluations // 2), (1.0, evaluations)) if wide > 1.5 else ((1.0, evaluations),)
     # some thirty weights: derivatives are taken once, and then only carried on
     once = partial(fit, problem, floor, use=train, anew=False, progress=progress)
@@ -202,6 +201,12 @@ def learn(
         found = more if more.cost < found.cost else found
         if arrived:
             break
+    if begin is None:
+        # derivatives that were carried on so far hold the solver's noise, which looks like knowledge of the weights
+        more = fit(
+            fine, floor, z=found.z, events=found.events, stages=((1.0, evaluations),), use=train, progress=progress
+        )
+        found = more if more.cost < found.cost else replace(found, columns=more.columns)
     return again(base, optimum, measurement, floor, train, found)
 
 

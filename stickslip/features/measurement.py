@@ -110,7 +110,8 @@ def measure(
             f"{'one slip' if pairs else 'no slip'} in the whole campaign: the dynamic model needs at least two, so "
             "that a stick between slips can be compared",
             key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in traces[:4]) + ", ..." * (len(traces) > 4),
-            hint="record longer, drive slower or with a softer spring; --model static fits single creep processes"
+            hint="record longer, drive slower or with a softer spring"
+            + ("; --model static fits single creep processes" if any(t.virgin for t in traces) else "")
             + doubts(traces),
         )
     one_way = [_one_way(t, s) for t, s in pairs]

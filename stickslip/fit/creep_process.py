@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,15 +87,23 @@ def creep_processes(
     if velocity_noise(noise, half, step) > 0.5 * v_lim:
         hidden = f"{shown(noise, 'm', 2)} of noise at {shown(trace.sampling_rate, 'Hz', 3)}"
         why = f"v_lim = {shown(v_lim, 'm/s', 3)} cannot be seen: {hidden} hide it"
-        return [], [Dropped("creep processes", len(segmentation.events), trace.name, why)]
+        return [], [Dropped("creep processes", len(segmentation.events), trace.name, why, coarse=True)]
     kept, dropped = [], []
     for event in segmentation.events:
         outcome = _process(trace, segmentation, event, position, noise, half, v_lim, points, sampling)
-        if isinstance(outcome, str):
-            dropped.append(Dropped("creep process", 1, f"{trace.name}, event {event.index + 1}", outcome))
+        if isinstance(outcome, _Refused):
+            where = f"{trace.name}, event {event.index + 1}"
+            dropped.append(Dropped("creep process", 1, where, outcome.why, outcome.coarse))
         else:
             kept.append(outcome)
     return kept, dropped
+
+
+class _Refused(NamedTuple):
+    """Why an event has no process; ``coarse`` if a larger v_lim might be seen."""
+
+    why: str
+    coarse: bool = False
 
 
 def _process(
@@ -108,26 +116,27 @@ def _process(
     v_lim: float,
     points: int,
     sampling: Sampling,
-) -> CreepProcess | str:
+) -> CreepProcess | _Refused:
     """One process, or why there is none."""
     time = trace.time
     first, start = _begin(trace, found, event)
     if event.holds:
-        return "the drive stood still before this slip: virtual time needs a steady pull"
+        return _Refused("the drive stood still before this slip: virtual time needs a steady pull")
     if first is None:
-        return "the record begins within this stick (with freshly set down contacts: virgin = true)"
+        return _Refused("the record begins within this stick (with freshly set down contacts: virgin = true)")
     drive = trace.drive
     speed = abs(float(drive.velocity(max(event.t_onset - 1e-9, time[0])))) if drive is not None else 0.0
     if speed <= v_lim:
-        return f"the drive ({shown(speed, 'm/s', 3)}) is not faster than v_lim ({shown(v_lim, 'm/s', 3)})"
+        return _Refused(f"the drive ({shown(speed, 'm/s', 3)}) is not faster than v_lim ({shown(v_lim, 'm/s', 3)})")
     low, high = int(np.searchsorted(time, start)), event.i_onset
     if high - low < 4 * half + 8:
-        return "too few samples between ring-down and onset"
+        return _Refused("too few samples between ring-down and onset")
     # where x - v_lim t is smallest the isotonic fit of the velocity passes v_lim: hum and counts do not fool it
     smooth = uniform_filter1d(event.direction * position[low:high], 2 * half + 1, mode="nearest")
     i = int(np.argmin(smooth - v_lim * (time[low:high] - time[low])))
     if i < 8 or i >= high - low - 1:
-        return f"the block never creeps through v_lim = {shown(v_lim, 'm/s', 3)} (sampled or sensed too coarsely)"
+        seen = f"the block never creeps through v_lim = {shown(v_lim, 'm/s', 3)} (sampled or sensed too coarsely)"
+        return _Refused(seen, coarse=True)
     moment = float(time[low + i])
     there = position_at(time, position, moment, max(half, 2))
     t, u, n = _windows(
@@ -136,7 +145,8 @@ def _process(
     spread = noise / np.sqrt(n)
     amplitude = float(np.ptp(u))
     if amplitude < LEAST_NOISE * float(np.median(spread)):
-        return f"its creep ({amplitude:.2g} m) does not stand out of the noise ({noise:.2g} m a sample)"
+        least = f"{shown(noise, 'm', 2)} a sample"
+        return _Refused(f"its creep ({shown(amplitude, 'm', 2)}) does not stand out of the noise ({least})")
     virgin = trace.virgin and event.index == 0
     return CreepProcess(trace.name, event.index, t, u, speed, v_lim, spread, virgin)
 

@@ -81,7 +81,10 @@ def find_reader(path: str | Path, name: str | None = None) -> Reader:
             allowed=supported(),
             hint="give it its right ending, or export it as text",
         )
-    raise InputError("the format of the file is not known", file=path, allowed=supported())
+    raise InputError(
+        "the format of the file is not known", file=path, allowed=supported(),
+        hint="export it in one of these, as CSV for one, or add a reader for it (see the documentation)",
+    )  # fmt: skip
 
 
 def read_columns(path: str | Path, name: str | None = None) -> Columns:

@@ -162,7 +162,8 @@ def drop_nan(time: Array, channels: dict[str, Array]) -> tuple[Mask | None, list
         first = int(np.argmax(bad))
         runs = int(np.count_nonzero(np.diff(bad.astype(np.int8)) == 1) + bad[0])
         reason = f"not a number, in {runs} run{'s' if runs > 1 else ''}; these samples are left out"
-        repairs.append(Repair("nan", int(bad.sum()), f"{name}, first at sample {first}", reason))
+        at = f" ({time[first]:.6g} s)" if np.isfinite(time[first]) else ""
+        repairs.append(Repair("nan", int(bad.sum()), f"{name}, first at sample {first}{at}", reason))
         keep = good if keep is None else keep & good
     return keep, repairs
 

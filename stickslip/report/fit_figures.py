@@ -117,7 +117,7 @@ def creep_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: in
         top.plot(t, u * k, color=DARK, lw=1.2, label="measured")
         top.plot(t, model * k, color=MIDDLE, ls="--", lw=1.2, label="static model")
         fit = fits[i]
-        top.set_title(plain(f"{fit['trace']}, event {fit['event'] + 1}: {100 * fit['nrmse']:.2g} %", 40), fontsize=9)
+        top.set_title(plain(f"{fit['trace']}, event {fit['event']}: {100 * fit['nrmse']:.2g} %", 40), fontsize=9)
         top.set_ylabel(f"u / {unit}")
         k, unit = scaled(u - model, "m")
         low.plot(t, (u - model) * k, color=DARK, lw=1.0)

@@ -51,6 +51,7 @@ def static_result(
     rigs: list[StaticRig] = []
     ramps: list[Ramp] = []
     dropped: list[str] = []
+    coarse = False
     for trace, found in zip(traces, segmentations, strict=True):
         if is_ramp(trace):
             ramp = break_away(trace, found)
@@ -61,12 +62,12 @@ def static_result(
             continue
         kept, lost = creep_processes(trace, found, v_lim=v_lim, sampling=sampling)  # type: ignore[arg-type]
         dropped += [str(d) for d in lost]
+        coarse |= any(d.coarse for d in lost)
         if kept:
             rigs += [rig_of(trace)] * len(kept)
             processes += kept
     if not processes and not ramps:
         why = shorten("; ".join(dict.fromkeys(dropped)) or "no trace holds a slip", 600, placeholder=" ...")
-        coarse = any(words in why for words in ("cannot be seen", "sensed too coarsely"))
         larger = ". A coarse sensor needs a larger --v-lim" if coarse else ""
         raise InputError(
             "nothing here can be compared with the static model", value=None, hint=f"{why}{larger}{doubts(traces)}"
@@ -144,7 +145,7 @@ def _one(f: CreepFit) -> dict[str, Any]:
         note = "virgin" + (f"; {note}" if note else "")
     return {
         "trace": f.process.trace,
-        "event": f.process.event,
+        "event": f.process.event + 1,
         "hurst": f.hurst,
         "hurst_std": f.hurst_std,
         "h_rms": f.h_rms,

@@ -87,12 +87,13 @@ class Phase:
 
 @dataclass(frozen=True)
 class Dropped:
-    """Something left out: what, how many, where, why."""
+    """Something left out: what, how many, where, why; ``coarse`` if the sensor shows too little for what was asked."""
 
     what: str
     count: int
     where: str
     reason: str
+    coarse: bool = False
 
     def __str__(self) -> str:
         what = "slip" if self.count == 1 and self.what == "slips" else self.what

@@ -6,6 +6,9 @@ derivative of a discrete solution then says nothing about the curve the solution
 motion. Each cycle is cut where the spring has reached a fixed share of full strength, late in the stick, and where the
 block all but rests; the first steps after a cut have fixed lengths, the last few are stretched alike so that the next
 cut is met. What the parameters move is then the cuts, by the implicit function theorem, and hardly any step's error.
+
+What is left is a ripple: where in a step an element begins to slide. It is a function of the place in the step, so the
+mean over a few grids, each shifted by the same share of its steps, is all but free of it.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from .integrate import integrate
 from .stepper import ContactStepper, Increments, Step, Tolerance, hermite
 from .trajectory import Trajectory
 
+GRIDS = 4  # of shifted steps: more do not lessen the ripple further
 STRETCHED = 8  # steps at the end of a piece that give way
 NEWTON = 5  # iterations for their length; it is known to a few per cent before the first
 LATE = 0.9  # of the stick's quiet part: where it is cut; the ringing is over, the slip has not begun
@@ -54,7 +58,8 @@ class Slips(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Steps tied to the motion; (p,) pieces of up to n steps, sticks and slips in turn.
+    """Steps tied to the motion; (p,) pieces of up to n steps, sticks and slips in turn; several shifted grids at once
+    have a leading axis.
 
     Fields:
         lengths: fixed steps at the start of each piece (s), shape (p, n).
@@ -77,10 +82,11 @@ def slip_derivatives(
     start: Callable[[Model], State] = Model.rest,
     tolerance: Tolerance | None = None,
     refine: int = 2,
+    grids: int = GRIDS,
 ) -> tuple[Slips, Slips]:
     """Times and sizes of all slips and their derivatives in every parameter, for a drive of one velocity.
 
-    What it costs is mostly compiling, some twenty seconds; the plain run and all derivatives take about one.
+    What it costs is mostly compiling, some twenty seconds; the plain run and all derivatives take a few.
 
     Args:
         build: the model as a differentiable function of the parameters.
@@ -90,6 +96,7 @@ def slip_derivatives(
         tolerance: of the run that the steps are taken from (default: a tenth of the solver's).
         refine: into how many each of them is divided. With both defaults the errors are below one per cent of what
             the largest of the parameters does; either makes them smaller.
+        grids: of shifted steps, over which slips and derivatives are averaged.
 
     Returns:
         Slips, shape (n,), and their derivatives, shape (p, n).
@@ -101,14 +108,14 @@ def slip_derivatives(
     theta = jnp.asarray(theta, float)
     model = build(theta)
     trajectory, _ = integrate(model, end, state=start(model), tolerance=tolerance)
-    grid = slip_grid(model, trajectory, refine)
+    grid = slip_grid(model, trajectory, refine, grids)
     exact = jax.tree.map(lambda a: EXACT * a, tolerance)
 
     @jax.jit
     def derivatives(direction: Array) -> tuple[Slips, Slips]:
         def slips(theta: Array) -> Slips:
             model = build(theta)
-            return slips_on(model, start(model), grid, exact, refine)
+            return mean_slips(model, start(model), grid, exact, refine)
 
         return jax.jvp(slips, (theta,), (direction,))
 
@@ -116,8 +123,11 @@ def slip_derivatives(
     return Slips(*(a[0] for a in values)), columns
 
 
-def slip_grid(model: Model, trajectory: Trajectory, refine: int = 1) -> Grid:
-    """Steps of a run, cut at the slips; each divided into ``refine``. Arguments and errors as of `slip_derivatives`."""
+def slip_grid(model: Model, trajectory: Trajectory, refine: int = 1, grids: int = 1) -> Grid:
+    """Steps of a run, cut at the slips; each divided into ``refine``. Arguments and errors as of `slip_derivatives`.
+
+    With a leading axis of ``grids``, in each of which the steps begin at another share of those of the run.
+    """
     s = trajectory.steps
     speed = np.gradient(np.asarray(jax.vmap(model.lead)(jnp.asarray(s.t))), s.t)
     strength = float(model.bank.total_strength)
@@ -126,7 +136,7 @@ def slip_grid(model: Model, trajectory: Trajectory, refine: int = 1) -> Grid:
     edges = np.flatnonzero(ahead[1:] != ahead[:-1]).reshape(-1, 2)
     edges = edges[(edges[:, 0] > 0) & (edges[:, 1] < s.t.size)]
     fall = pull * (s.spring_force[edges[:, 0] - 1] - s.spring_force[edges[:, 1]])
-    begin, pieces = float(s.t[0]), []
+    begin, bounds = float(s.t[0]), []
     for first, after in edges[fall > LEAST_DROP * strength]:
         stop = after + int(np.argmax(pull * s.v[after:] <= 0.0))
         if pull * s.v[stop] > 0.0:
@@ -137,23 +147,39 @@ def slip_grid(model: Model, trajectory: Trajectory, refine: int = 1) -> Grid:
             raise SolveError("the block never creeps slowly before a slip; drive slower")
         cut = begin + LATE * (float(s.t[slow][-1]) - begin)
         level = float(np.interp(cut, s.t, s.spring_force)) / strength
-        pieces.append((*_cut(s.t, begin, cut, GIVE[0], refine), level))
-        pieces.append((*_cut(s.t, cut, rest, GIVE[1], refine), np.nan))
+        bounds += [(begin, cut, GIVE[0], level), (cut, rest, GIVE[1], np.nan)]
         begin = rest
-    if not pieces:
+    if not bounds:
         raise SolveError("no slip is complete within the run; end it later")
-    most = max(len(steps) for steps, _, _ in pieces)
-    lengths = [np.pad(steps, (0, most - len(steps)), constant_values=1e-6) for steps, _, _ in pieces]
+    shares = np.arange(grids) / grids
+    pieces = [[(*_cut(s.t, *b[:3], refine, share), b[3]) for b in bounds] for share in shares]
+    most = max(len(steps) for grid in pieces for steps, _, _ in grid)
     return Grid(
-        *map(jnp.asarray, (lengths, [len(a) for a, _, _ in pieces], *zip(*(p[1:] for p in pieces), strict=True)))
+        jnp.asarray([[np.pad(a, (0, most - len(a)), constant_values=1e-6) for a, _, _ in grid] for grid in pieces]),
+        jnp.asarray([[len(a) for a, _, _ in grid] for grid in pieces]),
+        jnp.asarray([[last for _, last, _ in grid] for grid in pieces]),
+        jnp.asarray([[level for _, _, level in grid] for grid in pieces]),
     )
 
 
-def _cut(t: np.ndarray, begin: float, end: float, give: float, refine: int) -> tuple[np.ndarray, float]:
-    """Fixed steps from ``begin`` on, and the length of those that are stretched to reach ``end``."""
+def _cut(t: np.ndarray, begin: float, end: float, give: float, refine: int, share: float) -> tuple[np.ndarray, float]:
+    """Fixed steps from ``begin`` on, and the length of those that are stretched to reach ``end``.
+
+    Each node of the divided steps is moved on by ``share`` of the step that follows it.
+    """
     last = end - give * (end - begin)
     nodes = np.concatenate([[begin], t[(t > begin) & (t < last)]])
-    return np.repeat(np.diff(nodes) / refine, refine), (end - nodes[-1]) / (STRETCHED * refine)
+    number = np.arange((nodes.size - 1) * refine + 1)
+    nodes = np.interp(number / refine, np.arange(nodes.size), nodes)
+    moved = nodes[:-1] + share * np.diff(nodes)
+    nodes = nodes if share == 0.0 else np.concatenate([[begin], moved])
+    return np.diff(nodes), (end - nodes[-1]) / (STRETCHED * refine)
+
+
+def mean_slips(model: Model, state: State, grids: Grid, tolerance: Tolerance, refine: int = 1) -> Slips:
+    """The mean of :func:`slips_on` over several grids."""
+    found = jax.lax.map(lambda grid: slips_on(model, state, grid, tolerance, refine), grids)
+    return Slips(*(jnp.mean(a, axis=0) for a in found))
 
 
 class _Seen(NamedTuple):

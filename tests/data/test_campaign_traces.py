@@ -129,6 +129,11 @@ def test_all_repairs_together_are_counted_and_exact(campaign, run):
     }
     # the samples lost to NaN and the doubled stamp leave holes in time as well
     assert kinds["dropped-samples"] == 5 + 10 + 1
+    (gaps,) = (repair for repair in trace.repairs if repair.kind == "dropped-samples")
+    assert "left out" in gaps.reason
+    assert "are among them" in gaps.reason
+    (lost,) = (repair for repair in trace.repairs if repair.kind == "nan")
+    assert lost.where.endswith(f"({t[20000]:.6g} s)")
     assert kinds["wrap"] == np.floor((x[-1] + 16.2) / (4096 * LSB))
     assert all(repair.reason and repair.where for repair in trace.repairs)
     index = np.round(trace.time * 1e4).astype(int)

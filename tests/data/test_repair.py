@@ -145,7 +145,7 @@ def test_nan_runs_are_counted(record):
     assert keep.sum() == t.size - 12
     assert repair.count == 12
     assert "3 runs" in repair.reason
-    assert repair.where == "x, first at sample 0"
+    assert repair.where == "x, first at sample 0 (0 s)"
 
 
 def test_duplicate_stamps_keep_their_first_sample():

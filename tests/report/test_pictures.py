@@ -77,7 +77,7 @@ def test_grids_of_fits_say_which_line_is_the_model():
             for name in names
         }
     )
-    fit = {"trace": "run", "event": 0, "nrmse": 0.01, "u_max": 1e-6}
+    fit = {"trace": "run", "event": 1, "nrmse": 0.01, "u_max": 1e-6}
     for grid in (ramp_grid, creep_grid):
         legend = grid(data, [fit]).axes[0].get_legend()
         assert [text.get_text() for text in legend.get_texts()] == ["measured", "static model"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.model import Model
 from stickslip.solve import Tolerance, integrate
-from stickslip.solve.derivatives import EXACT, Slips, slip_derivatives, slip_grid, slips_on
+from stickslip.solve.derivatives import EXACT, GRIDS, Slips, mean_slips, slip_derivatives, slip_grid
 
 from . import brute_force
 from .derivatives import BASE, build
@@ -86,25 +86,29 @@ def brute_differences(step: float) -> dict[str, np.ndarray]:
 
 
 @functools.cache
-def solved(factor: float = 10.0, refine: int = 2) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def solved(
+    factor: float = 10.0, refine: int = 2, grids: int = GRIDS
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """`table` of the solver's slips and of their derivatives, the steps taken from a run this much tighter."""
-    values, columns = slip_derivatives(build, np.zeros(len(BASE)), END, tolerance=tighter(factor), refine=refine)
+    values, columns = slip_derivatives(
+        build, np.zeros(len(BASE)), END, tolerance=tighter(factor), refine=refine, grids=grids
+    )
     return table(values), table(columns)
 
 
 @functools.cache
-def on_tied_steps(factor: float = 10.0, refine: int = 2):
+def on_tied_steps(factor: float = 10.0, refine: int = 2, grids: int = GRIDS):
     """The slips as a function of theta, on steps tied to the motion."""
     model: Model = build(jnp.zeros(len(BASE)))
     tolerance: Tolerance = tighter(factor)
     trajectory, _ = integrate(model, END, tolerance=tolerance)
-    grid = slip_grid(model, trajectory, refine)
+    grid = slip_grid(model, trajectory, refine, grids)
     exact = jax.tree.map(lambda a: EXACT * a, tolerance)
 
     @jax.jit
     def slips(theta: jax.Array) -> Slips:
         model = build(theta)
-        return slips_on(model, model.rest(), grid, exact, refine)
+        return mean_slips(model, model.rest(), grid, exact, refine)
 
     return slips
 
