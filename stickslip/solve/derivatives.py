@@ -34,6 +34,7 @@ NEWTON = 5  # iterations for their length; it is known to a few per cent before 
 LATE = 0.9  # of the stick's quiet part: where it is cut; the ringing is over, the slip has not begun
 QUIET = 0.02  # of the drive's speed: what the block creeps with before a slip begins
 GIVE = (0.1, 0.015)  # share of a stick's piece and of a slip's piece that is stretched
+MET = 1e-6  # how near the cuts are met: share of full strength, or of the drive's speed
 REST = 1e-3  # of the drive's speed: what the block has left at the cut of an arrest, so that it has not turned yet
 LEAST_DROP = 0.01  # of full strength, by which a slip lowers the spring's force at least
 EXACT = 1e-3  # of the tolerance: to this the steps' equations are solved, so that they are smooth functions
@@ -102,7 +103,8 @@ def slip_derivatives(
         Slips, shape (n,), and their derivatives, shape (p, n).
 
     Raises:
-        SolveError: no slip is complete within the run, or the block does not come to rest after one.
+        SolveError: no slip is complete within the run, the block does not come to rest after one, or the steps are too
+            coarse to meet where it does.
     """
     tolerance = Tolerance(3e-4, 3e-13, 3e-9) if tolerance is None else tolerance
     theta = jnp.asarray(theta, float)
@@ -120,6 +122,8 @@ def slip_derivatives(
         return jax.jvp(slips, (theta,), (direction,))
 
     values, columns = jax.vmap(derivatives)(jnp.eye(theta.size))
+    if not np.isfinite(values.slip).all():
+        raise SolveError("the steps are too coarse to meet an arrest; make the tolerance smaller or refine more")
     return Slips(*(a[0] for a in values)), columns
 
 
@@ -211,8 +215,8 @@ def slips_on(model: Model, state: State, grid: Grid, tolerance: Tolerance, refin
             seen = jax.lax.fori_loop(0, STRETCHED * refine, lambda i, c: _step(model, bank, stepper, c, h), seen)
             lead = model.lead(seen.t)
             share = model.pull(lead - seen.y.x) / model.bank.total_strength
-            rest = REST * (lead - model.lead(seen.t - h)) / h
-            return seen, jnp.where(jnp.isnan(item.level), seen.y.v - rest, share - item.level)
+            speed = (lead - model.lead(seen.t - h)) / h
+            return seen, jnp.where(jnp.isnan(item.level), seen.y.v / speed - REST, share - item.level)
 
         frozen = constant((model, bank, seen))
 
@@ -227,7 +231,8 @@ def slips_on(model: Model, state: State, grid: Grid, tolerance: Tolerance, refin
         # the length follows the gap by the implicit function theorem; the gap itself is zero
         more = -(gap - constant(gap)) / slope
         end = jax.tree.map(lambda a, b: a + b * more, end, change)
-        found = Slips(end.onset, end.arrest, end.end - end.position, end.peak, end.position)
+        missed = jnp.where(abs(gap) < MET, 0.0, jnp.nan)  # a cut that was not met says nothing
+        found = Slips(end.onset, end.arrest, end.end - end.position + missed, end.peak, end.position)
         return (end.y, end.acceleration, end.t), found
 
     _, found = jax.lax.scan(piece, (state, acceleration, zero), grid)

@@ -85,7 +85,7 @@ def _climb(factor, grids, *rungs):
 @pytest.mark.slow
 def test_derivatives_converge_with_the_steps():
     expected = brute_differences(1e-3)
-    coarse, fine = errors(solved(1.0, 1)[1], expected), errors(solved()[1], expected)
+    coarse, fine = errors(solved(1.0, 1, 1)[1], expected), errors(solved()[1], expected)
     assert all(fine[name] < 0.2 * coarse[name] for name in SHOWN)
 
 
@@ -101,6 +101,12 @@ def test_pulling_the_other_way_gives_the_same_derivatives():
     assert np.asarray(values.onset[:1]) == pytest.approx(expected["onset"], rel=1e-9)
     assert -np.asarray(values.slip) == pytest.approx(expected["slip"], rel=1e-9)
     assert np.diff(columns.onset) == pytest.approx(derivatives["recurrence"], rel=1e-6, abs=1e-9)
+
+
+def test_steps_that_miss_an_arrest_are_refused():
+    """Steps of a millisecond at an arrest; shifted, they no longer meet it."""
+    with pytest.raises(SolveError, match="too coarse to meet an arrest"):
+        solved(1.0, 1, GRIDS)
 
 
 def test_a_run_without_a_slip_is_refused():
