@@ -189,6 +189,8 @@ class Trace:
         normal_load: N, if measured.
         resolution: one count of the leading signal, in its unit.
         noise: standard deviation of one sample of the leading signal, in its unit.
+        walk: random walk of the displacement, m/sqrt(s), where somebody stated it.
+        hum: amplitude of the displacement's error at the mains frequency, m, where somebody stated it.
         spring_stiffness: N/m, where this run's spring is known.
         virgin: whether the run starts from a freshly set down, never loaded contact.
         role: ``"train"``, ``"held-out"`` or ``""`` (undecided).
@@ -210,6 +212,8 @@ class Trace:
     normal_load: Array | None = None
     resolution: float | None = None
     noise: float | None = None
+    walk: float = 0.0
+    hum: float = 0.0
     spring_stiffness: float | None = None
     virgin: bool = False
     role: str = ""

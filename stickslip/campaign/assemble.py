@@ -104,6 +104,8 @@ class _Assembly:
             drive=drive,
             resolution=resolution[leading],
             noise=noise[leading],
+            walk=entry.displacement.walk if entry.displacement is not None else 0.0,
+            hum=entry.displacement.hum if entry.displacement is not None else 0.0,
             spring_stiffness=stiffness,
             virgin=entry.virgin,
             role=entry.role or "",

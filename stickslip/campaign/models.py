@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import PurePath
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from ..errors import InputError
 from ..units import factor_to_si, to_si
@@ -56,6 +56,7 @@ class Rig(RigKeys):
     h_rms: Annotated[Measured | None, quantity("m", above=0, unmeasured=True)] = None
 
 
+MOST_SLOW = 1e-3  # of a sensor's walk and hum (SI); above it is a slip of the pen
 LEAST_SIZE = 1e-18  # of a count or a counter's range (SI); below it is a slip of the pen
 
 
@@ -129,9 +130,26 @@ class Channel(_Scaled):
 
 
 class DisplacementChannel(Channel):
-    """Position of the block."""
+    """Position of the block.
+
+    Keys beside those of a channel, for what the record itself does not tell from creep: walk (random walk of the
+    reading, m/sqrt(s)) and hum (amplitude at the mains frequency). A record of the block at rest tells both.
+    """
 
     si: ClassVar[str] = "m"
+    walk: float = 0.0
+    hum: float = 0.0
+
+    @field_validator("walk", "hum", mode="before")
+    @classmethod
+    def _slow(cls, value: Any, info: ValidationInfo) -> float:
+        try:
+            number = to_si(value, "m/s**0.5" if info.field_name == "walk" else "m")
+            if not 0.0 <= number < MOST_SLOW:
+                raise InputError("out of range", value=value, allowed=f"0 to {MOST_SLOW:g}, SI")
+        except InputError as error:
+            raise fault(error) from None
+        return number
 
 
 class VelocityChannel(Channel):

@@ -32,6 +32,7 @@ file = "run1.csv"                      # beside this file; else  outside = true
 time = { column = "time", unit = "s" } # by name or number from 1; or  sampling_rate = "10 kHz"
 # at least one of displacement, velocity, spring_force:
 displacement = { column = "displacement", unit = "um", resolution = "8 nm" }
+#   from a record of the block at rest:  walk = "0.3 nm/s^0.5", hum = "0.3 nm" (amplitude at the mains frequency)
 #   counter that wraps:  wrap = "32.4 um"      counter that was cleared:  resets = ["2.3 s", "5.1 s"]  or  true
 # spring_force = { column = "F", unit = "mN" }
 # normal_load = { column = "N", unit = "N" }

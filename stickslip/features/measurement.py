@@ -21,6 +21,7 @@ from .layout import CREEP_POINTS, HOLD, LEVELS, SETTLE, Layout
 
 SLIP_SAMPLES, LEAST_SAMPLES = 50.0, 8.0  # of a slip, below which samples are put between, if there are so many
 RING_COUNTS = 1.0  # rms of the ringing, in counts, below which nothing is said of it
+MAINS = 50.0  # Hz; at 60 Hz a window averages little more
 RING_RATE = 4.0  # samples a period of the ringing below which nothing is said of it
 
 
@@ -302,7 +303,10 @@ def _cycle(
         # a reading that rests on its counts: neither how loud it rings nor how fast can be told
         valid[s["ring"]] = valid[s["frequency"]] = False
     valid &= np.isfinite(values)
-    sensor = _sensor_noise(values, anchors, layout, noise, count, rate)
+    sensor = np.hypot(
+        _sensor_noise(values, anchors, layout, noise, count, rate),
+        slow_noise(anchors, layout, first, stop, trace.walk, trace.hum),
+    )
     return {
         "start": start,
         "position": position,
@@ -344,6 +348,32 @@ def _sensor_noise(
     out[s["settle"]] = np.hypot(rest, window(0.1 * layout.settling))
     length = float(anchors.hold[1] - anchors.hold[0])
     out[s["hold"]] = [np.hypot(window(0.03 * length), window(0.08 * length))] * len(HOLD)
+    return out
+
+
+def slow_noise(anchors: Anchors, layout: Layout, first: float, stop: float, walk: float, hum: float) -> np.ndarray:
+    """Standard deviation of every feature from a sensor's random walk (m/sqrt(s)) and hum (amplitude, m), SI.
+
+    Displacements are differences of means over two windows: a walk grows with the root of the time between them, a hum
+    counts as far as a window does not average it. ``first`` is when the slip of the cycle begins, ``stop`` its arrest.
+    """
+    s, settling, start = layout.slices(), layout.settling, float(anchors.start)
+    out = np.zeros(layout.size)
+    if walk == 0.0 and hum == 0.0:
+        return out
+    rest, rest_width = start + 1.15 * settling, 0.3 * settling
+
+    def moved(at: np.ndarray, width: Any, since: float = rest, since_width: float = rest_width) -> np.ndarray:
+        swing = hum / np.sqrt(2.0) * np.hypot(np.sinc(MAINS * width), np.sinc(MAINS * since_width))
+        return np.hypot(walk * np.sqrt(np.abs(at - since)), swing)
+
+    creep = anchors.creep
+    out[s["size"]] = moved(np.array([stop]), 0.0)
+    out[s["overshoot"]] = moved(np.array([start]), 0.0)
+    out[s["creep"]] = moved(first - creep, np.maximum(0.12 * creep, 0.25 * layout.shortest))
+    out[s["settle"]] = moved(start + np.array(SETTLE) * settling, 0.1 * settling)
+    begin, length = float(anchors.hold[0]), float(anchors.hold[1] - anchors.hold[0])
+    out[s["hold"]] = moved(begin + np.array(HOLD) * length, 0.08 * length, begin + 0.02 * length, 0.03 * length)
     return out
 
 

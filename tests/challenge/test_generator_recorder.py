@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stickslip.campaign import load_campaign, load_traces
-from stickslip.challenge.generator import Run, make_campaign
+from stickslip.challenge.generator import Run, draw_setup, make_campaign
 from stickslip.challenge.generator.recorder import RANGE, RECORDERS, record
 from stickslip.challenge.generator.sensor import COUNT
 from stickslip.cli import run
@@ -73,6 +74,17 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, dict
     return {kind: (root / kind, make_campaign(root / kind, 9, runs=RUNS, recorder=kind)) for kind in RECORDERS}
 
 
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, dict]]:
+    """The same with a sensor whose samples scatter by less than a count."""
+    root = tmp_path_factory.mktemp("calm")
+    drawn = draw_setup(np.random.default_rng(9))
+    setup = replace(drawn, sensor=replace(drawn.sensor, white=2e-11))
+    return {
+        kind: (root / kind, make_campaign(root / kind, 9, runs=RUNS, recorder=kind, setup=setup)) for kind in RECORDERS
+    }
+
+
 @pytest.mark.parametrize("kind", RECORDERS)
 def test_inspect_finds_and_counts_what_was_done(
     made: dict[str, tuple[Path, dict]], kind: str, capsys: pytest.CaptureFixture
@@ -98,9 +110,9 @@ def _traces(folder: Path) -> dict[str, Trace]:
     return {trace.name: trace for trace in load_traces(load_campaign(folder / "campaign.toml"))}
 
 
-def test_mended_records_are_those_of_a_plain_recorder(made: dict[str, tuple[Path, dict]]) -> None:
-    plain, wrapped, cleared, lost = (_traces(made[kind][0]) for kind in RECORDERS)
-    for true in made["cleared"][1]["runs"]:
+def test_mended_records_are_those_of_a_plain_recorder(calm: dict[str, tuple[Path, dict]]) -> None:
+    plain, wrapped, cleared, lost = (_traces(calm[kind][0]) for kind in RECORDERS)
+    for true in calm["cleared"][1]["runs"]:
         name = true["name"]
         whole = plain[name].displacement
         assert np.allclose(wrapped[name].displacement, whole, rtol=0, atol=1e-3 * COUNT)

@@ -33,12 +33,14 @@ def draw_setup(rng: np.random.Generator, *, points: int = 16384) -> Setup:
         if unstable(rig, 1.8 * FASTEST):
             break
     surface = Surface(hurst=rng.uniform(0.25, 0.4), h_rms=log_uniform(rng, 2.0e-6, 3.0e-6), points=points)
+    # no error of the gain, no drift to speak of, no vibration of the table: those are effects, and hidden as such
     sensor = Sensor(
-        white=log_uniform(rng, 1e-11, 3e-11),
-        walk=log_uniform(rng, 1e-10, 5e-10),
-        drift=rng.normal(0.0, 2e-11),
+        white=log_uniform(rng, 1e-12, 1e-10),
+        walk=log_uniform(rng, 1e-9, 5e-9),
+        drift=rng.normal(0.0, 1e-10),
         clock=rng.normal(0.0, 5e-6),
-        gain=0.0,
+        hum=log_uniform(rng, 5e-10, 5e-9),
+        interpolation=log_uniform(rng, 1e-9, 3e-9),
     )
     return Setup(rig=rig, surface=surface, sensor=sensor)
 

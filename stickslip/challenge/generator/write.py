@@ -40,6 +40,8 @@ def write_campaign(
         f'line_length = "{surface.length * 1e6:.6g} um"',
     ]
     count = f"{setup.sensor.count * 1e9:.6g} nm"
+    # what a user reads off a record of the block at rest
+    slow = f', walk = "{setup.sensor.walk * 1e9:.1g} nm/s^0.5", hum = "{setup.sensor.hum * 1e9:.1g} nm"'
     for run, recorded, pieces in traces:
         read = recorded.counts
         np.savetxt(
@@ -51,7 +53,7 @@ def write_campaign(
             "[[trace]]",
             f'file = "{run.name}.csv"',
             f'sampling_rate = "{rate / 1e3:g} kHz"',
-            f'displacement = {{ column = "counts", unit = "{count}", resolution = "{count}"{more} }}',
+            f'displacement = {{ column = "counts", unit = "{count}", resolution = "{count}"{slow}{more} }}',
         ]
         if pieces:
             told = ", ".join(
