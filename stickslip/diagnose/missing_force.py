@@ -19,7 +19,7 @@ from ..effects.learned import AGES, PLACES, REACH, SPEEDS, LearnedForce
 from ..features.layout import LEVELS
 from ..features.measurement import Measurement
 from ..fit.composition import Composition
-from ..fit.inertial import DISPERSION, Fit, errors, fit
+from ..fit.inertial import MODEL_ERROR, Fit, errors, fit
 from ..fit.parameters import Free
 from ..fit.problem import Problem
 from ..params import specs
@@ -235,7 +235,7 @@ def _covariance(problem: Problem, found: Fit, measurement: Measurement, floor: n
     """
     linear = Linear(problem, found, measurement, floor, measurement.valid & found.use[..., None])
     matrix = linear.basis @ linear.triangle * linear.size
-    matrix[: linear.rows] /= np.sqrt(DISPERSION)
+    matrix[: linear.rows] /= MODEL_ERROR
     at = {f.name: i for i, f in enumerate(found.free)}
     own = [at.get(f"{LearnedForce.tag}.{name}") for name in names()]
     whole = np.linalg.pinv(matrix.T @ matrix)

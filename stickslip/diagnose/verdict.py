@@ -118,7 +118,7 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
     if gain.size:
         error = np.std(gain, ddof=1) / np.sqrt(gain.size) if gain.size > 1 else 0.0
         fall, errors_of_it = (limits.unseen, limits.standard_errors) if ample else (limits.plain, limits.clearly)
-        for_little = "" if ample else " for so little on the fitted ones"
+        for_little = "" if ample or share < limits.gain else " for so little on the fitted ones"
         if candidate.held.score > (1.0 - fall) * base_held.score:
             fails.append(f"the error on unseen cycles does not fall enough{for_little}")
         elif np.mean(gain) < errors_of_it * error:
