@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from stickslip.contact import Bank
@@ -104,5 +104,5 @@ def table(case: Case, limit: float) -> float:
     return chosen.setting
 
 
-def report(limit: float, small: bool = False) -> dict:
-    return {n: table(Case(springs=n, duration=2.0 if small else 5.0), limit) for n in ((64,) if small else (64, 256))}
+def report(limit: float, small: bool = False, springs: Sequence[int] = (64, 256)) -> dict:
+    return {n: table(Case(springs=n, duration=2.0 if small else 5.0), limit) for n in ((64,) if small else springs)}
