@@ -70,5 +70,5 @@ def test_fit_inertial_twice(tmp_path):
 def test_diagnose_twice(tmp_path):
     small_campaign(tmp_path)
     for n in (1, 2):
-        assert subprocess.run(diagnosis(tmp_path, tmp_path / f"out{n}"), capture_output=True).returncode in (0, 3)
+        assert subprocess.run(diagnosis(tmp_path, tmp_path / f"out{n}", 2), capture_output=True).returncode in (0, 3)
     same(tmp_path / "out1", tmp_path / "out2")
