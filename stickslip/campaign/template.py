@@ -74,6 +74,9 @@ def campaign_text(
             if getattr(trace, name) is None:
                 continue
             count = f", resolution = {trace.resolution!r}" if name == trace.leading and trace.resolution else ""
+            if name == "displacement":
+                slow = {"walk": trace.walk, "hum": trace.hum}
+                count += "".join(f", {key} = {_toml(value)}" for key, value in slow.items() if value)
             lines.append(f'{name} = {{ column = "{name}", unit = "{unit}"{count} }}')
         if trace.drive is not None:
             times, positions = trace.drive.times, trace.drive.positions

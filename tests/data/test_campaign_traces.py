@@ -1,6 +1,7 @@
 """From files to traces: units, drives, repairs, order of time, and runs that cannot be."""
 
 import json
+import tomllib
 
 import numpy as np
 import pytest
@@ -359,3 +360,13 @@ def test_a_repair_that_was_asked_for_and_found_nothing_is_said(campaign, run):
         "displacement: no jump of half of 'wrap', so nothing was unwrapped",
         "displacement: 'resets' is true, and the counter never jumps to zero",
     )
+
+
+def test_slow_noise_is_stated_and_written_again(campaign, run, refuses):
+    rows = np.column_stack(run)
+    trace = only(campaign(TIME + X.replace('"um"', '"um", walk = "2 nm/s^0.5", hum = "3 nm"') + DRIVE, rows=rows))
+    assert (trace.walk, trace.hum) == pytest.approx((2e-9, 3e-9))
+    (again,) = tomllib.loads(campaign_text([trace], ["a.csv"], {"mass": 0.0894}))["trace"]
+    assert (again["displacement"]["walk"], again["displacement"]["hum"]) == (trace.walk, trace.hum)
+    wrong = campaign(TIME + X.replace('"um"', '"um", walk = "-2 nm/s^0.5"') + DRIVE, rows=rows)
+    refuses(lambda: only(wrong), "walk", "out of range")
