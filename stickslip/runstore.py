@@ -14,8 +14,9 @@ import os
 import platform
 import shutil
 import sys
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol, TextIO
@@ -23,6 +24,8 @@ from typing import Any, Protocol, TextIO
 from .errors import InputError, RunFolderError
 
 RESULT = "result.json"
+_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
+_DISK = (*_FULL, errno.EROFS, errno.EACCES)
 PACKAGES = ("stickslip", "numpy", "scipy", "jax", "diffrax", "equinox", "xarray")
 
 
@@ -82,9 +85,26 @@ def write_aside(path: Path, content: str | bytes) -> Path:
             stream.flush()
             os.fsync(stream.fileno())
         return aside.replace(path)
+    except OSError as error:  # writing, unlike opening, does not say what was written
+        _remove(aside)
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
     except BaseException:
-        aside.unlink(missing_ok=True)
+        _remove(aside)
         raise
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):  # what went wrong before is what is told
+        path.unlink(missing_ok=True)
+
+
+def is_of_the_disk(error: BaseException | None) -> bool:
+    """Whether an error is there because a disk is full, read-only or shut, and not because of what was to be done."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _DISK:
+            return True
+        error = error.__cause__
+    return False
 
 
 @contextmanager
@@ -107,7 +127,7 @@ def _reserve(path: Path, size: int) -> None:
             try:
                 os.posix_fallocate(stream.fileno(), 0, size)
             except OSError as error:
-                if error.errno in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+                if error.errno in _FULL:
                     raise OSError(error.errno, error.strerror, str(path)) from None
 
 
@@ -129,11 +149,11 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
     name = target.name
     if not name:
         raise RunFolderError("not a name for a run folder", file=target)
-    refuse_existing(target, force)
+    _refuse_existing(target, force)
     partial = target.with_name(f"{name}.partial")
     with _speaking(target), _locked(target):
         _recover(target)
-        refuse_existing(target, force)
+        _refuse_existing(target, force)
         resumed = resume and partial.is_dir()
         if partial.exists() and not resumed:
             shutil.rmtree(partial)
@@ -150,11 +170,24 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
 
 
 def refuse_existing(target: Path, force: bool) -> None:
-    """Say early that a folder cannot be written.
+    """Say early, before long work, that a folder cannot be written.
 
     Raises:
-        RunFolderError: it exists, unless it is an empty folder, or a run folder and ``force``.
+        RunFolderError: it exists, unless it is an empty folder, or a run folder and ``force``; or nobody can write
+            where it would lie.
     """
+    _refuse_existing(target, force)
+    home = next((folder for folder in target.absolute().parents if folder.exists()), target)
+    try:
+        with tempfile.TemporaryFile(dir=home):
+            pass
+    except OSError as error:
+        raise RunFolderError(
+            f"nothing can be written into {home} ({error.strerror or error})", file=target, hint="choose another --out"
+        ) from error
+
+
+def _refuse_existing(target: Path, force: bool) -> None:
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
     if not target.is_dir():

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RunFolderError, StickslipError
-from ..runstore import RESULT, json_text, write_aside
+from ..runstore import RESULT, is_of_the_disk, json_text, write_aside
 
 Diagnosis = Callable[[Path, Path], Any]
 WAIT = 60.0  # s for a process that was given up, but still holds the case, to finish or to end
 
+REFUSED = "refused"  # state of a case that the disk stands in the way of: neither done nor failed
 LIVES = 3  # processes that a case may take down with it in one run
 
 
@@ -61,16 +62,26 @@ def do_case(campaign: str, runs: str, case: str, diagnosis: Diagnosis, session: 
     """Diagnose one case, unless it is done; an error of whatever kind is written down, not raised.
 
     A process that dies writes nothing, so every start is: a case started three times in one ``session`` without coming
-    to an end has failed.
+    to an end has failed. A full or read-only disk is no failure of the case, and could not be written down.
 
     Returns:
-        ``case``, ``state`` ("done" or "failed"), ``message`` and ``seconds``.
+        ``case``, ``state`` ("done", "failed" or "refused", by the disk), ``message`` and ``seconds``.
     """
     from .. import cache
 
     cache.enable()
-    folder = Path(runs)
     began = time.monotonic()
+    try:
+        return _attempt(campaign, Path(runs), case, diagnosis, session, began)
+    except Exception as error:
+        if not is_of_the_disk(error):
+            raise
+        return _told(case, REFUSED, str(error), began)
+
+
+def _attempt(
+    campaign: str, folder: Path, case: str, diagnosis: Diagnosis, session: str, began: float
+) -> dict[str, Any]:
     if not is_done(folder, case):
         if _starts(folder, case, session) >= LIVES:
             error: BaseException = ProcessDiedError(f"the process died {LIVES} times while at this case")
@@ -96,6 +107,8 @@ def do_case(campaign: str, runs: str, case: str, diagnosis: Diagnosis, session: 
             error = fault
         else:
             return _told(case, "done", _verdict(folder / case), began)
+        if is_of_the_disk(error):
+            raise error
         record_failure(folder, case, error, time.monotonic() - began)
         return _told(case, "failed", f"{type(error).__name__}: {error}", began)
 

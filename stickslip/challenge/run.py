@@ -13,11 +13,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, StickslipError
+from ..errors import InputError, RunFolderError, StickslipError
 from ..runstore import alone, json_text, versions, write_aside
 from ..workflow import diagnose_campaign
 from .cluster import cluster
-from .one_case import Diagnosis, do_case, failures, is_done
+from .one_case import REFUSED, Diagnosis, do_case, failures, is_done
 from .seal import CASES, RUNS, case_names, check_seal, digest
 
 PROTOCOL = "protocol.json"
@@ -68,7 +68,7 @@ def run_challenge(
 
     Raises:
         SealError: a campaign is not as sealed. InputError: other settings than before; no scheduler answers.
-        RunFolderError: another run is at this challenge.
+        RunFolderError: another run is at this challenge, or the disk is full or read-only.
         StickslipError: the cluster was lost.
     """
     folder = Path(folder).resolve()
@@ -168,6 +168,12 @@ def _work(
                         f"the cluster was lost while {case} was running; what is finished is kept"
                         "\n  to mend: run the same command again"
                     )
+                if told["state"] == REFUSED:
+                    raise RunFolderError(
+                        f"{case} cannot be written: {told['message'].splitlines()[0]}", file=runs,
+                        hint="make room, or make the folder writable, and run the same command again;"
+                        " what is finished is kept, and the case goes on from its pieces",
+                    )  # fmt: skip
                 del at_work[case]
                 count += 1
                 if tell is not None:

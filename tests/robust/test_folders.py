@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -222,6 +223,140 @@ def test_a_full_disk_under_long_work(tmp_path):
             shutil.rmtree(tmp_path / name)  # a comparison is small
         assert run([*arguments, "--out", str(tmp_path / name)]) in (0, 3)
         assert (tmp_path / name / RESULT).is_file()
+
+
+ON_A_DISK = """
+import contextlib, io, json, sys
+from stickslip.cli import run
+if __name__ == "__main__":
+    found = {}
+    for name, arguments in json.loads(sys.stdin.read()).items():
+        said = io.StringIO()
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+            code = run(arguments)
+        found[name] = [code, said.getvalue()]
+    print(json.dumps(found))
+"""
+
+
+def on_a_disk(disk: Path, make: str, work: dict[str, list[str]]) -> tuple[dict[str, list], list[str]]:
+    """Run commands where a small disk is mounted, out of sight of everyone else; what each said, and what is there."""
+    disk.mkdir()
+    script = f'mount -t tmpfs -o size=1M,mode=777 tmpfs "$0" && {{ {make}; }} && "$1" -c "$2" && ls -A "$0" >&2'
+    if subprocess.run(["unshare", "-Urm", "sh", "-c", 'mount -t tmpfs tmpfs "$0"', str(disk)]).returncode:
+        pytest.skip("the system lets nobody mount a disk of their own here (unshare -Urm)")
+    done = subprocess.run(
+        ["unshare", "-Urm", "sh", "-c", script, str(disk), sys.executable, ON_A_DISK], input=json.dumps(work),
+        capture_output=True, text=True, env={**os.environ, "STICKSLIP_NO_CACHE": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1]), done.stderr.split("\n")[:-1]
+
+
+@pytest.fixture
+def every_command(files, tmp_path):
+    """Everything that writes, into ``tmp_path / "disk"``; what it reads is good, or (``compare``) comes later."""
+    disk = tmp_path / "disk"
+    measured = tmp_path / "measured"
+    measured.mkdir()
+    small_campaign(measured)
+    given = commands(files)
+    for name in ("inspect", "fit", "fit-inertial", "diagnose"):
+        given[name][1] = str(measured / "campaign.toml")
+    out = {name: [*arguments, "--out", str(disk / name)] for name, arguments in given.items()}
+    return {
+        **out,
+        "new": ["new", "scenario", str(disk / "s.toml")],
+        "challenge make": ["challenge", "make", str(disk / "c"), "--cases", "1", "--jobs", "1"],
+        "challenge run": ["challenge", "run", str(disk / "made"), "--workers", "1"],
+    }
+
+
+@pytest.mark.skipif(shutil.which("unshare") is None, reason="needs unshare")
+def test_every_command_on_a_read_only_disk(every_command, tmp_path):
+    made = challenge(tmp_path / "made", 1, small_campaign)
+    found, there = on_a_disk(tmp_path / "disk", f'cp -r {made} "$0" && mount -o remount,ro "$0"', every_command)
+    for name, (code, said) in found.items():
+        assert code == 2, (name, said)
+        assert "Read-only file system" in said, (name, said)
+        assert "Traceback" not in said
+    assert there == ["made"]
+
+
+@pytest.mark.skipif(shutil.which("unshare") is None, reason="needs unshare")
+def test_every_command_on_a_disk_that_is_full(every_command, tmp_path):
+    """Eight kilobytes are left: enough to begin, and for nothing that a command writes."""
+    made = challenge(tmp_path / "made", 1, small_campaign)
+    fill = f'cp -r {made} "$0" && dd if=/dev/zero of="$0/filled" bs=4k 2>/dev/null; truncate -s -8k "$0/filled"'
+    for name in ("fit", "fit-inertial", "diagnose", "compare"):  # `test_a_full_disk_under_long_work`
+        del every_command[name]
+    found, there = on_a_disk(tmp_path / "disk", fill, every_command)
+    for name, (code, said) in found.items():
+        if name != "new" or code:  # the one small file may fit
+            assert code == 2, (name, said)
+            assert "No space left on device" in said, (name, said)
+            assert "Traceback" not in said
+    assert {n for n in there if not n.endswith(".partial")} - {"s.toml"} == {"filled", "made"}
+
+
+CHALLENGE = """
+import resource, sys
+from stickslip.challenge.run import run_challenge
+from stickslip.errors import StickslipError
+from tests.robust.challenges import piecewise
+if __name__ == "__main__":
+    limit = int(sys.argv[2])
+    if limit:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    try:
+        found = run_challenge(sys.argv[1], workers=2, diagnosis=piecewise)
+    except StickslipError as error:
+        print(error, file=sys.stderr)
+        sys.exit(error.exit_code)
+    sys.exit(found["open"] + found["failed"] != 0)
+"""
+
+
+def run_piecewise(folder: Path, limit: int = 0) -> subprocess.Popen:
+    return subprocess.Popen(
+        [sys.executable, "-c", CHALLENGE, str(folder), str(limit)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("limit", [4_000, 12_000], ids=["the pieces do not fit", "the result does not fit"])
+def test_a_challenge_on_a_full_disk_stops_in_words_and_goes_on(tmp_path, limit):
+    """A full disk is no failure of a case: with room again, all are done, as if nothing had been."""
+    folder, whole = (challenge(tmp_path / name, 2) for name in ("full", "whole"))
+    process = run_piecewise(folder, limit)
+    _, said = process.communicate()
+    assert process.returncode == 2, said
+    assert "File too large" in said
+    assert "case-00" in said
+    assert "make room" in said
+    assert "Traceback" not in said
+    assert not list((folder / "runs").glob("*.failures.json"))
+    for path in (folder, whole):
+        process = run_piecewise(path)
+        _, said = process.communicate()
+        assert process.returncode == 0, said
+    for name in ("case-001", "case-002"):
+        totals = [read_result(path / "runs" / name)["total"] for path in (folder, whole)]
+        assert totals[0] == totals[1]
+
+
+def test_a_second_run_of_a_challenge_is_refused_while_the_first_is_at_work(tmp_path, capsys):
+    folder = challenge(tmp_path / "c", 4)
+    first = run_piecewise(folder)
+    while not (folder / "runs" / "protocol.json").exists():
+        assert first.poll() is None
+        time.sleep(0.02)
+    assert run(["challenge", "run", str(folder), "--workers", "1"]) == 2
+    assert "another run is writing this folder" in capsys.readouterr().err
+    _, said = first.communicate()
+    assert first.returncode == 0, said
+    names = [f"case-00{n}" for n in range(1, 5)]
+    assert [p.name for p in sorted((folder / "runs").iterdir()) if p.is_dir()] == names
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
