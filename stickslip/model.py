@@ -236,7 +236,8 @@ class Model(eqx.Module):
         body = jnp.zeros(())
         for e, m in zip(self.effects, memory, strict=True):
             if isinstance(e, Threshold):
-                cap = cap * e.strength(m, motion, contact)
+                factor = e.strength(m, motion, contact)
+                cap = cap * jnp.where(factor < 0.0, 0.0, factor)  # a contact that is pulled open carries nothing
             if isinstance(e, Stiffness):
                 stiffness = stiffness * e.stiffness(m, motion, contact)
             if isinstance(e, BodyForce):

@@ -224,6 +224,22 @@ def test_tilt_takes_the_force_at_the_end_of_a_step(by: str, n: int) -> None:
         before, pull = x, force
 
 
+@pytest.mark.parametrize("others", [0, 1])
+def test_a_contact_that_is_pulled_open_carries_nothing(others: int) -> None:
+    """A pull of twice what takes all load away; two such effects do not make a load again."""
+    effects = tuple(make("tilt", coupling=-0.3, by=by) for by in ("spring", "contact")[: others + 1])
+    model = Model(Block(), BANK, Weakening(ratio=1.0), LoadPoint(jnp.arange(2.0), jnp.arange(2.0)), ())
+    model = eqx.tree_at(lambda m: m.effects, model, effects)
+    bank, state = model.shaped(), model.rest()
+    step = motion(1e-3, 1e-6, 1e-3, 1e-6)
+    pull = 2.0 / 0.3 * float(np.sum(np.asarray(BANK.strength)))
+    contact = Contact(state.force, bank.stiffness, bank.strength, jnp.asarray(0.0), state.cap, jnp.asarray(0.1))
+    far = step._replace(load_point=jnp.asarray(1e-6 + pull / float(model.block.spring_stiffness)))
+    state, forces = model.advance(state, bank, contact, far)
+    assert np.all(np.asarray(state.cap) == 0.0)
+    assert float(forces.contact) == 0.0
+
+
 def test_tilt_by_the_springs_force_sets_the_breakaway() -> None:
     """Slow loading at constant friction: F = F_s (1 + kappa F/F_s), hence F = (F_s + c v)/(1 - kappa) with damping."""
     for kappa in (-0.2, 0.1):
