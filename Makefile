@@ -46,7 +46,7 @@ test-newest:
 	.venv-newest/bin/python -m pytest -n $(WORKERS) $(TESTS)
 
 fuzz: $(STAMP)
-	$(BIN)/python -m tests.robust.fuzz --number 100000
+	$(BIN)/python -m tests.robust.fuzz --number 100000 --commands
 
 docs: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]' $(PLAIN)

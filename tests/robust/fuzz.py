@@ -1,7 +1,9 @@
 """Fuzzing of everything that reads a file: mutations of valid files, and random bytes.
 
 Only the program's own errors may come out. ``python -m tests.robust.fuzz --number 100000`` prints what else did. Input
-``n`` of a seed is always the same: ``--first n --number 1 --keep FOLDER`` keeps it.
+``n`` of a seed is always the same: ``--first n --number 1 --keep FOLDER`` keeps it. With ``--commands`` what is refused
+goes through a command of the program as well, which must end with 2, in words, and leave no file; of what can be read
+every fiftieth is inspected to the end.
 
 Inputs are read in child processes of many inputs each, with bounded memory: compiled libraries crash and hang too.
 The program's own precaution against that (`stickslip.readers.guard`) costs a process for each file and is switched off
@@ -12,8 +14,10 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
+import io
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,7 +27,7 @@ import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -188,7 +192,45 @@ def try_one(folder: Path, name: str, content: bytes) -> tuple[str, str]:
     return ("fault", f"warned: {spoken[0]}") if spoken else outcome
 
 
-def child(seed: int, first: int, number: int, state: Path, guarded: bool) -> None:
+COMMANDS = {
+    "scenario": (["simulate"], ["creep"]),
+    "campaign": (["inspect"], ["fit", "--model", "static"], ["fit", "--model", "inertial"], ["diagnose"]),
+}
+
+
+def command_of(name: str, number: int) -> list[str]:
+    """The command that an input goes through."""
+    kind = "scenario" if name.startswith("scenario") else "campaign"
+    first, *more = COMMANDS[kind][number % len(COMMANDS[kind])]
+    return [first, name if name.endswith(".toml") else "of-one.toml", *more]
+
+
+def try_command(folder: Path, arguments: list[str], refused: bool) -> str:
+    """Run a command on what `try_one` has left in the folder; what was wrong with its end, if anything."""
+    from stickslip.cli import run
+
+    before = {p.name for p in folder.iterdir()}
+    said = io.StringIO()
+    command, name, *more = arguments
+    try:
+        with patience(4 * PATIENCE), redirect_stderr(said), redirect_stdout(io.StringIO()):
+            code = run([command, str(folder / name), *more, "--out", str(folder / "out")])
+    except (Exception, Hang) as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        return f"{command}: {type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {str(error)[:120]}"
+    words = said.getvalue()
+    left = {p.name for p in folder.iterdir()} - before
+    if "Traceback" in words:
+        return f"{command}: a traceback: {words[-200:]}"
+    if code == 2 and (left or not words.startswith("stickslip: ")):
+        return f"{command}: refused, and left {sorted(left)}, said {words[:100]!r}"
+    if (refused and code != 2) or code not in (0, 2, 3):
+        return f"{command}: ended with {code}: {words[:100]!r}"
+    shutil.rmtree(folder / "out", ignore_errors=True)
+    return ""
+
+
+def child(seed: int, first: int, number: int, state: Path, guarded: bool, commands: bool) -> None:
     """Try inputs one after the other; every outcome is one line of JSON on stdout."""
     import resource
 
@@ -204,17 +246,34 @@ def child(seed: int, first: int, number: int, state: Path, guarded: bool) -> Non
             state.write_text(str(n))
             outcome, what = try_one(Path(folder), *inputs(seed, n))
             counts[outcome] += 1
+            if commands and (outcome == "refused" or (outcome == "read" and n % 50 == 0)):
+                name = inputs(seed, n)[0]
+                arguments = command_of(name, n // 2)
+                if outcome == "read":
+                    arguments = ["inspect", arguments[1]]
+                if outcome == "refused" or not name.startswith("scenario"):
+                    counts[f"through {arguments[0]}"] += 1
+                    what = try_command(Path(folder), arguments, outcome == "refused")
+                    outcome = "fault" if what else outcome
             if outcome == "fault":
                 print(json.dumps({"input": n, "what": what}), flush=True)
     print(json.dumps(dict(counts)), flush=True)
 
 
 def _child(
-    seed: int, first: int, number: int, state: Path, guarded: bool, counts: Counter[str], faults: dict[str, list[int]]
+    seed: int,
+    first: int,
+    number: int,
+    state: Path,
+    guarded: bool,
+    counts: Counter[str],
+    faults: dict[str, list[int]],
+    commands: bool = False,
 ) -> tuple[int, str]:
     """Have a process try inputs; its exit code and the end of what it said."""
     command = [sys.executable, "-m", "tests.robust.fuzz", "--child", str(state)]
     command += ["--seed", str(seed), "--first", str(first), "--number", str(number), *["--guarded"] * guarded]
+    command += ["--commands"] * commands
     done = subprocess.run(command, capture_output=True, text=True, errors="replace")
     for line in done.stdout.splitlines():
         try:
@@ -228,7 +287,9 @@ def _child(
     return done.returncode, done.stderr.strip()[-300:]
 
 
-def campaign(seed: int, first: int, number: int, seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
+def campaign(
+    seed: int, first: int, number: int, seconds: float, tell: Callable[[str], None], commands: bool = False
+) -> dict[str, Any]:
     """Try many inputs in children; what came out, by kind."""
     counts: Counter[str] = Counter()
     faults: dict[str, list[int]] = {}
@@ -237,7 +298,7 @@ def campaign(seed: int, first: int, number: int, seconds: float, tell: Callable[
         state = Path(folder) / "state"
         while n < first + number and crashes < MOST_CRASHES and time.monotonic() - began < seconds:
             size = min(CHUNK, first + number - n)
-            code, words = _child(seed, n, size, state, False, counts, faults)
+            code, words = _child(seed, n, size, state, False, counts, faults, commands)
             if code == 0:
                 n += size
             else:
@@ -262,10 +323,11 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
     parser.add_argument("--keep", type=Path, help="write the inputs into this folder instead of trying them")
     parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--commands", action="store_true", help="what is refused goes through a command as well")
     parser.add_argument("--guarded", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child is not None:
-        child(options.seed, options.first, options.number, options.child, options.guarded)
+        child(options.seed, options.first, options.number, options.child, options.guarded, options.commands)
         return 0
     if options.keep is not None:
         options.keep.mkdir(parents=True, exist_ok=True)
@@ -273,7 +335,7 @@ def main() -> int:
             name, content = inputs(options.seed, n)
             (options.keep / f"{n}-{name}").write_bytes(content)
         return 0
-    found = campaign(options.seed, options.first, options.number, options.seconds, print)
+    found = campaign(options.seed, options.first, options.number, options.seconds, print, options.commands)
     for what, where in sorted(found["faults"].items(), key=lambda item: -len(item[1])):
         print(f"{len(where)} x {what}\n    inputs {where[:6]}")
     print(f"{found['inputs']} inputs, seed {found['seed']}: {found['counts']}")

@@ -39,11 +39,13 @@ def test_every_input_can_be_made_again():
 
 def test_damaged_files_are_read_or_refused():
     """In another process, because compiled readers crash; none of these kinds of fault may come out."""
-    found = campaign(seed=7, first=0, number=500, seconds=240.0, tell=print)
+    found = campaign(seed=7, first=0, number=500, seconds=240.0, tell=print, commands=True)
     assert found["faults"] == {}
     assert found["inputs"] == 500
     assert found["counts"]["refused"] > 300
     assert found["counts"]["read"] > 30
+    for command in ("inspect", "simulate", "creep", "fit", "diagnose"):
+        assert found["counts"][f"through {command}"] > 30
 
 
 @pytest.mark.parametrize("name", ["5.mat", "4.nc"])
