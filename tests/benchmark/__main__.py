@@ -57,7 +57,7 @@ def main() -> None:
     parser.add_argument(
         "--limit", type=float, default=60.0, help="processor seconds for each run of a peer among the solvers"
     )
-    parser.add_argument("--springs", type=int, nargs="+", default=(64, 256), help="numbers of springs of the solvers")
+    parser.add_argument("--springs", type=int, nargs="+", help="numbers of springs of the solvers")
     parser.add_argument("--sets", type=int, default=1000, help="parameter sets of the batches")
     parser.add_argument("--small", action="store_true", help="small sizes, to see that it runs; writes no files")
     parser.add_argument("--only", choices=PARTS, help="sizes: springs, drive and events")
@@ -73,7 +73,7 @@ def main() -> None:
     if only in (None, "solvers"):
         from . import solvers
 
-        solvers.report(arguments.limit, small, arguments.springs)
+        solvers.report(arguments.limit, small, arguments.springs or solvers.SPRINGS)
     sizes_wanted = [part for part in ("springs", "drive", "events") if only in (None, "sizes", part)]
     if sizes_wanted:
         from . import sizes
