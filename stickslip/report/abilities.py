@@ -42,7 +42,9 @@ def abilities(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) ->
     if not slipping:
         cannot.append("No trace holds a slip: nothing but creep or sliding can be looked at, no dynamic model fitted.")
     shapes = [event_shapes(t, s) for t, s in slipping]
-    verdicts = [judge(pairs, slipping) for judge in (_velocities, _pace, _events, _holds, _virgin, _signals)]
+    verdicts = [
+        judge(pairs, slipping) for judge in (_velocities, _pace, _events, _holds, _virgin, _signals, _slow_noise)
+    ]
     verdicts += [judge(slipping, shapes) for judge in (_slip, _overshoot, _ringing)]
     verdicts += [judge(pairs, slipping) for judge in (_creep, _ramps, _unseen)]
     for good, bad in verdicts:
@@ -101,6 +103,24 @@ def _events(pairs: Pairs, slipping: Pairs) -> Verdict:
     if odd and slipping:
         bad.append(f"No regular stick-slip in {_some(odd)}.")
     return good, bad
+
+
+def _slow_noise(pairs: Pairs, slipping: Pairs) -> Verdict:
+    """A reading that wanders looks like creep; only a record of the block at rest tells the two apart."""
+    measured = [t for t, _ in slipping if t.displacement is not None]
+    stated = [t for t in measured if t.walk or t.hum]
+    silent = [t.name for t in measured if not (t.walk or t.hum)]
+    kinds = sorted({(t.walk, t.hum) for t in stated})
+    good = [
+        f"Slow noise of the sensor is known in {_some([t.name for t in stated if (t.walk, t.hum) == (walk, hum)])}: "
+        f"{walk * 1e9:.3g} nm/s^0.5 at random, {hum * 1e9:.3g} nm of hum."
+        for walk, hum in kinds
+    ]
+    bad = [
+        f"Slow noise of the sensor is not stated in {_some(silent)}: a reading that wanders or hums by nanometres would "
+        "be taken for creep. Record the block at rest, and give walk and hum beside the displacement's column."
+    ]
+    return good, bad if silent else []
 
 
 def _holds(pairs: Pairs, slipping: Pairs) -> Verdict:

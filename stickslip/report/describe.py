@@ -150,6 +150,8 @@ def describe_trace(trace: Trace, found: Segmentation) -> dict[str, Any]:
         "sampling_rate": trace.sampling_rate,
         "resolution": trace.resolution,
         "noise": trace.noise,
+        "walk": trace.walk,
+        "hum": trace.hum,
         "drive_velocity": trace.drive_velocity,
         "spring_stiffness": trace.spring_stiffness,
         "virgin": trace.virgin,

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.report.abilities import _pace
+from stickslip.report.abilities import _pace, _slow_noise
 from stickslip.trace import Drive
 
 
@@ -38,3 +38,16 @@ def test_a_drive_that_goes_back_is_no_fault(turns):
     trace = SimpleNamespace(name="back", time=time, displacement=x, drive=drive)
     events = [SimpleNamespace(t_onset=0.9 * k - 0.01) for k in range(1, 10)]
     assert _pace([], [(trace, SimpleNamespace(events=events))]) == ([], [])
+
+
+def test_slow_noise_is_asked_for_where_it_is_not_stated():
+    def trace(name, walk=0.0, hum=0.0, displacement=True):
+        return SimpleNamespace(name=name, walk=walk, hum=hum, displacement=np.zeros(3) if displacement else None), None
+
+    silent, stated, force = trace("a"), trace("b", 2e-9, 3e-9), trace("c", displacement=False)
+    good, bad = _slow_noise([], [silent, stated, force])
+    assert good == ["Slow noise of the sensor is known in b: 2 nm/s^0.5 at random, 3 nm of hum."]
+    assert len(bad) == 1
+    assert "not stated in a:" in bad[0]
+    assert _slow_noise([], [stated]) == (good, [])
+    assert _slow_noise([], [force]) == ([], [])
