@@ -117,8 +117,8 @@ def _slow_noise(pairs: Pairs, slipping: Pairs) -> Verdict:
         for walk, hum in kinds
     ]
     bad = [
-        f"Slow noise of the sensor is not stated in {_some(silent)}: a reading that wanders or hums by nanometres would "
-        "be taken for creep. Record the block at rest, and give walk and hum beside the displacement's column."
+        f"Slow noise of the sensor is not stated in {_some(silent)}: a reading that wanders or hums by nanometres "
+        "would be taken for creep. Record the block at rest, and give walk and hum beside the displacement's column."
     ]
     return good, bad if silent else []
 
