@@ -28,6 +28,7 @@ def make_challenge(
     seed: int = 0,
     *,
     own: Sequence[Case] | None = None,
+    grouped: bool = False,
     jobs: int | None = None,
     tell: Tell | None = None,
 ) -> str:
@@ -39,6 +40,7 @@ def make_challenge(
         folder: must not exist, or be empty.
         cases, seed: see :func:`stickslip.challenge.mix.plan`.
         own: cases of one's own in place of the mix.
+        grouped: join springs of about the same threshold: ten times faster, slips a little beside (docs/challenge).
         jobs: parallel processes; default the number of cores.
         tell: told the case that was finished and the share done.
 
@@ -56,7 +58,7 @@ def make_challenge(
     _need_numba()
     planned = plan(cases, seed) if own is None else list(own)
     with open_run(folder, resume=True) as run:
-        made = _make_all(run, planned, seed, os.cpu_count() or 1 if jobs is None else jobs, tell)
+        made = _make_all(run, planned, seed, grouped, os.cpu_count() or 1 if jobs is None else jobs, tell)
         truth = {
             "schema": 1,
             "seed": seed,
@@ -82,14 +84,16 @@ def _need_numba() -> None:
         ) from None
 
 
-def _make_all(run: Run, planned: list[Case], seed: int, jobs: int, tell: Tell | None) -> dict[str, dict[str, Any]]:
+def _make_all(
+    run: Run, planned: list[Case], seed: int, grouped: bool, jobs: int, tell: Tell | None
+) -> dict[str, dict[str, Any]]:
     from joblib import Parallel, delayed
 
-    made = {case.name: kept for case in planned if (kept := _kept(run, case)) is not None}
+    made = {case.name: kept for case in planned if (kept := _kept(run, case, grouped)) is not None}
     work = [(number, case) for number, case in enumerate(planned, start=1) if case.name not in made]
     root = str(run.folder)
     results = Parallel(n_jobs=max(1, min(jobs, len(work) or 1)), return_as="generator_unordered")(
-        delayed(make_case)(root, case, seed, number) for number, case in work
+        delayed(make_case)(root, case, seed, number, grouped) for number, case in work
     )
     for truth in results:
         made[truth["name"]] = truth
@@ -99,20 +103,20 @@ def _make_all(run: Run, planned: list[Case], seed: int, jobs: int, tell: Tell | 
     return made
 
 
-def _fingerprint(case: Case) -> str:
-    return hashlib.sha256(json_text(case.plain()).encode()).hexdigest()
+def _fingerprint(case: Case, grouped: bool) -> str:
+    return hashlib.sha256(json_text({**case.plain(), "grouped": grouped}).encode()).hexdigest()
 
 
-def _kept(run: Run, case: Case) -> dict[str, Any] | None:
+def _kept(run: Run, case: Case, grouped: bool) -> dict[str, Any] | None:
     path = run.path(f"{MADE}/{case.name}.json")
     try:
         truth: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return truth if truth.get("plan") == _fingerprint(case) else None
+    return truth if truth.get("plan") == _fingerprint(case, grouped) else None
 
 
-def make_case(root: str, case: Case, seed: int, number: int) -> dict[str, Any]:
+def make_case(root: str, case: Case, seed: int, number: int, grouped: bool = False) -> dict[str, Any]:
     """Simulate one case into ``root/cases/NAME``; returns its truth.
 
     A rig that does not stick and slip is drawn again, from the fourth attempt on with effects half as large; how often
@@ -140,6 +144,7 @@ def make_case(root: str, case: Case, seed: int, number: int) -> dict[str, Any]:
                 virgin=tried.virgin,
                 spring_known=tried.spring_known,
                 recorder=tried.recorder,
+                grouped=grouped,
             )
         except StickslipError as error:
             reason = str(error)
@@ -147,6 +152,6 @@ def make_case(root: str, case: Case, seed: int, number: int) -> dict[str, Any]:
         for effect, hidden in zip(truth["effects"], tried.hidden, strict=True):
             effect["multiple"] = hidden.multiple
         circumstances = {"velocities": list(tried.velocities), "holds": list(tried.holds)}
-        head = {"name": case.name, "kind": case.kind, "plan": _fingerprint(case), "attempts": attempt + 1}
+        head = {"name": case.name, "kind": case.kind, "plan": _fingerprint(case, grouped), "attempts": attempt + 1}
         return {**head, **circumstances, **truth}
     raise StickslipError(f"{case.name} could not be made in {ATTEMPTS} attempts: {reason}")

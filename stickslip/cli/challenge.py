@@ -22,7 +22,10 @@ challenge = App(
 
 
 @challenge.command
-def make(folder: Path, *, cases: int = 100, seed: int = 0, jobs: int | None = None) -> int:
+def make(
+    folder: Path, *, cases: int = 100, seed: int = 0, grouped: Annotated[bool, Parameter(negative="")] = False,
+    jobs: int | None = None,
+) -> int:  # fmt: skip
     """Make campaigns with hidden effects; the truth is sealed in a file apart.
 
     Parameters
@@ -33,13 +36,16 @@ def make(folder: Path, *, cases: int = 100, seed: int = 0, jobs: int | None = No
         How many: 30 % with nothing missing, 45 % with one effect, 15 % with two, 10 % outside the catalogue.
     seed:
         Fixes every file.
+    grouped:
+        Join springs of about the same threshold, instead of moving every one of them: ten times faster, not quite the
+        same slips.
     jobs:
         Parallel processes; default one a core.
     """
     from ..challenge.make import make_challenge
 
     with working("making campaigns") as tell:
-        seal = make_challenge(folder, cases, seed, jobs=jobs, tell=tell)
+        seal = make_challenge(folder, cases, seed, grouped=grouped, jobs=jobs, tell=tell)
     print(f"{cases} campaigns in {folder}\nseal {seal}")
     return 0
 

@@ -135,7 +135,7 @@ def test_runs_of_a_case() -> None:
 
 
 def test_making_is_deterministic_sealed_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    seal = make_challenge(tmp_path / "first", 3, 11, jobs=1)
+    seal = make_challenge(tmp_path / "first", 3, 11, grouped=True, jobs=1)
     first = tmp_path / "first"
     assert digest(first) == seal
     names = sorted(path.name for path in (first / CASES).iterdir())
@@ -149,18 +149,18 @@ def test_making_is_deterministic_sealed_and_resumed(tmp_path: Path, monkeypatch:
     made: list[str] = []
     real = module.make_case
 
-    def stopping(root: str, case: Case, seed: int, number: int) -> dict:
+    def stopping(root: str, case: Case, seed: int, number: int, grouped: bool) -> dict:
         if made and made[0] == "stop":
             raise KeyboardInterrupt
         made.append(case.name)
-        found = real(root, case, seed, number)
+        found = real(root, case, seed, number, grouped)
         if len(made) == 1:
             made.insert(0, "stop")
         return found
 
     monkeypatch.setattr(module, "make_case", stopping)
     with pytest.raises(KeyboardInterrupt):
-        make_challenge(tmp_path / "second", 3, 11, jobs=1)
+        make_challenge(tmp_path / "second", 3, 11, grouped=True, jobs=1)
     assert not (tmp_path / "second").exists()
     made.clear()
     made.append("go on")
@@ -168,7 +168,7 @@ def test_making_is_deterministic_sealed_and_resumed(tmp_path: Path, monkeypatch:
     stray = tmp_path / "second.partial" / CASES / "case-009"
     stray.mkdir()
     (stray / "campaign.toml").write_text("half")
-    assert make_challenge(tmp_path / "second", 3, 11, jobs=1) == seal
+    assert make_challenge(tmp_path / "second", 3, 11, grouped=True, jobs=1) == seal
     assert made == ["go on", "case-002", "case-003"]
     for name in files:
         assert (tmp_path / "second" / name).read_bytes() == (first / name).read_bytes()
@@ -202,7 +202,7 @@ def test_a_rig_that_does_not_slip_is_drawn_again(tmp_path: Path, monkeypatch: py
 
     monkeypatch.setattr(generator, "make_campaign", failing)
     case = next(c for c in plan(40, 1) if c.kind == "one" and c.hidden[0].multiple > 5)
-    truth = make_case(str(tmp_path), case, 1, 2)
+    truth = make_case(str(tmp_path), case, 1, 2, True)
     size, multiple = case.hidden[0].amplitude, case.hidden[0].multiple
     assert [a / size for _, a in tried] == pytest.approx([1, 1, 1, 0.5, 0.25])
     assert len({seed for seed, _ in tried}) == 5
@@ -210,7 +210,7 @@ def test_a_rig_that_does_not_slip_is_drawn_again(tmp_path: Path, monkeypatch: py
     assert truth["effects"][0]["multiple"] == pytest.approx(multiple / 4)
     monkeypatch.setattr(generator, "make_campaign", lambda *a, **k: (_ for _ in ()).throw(InputError("no slips")))
     with pytest.raises(StickslipError, match="no slips"):
-        make_case(str(tmp_path), case, 1, 2)
+        make_case(str(tmp_path), case, 1, 2, True)
 
 
 def test_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -232,7 +232,7 @@ def test_a_worker_killed_on_the_way_loses_nothing(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_real_diagnosis_from_making_to_the_score(tmp_path: Path) -> None:
     folder = str(tmp_path / "c")
-    assert run(["challenge", "make", folder, "--cases", "2", "--seed", "3", "--jobs", "1"]) == 0
+    assert run(["challenge", "make", folder, "--cases", "2", "--seed", "3", "--grouped", "--jobs", "1"]) == 0
     settings = ["--workers", "1", "--candidates", "contact-ageing", "--max-effects", "1"]
     assert run(["challenge", "run", folder, *settings]) == 0
     for name in ("case-001", "case-002"):

@@ -175,3 +175,16 @@ def test_generator_shares_nothing_with_the_model() -> None:
             for name in names:
                 allowed = ("stickslip.challenge.generator", "stickslip.errors", "stickslip.units")
                 assert not name.startswith("stickslip") or name.startswith(allowed), f"{path.name} imports {name}"
+
+
+def test_every_spring_by_itself_or_in_groups(tmp_path: Path) -> None:
+    """The truth says which; on small lines both have the same slips, to a thousandth of the time between them."""
+    found = {}
+    for grouped in (True, False):
+        setup = draw_setup(np.random.default_rng(4), points=2048)
+        found[grouped] = make_campaign(tmp_path / str(grouped), 4, runs=SHORT[-1:], setup=setup, grouped=grouped)
+    assert [found[g]["elements_a_contact"] for g in (True, False)] == [128, "every spring"]
+    onsets = [np.array(found[g]["runs"][0]["onset"]) for g in (True, False)]
+    assert onsets[0].size == onsets[1].size > 2
+    assert not np.array_equal(*onsets)
+    assert np.diff(onsets[0]) == pytest.approx(np.diff(onsets[1]), rel=1e-3)

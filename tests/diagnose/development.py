@@ -133,7 +133,12 @@ def main() -> None:
     options = parser.parse_args()
     folder = options.folder
     if not folder.exists():
-        print("seal", make_challenge(folder, seed=options.seed, own=cases(options.part, options.seed, options.number)))
+        print(
+            "seal",
+            make_challenge(
+                folder, seed=options.seed, own=cases(options.part, options.seed, options.number), grouped=True
+            ),
+        )
     read_seal(folder)
     diagnosis = None
     if options.part == "left-out":

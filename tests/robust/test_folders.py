@@ -267,7 +267,7 @@ def every_command(files, tmp_path):
     return {
         **out,
         "new": ["new", "scenario", str(disk / "s.toml")],
-        "challenge make": ["challenge", "make", str(disk / "c"), "--cases", "1", "--jobs", "1"],
+        "challenge make": ["challenge", "make", str(disk / "c"), "--cases", "1", "--grouped", "--jobs", "1"],
         "challenge run": ["challenge", "run", str(disk / "made"), "--workers", "1"],
     }
 

@@ -26,6 +26,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--not-virgin", action="store_true", help="records start after two slips")
     parser.add_argument("--spring", choices=("known", "unknown"), help="default: drawn")
     parser.add_argument("--recorder", choices=RECORDERS, default="plain", help="what happens to the counts")
+    parser.add_argument("--every-spring", action="store_true", help="no groups of springs; takes ten times as long")
     parser.add_argument("--dt", type=float, default=2e-5, help="small step, s")
     parser.add_argument("--truth", type=Path, help="where to write the truth (kept apart from the campaign)")
     given = parser.parse_args(arguments)
@@ -39,6 +40,7 @@ def main(arguments: list[str] | None = None) -> int:
             spring_known=None if given.spring is None else given.spring == "known",
             dt=given.dt,
             recorder=given.recorder,
+            grouped=not given.every_spring,
         )
     except StickslipError as error:
         print(error, file=sys.stderr)

@@ -59,6 +59,7 @@ def make_campaign(
     quiet: bool = True,
     setup: Setup | None = None,
     recorder: str = "plain",
+    grouped: bool = True,
     title: str = "Steel block on V-grooves",
 ) -> dict[str, Any]:
     """Simulate a campaign with hidden effects and write ``campaign.toml`` and one CSV of counts per run.
@@ -72,6 +73,8 @@ def make_campaign(
         spring_known: whether the file gives the spring's stiffness; None: in every other case.
         setup: the apparatus; None draws one.
         recorder: what happens to the counts of every run; see ``recorder.record``.
+        grouped: join springs of about the same threshold into one element, as many as the setup says; else every
+            spring that touches is one, which takes ten times as long.
 
     Returns:
         The truth, ready for JSON: rig, surface, sensor, effects with their inner parameters, events of every run.
@@ -91,6 +94,8 @@ def make_campaign(
     base_mass = setup.rig.mass
     seeds = rng.integers(2**31, size=3)  # lines and noise do not change with what is hidden
     hidden = [hide(setup, tag, amplitude, rng, *form) for tag, amplitude, *form in effects]
+    if not grouped:
+        setup.groups = None
     noise = np.random.default_rng(seeds[1])
     faults = np.random.default_rng([seed, 1])  # so that counts do not change with what the recorder makes of them
     traces, listed = [], []
@@ -121,6 +126,7 @@ def make_campaign(
         "surface": asdict(setup.surface),
         "sensor": asdict(setup.sensor),
         "recorder": recorder,
+        "elements_a_contact": setup.groups or "every spring",
         "runs": listed,
     }
     plain: dict[str, Any] = json.loads(json.dumps(truth))  # as it will be read again
