@@ -36,16 +36,20 @@ def command_line() -> None:
     head("command", "processor s", "wall s")
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "XDG_CACHE_HOME": folder}
-        simulate = ["simulate", "scenarios/grzemba2014.toml", "--out", f"{folder}/out", "--force"]
+        simulate = ["simulate", "scenarios/grzemba2014.toml"]
+        kept = [*simulate, "--out", f"{folder}/out", "--force"]
         for name, arguments, repeats in (
+            ("python, a sum of 10 million numbers", [], 3),
             ("stickslip --help", ["--help"], 5),
-            ("stickslip simulate scenarios/grzemba2014.toml, cold", simulate, 1),
-            ("the same with the compilation cache", simulate, 3),
+            ("stickslip simulate scenarios/grzemba2014.toml, nothing compiled before", simulate, 1),
+            ("the same again", simulate, 5),
+            ("with --out: pictures, arrays, trace", kept, 5),
         ):
+            command = [program, *arguments] if arguments else [sys.executable, "-c", "sum(range(10_000_000))"]
             cpu, wall = [], []
             for _ in range(repeats):
                 before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-                subprocess.run([program, *arguments], cwd=ROOT, env=environment, capture_output=True, check=True)
+                subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, check=True)
                 after = resource.getrusage(resource.RUSAGE_CHILDREN)
                 wall.append(time.perf_counter() - start)
                 cpu.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
