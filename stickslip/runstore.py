@@ -143,9 +143,7 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
     Raises:
         RunFolderError: it exists, another run is writing it, or the disk is read-only or full.
     """
-    target = Path(target)
-    if target.is_symlink() or target.name in ("", "..", "."):
-        target = target.resolve()  # the folder itself is what is locked and written
+    target = _itself(Path(target))
     name = target.name
     if not name:
         raise RunFolderError("not a name for a run folder", file=target)
@@ -176,6 +174,7 @@ def refuse_existing(target: Path, force: bool) -> None:
         RunFolderError: it exists, unless it is an empty folder, or a run folder and ``force``; or nobody can write
             where it would lie.
     """
+    target = _itself(target)
     _refuse_existing(target, force)
     home = next((folder for folder in target.absolute().parents if folder.exists()), target)
     try:
@@ -183,8 +182,17 @@ def refuse_existing(target: Path, force: bool) -> None:
             pass
     except OSError as error:
         raise RunFolderError(
-            f"nothing can be written into {home} ({error.strerror or error})", file=target, hint="choose another --out"
-        ) from error
+            f"the run folder cannot be written: nothing can be, into {home} ({error.strerror or error})",
+            file=target, hint="choose another --out",
+        ) from error  # fmt: skip
+    if _lock(target).exists():  # of a run that is at work, or of one that was killed
+        with _locked(target):
+            pass
+
+
+def _itself(target: Path) -> Path:
+    """The folder that is locked and written: what a link leads to, and a name where there is none."""
+    return target.resolve() if target.is_symlink() or target.name in ("", "..", ".") else target
 
 
 def _refuse_existing(target: Path, force: bool) -> None:
@@ -242,11 +250,15 @@ def _speaking(target: Path) -> Iterator[None]:
         ) from error
 
 
+def _lock(target: Path) -> Path:
+    return target.with_name(f".{target.name}.lock")
+
+
 @contextmanager
 def _locked(target: Path) -> Iterator[None]:
     """Hold the lock of a run folder; the system lets go of it when the process ends, however it ends."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    path = target.with_name(f".{target.name}.lock")
+    path = _lock(target)
     stream = path.open("a+", encoding="utf-8")
     try:
         if not _take(stream):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from ..challenge.run import Progress
 
 UNRESOLVED = 3
+SCORE = ("score.json", "score.txt", "confusion.png", "confusion-by-amplitude.png", "amplitude.png")
 challenge = App(
     name="challenge",
     help="Test the diagnosis blindly on campaigns with a hidden effect: make, run, score.",
@@ -150,13 +152,14 @@ def score(
     from ..errors import RunFolderError
     from ..runstore import json_text
 
-    if (folder / "score" / "score.json").exists() and not force:
-        raise RunFolderError(
-            "there is a score already", file=folder / "score", hint="move it away, or replace it with --force"
-        )
-
+    out = folder / "score"
+    there = {path.name for path in out.iterdir()} if out.is_dir() else {""} if out.exists() else set()
+    if there - set(SCORE):
+        raise RunFolderError("there is something else under the score's name", file=out, hint="move it away")
+    if there and not force:
+        raise RunFolderError("there is a score already", file=out, hint="move it away, or replace it with --force")
     found = score_challenge(folder, expected=seal)
-    text = _write(folder / "score", found)
+    text = _write(out, found)
     print(json_text(found) if json else text, end="")
     return 0 if not found["not_run"] else UNRESOLVED
 
@@ -169,13 +172,19 @@ def _write(out: Path, found: dict[str, Any]) -> str:
     from ..runstore import json_text, write_aside
 
     text = score_text(found)
+    aside = out.with_name(f".{out.name}.part")
     try:
-        out.mkdir(exist_ok=True)
-        write_aside(out / "score.json", json_text(found) + "\n")
-        write_aside(out / "score.txt", text)
-        save(confusion_figure(found), out / "confusion.png")
-        save(confusion_by_amplitude_figure(found), out / "confusion-by-amplitude.png")
-        save(amplitude_figure(found), out / "amplitude.png")
+        shutil.rmtree(aside, ignore_errors=True)
+        aside.mkdir()
+        write_aside(aside / "score.json", json_text(found) + "\n")
+        write_aside(aside / "score.txt", text)
+        save(confusion_figure(found), aside / "confusion.png")
+        save(confusion_by_amplitude_figure(found), aside / "confusion-by-amplitude.png")
+        save(amplitude_figure(found), aside / "amplitude.png")
+        if out.exists():
+            shutil.rmtree(out)
+        aside.rename(out)
     except OSError as error:
-        raise RunFolderError(f"the score cannot be written ({error.strerror})", file=out) from None
+        shutil.rmtree(aside, ignore_errors=True)
+        raise RunFolderError(f"the score cannot be written ({error.strerror})", file=out) from error
     return text

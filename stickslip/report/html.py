@@ -41,7 +41,7 @@ def write_report(folder: str | Path) -> Path:
     try:
         return write_aside(path, text)
     except OSError as error:
-        raise RunFolderError(f"the report cannot be written ({error.strerror})", file=path) from None
+        raise RunFolderError(f"the report cannot be written ({error.strerror})", file=path) from error
 
 
 def render(result: dict[str, Any], images: Iterable[tuple[str, str, Figure]]) -> str:

@@ -252,6 +252,30 @@ def test_command_writes_text_json_and_pictures(folder: Path, capsys: pytest.Capt
     assert "a score already" in capsys.readouterr().err
     assert run(["challenge", "score", str(folder), "--json", "--force"]) == 0
     assert json.loads(capsys.readouterr().out) == found
+    assert sorted(p.name for p in folder.glob("*score*")) == ["score"]
+    # what is not the program's is not replaced, not even with --force
+    (folder / "score" / "notes.txt").write_text("mine")
+    assert run(["challenge", "score", str(folder), "--force"]) == 2
+    assert "something else" in capsys.readouterr().err
+    assert (folder / "score" / "notes.txt").read_text() == "mine"
+
+
+def test_a_score_that_does_not_fit_leaves_nothing(
+    folder: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = Path.replace
+
+    def full(self: Path, target: Path) -> Path:
+        if Path(target).suffix == ".png":
+            raise OSError(28, "No space left on device", str(self))
+        return real(self, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", full)
+        assert run(["challenge", "score", str(folder)]) == 2
+    assert "No space left on device" in capsys.readouterr().err
+    assert not list(folder.glob("*score*"))
+    assert run(["challenge", "score", str(folder)]) == 0
 
 
 def test_results_of_other_files_are_refused(folder: Path) -> None:

@@ -305,7 +305,7 @@ def campaign(
                 at = int(state.read_text())
                 counts["before a crash"] += at - n
                 n, crashes = at + 1, crashes + 1
-                code, again = _child(seed, at, 1, state, True, Counter(), faults)
+                code, again = _child(seed, at, 1, state, True, Counter(), faults, commands)
                 counts["crash" if code else "crash stopped by the guard"] += 1
                 if code:
                     faults.setdefault(f"the process ended with {code}: {words} {again}", []).append(at)

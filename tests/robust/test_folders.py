@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -13,7 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stickslip.challenge.one_case import do_case
 from stickslip.cli import run
+from stickslip.report import write_report
 from stickslip.runstore import RESULT, open_run, read_result
 
 from .challenges import challenge
@@ -113,7 +116,7 @@ def test_force_replaces_the_whole(files, tmp_path, capsys, name):
     capsys.readouterr()
 
 
-@pytest.mark.parametrize("name", ["simulate", "creep", "inspect"])
+@pytest.mark.parametrize("name", ["simulate", "creep", "inspect", "fit", "diagnose", "compare"])
 def test_the_second_run_into_a_folder_is_refused_while_the_first_is_at_work(files, tmp_path, capsys, name):
     with open_run(tmp_path / "out") as first:
         first.json({"value": 1})
@@ -155,11 +158,45 @@ def test_no_place_to_write(files, tmp_path, capsys, name):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "in"]
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_read_only_folder(files, tmp_path, capsys):
+def as_an_ordinary_user() -> list[str]:
+    """What to put before a command so that it may not write everywhere: root has no such right in a namespace."""
+    if os.geteuid() != 0:
+        return []
+    if (
+        shutil.which("unshare") is None
+        or subprocess.run(["unshare", "-U", "true"], stderr=subprocess.DEVNULL).returncode
+    ):
+        pytest.skip("root may write everywhere, and the system lets it not be somebody else (unshare -U)")
+    return ["unshare", "-U"]
+
+
+def test_a_read_only_folder(files, tmp_path):
     (tmp_path / "shut").mkdir(mode=0o555)
-    assert run([*commands(files)["creep"], "--out", str(tmp_path / "shut" / "out")]) == 2
-    assert "cannot be written" in capsys.readouterr().err
+    out = tmp_path / "shut" / "out"
+    command = [
+        *as_an_ordinary_user(),
+        sys.executable,
+        "-m",
+        "stickslip.cli",
+        *commands(files)["creep"],
+        "--out",
+        str(out),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "the run folder cannot be written" in done.stderr
+    assert "Permission denied" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_link_in_a_read_only_folder_leads_to_where_one_may_write(files, tmp_path):
+    (tmp_path / "open").mkdir()
+    (tmp_path / "shut").mkdir()
+    (tmp_path / "shut" / "out").symlink_to(tmp_path / "open" / "out")
+    (tmp_path / "shut").chmod(0o555)
+    command = [*as_an_ordinary_user(), sys.executable, "-m", "stickslip.cli", *commands(files)["creep"]]
+    assert subprocess.run([*command, "--out", str(tmp_path / "shut" / "out")], capture_output=True).returncode == 0
+    assert (tmp_path / "open" / "out" / RESULT).is_file()
 
 
 def test_a_read_only_disk(files, tmp_path, capsys, monkeypatch):
@@ -269,6 +306,7 @@ def every_command(files, tmp_path):
         "new": ["new", "scenario", str(disk / "s.toml")],
         "challenge make": ["challenge", "make", str(disk / "c"), "--cases", "1", "--grouped", "--jobs", "1"],
         "challenge run": ["challenge", "run", str(disk / "made"), "--workers", "1"],
+        "effects": ["effects", "contact-ageing", "--picture", str(disk / "e.png")],
     }
 
 
@@ -343,6 +381,33 @@ def test_a_challenge_on_a_full_disk_stops_in_words_and_goes_on(tmp_path, limit):
     for name in ("case-001", "case-002"):
         totals = [read_result(path / "runs" / name)["total"] for path in (folder, whole)]
         assert totals[0] == totals[1]
+
+
+def test_a_report_that_does_not_fit_is_no_failure_of_the_case(tmp_path, monkeypatch):
+    """The last and largest file of a diagnosis, and the one that is written by another module."""
+    runs, real = tmp_path / "runs", Path.replace
+
+    def full(self, target):
+        if Path(target).name == "report.html":
+            raise OSError(errno.ENOSPC, "No space left on device", str(self))
+        return real(self, target)
+
+    def diagnosis(campaign, out):
+        with open_run(out, resume=True) as folder:
+            folder.json({"schema": 1, "kind": "compare"})
+            monkeypatch.setattr("stickslip.report.html.render", lambda *a: "<html></html>")
+            monkeypatch.setattr("stickslip.report.html._arrays", lambda *a: {})
+            monkeypatch.setattr("stickslip.report.sections.pictures", lambda *a: [])
+            write_report(folder.folder)
+
+    runs.mkdir()
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", full)
+        told = do_case("c.toml", str(runs), "case-001", diagnosis, "session")
+    assert told["state"] == "refused"
+    assert "No space left on device" in told["message"]
+    assert not list(runs.glob("*.failures.json"))
+    assert do_case("c.toml", str(runs), "case-001", diagnosis, "session")["state"] == "done"
 
 
 def test_a_second_run_of_a_challenge_is_refused_while_the_first_is_at_work(tmp_path, capsys):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +95,7 @@ def make_campaign(
     seeds = rng.integers(2**31, size=3)  # lines and noise do not change with what is hidden
     hidden = [hide(setup, tag, amplitude, rng, *form) for tag, amplitude, *form in effects]
     if not grouped:
-        setup.groups = None
+        setup = replace(setup, groups=None)
     noise = np.random.default_rng(seeds[1])
     faults = np.random.default_rng([seed, 1])  # so that counts do not change with what the recorder makes of them
     traces, listed = [], []
