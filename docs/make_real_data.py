@@ -17,16 +17,21 @@ import json
 import os
 import sys
 import tempfile
+from datetime import date
 from pathlib import Path
 from statistics import mean, median, stdev
 
 import numpy as np
 import xarray
 
+from stickslip import __version__
+from stickslip.campaign import load_campaign, load_traces
 from stickslip.cli import run
 from stickslip.plots import save
 from stickslip.report.figures import ripple_picture, trace_picture
 from stickslip.report.fit_figures import heat_map, ramp_grid
+from stickslip.report.ripple import stick_spectrum
+from stickslip.segment import segment
 
 DOCS = Path(__file__).resolve().parent
 DEFAULT = DOCS.parents[1] / "shared" / "data" / "real"
@@ -132,6 +137,7 @@ def paper(data: Path, work: Path, rows: list[list[str]]) -> str:
     near = [x for x in trace["ripple"]["lines"] if 0.1 < x["period"] < 0.2]
     f, a = arrays["trace0_ripple_frequency"].values, arrays["trace0_ripple_amplitude"].values
     around = float(a[(f > 1 / 0.17) & (f < 1 / 0.13)].max())
+    wandering = without_phase(path)
     by_phase = dynamic["ladder"][-1]["by_phase"]
     short_gain = dynamic["traces"][0]["duration"]
     used = dynamic["traces"][0]["events"][: dynamic["fit"]["cycles"]]
@@ -142,13 +148,13 @@ def paper(data: Path, work: Path, rows: list[list[str]]) -> str:
     error = dict(zip(map(str, fitted["feature"].values), z.tolist(), strict=True))
     worst = sorted(error.items(), key=lambda item: -item[1])[:6]
     noise = (
-        " The times at which a slip has done its first twentieth and tenth say nothing of the model: noise of this record reaches those levels long before the slip, and the program takes the first sample above a level. Creep is counted back from there, so its small error is no merit of the model either."
+        " The times at which a slip has done its first twentieth and tenth say nothing of the model: noise of this record reaches those levels long before the slip. Creep is counted back from there, so its small error is no merit of the model either."
         if max(error[name] for name in EARLY) > 2 * error["slip size"]
         else ""
     )
     rows.append([
-        "paper slider, k = 168 N/m, 42 um/s", str(len(slips)), f"{100 * s['median_nrmse']:.0f} % of the creep ({s['satisfying']} of {s['processes']} fit)",
-        f"{dynamic['ladder'][-1]['train_error']:.0f} floors", "size of the slips and when they come: " + ", ".join(f"{p} {e:.3g}" + (f" (its size {error['slip size']:.3g})" if p == "slip" else "") for p, e in by_phase.items()),
+        "paper slider, k = 168 N/m, 42 um/s", str(len(slips)), f"{100 * s['median_nrmse']:.0f} % of the creep ({s['satisfying']} of {s['processes']} fit, v_lim = 10 µm/s)",
+        f"{dynamic['ladder'][-1]['train_error']:.0f} floors ({dynamic['fit']['cycles']} cycles)", "size of the slips and when they come: " + ", ".join(f"{p} {e:.3g}" + (f" (its size {error['slip size']:.3g})" if p == "slip" else "") for p, e in by_phase.items()),
     ])  # fmt: skip
     return f"""## Paper on paper (spring-driven slider)
 
@@ -164,7 +170,8 @@ finds it by itself and says, of the {short_gain:.0f} s used below:
 
 {quote([note for note in dynamic["notes"] if "sensor-gain" in note])}
 **Ripple.** {trace["ripple"]["text"][0].upper() + trace["ripple"]["text"][1:]}. Around a period of 0.15 s, at which the slope was described as modulated,
-{"a line stands out" if near else f"no line stands out: what keeps its phase over the whole record is below {1e9 * around:.0f} nm; a ripple whose phase wanders may be larger"}.
+{"a line stands out" if near else f"no line stands out: what keeps its phase over the whole record is below {1e9 * around:.0f} nm"}.
+{wandering} These are spectra of the position in the sticks, less what all sticks share, not of the residual of a fit, which describes too little of this record.
 
 ![spectrum of the position in the sticks](figures/real-paper-ripple.png)
 
@@ -188,6 +195,22 @@ The last column is what who collected these records counted by eye. At these vel
 sticks, or hardly sticks, and how many of its swings are slips depends on what one calls a slip: the program's count is of velocities beyond
 its threshold and says no more here than that this is not the stick-slip that the models describe.
 """
+
+
+def without_phase(path: str) -> str:
+    """What the mean of the sticks' spectra without phase says of a ripple of 0.15 s, in words."""
+    (trace,) = load_traces(load_campaign(path))
+    f, a, sticks = stick_spectrum(trace, segment(trace))
+    inside = (f > 1 / 0.17) & (f < 1 / 0.13)
+    beside = (f > 4.5) & (f < 10.0) & ~inside
+    smooth = np.exp(np.polyval(np.polyfit(np.log(f[beside]), np.log(a[beside] ** 2), 2), np.log(f[inside])))
+    excess = float(np.sqrt(max(np.max(a[inside] ** 2 - smooth), 0.0)))
+    # a mean of so many powers of noise is known to its size over their root
+    seen = float(np.sqrt(3.0 / np.sqrt(sticks) * np.max(smooth)))
+    return (
+        f"The mean of the spectra of {sticks} sticks without their phases, {1e9 * a[inside][0]:.0f} nm at {f[inside][0]:.2g} Hz, falls to {1e9 * a[inside][-1]:.0f} nm at {f[inside][-1]:.2g} Hz, at most "
+        f"{1e9 * excess:.0f} nm (in squares) above a smooth line through its neighbours from 4.5 to 10 Hz: a ripple whose phase wanders would stand out from about {1e9 * seen:.0f} nm on."
+    )
 
 
 def together(data: Path, work: Path) -> str:
@@ -350,7 +373,7 @@ def main() -> None:
     table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
     text = f"""# Measured records
 
-Written by `python docs/make_real_data.py`; every number and picture is the program's. The records are others' and are not part of this
+Written by `python docs/make_real_data.py` on {date.today():%-d %B %Y} with version {__version__}; every number and picture is the program's. The records are others' and are not part of this
 repository. Sources: Colas et al., Phys. Rev. E 2019 (paper slider, github.com/npusteln/stickslip, CeCILL-B); github.com/jorgevchin/Friction-Identification
 (robot joints); github.com/lauralaurenti/DNN-earthquake-prediction-forecasting (laboratory fault p5198, raw data by C. Marone's group).
 

@@ -74,6 +74,7 @@ CREEP_NOISE = 0.003  # of that of the creep, from the sensor
 MOST_VARIED = 1.5
 EVENT_WIDTHS = (0.12, 0.08)  # prior s.d. of ln(u_max) and ln(p) from event to event where lines are new every time
 LEAST_WIDTH = 0.02  # share of these where the lines are the same
+CONTACTS = 4  # of the rigs that all these numbers are of: what rough lines do to the mean of n goes as 1/sqrt(n)
 FEWEST = 4  # events of a run that tell scatter
 CREEP_MIDDLE = slice(3, 9)  # points of the creep that scatter most with the lines
 
@@ -83,7 +84,7 @@ def floors(measurement: Measurement) -> np.ndarray:
 
     The part of new lines counts as much as the events of the campaign scatter (:func:`scatter_factor`).
     """
-    own, lines = _level(measurement, ALONE), _level(measurement, LINES)
+    own, lines = _level(measurement, ALONE), lines_share(measurement) * _level(measurement, LINES)
     return _root_sum(measurement.sensor, own, scatter_factor(measurement) * lines)
 
 
@@ -97,7 +98,13 @@ def common(measurement: Measurement) -> tuple[np.ndarray, np.ndarray]:
 
     Zero in the first cycle of a run, which is not like others.
     """
-    return _level(measurement, RUN), _level(measurement, ALL)
+    share = lines_share(measurement)
+    return share * _level(measurement, RUN), share * _level(measurement, ALL)
+
+
+def lines_share(measurement: Measurement) -> float:
+    """How much more (or less) rough lines do to the mean of this rig's contacts than to that of four."""
+    return float(np.sqrt(CONTACTS / measurement.contacts)) if measurement.contacts else 1.0
 
 
 def event_widths(measurement: Measurement) -> np.ndarray:
@@ -107,7 +114,7 @@ def event_widths(measurement: Measurement) -> np.ndarray:
     """
     share = np.full(measurement.valid.shape[:2], max(min(scatter_factor(measurement), 1.0), LEAST_WIDTH))
     share[:, 0][np.asarray(measurement.cycles.virgin, bool)] = 1.0
-    return share[..., None] * np.array(EVENT_WIDTHS)
+    return lines_share(measurement) * share[..., None] * np.array(EVENT_WIDTHS)
 
 
 def _level(measurement: Measurement, k: Scatter) -> np.ndarray:
@@ -164,7 +171,7 @@ def scatter_factor(measurement: Measurement) -> float:
         return 0.5
     size, creep = np.median(ratios, axis=0)
     creep = np.sqrt(max(creep**2 - CREEP_NOISE**2, 0.0))
-    varied = min(float(size) / NEW_SIZE, float(creep) / NEW_CREEP)
+    varied = min(float(size) / NEW_SIZE, float(creep) / NEW_CREEP) / lines_share(m)
     return float(np.clip(varied, 0.0, MOST_VARIED))
 
 
@@ -183,5 +190,5 @@ def uncertain(measurement: Measurement) -> np.ndarray:
     """
     same = float(np.clip(1.0 - scatter_factor(measurement), 0.0, 1.0))
     cycles = 1.0 + (float(np.sum(np.asarray(measurement.cycles.used))) - 1.0) * same
-    real = (2.0 - same) * _level(measurement, Scatter())
+    real = (2.0 - same) * lines_share(measurement) * _level(measurement, Scatter())
     return _root_sum(measurement.sensor, np.sqrt(cycles) * real)

@@ -76,7 +76,14 @@ def fit_inertial(
         notes.append(UNHEARD)
     period = heard or FALLBACK_PERIOD
     try:
-        m = measure(own, segments, ring_period=period, most_cycles=options.most_events, most_steps=options.most_steps)
+        m = measure(
+            own,
+            segments,
+            ring_period=period,
+            most_cycles=options.most_events,
+            most_steps=options.most_steps,
+            contacts=loaded.rig.contacts,
+        )
     except InputError as error:
         raise error.at(file=loaded.path) from None
     m = replace(m, new_lines=options.scatter)

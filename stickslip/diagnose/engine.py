@@ -143,7 +143,13 @@ def diagnose(
     heard = ringing(traces, segmentations)
     if heard is None:
         dropped.append(UNHEARD)
-    data = measure(traces, segmentations, ring_period=heard or FALLBACK_PERIOD, most_cycles=MOST_CYCLES)
+    data = measure(
+        traces,
+        segmentations,
+        ring_period=heard or FALLBACK_PERIOD,
+        most_cycles=MOST_CYCLES,
+        contacts=campaign.rig.contacts,
+    )
     holdout = holdout or [t.name for t in traces if t.role == "held-out" and t.name in data.names]
     train = training_cycles(data, holdout, [t.name for t in traces if t.role == "train"])
     floor = floors(data)

@@ -40,6 +40,7 @@ class Measurement:
         velocities: usual speed of the drive in each run (m/s), shape (R,).
         dropped: what was left out, and why.
         new_lines: how much of the contact is new at every event, 0 to 1, where that is known; None: its scatter tells.
+        contacts: over how many of them the contact averages, where that is known.
     """
 
     layout: Layout
@@ -52,6 +53,7 @@ class Measurement:
     velocities: np.ndarray
     dropped: tuple[str, ...] = ()
     new_lines: float | None = None
+    contacts: int | None = None
 
     @property
     def runs(self) -> int:
@@ -71,6 +73,7 @@ class Measurement:
             self.velocities[i],
             self.dropped,
             self.new_lines,
+            self.contacts,
         )
 
 
@@ -84,6 +87,7 @@ def measure(
     ring_period: float,
     most_cycles: int = 8,
     most_steps: int = MOST_STEPS,
+    contacts: int | None = None,
 ) -> Measurement:
     """Features of every cycle of every run.
 
@@ -92,6 +96,7 @@ def measure(
         ring_period: expected period of the contact resonance (s).
         most_cycles: at most so many cycles of a run are used, the first ones.
         most_steps: that the model will have for one cycle; runs end before a longer one.
+        contacts: of the rig, where that is known.
 
     Raises:
         InputError: there are fewer than two slips in all runs.
@@ -155,6 +160,7 @@ def measure(
         tuple(t.name for t, _ in pairs),
         np.array([s.settings.speed for _, s in pairs]),
         tuple(dropped),
+        contacts=contacts,
     )
 
 

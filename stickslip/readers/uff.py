@@ -26,6 +26,7 @@ _MARK = re.compile(  # columns 5 and 6 in the standard; some writers begin at th
 _CLOSE = re.compile(rb"(?:\r\n|\n|\r)?[ ]{0,8}-1[ \t]*(?:\r\n|\n|\r|\Z)")
 _INDENT = b"    "
 _NOTHING = re.compile(rb"[\s\0]*\Z")  # some writers leave the closing mark out
+_FORTRAN = re.compile(rb"(\d)[dD]([+-]\d)")  # 1.0D+00, as Fortran writes double precision
 _HEADER_LINES = 11  # records 1 to 11, after the line with the data set's number
 _KINDS = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}
 _SINGLE, _DOUBLE = 4, 8
@@ -88,7 +89,7 @@ def _sets(path: Path) -> Iterator[_Set]:
             else:
                 close = _closing(rb"[ ]{0,8}").search(raw, start)
                 end, position = (close.start(), close.end()) if close else (len(raw), len(raw))
-                header = _pyuff(b"    -1\n    58\n" + raw[mark.end() : end])
+                header = _pyuff(b"    -1\n    58\n" + raw[mark.end() : start] + _FORTRAN.sub(rb"\1E\2", raw[start:end]))
                 x, y, notes = header.pop("x"), header.pop("data"), []
                 _check_length(y, header)
         except InputError as error:

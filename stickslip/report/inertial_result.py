@@ -112,6 +112,7 @@ def effective(fit: Fit, rig: Any, contacts: int) -> dict[str, Any] | None:
         f"{shown(line.h_rms, 'm', 3)} +- {shown(rms_std, 'm', 2)}, for L = {shown(line.length, 'm')}, "
         f"N = {line.n_springs}, F_n = {known.normal_force:.3g} N and friction {known.friction:.3g}"
         f"{' (from the fitted strength)' if fitted else ' (guessed)' if known.guessed else ''}; {line.note}."
+        " The deviations are of the fit alone: other lines of the same surface differ by more."
     )
     prior = surface_prior(rig)
     return {

@@ -35,26 +35,11 @@ def stick_ripple(trace: Trace, found: Segmentation) -> dict[str, Any] | None:
         ``lines``: list of period (s), amplitude (in ``unit``) and prominence, the strongest first; ``unit``;
         ``text``; ``frequency`` (Hz) and ``amplitude`` arrays for a picture (largest of each bin).
     """
-    position, _, _, unit = block_motion(trace, gain=found.settings.gain)
-    block = max(1, int(trace.sampling_rate // _RATE))
-    n = trace.time.size // block
-    time, position = (a[: n * block].reshape(n, block).mean(axis=1) for a in (trace.time, position))
-    rate = trace.sampling_rate / block
-    rest, sticks = np.zeros(n), []
-    for event in found.events[1:]:
-        length = event.stick_time
-        if not np.isfinite(length) or event.holds:
-            continue
-        begin = event.t_onset - length
-        low, high = np.searchsorted(time, [begin + 0.12 * length, begin + 0.85 * length])
-        if high - low < 64:
-            continue
-        x, y = np.linspace(-1, 1, high - low), position[low:high]
-        rest[low:high] = y - np.polynomial.polynomial.polyval(x, np.polynomial.polynomial.polyfit(x, y, 3))
-        sticks.append((int(low), int(high)))
-    if len(sticks) < _LEAST_STICKS:
+    pieces = _residues(trace, found)
+    if pieces is None:
         return None
-    taper = _tapered(rest, sticks)
+    rest, sticks, taper, rate, unit = pieces
+    n = rest.size
     lengths = [(high - low) / rate for low, high in sticks]
     frequency = np.fft.rfftfreq(n, 1 / rate)
     power = np.convolve(np.abs(np.fft.rfft(rest)) ** 2 * 4.0 / taper**2, np.ones(3), mode="same")
@@ -91,6 +76,48 @@ def stick_ripple(trace: Trace, found: Segmentation) -> dict[str, Any] | None:
         "frequency": frequency[:usable].reshape(-1, size).mean(axis=1),
         "amplitude": np.sqrt(power[:usable].reshape(-1, size).max(axis=1)),
     }
+
+
+def stick_spectrum(trace: Trace, found: Segmentation) -> tuple[np.ndarray, np.ndarray, int] | None:
+    """The mean of the sticks' spectra without their phases: it shows a ripple whose phase wanders as well.
+
+    Returns:
+        Frequencies (Hz), amplitudes (root of the mean square, in the unit of the motion) and the number of sticks, or
+        None where there are too few.
+    """
+    pieces = _residues(trace, found)
+    if pieces is None:
+        return None
+    rest, sticks, _, rate, _ = pieces
+    size = 4 * 2 ** int(np.ceil(np.log2(max(high - low for low, high in sticks))))
+    power = [
+        np.abs(2.0 * np.fft.rfft(rest[low:high], size) / np.sum(np.hanning(high - low))) ** 2 for low, high in sticks
+    ]
+    return np.fft.rfftfreq(size, 1.0 / rate), np.sqrt(np.mean(power, axis=0)), len(sticks)
+
+
+def _residues(trace: Trace, found: Segmentation) -> tuple[np.ndarray, list[tuple[int, int]], float, float, str] | None:
+    """What is left of the sticks: averaged samples, where they lie, the sum of the tapers, the rate, the unit."""
+    position, _, _, unit = block_motion(trace, gain=found.settings.gain)
+    block = max(1, int(trace.sampling_rate // _RATE))
+    n = trace.time.size // block
+    time, position = (a[: n * block].reshape(n, block).mean(axis=1) for a in (trace.time, position))
+    rate = trace.sampling_rate / block
+    rest, sticks = np.zeros(n), []
+    for event in found.events[1:]:
+        length = event.stick_time
+        if not np.isfinite(length) or event.holds:
+            continue
+        begin = event.t_onset - length
+        low, high = np.searchsorted(time, [begin + 0.12 * length, begin + 0.85 * length])
+        if high - low < 64:
+            continue
+        x, y = np.linspace(-1, 1, high - low), position[low:high]
+        rest[low:high] = y - np.polynomial.polynomial.polyval(x, np.polynomial.polynomial.polyfit(x, y, 3))
+        sticks.append((int(low), int(high)))
+    if len(sticks) < _LEAST_STICKS:
+        return None
+    return rest, sticks, _tapered(rest, sticks), rate, unit
 
 
 def _belongs(frequency: float, amplitude: float, line: dict[str, float], sideband: float) -> bool:

@@ -45,11 +45,12 @@ def differentiable_rise(curve: StepCurve, levels: Any, after: Any) -> Any:
 
 @lru_cache(maxsize=16)
 def _program(family: Any) -> Any:
-    run = fitting._tracks(family)
+    # fresh ones: what was traced before knows nothing of a differentiable rise
+    run, features = fitting._tracks.__wrapped__(family), fitting._features.__wrapped__
 
     def derivatives(numbers, later, moved, moved_later, events, cycles, anchors, times, tolerance):
         def of(numbers, later):
-            return fitting._features(run(numbers, events, cycles, later, tolerance), anchors, times)
+            return features(run(numbers, events, cycles, later, tolerance), anchors, times)
 
         return jax.vmap(lambda a, b: jax.jvp(of, (numbers, later), (a, b))[1])(moved, moved_later)
 
@@ -83,6 +84,8 @@ def forward(
         )
         out[r] = np.moveaxis(np.asarray(found), 0, -1)
     problem.runs_done += data.runs * directions.shape[1]
+    if not np.isfinite(out).all():
+        print(f"{np.count_nonzero(~np.isfinite(out))} of {out.size} derivatives are no numbers; taken as zero")
     return np.where(np.isfinite(out), out, 0.0)
 
 
@@ -140,6 +143,13 @@ def slopes(damping: float, seed: int) -> None:
                 for n in used[:3]
             ]
             row(f"of fits/{finer:g}", *(f"{o:.2g}" for o in np.concatenate(off)), f"{spent:.2f}")
+        print("\nWhat a difference of a step says, ds per unit of ln, central, recurrences of the same slips:\n")
+        head("step", *(f"recurrence {n + 1}, {s}" for n in used[:3] for s in fit_peers.NAMES))
+        for step in 10.0 ** np.arange(-10, -1):
+            lanes = [(z + sign * step * d, events) for d in directions.T for sign in (1.0, -1.0)]
+            seen = np.array(problem._call(lanes))[:, 0, :, at["recurrence"]][..., 0].reshape(-1, 2, base.shape[1])
+            change = (seen[:, 0] - seen[:, 1]) / (2.0 * step)
+            row(f"{step:.0e}", *(f"{c:.3g}" for c in change[:, used[:3]].T.ravel()))
 
 
 def tied(damping: float) -> None:

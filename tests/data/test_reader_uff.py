@@ -149,7 +149,11 @@ def _small_exponents(lines):
     return [line if i < 13 else line.replace("E", "e") for i, line in enumerate(lines)]
 
 
-@pytest.mark.parametrize("edit", [_spaces_at_the_end, _short_records, _small_exponents])
+def _fortran_exponents(lines):  # of double precision: 1.0D+00
+    return [line if i < 13 else line.replace("E", "D") for i, line in enumerate(lines)]
+
+
+@pytest.mark.parametrize("edit", [_spaces_at_the_end, _short_records, _small_exponents, _fortran_exponents])
 @pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
 def test_text_as_other_writers_have_it(tmp_path, edit, newline):
     path = tmp_path / "a.uff"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.campaign import load_campaign, load_traces
-from stickslip.challenge.generator import make_campaign
+from stickslip.challenge.generator import draw_setup, make_campaign
 from stickslip.features.measurement import measure
 from stickslip.fit.start import ring_period
 from stickslip.floors import floors, scatter_factor
@@ -19,14 +19,18 @@ pytestmark = pytest.mark.slow  # eight campaigns
 SEEDS = (21, 22, 23, 24)
 
 
-def scatter(folder, new_lines: bool) -> dict[str, float]:
+def scatter(folder, new_lines: bool, contacts: int | None = None) -> dict[str, float]:
     """Rms deviation from the mean of a run over its floor, by group of features; without holds and first cycles."""
     found: dict[str, list[float]] = {}
     for seed in SEEDS:
-        make_campaign(folder / str(seed), seed, new_lines=new_lines)
+        setup = None
+        if contacts is not None:
+            setup = draw_setup(np.random.default_rng(seed))
+            setup.with_rig(loads=(sum(setup.rig.loads) / contacts,) * contacts)
+        make_campaign(folder / str(seed), seed, new_lines=new_lines, setup=setup)
         traces = load_traces(load_campaign(folder / str(seed) / "campaign.toml"))
         segments = [segment(t) for t in traces]
-        m = measure(traces, segments, ring_period=ring_period(traces, segments), most_cycles=14)
+        m = measure(traces, segments, ring_period=ring_period(traces, segments), most_cycles=14, contacts=contacts)
         told = scatter_factor(m)  # the events tell which of the two it is
         assert told > 0.4 if new_lines else told < 0.2, (seed, told)
         floor = floors(replace(m, new_lines=1.0 if new_lines else 0.0))
@@ -49,6 +53,16 @@ def test_fresh_lines_scatter_the_features_as_the_floors_say(tmp_path):
         assert 0.6 < found[group] < 1.5, (group, found)
     # more than the floor, for two factors of each event are refitted and take most of it
     assert 1.0 < found["creep"] < 3.0, found
+
+
+def test_lines_average_out_over_the_contacts(tmp_path):
+    """The same rigs on one, four and nine contacts that carry the same load: about the same share of a floor."""
+    found = {n: scatter(tmp_path / str(n), new_lines=True, contacts=n) for n in (1, 4, 9)}
+    # creep falls faster than the root, by more than six from one contact to nine; most of it is refitted event by event
+    for group, most in (("recurrence", 2.0), ("size", 2.0), ("creep", 3.0)):
+        shares = [found[n][group] for n in (1, 4, 9)]
+        print(group, [round(s, 2) for s in shares])
+        assert max(shares) < most * min(shares), group
 
 
 def test_with_the_same_lines_only_the_sensor_scatters(tmp_path):

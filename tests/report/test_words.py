@@ -9,7 +9,7 @@ from stickslip.features.layout import PHASES, Layout
 from stickslip.motion import true_gains
 from stickslip.report import abilities, misfit_sentence, phase_table
 from stickslip.report.describe import describe_trace, gain_is_wrong, stick_gain
-from stickslip.report.ripple import stick_ripple
+from stickslip.report.ripple import stick_ripple, stick_spectrum
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
 
@@ -23,6 +23,7 @@ def sawtooth(
     gain=1.0,
     ripple=0.0,
     period=0.4,
+    wander=0.0,
     noise=1e-6,
     seed=0,
     creep=0.0,
@@ -32,13 +33,15 @@ def sawtooth(
     onsets = np.cumsum(rng.uniform(1.3, 1.9, sticks))
     t = np.arange(0.0, onsets[-1] + 1.0, 1 / rate)
     x, before = np.zeros_like(t), 0.0
+    steps = wander * np.random.default_rng(seed + 1).standard_normal(sticks)  # periods, from stick to stick
+    phase = np.interp(t, onsets, np.cumsum(steps))
     for onset in onsets:
         size = v0 * (onset - before) - creep
         x += 0.5 * size * (1 - np.cos(np.pi * np.clip((t - onset) / 0.038, 0, 1)))
         x += creep * np.clip((t - onset + 0.5) / 0.5, 0, 1) ** 2
         before = onset
     drive = Drive.constant(v0, 0.0, t[-1])
-    position = drive.position(t) + ripple * np.sin(2 * np.pi * t / period)
+    position = drive.position(t) + ripple * np.sin(2 * np.pi * (t / period + phase))
     force = gain * stiffness * (position - x) + stiffness * noise * rng.standard_normal(t.size)
     return Trace("saw", t, spring_force=force, drive=drive, spring_stiffness=stiffness, noise=stiffness * noise)
 
@@ -73,6 +76,16 @@ def test_ripple_of_the_drive_is_found_below_the_noise():
     assert found["lines"][0]["amplitude"] == pytest.approx(150e-9, rel=0.3)
     assert len(found["lines"]) == 1
     assert "µm of drive" in found["text"]
+
+
+def test_a_ripple_whose_phase_wanders_shows_in_the_spectra_without_phase():
+    """Its phase walks by half a turn from stick to stick."""
+    saws = [sawtooth(ripple=r, period=0.15, wander=0.5) for r in (0.0, 400e-9)]
+    none, some = (stick_spectrum(saw, segment(saw)) for saw in saws)
+    assert some[2] > 50
+    near = np.abs(some[0] - 1 / 0.15) < 0.3
+    assert np.max(some[1][near]) == pytest.approx(400e-9, rel=0.25)
+    assert np.max(none[1][near]) < 100e-9
 
 
 @pytest.mark.parametrize("seed", range(4))
