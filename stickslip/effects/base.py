@@ -140,7 +140,7 @@ class Threshold(Effect):
 
     @abc.abstractmethod
     def strength(self, state: Any, motion: Motion, contact: Contact) -> Array:
-        """Factor on the caps, a scalar or one per element (1)."""
+        """Factor on the caps, a scalar or one per element (1); below zero counts as zero: an open contact."""
 
 
 class Stiffness(Effect):

@@ -50,7 +50,9 @@ def test_27_processes_come_back_in_two_seconds():
     static_table()
     began = time.process_time()
     found = fit_static(processes, RIG)
-    assert time.process_time() - began < 2.0
+    spent = time.process_time() - began
+    print(f"27 processes: {spent:.2f} s of processor time")
+    assert spent < 2.0
     assert found.share == 1.0
     for fit, (hurst, h_rms) in zip(found.fits, truth, strict=True):
         assert fit.hurst == pytest.approx(hurst, abs=0.02)
