@@ -144,7 +144,8 @@ def draw(name: str, series: Series) -> Figure:
     logarithmic(ax, "y")
     ax.set_xlabel(label)
     ax.set_ylabel("processor time of a run (s)")
-    ax.legend()
+    ax.set_ylim(top=ax.get_ylim()[1] * 6.0 ** (len(series) - 1))  # room for the legend
+    ax.legend(loc="upper right" if name == "drive" else "upper left")
     return made
 
 
