@@ -71,6 +71,7 @@ def scipy_answer(case: Case, method: str, rtol: float, until: float) -> tuple[An
 def diffrax_solver(case: Case, name: str) -> Callable[[float, float], tuple[Answer, int]]:
     """A stock solver of diffrax, compiled: from rtol and the time limit (as of `scipy_answer`) to trace and steps."""
     method, steps = DIFFRAX[name]
+    steps = max(2, round(steps * min(1.0, (256 / case.springs) ** 2)))  # a matrix of 4000 rows takes seconds a step
     typical, stiffness, cap = (jnp.asarray(a) for a in (_typical(case), case.stiffness, case.cap))
 
     def rates(t, scaled, args):
