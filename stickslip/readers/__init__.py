@@ -101,6 +101,7 @@ def read_columns(path: str | Path, name: str | None = None) -> Columns:
     reader = find_reader(path, name)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        warnings.simplefilter("ignore", ResourceWarning)  # of whatever is collected meanwhile: another file's, perhaps
         columns = reader.read(path)
     columns.notes += list(dict.fromkeys(f"warning of the reader: {w.message}" for w in caught))
     columns.reader = reader.name

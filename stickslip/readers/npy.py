@@ -23,13 +23,14 @@ class NpyReader:
     def read(self, path: Path) -> Columns:
         columns = Columns({})
         try:
-            content = np.load(path, allow_pickle=False)
-            if isinstance(content, np.ndarray):
-                add_array(columns, "" if content.ndim == 2 or content.dtype.names else "column 1", content)
-            else:
-                with content:
-                    for name in content.files:
-                        add_array(columns, name, content[name])
+            with path.open("rb") as stream:  # numpy leaves a damaged archive open
+                content = np.load(stream, allow_pickle=False)
+                if isinstance(content, np.ndarray):
+                    add_array(columns, "" if content.ndim == 2 or content.dtype.names else "column 1", content)
+                else:
+                    with content:
+                        for name in content.files:
+                            add_array(columns, name, content[name])
         except ValueError as error:
             hint = "save plain arrays of floats" if "pickle" in str(error).lower() else None
             raise InputError(f"the NumPy file cannot be read ({error})", file=path, hint=hint) from None

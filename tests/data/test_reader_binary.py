@@ -1,4 +1,7 @@
+import os
 import sys
+import warnings
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -6,7 +9,9 @@ import pytest
 import scipy.io
 import xarray
 
+from stickslip.errors import InputError
 from stickslip.readers import READERS, read_columns
+from stickslip.readers.npy import NpyReader
 
 T = np.arange(50) * 1e-3
 X = np.sin(T * 30) * 1e-6
@@ -194,3 +199,27 @@ def test_a_plug_in_reader_is_found_and_a_broken_one_left_out(tmp_path, monkeypat
     columns = read_columns(tmp_path / "a.mine")
     assert columns.reader == "mine"
     assert np.array_equal(columns.data["x"], X)
+
+
+def test_what_another_file_left_open_is_no_warning_of_this_one(tmp_path):
+    """Found by a run of all tests: a damaged archive that numpy had not closed was collected while a file was read."""
+
+    class Reader(NpyReader):
+        def read(self, path):
+            warnings.warn("unclosed file <_io.FileIO name='other.npz'>", ResourceWarning, stacklevel=1)
+            warnings.warn("of this file", UserWarning, stacklevel=1)
+            return super().read(path)
+
+    np.save(tmp_path / "a.npy", X)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("stickslip.readers.find_reader", lambda *a: Reader())
+        assert read_columns(tmp_path / "a.npy").notes == ["warning of the reader: of this file"]
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs /proc")
+def test_a_damaged_archive_is_not_left_open(tmp_path):
+    (tmp_path / "a.npz").write_bytes(b"PK\x03\x04" + bytes(40))
+    with pytest.raises(InputError, match="cannot be read") as kept:
+        read_columns(tmp_path / "a.npz")
+    assert not [p for p in Path("/proc/self/fd").iterdir() if os.path.realpath(p).endswith("a.npz")]
+    assert kept.value.what  # as long as the error is kept, so is what it came from
