@@ -13,11 +13,10 @@ from .one_case import failures, is_done
 
 KINDS = ("complete", "missing", "ambiguous", "unknown")
 LARGEST_SET = 3
-# what campaigns of several velocities cannot be expected to tell apart
+# what campaigns of several velocities and holds cannot be expected to tell apart
 CLASSES = (
-    ("thermal-creep", "sensor-drift", "sensor-high-pass"),
+    ("sensor-drift", "sensor-high-pass"),
     ("sensor-low-pass", "residual-load"),
-    ("tilt", "viscous-drag"),
 )
 
 
@@ -34,6 +33,7 @@ class Answer:
         text: the verdict in words, or why there is none.
         seconds: of the diagnosis.
         hashes: SHA-256 of the files it read.
+        forms: of the effects in the last model: tag -> variant -> chosen.
     """
 
     kind: str
@@ -46,6 +46,7 @@ class Answer:
     text: str = ""
     seconds: float | None = None
     hashes: frozenset[str] = frozenset()
+    forms: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 def read_answer(runs: Path, case: str) -> Answer:
@@ -79,6 +80,7 @@ def parse(result: Mapping[str, Any]) -> Answer:
         verdict["text"],
         result.get("seconds"),
         frozenset(entry["sha256"] for entry in result["inputs"]),
+        {effect["type"]: effect["form"] for effect in result.get("fitted_model", {}).get("effects", ())},
     )
 
 

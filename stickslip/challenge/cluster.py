@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, StickslipError
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
 PATIENCE = 20.0  # s for a scheduler to answer
+LOOK = 2.0  # s after which workers are counted again
+LONELY = 30.0  # s without a worker after which it is said
 _TALKERS = ("distributed.client", "distributed.core", "distributed.utils")
 
 
@@ -62,6 +65,41 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         Client(local, set_as_default=False) as client,
     ):
         yield client
+
+
+class Workers:
+    """Who is there to work, counted every few seconds.
+
+    Attributes:
+        number: of workers. at_once: how many cases they can have under way together.
+    """
+
+    def __init__(self, client: Client, note: Callable[[str], None] | None = None) -> None:
+        self._client, self._note = client, note
+        self._address = getattr(client.scheduler, "address", "the scheduler")
+        self._seen = self._asked = time.monotonic()
+        self._told = False
+        self.number = self.at_once = 0
+        self._count()
+
+    def look(self) -> None:
+        """Count again where it is time, and say once where there has been no worker for long."""
+        now = time.monotonic()
+        if now - self._asked >= LOOK:
+            self._asked = now
+            self._count()
+        if self.number:
+            self._seen, self._told = now, False
+        elif self._note is not None and not self._told and now - self._seen >= LONELY:
+            self._told = True
+            self._note(f"no worker is connected to {self._address}; waiting")
+
+    def _count(self) -> None:
+        if self._client.status != "running":
+            return
+        with suppress(Exception):  # whether the cluster is lost is found out by who waits for its answers
+            threads = self._client.nthreads(callback_timeout=LOOK)
+            self.number, self.at_once = len(threads), sum(threads.values())
 
 
 @contextmanager

@@ -11,12 +11,14 @@ import numpy as np
 
 from ..errors import InputError
 from .answers import Answer
-from .marks import Marked, rate
+from .marks import CIRCUMSTANCES, Marked, rate
 from .sizes import Size
 
 KINDS = ("nothing", "one", "two", "outside")
+WORDS = {"nothing": "nothing missing", "one": "one effect", "two": "two effects", "outside": "outside the catalogue"}
 VERDICTS = (
-    "complete", "named", "set with it", "named wrongly", "set without it", "unknown", "failed", "not run",
+    "complete", "named", "named in part", "set with it", "named wrongly", "set without it", "unknown", "failed",
+    "not run",
 )  # fmt: skip
 BINS = (1.0, 2.0, 5.0, 10.0, 30.0)  # multiples of detection
 VISIBLE = 5.0  # multiples of detection from which the aim holds
@@ -37,10 +39,16 @@ def figures(marked: Sequence[Marked]) -> dict[str, Any]:
         "not_run": states["not run"],
         "by_kind": {kind: _accuracy(cases) for kind, cases in of.items()},
         "effects": _accuracy(hidden),
-        "false_alarms": rate(m.alarm for m in of["nothing"] if m.answered),
-        "false_names": rate(bool(m.answer.named or m.answer.set) for m in of["nothing"] if m.answered),
+        "by_circumstance": {name: _circumstance(name, of["nothing"], hidden) for name in CIRCUMSTANCES},
+        "by_form": {
+            "textbook_form": _accuracy([m for m in of["one"] if not m.effects[0]["own_form"]]),
+            "own_form": _accuracy([m for m in of["one"] if m.effects[0]["own_form"]]),
+        },
+        "false_alarms": _alarms(of["nothing"]),
+        "false_names": rate(m.names for m in of["nothing"] if m.answered),
         "unknown_recall": rate(m.answer.kind == "unknown" for m in of["outside"]),
         "unknown_without_a_name": rate(m.answer.kind == "unknown" and not m.answer.named for m in of["outside"]),
+        "unknown_base_failed": rate(m.base_failed for m in marked if m.answer.kind == "unknown"),
         "amplitude": {
             "all": _sizes(hidden, lambda s: True),
             "textbook_form": _sizes(hidden, lambda s: not s.own_form),
@@ -61,6 +69,20 @@ def _accuracy(cases: Sequence[Marked]) -> dict[str, Any]:
         "right": rate(m.right for m in cases),
         "class": rate(m.class_right for m in cases),
     }
+
+
+def _alarms(nothing: Sequence[Marked]) -> dict[str, Any]:
+    return rate(m.alarm for m in nothing if m.answered)
+
+
+def _circumstance(name: str, nothing: Sequence[Marked], hidden: Sequence[Marked]) -> dict[str, Any]:
+    """Answers where a circumstance holds and where it does not; cases of which it is not known are in neither."""
+    out = {}
+    for word, value in (("yes", True), ("no", False)):
+        found = _accuracy([m for m in hidden if m.circumstances.get(name) is value])
+        alarms = _alarms([m for m in nothing if m.circumstances.get(name) is value])
+        out[word] = {"exact": found["exact"], "right": found["right"], "false_alarms": alarms}
+    return out
 
 
 def _sizes(cases: Sequence[Marked], which: Callable[[Size], bool]) -> dict[str, Any]:
@@ -90,11 +112,11 @@ def _quartiles(values: Sequence[float]) -> list[float] | None:
 
 
 def _confidence(cases: Sequence[Marked]) -> dict[str, Any]:
-    """Confidences stated in these cases: their mean, how many of them are right, and the Brier score."""
-    stated = [(m.answer.confidence, m.right) for m in cases if m.answer.confidence is not None]
+    """Confidences stated in these cases: their mean, how often what they are stated of holds, and the Brier score."""
+    stated = [(m.answer.confidence, m.claim_holds) for m in cases if m.answer.confidence is not None]
     return {
         "stated": float(np.mean([c for c, _ in stated])) if stated else None,
-        "right": rate(ok for _, ok in stated),
+        "holds": rate(ok for _, ok in stated),
         "brier": float(np.mean([(c - ok) ** 2 for c, ok in stated])) if stated else None,
     }
 
@@ -124,14 +146,15 @@ def _edges() -> list[tuple[float, float]]:
     return list(itertools.pairwise(BINS))
 
 
-def _within(m: Marked, low: float, high: float) -> bool:
-    return m.multiple is not None and (low <= m.multiple < high or (high == BINS[-1] and m.multiple >= high))
+def _inside(multiple: float | None, low: float, high: float) -> bool:
+    return multiple is not None and (low <= multiple < high or (high == BINS[-1] and multiple >= high))
 
 
 def _bin(low: float, high: float, hidden: Sequence[Marked], outside: Sequence[Marked]) -> dict[str, Any]:
-    here = [m for m in hidden if _within(m, low, high)]
-    out = [m for m in outside if _within(m, low, high)]
-    sizes = [s for m in here for s in m.sizes]
+    """Cases by their weakest effect, amplitudes each by its own."""
+    here = [m for m in hidden if _inside(m.multiple, low, high)]
+    out = [m for m in outside if _inside(m.multiple, low, high)]
+    sizes = [s for m in hidden for s in m.sizes if _inside(s.multiple, low, high)]
     return {
         "from": low,
         "to": high,
@@ -142,7 +165,9 @@ def _bin(low: float, high: float, hidden: Sequence[Marked], outside: Sequence[Ma
         "amplitude": rate(s.within_two for s in sizes),
         "within_2_std": rate(ok for s in sizes if (ok := s.within(2.0)) is not None),
         "heldout": _heldout(here),
-        "named_right": rate(m.right for m in here if m.answer.kind in ("missing", "ambiguous")),
+        "heldout_named": _heldout([m for m in here if m.names]),
+        "heldout_right": _heldout(_explained(here))["within"],
+        "named_right": rate(m.right for m in [*here, *out] if m.answer.kind in ("missing", "ambiguous")),
         "confidence": _confidence([*here, *out]),
         "confusion": _confusion([*here, *out]),
     }
@@ -151,7 +176,9 @@ def _bin(low: float, high: float, hidden: Sequence[Marked], outside: Sequence[Ma
 def verdict_label(m: Marked) -> str:
     """The answer in the words of the confusion matrix of kinds."""
     if m.answer.kind == "missing":
-        return "named" if m.exact else "named wrongly"
+        if m.exact:
+            return "named"
+        return "named in part" if set(m.answer.named) & set(m.tags) else "named wrongly"
     if m.answer.kind == "ambiguous":
         return "set with it" if m.right else "set without it"
     return m.answer.kind
@@ -180,7 +207,7 @@ def _confusion(marked: Sequence[Marked]) -> dict[str, dict[str, dict[str, int]]]
 
 def _aims(nothing: Sequence[Marked], hidden: Sequence[Marked], marked: Sequence[Marked]) -> list[dict[str, Any]]:
     visible = rate(m.right for m in hidden if m.multiple is not None and m.multiple >= VISIBLE)
-    alarms = rate(m.alarm for m in nothing if m.answered)
+    alarms = _alarms(nothing)
     within = _heldout(_explained(marked))["within"]
     return [
         _aim("right (named, or a set of at most three with it) at 5 times detection and above", visible, least=0.85),
@@ -190,9 +217,15 @@ def _aims(nothing: Sequence[Marked], hidden: Sequence[Marked], marked: Sequence[
 
 
 def _aim(text: str, found: dict[str, Any], *, least: float | None = None, most: float | None = None) -> dict[str, Any]:
-    share = found["share"]
-    met = None if share is None else share >= least if least is not None else share <= (most or 0.0)
-    return {"text": text, "at_least": least, "at_most": most, **found, "met": met}
+    """An aim: whether it is ``met`` by the share found, and ``shown``, that is met by all of the interval."""
+    share, low, high = (found[key] for key in ("share", "low", "high"))
+    if share is None:
+        met = shown = None
+    elif least is not None:
+        met, shown = share >= least, low >= least
+    else:
+        met, shown = share <= (most or 0.0), high <= (most or 0.0)
+    return {"text": text, "at_least": least, "at_most": most, **found, "met": met, "shown": shown}
 
 
 def _line(m: Marked) -> dict[str, Any]:
@@ -208,7 +241,9 @@ def _line(m: Marked) -> dict[str, Any]:
         "class_right": m.class_right,
         "heldout_base": m.answer.base,
         "heldout_final": m.answer.final,
-        "amplitudes": [{"effect": s.tag, "value": s.value, "std": s.std, "truth": s.truth} for s in m.sizes],
+        "amplitudes": [
+            {"effect": s.tag, "multiple": s.multiple, "value": s.value, "std": s.std, "truth": s.truth} for s in m.sizes
+        ],
         "text": m.answer.text,
         "failed_before": m.failed_before,
         "seconds": m.answer.seconds,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from .answers import Answer, is_class_right, is_exact, is_right
 from .sizes import Size, compared
 
 LEVEL = 0.95
+CIRCUMSTANCES = ("spring_known", "virgin", "new_lines")
+BASE_FAILED = "The base model could not be fitted"  # begins the text of an ``unknown`` that looked for no effect
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,7 @@ class Marked:
         multiple: of detection, of the weakest effect; None where nothing is hidden.
         sizes: amplitudes found against hidden.
         failed_before: how many attempts at this case failed.
+        circumstances: whether the spring is known, the contact virgin, and the lines new at every event.
     """
 
     name: str
@@ -30,6 +33,7 @@ class Marked:
     answer: Answer
     sizes: tuple[Size, ...]
     failed_before: int = 0
+    circumstances: Mapping[str, bool] = field(default_factory=dict)
 
     @property
     def tags(self) -> tuple[str, ...]:
@@ -53,6 +57,23 @@ class Marked:
         return self.answer.kind in ("missing", "ambiguous", "unknown")
 
     @property
+    def names(self) -> bool:
+        """Whether any effect is named, be it on the way to an ``unknown``."""
+        return bool(self.answer.named or self.answer.set)
+
+    @property
+    def claim_holds(self) -> bool:
+        """Whether that is so which a confidence is stated of: of a set, that it and the names hold what is hidden."""
+        if self.answer.kind == "ambiguous":
+            return bool(self.tags) and set(self.tags) <= {*self.answer.named, *self.answer.set}
+        return self.right
+
+    @property
+    def base_failed(self) -> bool:
+        """Whether it is ``unknown`` because not even the base model could be fitted."""
+        return self.answer.kind == "unknown" and self.answer.text.startswith(BASE_FAILED)
+
+    @property
     def answered(self) -> bool:
         """Whether there is a verdict."""
         return self.answer.kind not in ("failed", "not run")
@@ -70,7 +91,8 @@ def mark(case: dict[str, Any], answer: Answer, failed_before: int = 0) -> Marked
     effects = tuple(case["effects"])
     multiple = min((effect["multiple"] for effect in effects), default=None)
     sizes = tuple(compared(list(effects), answer))
-    return Marked(case["name"], case["kind"], effects, multiple, answer, sizes, failed_before)
+    known = {name: case[name] for name in CIRCUMSTANCES if name in case}
+    return Marked(case["name"], case["kind"], effects, multiple, answer, sizes, failed_before, known)
 
 
 def rate(marks: Iterable[bool]) -> dict[str, Any]:

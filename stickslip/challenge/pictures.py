@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, styled
-from .figures import VERDICTS
+from .figures import VERDICTS, WORDS
 
 ANSWERED = "answered (number of cases, right ones in red; grey: share of the row)"
 LAST = ("a set", "several", "unknown", "failed", "not run")
@@ -101,7 +101,7 @@ def _matrix(
         axes.text(j, i, f"{values[i, j]:.0f}", ha="center", va="center", color=MIDDLE if right else DARK,
                   weight="bold" if right else "normal")  # fmt: skip
     axes.set_xticks(range(len(columns)), columns, rotation=60, ha="right", rotation_mode="anchor")
-    axes.set_yticks(range(len(rows)), rows)
+    axes.set_yticks(range(len(rows)), [WORDS.get(row, row) for row in rows])
     axes.set_ylabel("hidden")
     axes.set_xlabel(ANSWERED)
     axes.grid(False)
@@ -134,7 +134,7 @@ def amplitude_figure(score: Mapping[str, Any]) -> Figure:
     right.plot([], [], "o", color=DARK, label="answered rightly")
     right.plot([], [], "x", color=MIDDLE, label="answered wrongly")
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
-    right.set_ylabel("held-out error, last model / base model")
+    right.set_ylabel("held-out error, last / base model\n(1: nothing added, or nothing gained)")
     logarithmic(right, "y")
     right.set_title("Fall of the held-out error")
     _confidence(last, bins)
@@ -146,14 +146,15 @@ def amplitude_figure(score: Mapping[str, Any]) -> Figure:
 
 
 def _confidence(axes: Axes, bins: Sequence[Mapping[str, Any]]) -> None:
-    """Stated confidence beside the share of right answers among those that state one, in every bin."""
+    """Stated confidence beside how often what it is stated of holds, in every bin."""
     stated = [b for b in bins if b["confidence"]["stated"] is not None]
-    x, y, low, high = _points([{**b, "stated": b["confidence"]["right"]} for b in stated], "stated")
+    x, y, low, high = _points([{**b, "stated": b["confidence"]["holds"]} for b in stated], "stated")
     axes.plot(np.array(x) / 1.06, [b["confidence"]["stated"] for b in stated], "D", color=MIDDLE, label="stated, mean")
-    axes.errorbar(np.array(x) * 1.06, y, [low, high], color=DARK, marker="o", linestyle="", capsize=3, label="right")
+    axes.errorbar(np.array(x) * 1.06, y, [low, high], color=DARK, marker="o", linestyle="", capsize=3,
+                  label="claim holds")  # fmt: skip
     for b, at in zip(stated, x, strict=True):
-        axes.annotate(f"{b['confidence']['right']['of']}", (at, 1.0), ha="center", va="bottom", color=DARK)
-    axes.set_ylim(0, 1.1)
+        axes.annotate(f"n = {b['confidence']['holds']['of']}", (at, 1.04), ha="center", va="bottom", color=DARK)
+    axes.set_ylim(0, 1.13)
     axes.set_ylabel("share of the answers with a confidence")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
     axes.set_title("Stated confidence" if stated else "Stated confidence: none")

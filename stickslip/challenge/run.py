@@ -9,14 +9,14 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, RunFolderError, StickslipError
 from ..runstore import alone, json_text, versions, write_aside
 from ..workflow import diagnose_campaign
-from .cluster import cluster
+from .cluster import Workers, cluster
 from .one_case import REFUSED, Diagnosis, do_case, failures, is_done
 from .seal import CASES, RUNS, case_names, check_seal, digest
 
@@ -24,6 +24,7 @@ PROTOCOL = "protocol.json"
 POLL = 0.2  # s after which tasks are asked again
 ANSWER = 10.0  # s for the answer of a finished case to arrive
 RESUBMITTED = 20  # times a case may be handed out before the cluster is given up
+UNRECORDED = "not recorded"  # code of a run that did not write down its own
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ def run_challenge(
     retry: bool = False,
     diagnosis: Diagnosis | None = None,
     tell: Callable[[Progress], None] | None = None,
+    note: Callable[[str], None] | None = None,
 ) -> dict[str, int]:
     """Diagnose every case that has neither a result nor a recorded failure.
 
@@ -62,6 +64,7 @@ def run_challenge(
         retry: try cases again that failed before.
         diagnosis: called with the campaign file and the run folder to write; default the package's own.
         tell: told of every finished case.
+        note: told how much is to be done as it begins, and where no worker comes.
 
     Returns:
         How many cases are ``done``, ``failed`` and ``open``.
@@ -83,11 +86,21 @@ def run_challenge(
         cases = case_names(seal)
         waiting = [c for c in cases if not is_done(runs, c) and (retry or not failures(runs, c))]
         if waiting:
+            _go_on(runs, cases, waiting)
             with cluster(scheduler, workers) as client:
-                _work(client, folder, waiting, len(cases), diagnosis, tell)
+                there = Workers(client, note)
+                if note is not None:
+                    note(f"{len(waiting)} of {len(cases)} cases to do, {_workers(there.number)}")
+                _work(client, there, folder, waiting, len(cases), diagnosis, tell)
+            with suppress(OSError):  # who reads the protocol finds it out as well
+                _keep(runs, codes_of(runs, read_protocol(runs), cases))
     done = sum(is_done(runs, c) for c in cases)
     failed = sum(not is_done(runs, c) and bool(failures(runs, c)) for c in cases)
     return {"done": done, "failed": failed, "open": len(cases) - done - failed}
+
+
+def _workers(number: int) -> str:
+    return f"{number} worker{'' if number == 1 else 's'}"
 
 
 def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
@@ -95,6 +108,7 @@ def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
     from ..diagnose.thresholds import THRESHOLDS
 
     now = {"seal": seal, **options, "thresholds": asdict(THRESHOLDS), "versions": versions()}
+    now |= {"code": code_digest(), "codes": {}}
     path = runs / PROTOCOL
     if not path.is_file():
         write_aside(path, json_text(now) + "\n")
@@ -106,6 +120,42 @@ def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
                 f"this challenge was begun with other {key}", file=path, value=now[key], allowed=json_text(before[key]),
                 hint="one score must rest on one protocol: go on with the same settings, or remove the folder 'runs'",
             )  # fmt: skip
+
+
+@cache
+def code_digest() -> str:
+    """Digest of the package as this process found it."""
+    from ..workflow import _code
+
+    return _code(())
+
+
+def _go_on(runs: Path, cases: Sequence[str], waiting: Sequence[str]) -> None:
+    """Write down what is done before this code, and that it goes on with the rest."""
+    before = codes_of(runs, read_protocol(runs), cases)
+    left = {code: [case for case in done if case not in waiting] for code, done in before.items()}
+    _keep(runs, {code: done for code, done in left.items() if done}, code_digest())
+
+
+def _keep(runs: Path, codes: dict[str, list[str]], code: str | None = None) -> None:
+    before = read_protocol(runs)
+    now = {**before, "code": code or before["code"], "codes": codes}
+    if now != before:
+        write_aside(runs / PROTOCOL, json_text(now) + "\n")
+
+
+def codes_of(runs: Path, protocol: dict[str, Any], cases: Sequence[str]) -> dict[str, list[str]]:
+    """Which cases were answered by which code: digest of the package -> cases.
+
+    A case that no entry of the protocol lists was answered in the last run, which ended without writing it down.
+    """
+    codes = {code: list(done) for code, done in protocol.get("codes", {}).items()}
+    listed = {case for done in codes.values() for case in done}
+    new = [c for c in cases if c not in listed and (is_done(runs, c) or failures(runs, c))]
+    if new:
+        last = protocol.get("code", UNRECORDED)
+        codes[last] = sorted([*codes.get(last, []), *new])
+    return codes
 
 
 def read_protocol(runs: Path) -> dict[str, Any]:
@@ -127,6 +177,7 @@ def read_protocol(runs: Path) -> dict[str, Any]:
 
 def _work(
     client: Any,
+    there: Workers,
     folder: Path,
     waiting: list[str],
     total: int,
@@ -152,6 +203,7 @@ def _work(
         while at_work:
             # dask may forget to tell of a task whose answer was lost with its worker, so each is asked again and again
             time.sleep(POLL)
+            there.look()
             for case, future in list(at_work.items()):
                 if future.status == "pending":
                     if not is_done(runs, case) and len(failures(runs, case)) <= before[case]:
@@ -177,11 +229,20 @@ def _work(
                 del at_work[case]
                 count += 1
                 if tell is not None:
-                    left = (time.monotonic() - began) / count * (len(waiting) - count)
+                    left = time_left(time.monotonic() - began, count, len(waiting) - count, there.at_once)
                     tell(Progress(**told, done=first + count, total=total, left=left))
     except BaseException:
         client.cancel(list(at_work.values()))
         raise
+
+
+def time_left(elapsed: float, finished: int, remaining: int, at_once: int) -> float:
+    """Seconds until the remaining cases are done, at the pace so far.
+
+    Of the cases under way the one just begun is at its beginning; the others count as half done.
+    """
+    half = 0.5 * min(max(at_once, 1) - 1, remaining)
+    return elapsed * (remaining - half) / (finished + half)
 
 
 def _outcome(future: Any, runs: Path, case: str, failed_before: int) -> dict[str, Any] | None:

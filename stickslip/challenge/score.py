@@ -9,7 +9,7 @@ from .answers import read_answer
 from .figures import figures
 from .marks import mark
 from .one_case import failures
-from .run import PROTOCOL, read_protocol
+from .run import PROTOCOL, codes_of, read_protocol
 from .seal import RUNS, SealError, case_hashes, case_names, check_seal, digest, read_truth
 
 
@@ -38,12 +38,12 @@ def score_challenge(folder: str | Path, *, expected: str | None = None) -> dict[
     marked = []
     for name in sorted(cases):
         answer = read_answer(folder / RUNS, name)
-        strange = answer.hashes - case_hashes(seal, name)
-        if strange or (answer.kind not in ("failed", "not run") and not answer.hashes):
+        if answer.kind not in ("failed", "not run") and answer.hashes != case_hashes(seal, name):
             raise SealError(
                 "the result is of other files than those that were sealed", file=folder / RUNS / name,
                 hint="remove this folder and run the challenge again",
             )  # fmt: skip
         marked.append(mark(cases[name], answer, len(failures(folder / RUNS, name))))
+    protocol["codes"] = codes_of(folder / RUNS, protocol, sorted(cases))
     head = {"schema": 1, "seed": truth["seed"], "seal": digest(folder), "protocol": protocol}
     return {**head, **figures(marked)}

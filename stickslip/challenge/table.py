@@ -6,10 +6,14 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .figures import VERDICTS
+from .figures import VERDICTS, WORDS
 
 WIDTH = 110
-_KINDS = {"nothing": "nothing missing", "one": "one effect", "two": "two effects", "outside": "outside the catalogue"}
+_CIRCUMSTANCES = {
+    "spring_known": ("spring known", "spring not known"),
+    "virgin": ("contact never loaded before", "contact loaded before"),
+    "new_lines": ("new lines at every event", "the same lines at every event"),
+}
 
 
 def share(found: Mapping[str, Any]) -> str:
@@ -29,12 +33,13 @@ def score_text(score: Mapping[str, Any]) -> str:
         f"{s['finished']} diagnosed, {s['failed']} failed, {s['not_run']} not run (both count as wrong)",
         f"stickslip {s['protocol']['versions'].get('stickslip', '?')}, at most {s['protocol']['max_effects']} effects, "
         f"candidates: {', '.join(s['protocol']['candidates'] or []) or 'the whole catalogue'}",
+        *_codes(s["protocol"]),
         "",
         *_aims(s["aims"]),
         *_block(
             "What was hidden", ("exact", "right", "class"),
             [
-                (_KINDS.get(name, name), [share(row[k]) for k in ("exact", "right", "class")])
+                (WORDS.get(name, name), [share(row[k]) for k in ("exact", "right", "class")])
                 for name, row in [*s["by_kind"].items(), ("one or two effects", s["effects"])]
             ],
         ),
@@ -44,10 +49,19 @@ def score_text(score: Mapping[str, Any]) -> str:
              for b in s["by_amplitude"]],
         ),
         *_block(
-            "Times detection", ("amplitude in 2", "within 2 s.d.", "right if named", "held-out / base"),
+            "Times detection",
+            ("amplitude in 2", "within 2 s.d.", "right if named", "held-out / base, named", "within 1.5"),
             [(_edge(b), [share(b["amplitude"]), share(b["within_2_std"]), share(b["named_right"]),
-                         _middle(b["heldout"]["ratio"])]) for b in s["by_amplitude"]],
+                         _middle(b["heldout_named"]["ratio"]), share(b["heldout_right"])]) for b in s["by_amplitude"]],
         ),
+        *_block("Circumstance", ("exact", "right", "false alarms"), [
+            (words[value == "no"], [share(row[k]) for k in ("exact", "right", "false_alarms")])
+            for name, words in _CIRCUMSTANCES.items()
+            for value, row in s["by_circumstance"][name].items()
+        ]),
+        *_block("One effect", ("exact", "right"), [
+            (name.replace("_", " "), [share(row[k]) for k in ("exact", "right")]) for name, row in s["by_form"].items()
+        ]),
         *_confusion(s),
         *_confidence(s),
         *_block("Nothing missing, and outside", ("share",), [
@@ -55,9 +69,10 @@ def score_text(score: Mapping[str, Any]) -> str:
             ("effects named where nothing is missing", [share(s["false_names"])]),
             ("unknown recall", [share(s["unknown_recall"])]),
             ("unknown recall, and no effect named", [share(s["unknown_without_a_name"])]),
+            ("of all unknown: the base model could not be fitted", [share(s["unknown_base_failed"])]),
         ]),
         *_block("Held-out error in floors: median (quartiles)", ("base", "last model", "ratio", "within 1.5"), [
-            (_KINDS.get(name, "right answers"),
+            (WORDS.get(name, "right answers"),
              [_middle(row["base"]), _middle(row["final"]), _middle(row["ratio"]), share(row["within"])])
             for name, row in s["heldout"].items()
         ]),
@@ -68,6 +83,12 @@ def score_text(score: Mapping[str, Any]) -> str:
         *_wrong(s["list"]),
     ]  # fmt: skip
     return "\n".join(line.rstrip() for line in lines).rstrip() + "\n"
+
+
+def _codes(protocol: Mapping[str, Any]) -> list[str]:
+    """A line where not all cases were diagnosed by the same code."""
+    number = sum(bool(cases) for cases in protocol.get("codes", {}).values())
+    return [f"run by {number} versions of the code"] if number > 1 else []
 
 
 def _edge(b: Mapping[str, Any]) -> str:
@@ -91,7 +112,7 @@ def _block(title: str, heads: Sequence[str], rows: Sequence[tuple[str, list[str]
 def _aims(aims: Sequence[Mapping[str, Any]]) -> list[str]:
     out = []
     for aim in aims:
-        met = {None: "no case", True: "met", False: "MISSED"}[aim["met"]]
+        met = {None: "no case", True: "met" if aim["shown"] else "met, not shown", False: "MISSED"}[aim["met"]]
         bound = f"at least {100 * aim['at_least']:.0f} %" if aim["at_least"] is not None else ""
         bound = bound or f"at most {100 * aim['at_most']:.0f} %"
         out.append(f"aim {met}: {aim['text']}: {share(aim).strip()}, {bound}")
@@ -103,7 +124,7 @@ def _confusion(s: Mapping[str, Any]) -> list[str]:
     parts = [("", {"nothing": s["confusion"]["kinds"]["nothing"]})]
     parts += [(f", {_edge(b)} times", b["confusion"]["kinds"]) for b in s["by_amplitude"]]
     rows = [
-        (f"{_KINDS[kind]}{where}", [str(row[column]) if row.get(column) else "." for column in VERDICTS])
+        (f"{WORDS[kind]}{where}", [str(row[column]) if row.get(column) else "." for column in VERDICTS])
         for where, table in parts
         for kind, row in table.items()
         if row
@@ -112,15 +133,15 @@ def _confusion(s: Mapping[str, Any]) -> list[str]:
 
 
 def _confidence(s: Mapping[str, Any]) -> list[str]:
-    """Stated confidence against right answers, by amplitude; nothing where no verdict states one."""
-    parts = [(_KINDS["nothing"], s["calibration"]["nothing"])]
+    """Stated confidence against how often the claim holds, by amplitude; nothing where no verdict states one."""
+    parts = [(WORDS["nothing"], s["calibration"]["nothing"])]
     parts += [(f"{_edge(b)} times detection", b["confidence"]) for b in s["by_amplitude"]]
     rows = [
-        (name, [f"{100 * c['stated']:.0f} %", share(c["right"]), f"{c['brier']:.3f}"])
+        (name, [f"{100 * c['stated']:.0f} %", share(c["holds"]), f"{c['brier']:.3f}"])
         for name, c in parts
         if c["stated"] is not None
     ]
-    return _block("Confidence", ("stated, mean", "right", "Brier score"), rows) if rows else []
+    return _block("Confidence", ("stated, mean", "claim holds", "Brier score"), rows) if rows else []
 
 
 def _calibration(found: Mapping[str, Any]) -> list[str]:
@@ -131,7 +152,7 @@ def _calibration(found: Mapping[str, Any]) -> list[str]:
     if found["brier"] is not None:
         rows.append(("Brier score of stated confidence", [f"{found['brier']:.3f}"]))
         rows += [
-            (f"stated {100 * r['stated']:.0f} % on average, right", [share(r["right"])])
+            (f"stated {100 * r['stated']:.0f} % on average, claim holds", [share(r["holds"])])
             for r in found["reliability"]
             if r["stated"] is not None
         ]

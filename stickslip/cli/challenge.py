@@ -91,6 +91,7 @@ def run(
             max_effects=max_effects,
             retry=retry,
             tell=_tell,
+            note=_note,
         )
     except KeyboardInterrupt:
         raise KeyboardInterrupt("what is finished is kept; the same command goes on") from None
@@ -104,6 +105,10 @@ def _tell(p: Progress) -> None:
     left = f", about {_time(p.left)} left" if p.done < p.total else ""
     message = p.message.splitlines()[0] if p.message else ""
     print(f"{p.done}/{p.total} {p.case} {p.state}: {message} ({p.seconds:.0f} s{left})", file=sys.stderr, flush=True)
+
+
+def _note(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _time(seconds: float) -> str:

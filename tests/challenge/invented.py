@@ -23,16 +23,20 @@ def result(
     among: tuple[str, ...] | None = None,
     base: float = 1.0,
     final: float | None = None,
+    *,
+    forms: dict[str, str] | None = None,
+    confidence: float | None = None,
+    text: str = "invented",
     **parameters: tuple[float, float],
 ) -> dict[str, Any]:
-    """A ``result.json``; parameters as ``contact_ageing__rate=(value, std)``."""
+    """A ``result.json``; parameters as ``contact_ageing__rate=(value, std)``, forms of the last model by tag."""
     rungs = [("static", None, 500.0), ("inertia", "inertia", base)]
     if final is not None:
         rungs.append(("more", effects[0] if effects else "x", final))
     return {
         "schema": 1,
         "verdict": {"kind": kind, "effects": list(effects), "set": list(effects if among is None else among),
-                    "text": "invented", "reasons": []},
+                    "text": text, "reasons": [], "confidence": confidence},
         "ladder": [
             {"model": [name], "added": added, "train_error": error, "heldout_error": error, "by_phase": {}}
             for name, added, error in rungs
@@ -42,22 +46,33 @@ def result(
             name.replace("__", ".").replace("_", "-"): {"value": value, "std": std, "unit": "1", "doc": ""}
             for name, (value, std) in parameters.items()
         },
+        **({} if forms is None else {
+            "fitted_model": {"effects": [{"type": tag, "form": {"form": form}} for tag, form in forms.items()]},
+        }),
         "next_experiment": None,
         "dropped": [],
         "seconds": 2.0,
     }  # fmt: skip
 
 
-def make(folder: Path, cases: dict[str, tuple[str, list[dict[str, Any]]]]) -> Path:
-    """A sealed challenge of ``name: (kind, effects)`` with a campaign file of one line each."""
+def make(
+    folder: Path,
+    cases: dict[str, tuple[str, list[dict[str, Any]]]],
+    circumstances: dict[str, dict[str, bool]] | None = None,
+) -> Path:
+    """A sealed challenge of ``name: (kind, effects)`` with a campaign file and a trace of one line each."""
     files = [folder / TRUTH]
     for name in cases:
-        path = folder / CASES / name / "campaign.toml"
-        path.parent.mkdir(parents=True)
-        path.write_text(f"# {name}\n")
-        files.append(path)
+        (folder / CASES / name).mkdir(parents=True)
+        for file in ("campaign.toml", "v100.csv"):
+            path = folder / CASES / name / file
+            path.write_text(f"# {name} {file}\n")
+            files.append(path)
     (folder / TRUTH).parent.mkdir()
-    listed = [{"name": name, "kind": kind, "effects": effects} for name, (kind, effects) in cases.items()]
+    listed = [
+        {"name": name, "kind": kind, "effects": effects, **(circumstances or {}).get(name, {})}
+        for name, (kind, effects) in cases.items()
+    ]
     (folder / TRUTH).write_text(json.dumps({"schema": 1, "seed": 5, "cases": listed}))
     make_seal(folder, files, cases=len(cases))
     return folder
@@ -70,5 +85,5 @@ def answer(folder: Path, results: dict[str, dict[str, Any]]) -> None:
     _protocol(runs, digest(folder), {"candidates": None, "max_effects": 4})
     for name, content in results.items():
         (runs / name).mkdir()
-        inputs = [file_record(folder / CASES / name / "campaign.toml")]
+        inputs = [file_record(path) for path in sorted((folder / CASES / name).iterdir())]
         (runs / name / "result.json").write_text(json.dumps({**content, "inputs": inputs}))

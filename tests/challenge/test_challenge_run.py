@@ -17,9 +17,10 @@ import pytest
 from invented import effect, make
 
 from stickslip.challenge.one_case import failures
-from stickslip.challenge.run import Progress, run_challenge
+from stickslip.challenge.run import PROTOCOL, UNRECORDED, Progress, code_digest, run_challenge, time_left
 from stickslip.challenge.score import score_challenge
 from stickslip.challenge.seal import RUNS
+from stickslip.challenge.table import score_text
 from stickslip.cli import run
 from stickslip.errors import InputError
 
@@ -54,7 +55,8 @@ def invented_diagnosis(log: Path, slow: float = 0.0, failing: str = "", dying: s
                 {
                     "verdict": {"kind": "missing", "effects": ["wear"], "set": ["wear"], "text": ""},
                     "ladder": [{"added": "inertia", "heldout_error": 2.0}, {"added": "wear", "heldout_error": 1.0}],
-                    "parameters": {}, "inputs": [file_record(campaign)], "seconds": slow, "pieces": pieces,
+                    "parameters": {}, "inputs": [file_record(path) for path in sorted(campaign.parent.iterdir())],
+                    "seconds": slow, "pieces": pieces,
                 }
             )  # fmt: skip
 
@@ -71,9 +73,11 @@ def started(log: Path) -> list[tuple[str, int]]:
 def test_local_cluster_runs_every_case_once_and_keeps_failures(tmp_path: Path) -> None:
     folder, log = challenge(tmp_path / "c"), tmp_path / "log"
     told: list[Progress] = []
+    noted: list[str] = []
     found = run_challenge(
-        folder, workers=2, diagnosis=invented_diagnosis(log, failing="case-003"), tell=told.append
+        folder, workers=2, diagnosis=invented_diagnosis(log, failing="case-003"), tell=told.append, note=noted.append
     )  # fmt: skip
+    assert noted == ["6 of 6 cases to do, 2 workers"]
     assert found == {"done": 5, "failed": 1, "open": 0}
     assert sorted(name for name, _ in started(log)) == NAMES
     assert os.getpid() not in {pid for _, pid in started(log)}
@@ -91,14 +95,96 @@ def test_local_cluster_runs_every_case_once_and_keeps_failures(tmp_path: Path) -
 
     # again: nothing is done twice; a failure only when asked for, and its record stays
     log.unlink()
-    assert run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log)) == found
-    assert started(log) == []
-    assert run_challenge(folder, workers=1, retry=True, diagnosis=invented_diagnosis(log))["done"] == 6
+    noted.clear()
+    assert run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log), note=noted.append) == found
+    assert started(log) == noted == []
+    again = run_challenge(folder, workers=1, retry=True, diagnosis=invented_diagnosis(log), note=noted.append)
+    assert again["done"] == 6
+    assert noted == ["1 of 6 cases to do, 1 worker"]
     assert [name for name, _ in started(log)] == ["case-003"]
     assert json.loads((folder / RUNS / "case-003" / "result.json").read_text())["pieces"] == 2
     score = score_challenge(folder)
     assert (score["finished"], score["failed"]) == (6, 0)
     assert next(c["failed_before"] for c in score["list"] if c["case"] == "case-003") == 1
+
+
+def test_other_code_goes_on_and_is_written_down(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, log = challenge(tmp_path / "c", NAMES[:4]), tmp_path / "log"
+    path = folder / RUNS / PROTOCOL
+
+    def stop_at_second(progress: Progress) -> None:
+        if progress.done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log, slow=0.5, failing=NAMES[1]),
+                      tell=stop_at_second)  # fmt: skip
+    first = [n for n in NAMES[:4] if (folder / RUNS / n / "result.json").exists() or failures(folder / RUNS, n)]
+    assert NAMES[1] in first
+    assert len(first) < 4
+    # what the run had no time to write down is found when it is asked for
+    assert score_challenge(folder)["protocol"]["codes"] == {code_digest(): first}
+    assert "versions of the code" not in score_text(score_challenge(folder))
+
+    monkeypatch.setattr("stickslip.challenge.run.code_digest", lambda: "other")
+    run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log))
+    rest = sorted(set(NAMES[:4]) - set(first))
+    found = json.loads(path.read_text())
+    assert (found["code"], found["codes"]) == ("other", {code_digest(): first, "other": rest})
+    assert "run by 2 versions of the code" in score_text(score_challenge(folder))
+
+    # a case that is tried again is the later code's; a run that does nothing changes nothing
+    run_challenge(folder, workers=1, retry=True, diagnosis=invented_diagnosis(log))
+    codes = {code_digest(): [n for n in first if n != NAMES[1]], "other": sorted([*rest, NAMES[1]])}
+    assert json.loads(path.read_text())["codes"] == {code: done for code, done in codes.items() if done}
+    before = path.read_bytes()
+    monkeypatch.setattr("stickslip.challenge.run.code_digest", lambda: "third")
+    run_challenge(folder, workers=1, retry=True, diagnosis=invented_diagnosis(log))
+    assert path.read_bytes() == before
+
+
+def test_a_protocol_from_before_codes_were_written_is_taken_up(tmp_path: Path) -> None:
+    folder, log = challenge(tmp_path / "c", NAMES[:2]), tmp_path / "log"
+    failing = invented_diagnosis(log, failing=NAMES[1])
+    run_challenge(folder, workers=1, diagnosis=failing)
+    path = folder / RUNS / PROTOCOL
+    old = {key: value for key, value in json.loads(path.read_text()).items() if key not in ("code", "codes")}
+    path.write_text(json.dumps(old))
+    assert score_challenge(folder)["protocol"]["codes"] == {UNRECORDED: NAMES[:2]}
+    run_challenge(folder, workers=1, retry=True, diagnosis=invented_diagnosis(log))
+    assert json.loads(path.read_text())["codes"] == {UNRECORDED: NAMES[:1], code_digest(): NAMES[1:2]}
+
+
+@pytest.mark.parametrize(("workers", "finished"), [(1, 1), (4, 1), (4, 4), (4, 20)])
+def test_the_time_left_counts_with_the_workers(workers: int, finished: int) -> None:
+    """Forty cases of ten seconds each."""
+    rounds = -(-finished // workers)
+    estimate = time_left(10.0 * rounds, finished, 40 - finished, workers)
+    assert 0.5 < estimate / (10.0 * (40 / workers - rounds)) < 2.0
+    assert all(time_left(10.0, 39, 1, n) > 0.0 for n in range(100))
+
+
+def test_a_scheduler_without_workers_is_told_and_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, log = challenge(tmp_path / "c", NAMES[:2]), tmp_path / "log"
+    monkeypatch.setattr("stickslip.challenge.cluster.LOOK", 0.1)
+    monkeypatch.setattr("stickslip.challenge.cluster.LONELY", 1.0)
+    noted: list[str] = []
+    with loopback_cluster(tmp_path, 0) as (address, _):
+        come: list[subprocess.Popen] = []
+
+        def note(text: str) -> None:
+            noted.append(text)
+            if "waiting" in text:
+                come.append(worker(address, tmp_path / "late"))
+
+        try:
+            found = run_challenge(folder, scheduler=address, diagnosis=invented_diagnosis(log), note=note)
+        finally:
+            for process in come:
+                process.kill()
+                process.wait(10)
+    assert found == {"done": 2, "failed": 0, "open": 0}
+    assert noted == ["2 of 2 cases to do, 0 workers", f"no worker is connected to {address}; waiting"]
 
 
 def test_failures_add_up(tmp_path: Path) -> None:
@@ -170,6 +256,11 @@ def spawn(kind: str, *arguments: str) -> subprocess.Popen:
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
+def worker(address: str, folder: Path) -> subprocess.Popen:
+    return spawn("worker", address, "--no-nanny", "--nthreads", "1", "--host", "127.0.0.1", "--local-directory",
+                 str(folder))  # fmt: skip
+
+
 @contextmanager
 def loopback_cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen]]]:
     """A scheduler and workers as separate processes; gives its address and the workers."""
@@ -177,10 +268,7 @@ def loopback_cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[sub
     processes = [spawn("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))]
     try:
         address = wait_for(lambda: json.loads(file.read_text())["address"])
-        processes += [
-            spawn("worker", address, "--no-nanny", "--nthreads", "1", "--host", "127.0.0.1", "--local-directory",
-                  str(folder / f"worker{i}")) for i in range(workers)
-        ]  # fmt: skip
+        processes += [worker(address, folder / f"worker{i}") for i in range(workers)]
         yield address, processes[1:]
     finally:
         for process in reversed(processes):
