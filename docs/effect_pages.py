@@ -20,6 +20,9 @@ import xarray
 
 from stickslip.effects import catalogue
 from stickslip.effects.base import Effect
+from stickslip.effects.printed import pieces
+from stickslip.effects.symbols import BASE, found, of_parameters
+from stickslip.fit.parameters import priors
 from stickslip.params import Spec, specs, variants
 from stickslip.plots.style import scaled
 
@@ -35,92 +38,6 @@ ACTS = {
     "BodyForce": "the block, by a force of its own",
     "Sensor": "what is read, not what happens",
 }
-# symbols of the equations that are no parameters: their meaning everywhere, and on single pages
-SYMBOLS = {
-    "x": "displacement of the block (m)",
-    r"\dot x": "velocity of the block (m/s)",
-    "t": "time (s)",
-    "x_0": "position of the load point (m)",
-    "v_0": "velocity of the drive (m/s)",
-    "m": "mass of the block (kg)",
-    r"\mu": "friction coefficient",
-    "F_s": "full static friction of all contacts (N)",
-    "F_{n,i}": "normal load of an element (N)",
-    "f_i": "force of an element (N)",
-    r"\dot f_i": "rate of an element's force (N/s)",
-    "c_i": "cap of an element (N)",
-    "k_i": "stiffness of an element (N/m)",
-    "u_i": "displacement at which an element slides (m)",
-    "u_{max}": "displacement at which the last element slides (m)",
-    "k": "stiffness of all elements together (N/m)",
-    "c_s": "stiffness of the driving spring (N/m)",
-    r"\varphi": "phase",
-    "i": "number of the element",
-}
-_SHAPE = {"Q": "share of the stiffness that still sticks", "u": "displacement at which only this share sticks (m)"}
-_READ = {"y": "reading of the sensor (m)"}
-OWN = {
-    "base-vibration": {"F": "force on the block in the frame of the base (N)"},
-    "contact-ageing": {r"\theta": "age of the contact (s)", r"\dot\theta": "rate of the age"},
-    "contact-damping": {"F": "force on the block (N)"},
-    "contact-renewal": {
-        "f": "force of the junctions of one age in an element (N)",
-        "a": "age of the junctions, counted in slip (m)",
-        "c": "cap of the element (N)",
-        "k": "stiffness of the element (N/m)",
-        r"\ell": "mean slip that a junction lives (m)",
-    },
-    "curvature": _SHAPE,
-    "roll-off": _SHAPE,
-    "drive-ripple": {"s": "way the drive was told to go (m)"},
-    "flash-heating": {"P": "frictional power, averaged (W)", r"\dot P": "rate of this power (W/s)"},
-    "machine-compliance": _READ
-    | {
-        "F": "tangential force (N), F(u) that of the contact",
-        "u": "slip of the contact (m)",
-        "k_m": "stiffness of the fixture (N/m)",
-    },
-    "nonlinear-spring": {"F": "force of the driving spring (N)", "y": "elongation of the spring (m)"},
-    "rate-and-state": {r"\theta": "state of the contact (s)"},
-    "residual-load": {
-        "q": "mobility of the contacts, 0 at rest and 1 in a fast slip",
-        r"\dot q": "rate of the mobility (1/s)",
-    },
-    "sensor-drift": _READ,
-    "sensor-gain": _READ,
-    "sensor-high-pass": _READ | {"s": "slow part that is lost (m)", r"\dot s": "rate of this part (m/s)"},
-    "sensor-low-pass": _READ | {"e": "lag of the reading (m)", r"\dot e": "rate of the lag (m/s)"},
-    "slip-weakening": {"s_i": "way an element has slid since it last stuck (m)"},
-    "tilt": {"F": "force that tilts (N)"},
-    "unequal-contacts": {"z_{j(i)}": "normal score of the contact that the element belongs to"},
-    "viscoelastic-contact": {
-        "f": "force of an element (N)",
-        "e": "deflection of the element (m)",
-        r"\dot e": "rate of the deflection (m/s)",
-        "k": "stiffness of the element (N/m)",
-        "f_m": "force of the Maxwell branch (N)",
-        r"\dot f_m": "rate of this force (N/s)",
-    },
-    "viscous-drag": {"F": "force on the block (N)", "v_1": "a velocity of reference (m/s)"},
-    "wear": {"s": "path of the block (m)", r"\dot s": "rate of the path (m/s)", "g": "course of the wear, see below"},
-}
-_TOKEN = re.compile(r"(?:\\dot ?)?(?:\\[a-zA-Z]+|[A-Za-z])(?:_\{[^}]*\}|_\w)?")
-_WORDS = re.compile(r"\\(?:mathrm|text)\{[^}]*\}|\\quad|e\^|\\partial(?:_\w)?|dt\b")
-_FUNCTIONS = {
-    r"\to",
-    r"\ln",
-    r"\sin",
-    r"\sinh",
-    r"\max",
-    r"\sum",
-    r"\sum_i",
-    r"\int",
-    r"\left",
-    r"\right",
-    r"\le",
-    r"\sim",
-}
-_FUNCTIONS |= {r"\cdot", r"\pi", r"\propto", r"\frac", r"\tfrac"}
 FAMILIES = {
     "contact": "Contact",
     "friction": "Friction",
@@ -140,7 +57,7 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
     parts = [
         f"# {cls.tag}",
         f"{prose(cls.summary[:1].upper() + cls.summary[1:])}.",
-        f"```{{math}}\n{cls.equation}\n```",
+        display(cls.equation),
         *_symbols(cls),
         *(prose(text) for text in re.split(r"\n\s*\n", inspect.cleandoc(cls.__doc__ or ""))),
         f"**Acts on** {' and '.join(acting)}.{memory}",
@@ -182,31 +99,44 @@ def index(classes: Sequence[type[Effect]]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def display(latex: str) -> str:
+    """A formula as a block of its own, its equations below one another."""
+    parts = pieces(latex)
+    lines = " \\\\\n".join(f"& {part}" for part in parts) if len(parts) > 1 else parts[0]
+    return f"```{{math}}\n{lines}\n```"
+
+
 def symbols(cls: type[Effect]) -> list[str]:
-    """Symbols of an effect's equation that are not parameters of it, in the order they come."""
-    of_parameters = {t for spec in specs(cls).values() for t in _TOKEN.findall(spec.symbol or "")}
-    found = dict.fromkeys(_TOKEN.findall(_WORDS.sub(" ", cls.equation.replace("^*", ""))))
-    of_parameters |= {t.removesuffix("^*") for t in of_parameters}
-    return [t for t in found if t not in _FUNCTIONS and t not in of_parameters]
+    """Symbols of an effect's equations, in all its forms, that are not parameters of it, in the order they come."""
+    formulas = [cls.equation, *(cls(**form).formula() for form in catalogue.forms(cls))]
+    return [t for t in dict.fromkeys(t for f in formulas for t in found(f)) if t not in of_parameters(cls)]
+
+
+def meaning(cls: type[Effect], symbol: str) -> str:
+    """Of a symbol on an effect's page; empty where it has none."""
+    return {**BASE, **cls.symbols}.get(symbol, "")
 
 
 def _symbols(cls: type[Effect]) -> Iterator[str]:
-    known = {**SYMBOLS, **OWN.get(cls.tag, {})}
-    told = [f"${s}$ {known[s]}" for s in symbols(cls) if s in known]
+    told = [f"${s}$ {prose(meaning(cls, s))}" for s in symbols(cls) if meaning(cls, s)]
     if told:
-        yield f"{'; '.join(told)}."
+        dot = "; a dot is the rate of change in time" if r"\dot" in cls.equation else ""
+        yield f"{'; '.join(told)}{dot}."
 
 
 def _parameters(cls: type[Effect]) -> Iterator[str]:
-    rows = ["| | name | meaning | unit | default | range | absent at |", "|---|---|---|---|---|---|---|"]
+    rows = ["| | name | meaning | unit | default | range | absent at | prior |", "|---|---|---|---|---|---|---|---|"]
     default = cls()
+    known = priors(default)
     for name, spec in specs(cls).items():
         symbol = f"${spec.symbol}$" if spec.symbol else ""
         null = "" if spec.null is None else number(spec.null)
         unit = "" if spec.unit == "1" else spec.unit
         span = f"{number(spec.lower)} ... {number(spec.upper)}{', logarithmic' if spec.log else ''}"
         value = number(float(getattr(default, name)))
-        rows.append(f"| {symbol} | `{name}` | {cell(spec.doc)} | {cell(unit)} | {value} | {span} | {null} |")
+        rows.append(
+            f"| {symbol} | `{name}` | {cell(spec.doc)} | {cell(unit)} | {value} | {span} | {null} | {known[name]} |"
+        )
     yield "\n".join(rows)
     grids = {name: spec for name, spec in specs(cls).items() if spec.grid}
     if grids:
@@ -223,6 +153,9 @@ def _forms(cls: type[Effect]) -> Iterator[str]:
         doc = f": {prose(fields[name])}" if fields[name] else ""
         first = getattr(cls(), name)
         yield f"`{name}`{doc}. One of {', '.join(f'`{c}`' for c in choices)} (default `{first}`)."
+    for form in catalogue.forms(cls):
+        yield ", ".join(f"`{name} = {choice}`" for name, choice in form.items()) + ":"
+        yield display(cls(**form).formula())
 
 
 # what `measured` gives: name, unit, factor from SI, format

@@ -31,6 +31,12 @@ class Spec:
         doc: meaning in words.
         source: the equation or paper.
         symbol: LaTeX symbol.
+        ends: ends of the range where the law becomes a special case (a sharp corner, no direct effect): a fit may
+            arrive there, which says nothing against it.
+        prior: centre of what is known of the value beforehand (``None``: the default, of an amplitude its null).
+        width: standard deviation of that knowledge: of the natural logarithm for a parameter that is sought on a
+            logarithmic scale, else in SI (an amplitude is never sought on one); infinite where nothing is known.
+            ``None`` leaves it to the rule of :func:`stickslip.fit.parameters.effect_parameters`.
     """
 
     unit: str
@@ -42,6 +48,9 @@ class Spec:
     grid: tuple[float, ...] = ()
     source: str = ""
     symbol: str = ""
+    ends: tuple[float, ...] = ()
+    prior: float | None = None
+    width: float | None = None
 
 
 def _as_float(value: Any) -> Any:
@@ -62,9 +71,12 @@ def parameter(
     grid: tuple[float, ...] = (),
     source: str = "",
     symbol: str = "",
+    ends: tuple[float, ...] = (),
+    prior: float | None = None,
+    width: float | None = None,
 ) -> Any:
     """A field of a physical class: a 64-bit float with its :class:`Spec`. Arguments as there."""
-    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, source, symbol)
+    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, source, symbol, ends, prior, width)
     return eqx.field(default=float(default), converter=_as_float, metadata={"spec": spec})
 
 

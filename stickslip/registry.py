@@ -19,13 +19,21 @@ class Registry(Generic[T]):
         group: the entry point group, e.g. ``"stickslip.readers"``.
         what: how messages call one of them, e.g. ``"reader"``.
         prepare: makes the thing from what an entry point loads (e.g. calls a class); default: as loaded.
+        name: what a thing calls itself, by which a plug-in is then found; default: the name of its entry point.
 
-    A plug-in that fails to load is left out with a warning that names its package; it cannot stop the program.
+    A plug-in that fails to load, or whose name is taken, is left out with a warning that names its package; it cannot
+    stop the program.
     """
 
-    def __init__(self, group: str, what: str, prepare: Callable[[object], T] | None = None) -> None:
+    def __init__(
+        self,
+        group: str,
+        what: str,
+        prepare: Callable[[object], T] | None = None,
+        name: Callable[[T], str] | None = None,
+    ) -> None:
         self.group, self.what = group, what
-        self._prepare = prepare
+        self._prepare, self._name = prepare, name
         self._own: dict[str, T] = {}
         self._plugged: dict[str, T] | None = None
 
@@ -61,13 +69,25 @@ class Registry(Generic[T]):
     def __getitem__(self, name: str) -> T:
         return self._own[name] if name in self._own else (self._plugged or {})[name]
 
+    def packages(self) -> list[tuple[str, str]]:
+        """Name and version of every installed distribution that offers something in the group, sorted."""
+        found = (point.dist for point in entry_points(group=self.group))
+        return sorted({(dist.name, dist.version) for dist in found if dist is not None})
+
     def _load(self) -> dict[str, T]:
         found: dict[str, T] = {}
         for point in entry_points(group=self.group):
+            package = point.dist.name if point.dist else point.value
             try:
                 loaded = point.load()
-                found[point.name] = self._prepare(loaded) if self._prepare else loaded
+                thing: T = self._prepare(loaded) if self._prepare else loaded
+                name = self._name(thing) if self._name else point.name
             except Exception as error:  # whatever a foreign package raises on import
-                package = point.dist.name if point.dist else point.value
                 warnings.warn(f"the {self.what} '{point.name}' of {package} cannot be loaded: {error!r}", stacklevel=3)
+                continue
+            taken = self._own.get(name, found.get(name, thing))
+            if taken is thing:
+                found[name] = thing
+            else:
+                warnings.warn(f"the {self.what} '{name}' of {package} is left out: the name is taken", stacklevel=3)
         return found

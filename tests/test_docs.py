@@ -14,6 +14,7 @@ import pytest
 
 from stickslip.effects import catalogue
 from stickslip.effects.plain import plain
+from stickslip.fit.parameters import priors
 from stickslip.params import specs, variants
 from stickslip.scenario import load_scenario
 
@@ -56,14 +57,18 @@ def written(pages: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 
 @pytest.mark.parametrize("tag", catalogue.EFFECTS.names())
-def test_every_effect_has_its_page(written: Path, tag: str) -> None:
+def test_every_effect_has_its_page(pages: ModuleType, written: Path, tag: str) -> None:
     cls, text = catalogue.get(tag), (written / f"{tag}.md").read_text(encoding="utf-8")
     assert text.startswith(f"# {tag}\n")
-    assert f"```{{math}}\n{cls.equation}\n```" in text
+    assert pages.display(cls.equation) in text
+    for form in catalogue.forms(cls):
+        assert pages.display(cls(**form).formula()) in text
+        assert all(f"`{name} = {choice}`" in text for name, choice in form.items())
     rows = [line for line in text.splitlines() if line.startswith("|")]
     for name, spec in specs(cls).items():
         (row,) = [r for r in rows if f"| `{name}` |" in r]
-        assert row.count("|") == 8, "a cell too many or too few"
+        assert row.count("|") == 9, "a cell too many or too few"
+        assert row.endswith(f"| {priors(cls())[name]} |")
         assert f"${spec.symbol}$" in row and (spec.unit == "1" or spec.unit in row)
     for name, choices in variants(cls).items():
         assert f"`{name}`" in text and all(f"`{choice}`" in text for choice in choices)
@@ -78,11 +83,11 @@ def test_every_effect_has_its_page(written: Path, tag: str) -> None:
 @pytest.mark.parametrize("tag", catalogue.EFFECTS.names())
 def test_every_symbol_of_an_equation_is_explained(pages: ModuleType, tag: str) -> None:
     cls = catalogue.get(tag)
-    known = {**pages.SYMBOLS, **pages.OWN.get(tag, {})}
-    missing = [s for s in pages.symbols(cls) if s not in known]
-    assert not missing, f"give them a meaning in docs/effect_pages.py: {missing}"
+    missing = [s for s in pages.symbols(cls) if not pages.meaning(cls, s)]
+    assert not missing, f"give them a meaning in the class's symbols: {missing}"
     page = pages.page(cls)
-    assert all(f"${s}$ {known[s]}" in page for s in pages.symbols(cls))
+    assert all(f"${s}$ {pages.prose(pages.meaning(cls, s))}" in page for s in pages.symbols(cls))
+    assert set(cls.symbols) <= set(pages.symbols(cls)), "a meaning for a symbol that stands nowhere"
 
 
 def test_numbers_of_an_effects_runs(pages: ModuleType) -> None:

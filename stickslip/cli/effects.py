@@ -32,7 +32,8 @@ def effects(
     tag:
         The effect to explain.
     model:
-        Print the equations of this model: --model static,inertia,contact-ageing.
+        Print the equations of this model: --model static,inertia,contact-ageing. Forms of a law and values other than
+        the defaults go behind the tag: rate-and-state:law=slip:evolution=0.01, drive-ripple:pitch=2mm.
     latex:
         Print the equations as LaTeX.
     effect:
@@ -49,7 +50,7 @@ def effects(
     for path in effect:
         catalogue.load_file(path)
     if model is not None:
-        print(_equations([name.strip() for name in model.split(",") if name.strip()], latex), end="")
+        print(_equations(model.split(","), latex), end="")
         return 0
     if tag is None:
         print(_catalogue(catalogue.all()))
@@ -62,11 +63,11 @@ def effects(
     return 0
 
 
-def _equations(tags: list[str], latex: bool) -> str:
+def _equations(words: list[str], latex: bool) -> str:
     from ..effects.equations import of_tags
     from ..model import Block, Weakening
 
-    found = of_tags(tags, block=Block(), weakening=Weakening())
+    found = of_tags(words, block=Block(), weakening=Weakening())
     return found.latex() if latex else found.text()
 
 
@@ -84,12 +85,9 @@ def _catalogue(known: dict[str, type[Effect]]) -> str:
 
 def _explained(cls: type[Effect]) -> str:
     from ..effects.catalogue import roles
-    from ..effects.plain import plain
-    from ..params import variants
 
-    lines = [f"{cls.tag} ({cls.family}): {cls.summary}", "", f"  {plain(cls.equation)}", f"  LaTeX: {cls.equation}", ""]
-    lines += ["parameters:", *(f"  {line}" for line in _parameters(cls))]
-    lines += [f"  {name}: one of {', '.join(choices)}" for name, choices in variants(cls).items()]
+    lines = [f"{cls.tag} ({cls.family}): {cls.summary}", "", *_formula(cls.equation), ""]
+    lines += ["parameters:", *(f"  {line}" for line in _parameters(cls)), *_forms(cls)]
     lines += ["", f"acts as: {', '.join(roles(cls))}", *_wrapped("signature", cls.signature)]
     if cls.confused_with:
         lines.append("confused with:")
@@ -98,16 +96,40 @@ def _explained(cls: type[Effect]) -> str:
     return "\n".join([*lines, *_wrapped("source", cls.source)])
 
 
+def _formula(latex: str) -> list[str]:
+    from ..effects.plain import plain
+    from ..effects.printed import pieces
+
+    return [*(f"  {plain(part)}" for part in pieces(latex)), f"  LaTeX: {latex}"]
+
+
+def _forms(cls: type[Effect]) -> Iterator[str]:
+    """The choices, and the equations of every form of a law that has several."""
+    from ..effects.catalogue import forms
+    from ..params import variants
+
+    if not variants(cls):
+        return
+    yield from (f"  {name}: one of {', '.join(choices)}" for name, choices in variants(cls).items())
+    for number, form in enumerate(forms(cls)):
+        chosen = ", ".join(f"{name} = {choice}" for name, choice in form.items())
+        yield from ("", f"{chosen}{' (default)' if number == 0 else ''}:", *_formula(cls(**form).formula()))
+
+
 def _parameters(cls: type[Effect]) -> Iterator[str]:
     from ..effects.plain import plain
+    from ..fit.parameters import priors
     from ..params import specs
 
+    effect = cls()
+    known = priors(effect)
     for name, spec in specs(cls).items():
         unit = "" if spec.unit == "1" else f" {spec.unit}"
         symbol = f" ({plain(spec.symbol)})" if spec.symbol else ""
         null = "" if spec.null is None else f", absent at {spec.null:g}"
-        default = float(getattr(cls(), name))
-        yield f"{name}{symbol} = {default:.6g}{unit} [{spec.lower:g} ... {spec.upper:g}{unit}]: {spec.doc}{null}"
+        default = float(getattr(effect, name))
+        bounds = f"[{spec.lower:g} ... {spec.upper:g}{unit}]"
+        yield f"{name}{symbol} = {default:.6g}{unit} {bounds}: {spec.doc}{null}; prior: {known[name]}"
 
 
 def _wrapped(head: str, text: str) -> list[str]:

@@ -46,10 +46,11 @@ def check_effect(cls: type[Effect], *, full_metadata: bool = True) -> list[Findi
         cls: the class.
         full_metadata: whether source, signature and confusions must be there (they must in the catalogue).
 
-    What is checked: bounds are refused with a message; one compilation serves all values; the null reproduces the base
-    model bit for bit; values and derivatives are finite in every corner of the ranges, also in steps without time or
-    way; a passive contact creates no energy; derivatives through the solver agree with finite differences over a ladder
-    of steps at two tolerances.
+    What is checked: priors lie within the bounds and have a positive width; every form has an equation of its own;
+    bounds are refused with a message; one compilation serves all values; the null reproduces the base model bit for
+    bit; values and derivatives are finite in every corner of the ranges, also in steps without time or way; a passive
+    contact creates no energy; derivatives through the solver agree with finite differences over a ladder of steps at
+    two tolerances.
     """
     return check_effects([cls], full_metadata=full_metadata)
 

@@ -20,6 +20,11 @@ def check_metadata(cls: type[Effect], full: bool) -> Iterator[str]:
     for name in ("summary", "equation", *(("signature", "source", "confused_with") if full else ())):
         if not getattr(cls, name):
             yield f"{name} is empty"
+    told: dict[str, dict[str, str]] = {}
+    for form in catalogue.forms(cls) if full else ():
+        other = told.setdefault(cls(**form).formula(), form)
+        if other is not form:
+            yield f"the forms {other} and {form} have the same equation"
     for tag, experiment in cls.confused_with.items():
         if tag not in catalogue.all() or tag == cls.tag:
             yield f"confused with '{tag}', which is no other effect"

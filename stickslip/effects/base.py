@@ -92,7 +92,9 @@ class Effect(eqx.Module):
     Attributes:
         tag: name in files and verdicts.
         summary: one line.
-        equation: LaTeX of the law.
+        equation: LaTeX of the law, of all its forms at once where it has several (:meth:`formula` has that of one);
+            equations side by side have ``,\\quad`` between them.
+        symbols: meaning, with the unit, of symbols of the equations that are neither parameters nor of the base model.
         signature: what it does to a measured trace.
         confused_with: tags whose signature is alike, each with the experiment that separates the two.
         source: paper or book.
@@ -113,6 +115,11 @@ class Effect(eqx.Module):
     generalises: ClassVar[tuple[str, ...]] = ()
     periodic: ClassVar[tuple[str, Literal["time", "load point", "displacement"]] | None] = None
     family: ClassVar[str] = "contact"
+    symbols: ClassVar[dict[str, str]] = {}
+
+    def formula(self) -> str:
+        """LaTeX of the law in the form chosen, equations of its state included; to be overridden where forms differ."""
+        return self.equation
 
 
 class Memory(Effect):

@@ -20,6 +20,7 @@ class BaseVibration(BodyForce):
     tag = "base-vibration"
     summary = "the base shakes at a fixed frequency"
     equation = r"F = -m\,a_b \sin(2\pi f t + \varphi)"
+    symbols = {"F": "force on the block in the frame of the base (N)"}
     signature = "a line at a fixed frequency also in holds; slips set off early, ratcheting creep"
     confused_with = {
         "load-modulation": "spectrum with the drive off: the base still shakes the block",
@@ -38,7 +39,13 @@ class BaseVibration(BodyForce):
         20.0, unit="Hz", lower=1.0, upper=500.0, log=True, grid=(7.0, 20.0, 50.0), symbol="f", doc="frequency"
     )
     phase: Array = parameter(
-        0.0, unit="rad", lower=-np.pi, upper=np.pi, grid=(0.0, np.pi / 2), symbol=r"\varphi", doc="phase at t = 0"
+        0.0,
+        unit="rad",
+        lower=-2 * np.pi,
+        upper=2 * np.pi,
+        grid=(0.0, np.pi / 2),
+        symbol=r"\varphi",
+        doc="phase at t = 0",
     )
 
     def force(self, state: Any, motion: Motion, contact: Contact) -> Array:

@@ -60,6 +60,7 @@ def accept(cls: object) -> type[Effect]:
             raise InputError(
                 "the bounds of a parameter are empty", key=f"{here}.{name}", value=[spec.lower, spec.upper]
             )
+        _accept_prior(spec, f"{here}.{name}", name == cls.amplitude)
     if cls.__module__.startswith(f"{__package__}."):
         return cls  # making all of ours takes a quarter of the time of an import, and their tests do it
     check(cls(), where=cls.tag)
@@ -68,7 +69,19 @@ def accept(cls: object) -> type[Effect]:
     return cls
 
 
-EFFECTS: Registry[type[Effect]] = Registry("stickslip.effects", "effect", prepare=accept)
+def _accept_prior(spec: Spec, key: str, amplitude: bool) -> None:
+    if spec.prior is not None and not spec.lower <= spec.prior <= spec.upper:
+        allowed = f"{spec.lower:g} ... {spec.upper:g} {spec.unit}"
+        raise InputError(
+            "the prior of a parameter is centred beyond its bounds", key=key, value=spec.prior, allowed=allowed
+        )
+    if spec.width is not None and not spec.width > 0.0:
+        raise InputError("the width of a parameter's prior must be positive", key=key, value=spec.width)
+    if amplitude and spec.prior is not None and spec.width is None:
+        raise InputError("the prior of an amplitude needs a width", key=key, value=spec.prior)
+
+
+EFFECTS: Registry[type[Effect]] = Registry("stickslip.effects", "effect", prepare=accept, name=lambda cls: cls.tag)
 _user: dict[str, type[Effect]] = {}
 _unlisted: dict[str, type[Effect]] = {}
 

@@ -17,7 +17,11 @@ class ContactAgeing(Memory, Threshold):
 
     tag = "contact-ageing"
     summary = "contacts at rest grow stronger with the logarithm of time"
-    equation = r"\mu \to \mu\,[1 + \beta \ln(1 + \theta/t_0)],\quad \dot\theta = 1 - |\dot x|\,\theta/D"
+    equation = (
+        r"\mu \to \mu\,[1 + \beta \ln(1 + \theta/t_0)],\quad \dot\theta = 1 - |\dot x|\,\theta/D,"
+        r"\quad \theta(0) = \theta_1"
+    )
+    symbols = {r"\theta": "age of the contact (s)"}
     signature = "recurrence and slip size grow with hold time and with 1/v; the shape of creep stays"
     confused_with = {
         "rate-and-state": "velocity steps in steady sliding: ageing alone has no jump at the step",

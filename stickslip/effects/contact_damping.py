@@ -19,7 +19,8 @@ class ContactDamping(BodyForce):
 
     tag = "contact-damping"
     summary = "stuck contacts damp motion like dashpots"
-    equation = r"F = -\eta\,\dot x \sum_i k_i \left[1 - (f_i/c_i)^2\right]"
+    equation = r"F = -\eta\,\dot x \sum_i k_i \left[1 - (f_i/C_i)^2\right]"
+    symbols = {"F": "force on the block (N)"}
     signature = "ringing decays exponentially instead of hyperbolically; nothing in creep"
     confused_with = {
         "viscous-drag": "free vibration of the block on its spring without contact; slip against ring-down",

@@ -44,8 +44,13 @@ class ContactRenewal(Memory, Threshold, Flow):
     tag = "contact-renewal"
     summary = "sliding junctions break and are replaced by force-free ones"
     equation = (
-        r"\partial_t f + |\dot x|\,\partial_a f = k\dot x,\ |f| \le c,\ f|_{a=0} = 0,\quad a \sim \mathrm{Exp}(\ell)"
+        r"f_i = \int_0^\infty g_i(a)\,e^{-a/\ell}\,da/\ell,"
+        r"\quad \partial_t g_i + |\dot x|\,\partial_a g_i = k_i \dot x,\quad |g_i| \le C_i,\quad g_i(0) = 0"
     )
+    symbols = {
+        "g_i": "what the force of an element would be if all its junctions were of one age (N)",
+        "a": "age of a junction, counted in slip (m)",
+    }
     signature = "kinetic friction below static without weakening of the material, most for the deepest contacts"
     confused_with = {
         "velocity-weakening": "load series: the slip over which strength is lost scales with u_max",

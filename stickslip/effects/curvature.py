@@ -20,7 +20,14 @@ class Curvature(Geometry):
 
     tag = "curvature"
     summary = "macroscopic curvature of the contact"
-    equation = r"u(Q) \to (1-\varepsilon)\,u(Q) + \varepsilon\,\tfrac{3}{2}\tfrac{F_s}{k}\,(1 - Q^2)"
+    equation = (
+        r"u_i \to (1-\varepsilon)\,u_i + \varepsilon\,\frac{3 F_s}{2 k}\,(1 - Q_i^2),\quad k = \sum_i k_i,"
+        r"\quad Q_i = \sum_{u_j > u_i} k_j/k"
+    )
+    symbols = {
+        "k": "stiffness of all elements together (N/m)",
+        "Q_i": "share of the stiffness that still sticks when the element slides (Q_i^2: its mean over the element)",
+    }
     signature = "the exponent of the backbone falls towards 1.5: softer start, earlier end of creep"
     confused_with = {
         "machine-compliance": "load series: the exponent of a curved contact changes with load",
@@ -40,6 +47,7 @@ class Curvature(Geometry):
         null=0.0,
         symbol=r"\varepsilon",
         doc="how far the distribution of thresholds is that of a smooth sphere",
+        ends=(1.0,),
     )
 
     def reshape(self, bank: Bank) -> Bank:

@@ -21,7 +21,11 @@ class DirectEffect(Threshold):
 
     tag = "direct-effect"
     summary = "friction of sliding contacts rises with the logarithm of velocity"
-    equation = r"\mu \to \mu\,[1 + a \ln(1 + |\dot x|/v^*)]"
+    equation = (
+        r"\mu \to \mu\,[1 + a\,\Lambda],"
+        r"\quad \Lambda = \ln(1 + |\dot x|/v^*) \;\mathrm{or}\; \mathrm{asinh}\left(|\dot x|/(2 v^*)\right)"
+    )
+    symbols = {r"\Lambda": "logarithm of the velocity, zero at rest"}
     signature = "creep slows where velocity rises; creep and recurrence shift with the logarithm of the drive velocity"
     confused_with = {
         "unequal-contacts": "drive velocities that differ by a factor of ten",
@@ -53,6 +57,10 @@ class DirectEffect(Threshold):
         doc="velocity below which friction is static",
     )
     form: str = variant("shifted", ("shifted", "asinh"), "ln(1 + v/v*), or asinh(v/(2 v*)) of forward and back jumps")
+
+    def formula(self) -> str:
+        rise = r"\ln(1 + |\dot x|/v^*)" if self.form == "shifted" else r"\mathrm{asinh}\left(|\dot x|/(2 v^*)\right)"
+        return rf"\mu \to \mu\,[1 + a\,{rise}]"
 
     def strength(self, state: Any, motion: Motion, contact: Contact) -> Array:
         ratio = abs(motion.v) / self.cutoff_velocity

@@ -17,7 +17,8 @@ class DriveRipple(Drive):
 
     tag = "drive-ripple"
     summary = "periodic error of the drive along its travel"
-    equation = r"x_0(t) = s + \varepsilon\,[\sin(2\pi s/\ell + \varphi) - \sin\varphi],\quad s = \int v_0\,dt"
+    equation = r"x_0 \to x_0 + \varepsilon\,[\sin(2\pi s/\ell + \varphi) - \sin(\varphi)]"
+    symbols = {"s": "way the drive was told to go (m)"}
     signature = "recurrence and slip times scatter in step with the absolute position of the drive, at every velocity"
     confused_with = {
         "load-modulation": "change the drive velocity: a ripple is fixed to the travel, a modulation to the clock",
@@ -44,7 +45,13 @@ class DriveRipple(Drive):
         doc="travel of one period",
     )
     phase: Array = parameter(
-        0.0, unit="rad", lower=-np.pi, upper=np.pi, grid=(0.0, np.pi / 2), symbol=r"\varphi", doc="phase at travel 0"
+        0.0,
+        unit="rad",
+        lower=-2 * np.pi,
+        upper=2 * np.pi,
+        grid=(0.0, np.pi / 2),
+        symbol=r"\varphi",
+        doc="phase at travel 0",
     )
 
     def lead(self, t: Array, load_point: Array) -> Array:

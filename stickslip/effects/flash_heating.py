@@ -21,7 +21,8 @@ class FlashHeating(Memory, Threshold):
 
     tag = "flash-heating"
     summary = "frictional heat softens the contacts"
-    equation = r"\mu \to \mu\,e^{-\chi P},\quad \tau\,\dot P = F_s|\dot x| - P"
+    equation = r"\mu \to \mu\,e^{-\chi P},\quad \tau\,\dot P = F_s|\dot x| - P,\quad P(0) = 0"
+    symbols = {"P": "frictional power, averaged over the thermal time (W)"}
     signature = "none expected at these speeds; else kinetic friction falls with the power of the slip"
     confused_with = {
         "velocity-weakening": "another ambient temperature; another load at the same velocity",

@@ -29,7 +29,7 @@ class AddedMass(Inertia):
     family = "block"
 
     share: Array = parameter(
-        0.0, unit="1", lower=0.0, upper=0.1, null=0.0, symbol=r"\alpha", doc="added mass as a share of the block's"
+        0.0, unit="1", lower=0.0, upper=0.2, null=0.0, symbol=r"\alpha", doc="added mass as a share of the block's"
     )
 
     def mass(self, mass: Array) -> Array:

@@ -36,18 +36,18 @@ def odd_spline(place: Array, n: int) -> Array:
 
 def _place(j: int) -> Any:
     doc = f"force along the track in the direction of the drive, spline {j}"
-    return parameter(0.0, unit="1", lower=-REACH, upper=REACH, symbol=f"x_{{{j}}}", doc=doc)
+    return parameter(0.0, unit="1", lower=-REACH, upper=REACH, symbol=f"X_{{{j}}}", doc=doc)
 
 
 def _speed(j: int) -> Any:
     # never negative: a force that follows the velocity takes energy out
     doc = f"force against the motion, spline {j} of the velocity"
-    return parameter(0.0, unit="1", lower=0.0, upper=REACH, symbol=f"v_{{{j}}}", doc=doc)
+    return parameter(0.0, unit="1", lower=0.0, upper=REACH, symbol=f"V_{{{j}}}", doc=doc)
 
 
 def _age(j: int) -> Any:
     doc = f"growth of the full friction force, spline {j} of the time in contact"
-    return parameter(0.0, unit="1", lower=-REACH, upper=REACH, symbol=f"a_{{{j}}}", doc=doc)
+    return parameter(0.0, unit="1", lower=-REACH, upper=REACH, symbol=f"A_{{{j}}}", doc=doc)
 
 
 @unlisted
@@ -62,9 +62,33 @@ class LearnedForce(Memory, Threshold, BodyForce):
     tag = "learned-force"
     summary = "smooth force of displacement, velocity and time in contact, learned from residuals; no explanation"
     equation = (
-        r"F = F_1\,[f_x(x) - \mathrm{sign}(\dot x)\,f_v(|\dot x|)],\quad \mu \to \mu\,e^{F_1 f_\theta(\theta)/F_s},"
-        r"\quad \dot\theta = 1 - |\dot x|\,\theta/D"
+        r"F = F_1\,\left[W \sum_{j=1}^{10} (X_j - X_0)\,B(s_x + 2 - j)"
+        r" - \mathrm{sign}(\dot x) \sum_{j=1}^{6} V_j\,B_j(s_v)\right],"
+        r"\quad \mu \to \mu\,e^{F_1 A/F_s},\quad A = (1 - o) \sum_{j=1}^{5} A_j\,B_j(s_\theta) + o A_0,"
+        r"\quad s_x = 7\,(x - x_a)/(x_b - x_a)\ \mathrm{within}\ 0 \ldots 7,"
+        r"\quad s_v = 5\,\ln(1 + |\dot x|/v_a)/\ln(1 + v_b/v_a) \le 5,"
+        r"\quad s_\theta = 4\,\ln(\theta/\theta_a)/\ln(\theta_b/\theta_a)\ \mathrm{within}\ 0 \ldots 4,"
+        r"\quad B(s) = \frac{4 - 6 s^2 + 3 |s|^3}{6}\ (|s| < 1),\; \frac{(2 - |s|)^3}{6}\ (1 \le |s| < 2),"
+        r"\quad B_j(s) = B(s - j) - B(s + j),\quad X_0 = \frac{1}{8} \sum_{j=2}^{9} X_j,"
+        r"\quad \dot\theta = 1 - |\dot x|\,\theta/D,\quad \theta(0) = 0,\quad \dot o = -|\dot x|\,o/D,\quad o(0) = 1"
     )
+    symbols = {
+        "F": "force on the block (N)",
+        "W": "1 where the data are, fading to 0 over two distances of the splines beyond them",
+        "X_j": "weights of the splines of the displacement",
+        "X_0": "mean of the inner ones",
+        "V_j": "weights of the splines of the velocity",
+        "A_j": "weights of the splines of the time in contact",
+        "A": "growth of the full friction force, in units of F_1",
+        "B": "cubic B-spline",
+        "B_j": "cubic B-spline, odd at the origin",
+        "s": "place on the scale of the splines",
+        "s_x": "displacement in units of the distance of the splines",
+        "s_v": "logarithm of the speed in these units",
+        r"s_\theta": "logarithm of the time in contact in these units",
+        r"\theta": "time in contact (s)",
+        "o": "share of the contact that is still the one a record begins with",
+    }
     signature = "whatever the model leaves over"
     source = "cubic B-splines; Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425 on learned discrepancies"
     amplitude = "size"
@@ -85,7 +109,7 @@ class LearnedForce(Memory, Threshold, BodyForce):
         1e-6, unit="m", lower=1e-9, upper=1e-2, symbol="D", doc="slip over which the time in contact is lost"
     )
     first: Array = parameter(
-        0.0, unit="1", lower=-REACH, upper=REACH, symbol="a_0", doc="friction of the contact that a record begins with"
+        0.0, unit="1", lower=-REACH, upper=REACH, symbol="A_0", doc="friction of the contact that a record begins with"
     )
     x1: Array = _place(1)
     x2: Array = _place(2)

@@ -19,7 +19,7 @@ class LoadModulation(Threshold):
 
     tag = "load-modulation"
     summary = "normal load oscillates at a fixed frequency"
-    equation = r"F_{n,i}(t) = F_{n,i}\,[1 + \varepsilon \sin(2\pi f t + \varphi)]"
+    equation = r"C_i \to C_i\,[1 + \varepsilon \sin(2\pi f t + \varphi)]"
     signature = "a line at a fixed frequency in the creep velocity, scatter of the recurrence with the phase in time"
     confused_with = {
         "base-vibration": "a second sensor on the base; with the drive stopped far below the limit the base still "
@@ -44,7 +44,13 @@ class LoadModulation(Threshold):
         10.0, unit="Hz", lower=0.1, upper=500.0, log=True, grid=(5.0, 10.0, 25.0, 50.0), symbol="f", doc="frequency"
     )
     phase: Array = parameter(
-        0.0, unit="rad", lower=-np.pi, upper=np.pi, grid=(0.0, np.pi / 2), symbol=r"\varphi", doc="phase at t = 0"
+        0.0,
+        unit="rad",
+        lower=-2 * np.pi,
+        upper=2 * np.pi,
+        grid=(0.0, np.pi / 2),
+        symbol=r"\varphi",
+        doc="phase at t = 0",
     )
 
     def strength(self, state: Any, motion: Motion, contact: Contact) -> Array:

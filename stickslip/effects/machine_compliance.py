@@ -28,7 +28,11 @@ class MachineCompliance(Geometry, Sensor):
 
     tag = "machine-compliance"
     summary = "the fixture gives way under the friction force"
-    equation = r"y = x + F/k_m \quad\text{or}\quad F = F(u),\; u = x - F/k_m"
+    equation = r"y \to y + \sum_i f_i/k_m \quad\mathrm{or}\quad \dot f_i = k_i\,\dot x_c,\quad x_c = x - \sum_i f_i/k_m"
+    symbols = {
+        "x_c": "displacement of the contact, on which the fixture stands (m)",
+        "K_i": "stiffness of the elements that stick up to the displacement at which this one slides (N/m)",
+    }
     signature = "creep in proportion to the force, on top of the contact's; read-out: too large for the ring frequency"
     confused_with = {
         "curvature": "load series: the fixture's part of the creep does not depend on the normal load",
@@ -45,6 +49,14 @@ class MachineCompliance(Geometry, Sensor):
         0.0, unit="m/N", lower=0.0, upper=1e-6, null=0.0, symbol="1/k_m", doc="compliance of the fixture"
     )
     where: str = variant("read-out", ("read-out", "series"), "seen by the sensor only, or between contact and mass")
+
+    def formula(self) -> str:
+        if self.where == "read-out":
+            return r"y \to y + \sum_i f_i/k_m"
+        return (
+            r"x_c = x - \sum_i f_i/k_m: \quad u_i \to u_i + F(u_i)/k_m,"
+            r"\quad k_i \to k_i/\left[(1 + K_i/k_m)\,(1 + (K_i - k_i)/k_m)\right],\quad K_i = \sum_{u_j \ge u_i} k_j"
+        )
 
     def reshape(self, bank: Bank) -> Bank:
         if self.where == "read-out":

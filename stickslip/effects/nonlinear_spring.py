@@ -17,7 +17,10 @@ class NonlinearSpring(Spring):
 
     tag = "nonlinear-spring"
     summary = "force of the driving spring is not proportional to its elongation"
-    equation = r"F = c_s\,y\,(1 + \beta y) \quad\text{or}\quad F = c_s\,y\,(1 + \beta y^2/(1\,\mathrm{mm}))"
+    equation = (
+        r"F_{\mathrm{spring}} \to F_{\mathrm{spring}}\,[1 + \beta\,(x_0 - x)] \quad\mathrm{or}\quad"
+        r" F_{\mathrm{spring}}\,[1 + \beta\,(x_0 - x)^2/(1\,\mathrm{mm})]"
+    )
     signature = "relation of recurrence and slip size; recurrence of the first event, which loads the spring from zero"
     confused_with = {
         "tilt": "calibrate the spring with weights",
@@ -31,13 +34,17 @@ class NonlinearSpring(Spring):
     curvature: Array = parameter(
         0.0,
         unit="1/m",
-        lower=-300.0,
-        upper=300.0,
+        lower=-800.0,
+        upper=800.0,
         null=0.0,
         symbol=r"\beta",
         doc="relative change of the secant stiffness per metre of elongation (at 1 mm in the cubic form)",
     )
     form: str = variant("quadratic", ("quadratic", "cubic"), "one-sided (beam) or symmetric (wire)")
+
+    def formula(self) -> str:
+        lever = "(x_0 - x)" if self.form == "quadratic" else r"(x_0 - x)^2/(1\,\mathrm{mm})"
+        return rf"F_{{\mathrm{{spring}}}} \to F_{{\mathrm{{spring}}}}\,[1 + \beta\,{lever}]"
 
     def pull(self, stretch: Array, pull: Array) -> Array:
         lever = stretch if self.form == "quadratic" else stretch * stretch / STROKE

@@ -22,7 +22,8 @@ class Plasticity(Geometry):
 
     tag = "plasticity"
     summary = "asperities yield: a hardness limit blunts the distribution of thresholds"
-    equation = r"c_i \propto c_i\,[1 + (h\,u_i/u_{max})^n]^{-1/n},\quad \sum c_i\ \mathrm{kept}"
+    equation = r"c_i \to \nu\,c_i\,[1 + (h\,u_i/\max_j u_j)^n]^{-1/n},\quad \sum_i c_i = F_s"
+    symbols = {r"\nu": "factor that keeps the full friction force"}
     signature = "blunted end of creep, many elements slide together: more sudden; changes with load"
     confused_with = {
         "unequal-contacts": "load series; first against repeated loading",
@@ -44,7 +45,14 @@ class Plasticity(Geometry):
         doc="elastic over plastic load of the deepest asperity",
     )
     sharpness: Array = parameter(
-        1.0, unit="1", lower=1.0, upper=8.0, grid=(1.0, 4.0), symbol="n", doc="how abruptly asperities yield"
+        1.0,
+        unit="1",
+        lower=1.0,
+        upper=8.0,
+        grid=(1.0, 4.0),
+        symbol="n",
+        doc="how abruptly asperities yield",
+        ends=(1.0, 8.0),
     )
 
     def reshape(self, bank: Bank) -> Bank:

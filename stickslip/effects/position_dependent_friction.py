@@ -53,9 +53,20 @@ class PositionDependentFriction(Threshold):
         doc="wavelength, or length of the trend",
     )
     phase: Array = parameter(
-        0.0, unit="rad", lower=-np.pi, upper=np.pi, grid=(0.0, np.pi / 2), symbol=r"\varphi", doc="phase at x = 0"
+        0.0,
+        unit="rad",
+        lower=-2 * np.pi,
+        upper=2 * np.pi,
+        grid=(0.0, np.pi / 2),
+        symbol=r"\varphi",
+        doc="phase at x = 0",
     )
     form: str = variant("wave", ("wave", "trend"), "periodic, or growing along the track")
+
+    def formula(self) -> str:
+        if self.form == "trend":
+            return r"\mu \to \mu\,e^{\varepsilon x/\lambda}"
+        return r"\mu \to \mu\,[1 + \varepsilon \sin(2\pi x/\lambda + \varphi)]"
 
     def strength(self, state: Any, motion: Motion, contact: Contact) -> Array:
         place = motion.x / self.wavelength

@@ -17,18 +17,23 @@ _GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 4 / 9), (0.5 + 0.15**0.5, 5 / 18))  #
 class RateAndState(Memory, Threshold):
     """Dieterich's ageing law or Ruina's slip law, regularised to be static far below v*.
 
-    With V = |v| + v* the state theta obeys theta' = 1 - V theta/D_c (ageing) or -(V theta/D_c) ln(V theta/D_c) (slip).
-    It cannot exceed D_c/v*, where friction has its full strength; sliding steadily at v it is weaker by the factor
+    With V = |v| + v* the state theta obeys theta' = 1 - V theta/L (ageing) or -(V theta/L) ln(V theta/L) (slip).
+    It cannot exceed L/v*, where friction has its full strength; sliding steadily at v it is weaker by the factor
     1 - (b - a) ln(1 + v/v*).
     """
 
     tag = "rate-and-state"
     summary = "rate-and-state friction (direct effect and evolving state), ageing or slip law"
-    equation = r"\mu \to \mu\,[1 + a \ln(1 + |\dot x|/v^*) + b \ln(\theta v^*/D_c)]"
+    equation = (
+        r"\mu \to \mu\,[1 + a \ln(V/v^*) + b \ln(v^*\,\theta/L)],\quad V = |\dot x| + v^*,"
+        r"\quad \dot\theta = 1 - V\,\theta/L \;\mathrm{or}\; -(V\,\theta/L)\,\ln(V\,\theta/L),"
+        r"\quad \theta(0) = (L/v^*)\,(1 - e^{-v^*\,\theta_1/L})"
+    )
+    symbols = {r"\theta": "state of the contact (s)", "V": "velocity, not below the cut-off (m/s)"}
     signature = "creep velocity as 1/(time to slip); overshoot after arrest; recurrence and slip size follow ln(hold)"
     confused_with = {
-        "contact-ageing": "velocity steps in steady sliding: a jump that decays over D_c",
-        "direct-effect": "velocity steps in steady sliding: a jump that decays over D_c",
+        "contact-ageing": "velocity steps in steady sliding: a jump that decays over the slip distance",
+        "direct-effect": "velocity steps in steady sliding: a jump that decays over the slip distance",
         "slip-weakening": "slide-hold-slide",
         "velocity-weakening": "holds of 1 s to 1000 s",
     }
@@ -54,6 +59,7 @@ class RateAndState(Memory, Threshold):
         grid=(0.3, 0.7),
         symbol="a/b",
         doc="direct effect over evolution effect; below 1 friction weakens with velocity",
+        ends=(0.0,),
     )
     slip_distance: Array = parameter(
         2e-6,
@@ -62,7 +68,7 @@ class RateAndState(Memory, Threshold):
         upper=1e-4,
         log=True,
         grid=(5e-7, 5e-6),
-        symbol="D_c",
+        symbol="L",
         doc="slip over which the state is renewed",
     )
     cutoff_velocity: Array = parameter(
@@ -87,8 +93,15 @@ class RateAndState(Memory, Threshold):
     )
     law: str = variant("ageing", ("ageing", "slip"), "the state grows in stationary contact too, or by slip only")
 
+    def formula(self) -> str:
+        rate = r"1 - V\,\theta/L" if self.law == "ageing" else r"-(V\,\theta/L)\,\ln(V\,\theta/L)"
+        return (
+            r"\mu \to \mu\,[1 + a \ln(V/v^*) + b \ln(v^*\,\theta/L)],\quad V = |\dot x| + v^*,"
+            rf"\quad \dot\theta = {rate},\quad \theta(0) = (L/v^*)\,(1 - e^{{-v^*\,\theta_1/L}})"
+        )
+
     def start(self, bank: Bank) -> Array:
-        # ln(theta v*/D_c) of a contact that was renewed first_age ago and has rested since
+        # ln(theta v*/L) of a contact that was renewed first_age ago and has rested since
         return jnp.log(-jnp.expm1(-self.first_age * self._rest_rate))
 
     def advance(self, state: Array, motion: Motion, contact: Contact) -> Array:

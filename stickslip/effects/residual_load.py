@@ -30,7 +30,11 @@ class ResidualLoad(Memory, Flow):
 
     tag = "residual-load"
     summary = "contacts keep only part of their tangential load when a slip comes to rest"
-    equation = r"\dot f_i = f_i\,\ln(1-\varepsilon)\,\max(-\dot q, 0),\quad \dot q = |\dot x|(1-q)/\ell - q/\tau_a"
+    equation = (
+        r"\dot f_i \to \dot f_i + f_i\,\ln(1-\varepsilon)\,\max(-\dot q, 0),"
+        r"\quad \dot q = |\dot x|\,(1-q)/\ell - q/\tau_a,\quad q(0) = 0"
+    )
+    symbols = {"q": "mobility of the contacts, 0 at rest and 1 in a fast slip"}
     signature = "creep of all events after the first grows towards that of a virgin contact; rebound and ringing change"
     confused_with = {
         "sensor-low-pass": "lift the block off before an event: the virgin creep is known then",
@@ -49,6 +53,7 @@ class ResidualLoad(Memory, Flow):
         null=0.0,
         symbol=r"\varepsilon",
         doc="share of every force that is lost as a slip comes to rest (1: virgin again)",
+        ends=(0.98,),
     )
     slip_length: Array = parameter(
         1e-6, unit="m", lower=1e-8, upper=1e-4, log=True, symbol=r"\ell", doc="slip that sets the contacts in motion"

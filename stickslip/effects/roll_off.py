@@ -21,7 +21,14 @@ class RollOff(Geometry):
 
     tag = "roll-off"
     summary = "no roughness beyond a longest wave: exponentially distributed gaps"
-    equation = r"u(Q) \to (1-\varepsilon)\,u(Q) - \varepsilon\,\tfrac{F_s}{k}\,\ln Q"
+    equation = (
+        r"u_i \to (1-\varepsilon)\,u_i - \varepsilon\,\frac{F_s}{k}\,\ln Q_i,\quad k = \sum_i k_i,"
+        r"\quad Q_i = \sum_{u_j > u_i} k_j/k"
+    )
+    symbols = {
+        "k": "stiffness of all elements together (N/m)",
+        "Q_i": "share of the stiffness that still sticks when the element slides (ln Q_i: its mean over the element)",
+    }
     signature = "the backbone becomes exponential: creep velocity as 1/(time to slip), longer tail"
     confused_with = {
         "slip-weakening": "profilometry; the slowest drive",
@@ -41,6 +48,7 @@ class RollOff(Geometry):
         null=0.0,
         symbol=r"\varepsilon",
         doc="how far the distribution of thresholds is exponential",
+        ends=(1.0,),
     )
 
     def reshape(self, bank: Bank) -> Bank:

@@ -17,7 +17,7 @@ class SensorDrift(Sensor):
 
     tag = "sensor-drift"
     summary = "reading drifts at a constant rate"
-    equation = r"y = x + \varepsilon t"
+    equation = r"y \to y + \varepsilon t"
     signature = "linear addition to every creep curve and hold, the same at every load, also where nothing is loaded"
     confused_with = {
         "thermal-creep": "holds at several loads: the rate of creep depends on the load, that of drift does not",

@@ -17,7 +17,7 @@ class SensorGain(Sensor):
 
     tag = "sensor-gain"
     summary = "reading is too large or too small by a fixed share"
-    equation = r"y = (1 + \gamma)\,x"
+    equation = r"y \to (1 + \gamma)\,y"
     signature = "slip size against recurrence times drive velocity; every displacement by the same share"
     confused_with = {
         "nonlinear-spring": "steady sliding at the drive's velocity: only a gain shows there",

@@ -23,7 +23,8 @@ class SensorHighPass(Memory, Sensor):
 
     tag = "sensor-high-pass"
     summary = "slow motion is lost: first-order high-pass of the sensor"
-    equation = r"y = x - s,\quad \dot s = 2\pi f_c\,(x - s)"
+    equation = r"y \to y - s,\quad \dot s = 2\pi f_c\,(x - s),\quad s(0) = 0"
+    symbols = {"s": "slow part of the displacement, which is lost (m)"}
     signature = "after a slip the reading sags back exponentially; huge for slips of 100 um"
     confused_with = {
         "sensor-drift": "long hold after a slip: a high-pass decays and depends on the slip, a drift goes on",

@@ -18,7 +18,8 @@ class SensorLowPass(Memory, Sensor):
 
     tag = "sensor-low-pass"
     summary = "fast motion is smoothed: first-order low-pass of the sensor"
-    equation = r"y = x - e,\quad \dot e = \dot x - e/\tau"
+    equation = r"y \to y - \delta,\quad \dot\delta = \dot x - \delta/\tau,\quad \delta(0) = 0"
+    symbols = {r"\delta": "how far the reading stays behind (m)"}
     signature = "late and softened edges of the slip, smaller ring-down; nothing in creep"
     confused_with = {
         "residual-load": "the bandwidth of the decoder, or a hammer tap recorded with the same sensor",

@@ -23,7 +23,12 @@ class SlipWeakening(Memory, Threshold):
 
     tag = "slip-weakening"
     summary = "each contact weakens with the distance it has slid since it last stuck"
-    equation = r"c_i \to c_i\,[1 - \varepsilon\,(1 - e^{-s_i/D_s})]"
+    equation = (
+        r"C_i \to C_i\,[1 - \varepsilon\,(1 - e^{-s_i/D_s})],"
+        r"\quad \dot s_i = |\dot x|\ \mathrm{(sliding)}\;\mathrm{or}\; -|\dot x|\,s_i/\ell_h\ \mathrm{(stuck)},"
+        r"\quad s_i(0) = 0"
+    )
+    symbols = {"s_i": "way an element has slid since it last stuck (m)"}
     signature = "creep accelerates earlier and slip begins below full strength, however slow the drive"
     confused_with = {
         "direct-effect": "the slowest drive: slip effects stay, rate effects vanish",

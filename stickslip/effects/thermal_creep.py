@@ -25,7 +25,7 @@ class ThermalCreep(Flow):
 
     tag = "thermal-creep"
     summary = "stuck contacts creep by thermally activated jumps"
-    equation = r"\dot f_i = k_i\,\left[\dot x - 2 v_1 e^{-1/\alpha} \sinh\left(f_i/(\alpha c_i)\right)\right]"
+    equation = r"\dot f_i \to \dot f_i - 2\,k_i\,v_1\,e^{-1/\alpha}\,\sinh\left(f_i/(\alpha\,C_i)\right)"
     signature = "creep goes on with the drive stopped, as the logarithm of time"
     confused_with = {
         "sensor-drift": "holds at several loads: creep depends on load, drift does not; a reference beam",

@@ -23,7 +23,7 @@ class Tilt(Threshold):
 
     tag = "tilt"
     summary = "normal load changes in proportion to the tangential force (pull line off the contact plane)"
-    equation = r"F_{n,i}(t) = F_{n,i}\,[1 + \kappa\, F(t)/F_s]"
+    equation = r"C_i \to C_i\,[1 + \kappa\,F_{\mathrm{spring}}/F_s] \;\mathrm{or}\; C_i\,[1 + \kappa\sum_j f_j/F_s]"
     signature = "strength depends on the load at the time of slip: slip size and the recurrence of the first event"
     confused_with = {
         "nonlinear-spring": "move the height at which the spring is attached: tilt changes sign with it",
@@ -44,6 +44,10 @@ class Tilt(Threshold):
         doc="relative change of the normal load at the full friction force",
     )
     by: str = variant("spring", ("spring", "contact"), "the force that tilts: of the driving spring, or of the contact")
+
+    def formula(self) -> str:
+        force = r"F_{\mathrm{spring}}" if self.by == "spring" else r"\sum_j f_j"
+        return rf"C_i \to C_i\,[1 + \kappa\,{force}/F_s]"
 
     def strength(self, state: Any, motion: Motion, contact: Contact) -> Array:
         if self.by == "spring":

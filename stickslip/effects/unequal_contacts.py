@@ -24,6 +24,7 @@ class UnequalContacts(Geometry):
     tag = "unequal-contacts"
     summary = "the contacts differ in the displacement at which they slide"
     equation = r"u_i \to u_i\,e^{\sigma z_{j(i)}},\quad k_i \to k_i\,e^{-\sigma z_{j(i)}}"
+    symbols = {"z_{j(i)}": "normal score of the one of four contacts that the element belongs to"}
     signature = "longer tail at the end of creep, like a smaller Hurst exponent"
     confused_with = {
         "direct-effect": "drive velocities that differ by a factor of ten",

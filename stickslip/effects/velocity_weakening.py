@@ -21,7 +21,11 @@ class VelocityWeakening(Threshold):
 
     tag = "velocity-weakening"
     summary = "friction falls with the momentary velocity (Stribeck)"
-    equation = r"\mu \to \mu\,[1 - \varepsilon\,(1 - e^{-|\dot x/v_s|^q})]"
+    equation = (
+        r"\mu \to \mu\,[1 - \varepsilon\,(1 - e^{-s})] \;\mathrm{or}\; \mu\,[1 - \varepsilon\,s/(1 + s)],"
+        r"\quad s = (\dot x^2/v_s^2 + 10^{-6})^{q/2} - 10^{-3q}"
+    )
+    symbols = {"s": "power of the velocity, rounded at rest"}
     signature = "slip size, recurrence, how abruptly a slip begins; creep only near v_s and above"
     confused_with = {
         "residual-load": "lift the block off before an event",
@@ -53,9 +57,13 @@ class VelocityWeakening(Threshold):
         doc="velocity over which strength falls",
     )
     exponent: Array = parameter(
-        1.0, unit="1", lower=0.5, upper=2.0, grid=(1.0, 2.0), symbol="q", doc="power of the velocity"
+        1.0, unit="1", lower=0.3, upper=3.0, grid=(0.5, 1.0, 2.0), symbol="q", doc="power of the velocity"
     )
     form: str = variant("exponential", ("exponential", "hyperbolic"), "1 - exp(-s) or s/(1 + s) with s = (v/v_s)^q")
+
+    def formula(self) -> str:
+        fall = "(1 - e^{-s})" if self.form == "exponential" else "s/(1 + s)"
+        return rf"\mu \to \mu\,[1 - \varepsilon\,{fall}],\quad s = (\dot x^2/v_s^2 + 10^{{-6}})^{{q/2}} - 10^{{-3q}}"
 
     def strength(self, state: Any, motion: Motion, contact: Contact) -> Array:
         squared = (motion.v / self.velocity) ** 2 + ROUNDING

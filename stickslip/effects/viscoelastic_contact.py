@@ -44,7 +44,15 @@ class ViscoelasticContact(Memory, Flow):
 
     tag = "viscoelastic-contact"
     summary = "the contact's stiffness relaxes with time"
-    equation = r"f = (1-g)\,k e + f_m,\quad \dot f_m = g k \dot e - f_m/\tau"
+    equation = (
+        r"f_i = (1-g)\,k_i\,\delta_i + h_i,"
+        r"\quad \dot h_i = g\,k_i\,\dot\delta_i - h_i/\tau"
+        r" \;\left[+\,(g f_i - h_i)\,|\dot x - \dot\delta_i|/\ell\ \mathrm{where\ renewed}\right]"
+    )
+    symbols = {
+        r"\delta_i": "deflection of an element: its rate is that of the block while the element sticks (m)",
+        "h_i": "force of its Maxwell branch (N)",
+    }
     signature = "exponential relaxation after arrest and in holds; creep too large for the ring frequency"
     confused_with = {
         "thermal-creep": "long holds: exponential against logarithmic relaxation",
@@ -67,6 +75,10 @@ class ViscoelasticContact(Memory, Flow):
         1e-6, unit="m", lower=1e-8, upper=1e-4, log=True, symbol=r"\ell", doc="slip over which contacts are replaced"
     )
     sliding: str = variant("renewed", ("renewed", "kept"), "whether sliding brings fresh, not yet relaxed contacts")
+
+    def formula(self) -> str:
+        fresh = r" + (g f_i - h_i)\,|\dot x - \dot\delta_i|/\ell" if self.sliding == "renewed" else ""
+        return rf"f_i = (1-g)\,k_i\,\delta_i + h_i,\quad \dot h_i = g\,k_i\,\dot\delta_i - h_i/\tau{fresh}"
 
     def start(self, bank: Bank) -> Branch:
         zero = jnp.zeros_like(bank.stiffness)

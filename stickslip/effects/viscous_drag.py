@@ -20,7 +20,15 @@ class ViscousDrag(BodyForce):
 
     tag = "viscous-drag"
     summary = "a force against the motion that grows with a power of velocity"
-    equation = r"F = -F_1\,\frac{\dot x}{v_1}\left|\frac{\dot x}{v_1}\right|^{q-1},\quad v_1 = 1\,\mathrm{mm/s}"
+    equation = (
+        r"F = -F_1\,(\dot x/v_1)\,\left[(\dot x^2 + v_r^2)/v_1^2\right]^{(q-1)/2},"
+        r"\quad v_1 = 1\,\mathrm{mm/s},\quad v_r = 10^{-4}\,v_1"
+    )
+    symbols = {
+        "F": "force on the block (N)",
+        "v_1": "a velocity of reference (m/s)",
+        "v_r": "velocity below which the drag is linear (m/s)",
+    }
     signature = "late part of the slip, peak velocity, slip size, decay of the ringing"
     confused_with = {
         "contact-damping": "free vibration of the block on its spring without contact",

@@ -22,7 +22,17 @@ class Wear(Memory, Threshold, Stiffness):
 
     tag = "wear"
     summary = "run-in: friction or thresholds drift with the accumulated slip"
-    equation = r"\mu \;\mathrm{or}\; u_{max} \to (\cdot)\,[1 + \varepsilon\, g(s/s_1)],\quad \dot s = |\dot x|"
+    equation = (
+        r"\mu \to \mu\,w \;\mathrm{or}\; u_i \to u_i\,w,\; k_i \to k_i/w,"
+        r"\quad w = \max(1 + \varepsilon g,\, 0.01),"
+        r"\quad g = s/s_1 \;\mathrm{or}\; \ln(1 + s/s_1) \;\mathrm{or}\; 1 - e^{-s/s_1},"
+        r"\quad \dot s = |\dot x|,\quad s(0) = 0"
+    )
+    symbols = {
+        "s": "path of the block (m)",
+        "g": "course of the change with the path",
+        "w": "factor on what drifts",
+    }
     signature = "monotone drift of slip size and recurrence (or of creep) with accumulated slip, not with time"
     confused_with = {
         "position-dependent-friction": "go back over the same track",
@@ -54,6 +64,14 @@ class Wear(Memory, Threshold, Stiffness):
     )
     changes: str = variant("friction", ("friction", "thresholds"), "what drifts: the caps, or u_max at constant caps")
     course: str = variant("linear", ("linear", "logarithmic", "saturating"), "how it goes on with the path")
+
+    def formula(self) -> str:
+        drifts = {"friction": r"\mu \to \mu\,w", "thresholds": r"u_i \to u_i\,w,\quad k_i \to k_i/w"}
+        courses = {"linear": "s/s_1", "logarithmic": r"\ln(1 + s/s_1)", "saturating": "1 - e^{-s/s_1}"}
+        return (
+            rf"{drifts[self.changes]},\quad w = \max(1 + \varepsilon g,\, {LEAST:g}),\quad g = {courses[self.course]},"
+            r"\quad \dot s = |\dot x|,\quad s(0) = 0"
+        )
 
     def start(self, bank: Bank) -> Array:
         return jnp.zeros(())

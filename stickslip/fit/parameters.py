@@ -55,6 +55,18 @@ class Free:
         """d(SI)/d(search scale), to carry a standard deviation outward."""
         return self.outward(z) if self.scale == "log" else float(self.scale)
 
+    @property
+    def known(self) -> str:
+        """The prior in words."""
+        if not np.isfinite(self.width):
+            return "none but its bounds"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        if self.scale == "log":
+            return f"log-normal around {self.prior:.3g}{unit}, factor {float(f'{np.exp(self.width):.3g}'):g}"
+        deviation = self.width * float(self.scale)
+        share = " (half its range)" if np.isclose(deviation, 0.5 * (self.upper - self.lower)) else ""
+        return f"normal around {self.prior:.3g}{unit}, standard deviation {deviation:.3g}{unit}{share}"
+
     def starting(self, value: float) -> Free:
         """The same, starting at ``value`` (SI), kept within its bounds."""
         return replace(self, start=float(np.clip(value, self.lower * (1 + 1e-9), self.upper * (1 - 1e-9))))
@@ -63,8 +75,13 @@ class Free:
 def effect_parameters(effect: Effect, amplitude: float | None = None) -> list[Free]:
     """Free parameters of an effect, from the specs beside its fields.
 
-    The amplitude has no prior but its bounds; inner parameters start at their default, with a wide prior over their
-    range. ``amplitude`` gives the start (SI); default a tenth of its range.
+    A parameter that says nothing of its prior has this one: the amplitude none but its bounds; inner parameters one
+    around their default, whose standard deviation is 0.35 of the range of the logarithm, or half the range where they
+    are sought on a linear scale (for a phase, whose range is two periods, that is no preference).
+
+    Args:
+        effect: its values are where inner parameters start.
+        amplitude: start of the amplitude (SI); default a twentieth of the way from its null to the further bound.
     """
     out = []
     for name, spec in specs(effect).items():
@@ -88,10 +105,20 @@ def effect_parameters(effect: Effect, amplitude: float | None = None) -> list[Fr
         lower, upper = spec.lower, spec.upper
         if scale == "log" and default <= 0:
             start = float(np.sqrt(lower * upper))
+        centre = start
+        if spec.prior is not None or (is_amplitude and spec.width is not None):
+            centre = (spec.null or 0.0) if spec.prior is None else spec.prior
+        if spec.width is not None:
+            width = spec.width if scale == "log" else spec.width / float(scale)
         out.append(
-            Free(f"{effect.tag}.{name}", spec.unit, scale, start, start, width, lower, upper, spec.doc, is_amplitude)
+            Free(f"{effect.tag}.{name}", spec.unit, scale, start, centre, width, lower, upper, spec.doc, is_amplitude)
         )
     return out
+
+
+def priors(effect: Effect) -> dict[str, str]:
+    """Name of every parameter of an effect -> what a fit takes to be known of it beforehand, in words."""
+    return {f.name.split(".", 1)[1]: f.known for f in effect_parameters(effect)}
 
 
 def vector(free: Sequence[Free]) -> np.ndarray:

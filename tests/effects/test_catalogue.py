@@ -134,7 +134,8 @@ def test_equations_hold_the_values() -> None:
     text = shown.text()
     for part in (
         "m x'' = F_spring - c x' - Σ_i f_i",
-        "y = x + ε t",
+        "y → y + ε t",
+        "contact.elements",
         "sensor-drift.rate",
         "5e-09",
         "block.mass",
@@ -143,29 +144,16 @@ def test_equations_hold_the_values() -> None:
         assert part in text
     latex = shown.latex()
     assert r"m \ddot x" in latex and r"$5 \times 10^{-9}$" in latex and r"\begin{tabular}" in latex
-    for group in ("align*", "tabular"):
-        assert latex.count(rf"\begin{{{group}}}") == latex.count(rf"\end{{{group}}}") == 1
+    for group, number in (("align*", 1), ("tabular", 2)):  # one table of parameters, one of other symbols
+        assert latex.count(rf"\begin{{{group}}}") == latex.count(rf"\end{{{group}}}") == number
 
 
 def test_equations_of_the_static_model_have_no_inertia() -> None:
     text = of_tags(["static"], block=Block(), weakening=Weakening()).text()
     assert "0 = F_spring" in text and "x''" not in text and "block.mass" not in text and "ψ" not in text
     assert "block.spring_stiffness" in text
-    assert "0 = F_spring" in of_tags(["static", "contact-ageing"]).text()
     with pytest.raises(InputError, match="did you mean 'static'"):
         of_tags(["statc"])
-
-
-def test_every_equation_can_be_shown_as_text() -> None:
-    from matplotlib.mathtext import MathTextParser
-
-    from stickslip.effects.plain import plain
-
-    for tag, cls in catalogue.all().items():
-        shown = plain(cls.equation)
-        assert "\\" not in shown and shown.count("(") == shown.count(")"), tag
-        assert shown.count("{") == shown.count("}") == 0, tag
-        MathTextParser("path").parse(f"${cls.equation}$".replace(r"\tfrac", r"\frac").replace(r"\le ", r"\leq "))
 
 
 def test_inertia_alone_is_not_the_static_model() -> None:

@@ -9,10 +9,11 @@ import pytest
 from jax import Array
 
 from stickslip.conformance import check_effect, check_effects
+from stickslip.conformance.statics import check_metadata
 from stickslip.contact import Bank
 from stickslip.effects import catalogue
 from stickslip.effects.base import BodyForce, Contact, Memory, Motion, Threshold
-from stickslip.params import parameter
+from stickslip.params import parameter, variant
 
 TAGS = [
     "inertia",
@@ -137,6 +138,20 @@ def test_wrong_effects_are_found() -> None:
 
 def test_a_branch_on_a_traced_value_is_found_and_spares_the_others() -> None:
     assert [f.check for f in check_effect(Branch, full_metadata=False) if f.check != "metadata"] == ["compilation"]
+
+
+class Twofold(Offset):
+    """Wrong: two forms, and one equation for both."""
+
+    tag: ClassVar[str] = "wrong-forms"
+    equation: ClassVar[str] = "F = 0"
+    form: str = variant("one", ("one", "other"))
+
+
+def test_forms_that_share_an_equation_are_found() -> None:
+    texts = list(check_metadata(Twofold, True))
+    assert any("same equation" in text and "other" in text for text in texts)
+    assert not any("same equation" in text for text in check_metadata(Offset, True))
 
 
 def test_missing_metadata_is_found() -> None:

@@ -130,6 +130,11 @@ def test_equations_hold_the_fitted_values(folder):
     assert rows["contact.u_max"] == pytest.approx(0.95e-6)
     assert rows["weakening.ratio"] == pytest.approx(0.82)
     assert "9.5e-07" in words.text()
+    assert (rows["contact.strength"], rows["contact.p"], rows["contact.spread"]) == pytest.approx((0.26, 3.3, 0.15))
+    assert (rows["contact.contacts"], rows["contact.elements"]) == (4, 48)
+    assert {row.unit for row in words.rows if row.name == "contact.strength"} == {"N"}
+    assert "F(u) = F_s/N_c Σ_j [1 - (1 - u/U_j)^p]" in words.text()
+    assert "c_i = k_i u_i" in words.text()
     assert r"u_{\mathrm{max}}" in words.latex()
 
 
