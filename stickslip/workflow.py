@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 import time
 import zipfile
 import zlib
@@ -41,11 +42,28 @@ def _check_candidates(tags: Sequence[str]) -> None:
         )
 
 
+def _check_counts(max_effects: int, jobs: int | None) -> None:
+    """Numbers that a diagnosis could only fail on after its first fit."""
+    for key, value, hint in (
+        ("--max-effects", max_effects, "leave it out for up to 4; stickslip fit fits the base model alone"),
+        ("--jobs", jobs, "leave it out for one process a core"),
+    ):
+        if value is not None and value < 1:
+            raise InputError("out of range", key=key, value=value, allowed="1 or more", hint=hint)
+
+
 def _code(effect_files: Sequence[str | Path]) -> str:
-    """Digest of the package's own modules and of a user's effects: pieces made by other code are not taken up."""
+    """Digest of the package's own modules and of effects from elsewhere: pieces made by other code are not taken up.
+
+    Of an installed package it has the version, and the modules that define the effects (which may be under work).
+    """
+    from .effects import catalogue
+
     own = sorted(Path(__file__).parent.rglob("*.py"))
-    digest = hashlib.sha256()
-    for path in (*own, *map(Path, effect_files)):
+    plugged = sorted({getattr(sys.modules.get(c.__module__), "__file__", None) or "" for c in catalogue.all().values()})
+    others = [path for path in map(Path, plugged) if path.is_file() and path not in own]
+    digest = hashlib.sha256(json_text(catalogue.EFFECTS.packages()).encode())
+    for path in (*own, *others, *map(Path, effect_files)):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 
@@ -110,8 +128,10 @@ def diagnose_campaign(
         What ``result.json`` holds.
 
     Raises:
-        InputError: the campaign, a trace or a tag cannot be used. RunFolderError: the folder cannot be written.
+        InputError: the campaign, a trace, a tag or a number cannot be used.
+        RunFolderError: the folder cannot be written.
     """
+    _check_counts(max_effects, jobs)
     out = Path(out)
     refuse_existing(out, force)
     began = time.perf_counter()
@@ -168,7 +188,7 @@ def diagnose_campaign(
         result: dict[str, Any] = {
             "kind": "diagnose",
             "title": loaded.title,
-            **summary(found, loaded.rig, candidates or ()),
+            **summary(found, loaded.rig, candidates or (), progress=progress),
             "inputs": inputs,
             "versions": versions(),
         }

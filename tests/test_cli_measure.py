@@ -376,6 +376,7 @@ def test_a_unit_that_hides_all_slips_is_doubted_where_it_matters(capsys):
         (["--v-lim", "1 kg"], ("--v-lim", "m/s")),
         (["--model", "other"], ("static", "inertial")),
         (["--add", "tild"], ("tild", "tilt")),
+        (["--add", "machine-compliance:where=serial"], ("--add", "allowed", "machine-compliance:where=series")),
         (["--profile", "contact.umax"], ("--profile", "contact.u_max")),
         (["--model", "static", "--v-lim", "60 um/s"], ("static", "not faster than v_lim")),
     ],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from ..diagnose.candidate import forms_of, try_effect
 from ..diagnose.heldout import held_out
 from ..diagnose.static_rung import static_features
 from ..effects import catalogue
+from ..effects.base import Effect
 from ..errors import FitError, InputError, nearest
 from ..features.measurement import Measurement, measure
 from ..fit.composition import Composition
@@ -25,6 +26,7 @@ from ..fit.solved import solved
 from ..fit.start import FALLBACK_PERIOD, UNHEARD, base_composition, ringing
 from ..floors import floors, scatter_factor
 from ..motion import with_displacements
+from ..params import specs, variants
 from ..report.inertial_result import fit_sections, parameters
 from ..residual import misfit
 from ..segment import Segmentation
@@ -56,7 +58,7 @@ def fit_inertial(
     """Fit the dynamic model; what ``result.json`` and ``arrays.nc`` hold of it."""
     for path in options.files:
         catalogue.load_file(path)
-    effects = [forms_of(catalogue.get(tag).tag)[0] for tag in options.add if tag != "inertia"]
+    effects = chosen(options.add)
     traces, notes = with_displacements(traces, found)
     usable = [(t, s) for t, s in zip(traces, found, strict=True) if t.displacement is not None and t.drive is not None]
     if not usable:
@@ -121,6 +123,44 @@ def fit_inertial(
         "dropped": [*unusable, *m.dropped],
     }
     return result, variables
+
+
+def chosen(added: Sequence[str]) -> list[Effect]:
+    """The effects of ``--add``: ``tag``, or ``tag:name=value`` for another form of its law than the usual one.
+
+    Raises:
+        InputError: there is no such effect or form, or an effect is named twice.
+    """
+    effects: list[Effect] = []
+    for text in added:
+        tag, colon, rest = text.strip().partition(":")
+        try:
+            usual = forms_of(tag)[0]
+        except InputError as error:
+            raise error.at(key="--add") from None
+        if any(tag == effect.tag for effect in effects):
+            raise InputError("an effect can be added once", key="--add", value=tag, hint="name it in one form only")
+        effects.append(type(usual)(**_form(text, usual, rest)) if colon else usual)
+    return effects
+
+
+def _form(text: str, effect: Effect, asked: str) -> dict[str, str]:
+    """The variants that ``name=value,name=value`` asks for."""
+    known = variants(effect)
+    allowed = [f"{effect.tag}:{name}={choice}" for name, choices in known.items() for choice in choices]
+    form = {}
+    for part in asked.split(","):
+        name, _, value = (word.strip() for word in part.partition("="))
+        if value not in known.get(name, ()) or name in form:
+            raise InputError(
+                f"no form of {effect.tag}",
+                key="--add",
+                value=text,
+                allowed=", ".join(allowed) or f"{effect.tag}, which has one form",
+                hint="a fit finds the values of its parameters by itself" if name in specs(effect) else None,
+            )
+        form[name] = value
+    return form
 
 
 def _check_names(names: tuple[str, ...], base: Composition, effects: list[Any]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +12,7 @@ from cyclopts import Parameter
 
 from ..runstore import json_text
 from ..workflow import diagnose_campaign
-from .working import EVERY
+from .working import EVERY, Stage
 
 UNRESOLVED = 3
 
@@ -67,7 +68,7 @@ def diagnose(
         jobs=jobs,
         learn_residual=learn_residual,
         force=force,
-        progress=_teller(time.perf_counter()),
+        progress=_teller(),
     )
     if json:
         print(json_text(result))
@@ -76,18 +77,22 @@ def diagnose(
     return 0 if result["verdict"]["kind"] in ("complete", "missing") else UNRESOLVED
 
 
-def _teller(began: float) -> Any:
-    """Progress on stderr: what was finished, the share of the stage, the time left; for a log only now and then."""
-    last = began
+def _teller(clock: Callable[[], float] = time.perf_counter) -> Callable[[str, float], None]:
+    """Progress on stderr: what was finished, the share of the stage, the time left; for a log only now and then.
+
+    A stage begins where the share falls. How long it will take follows from the ``clock`` (s) and the share since then.
+    """
+    began = last = clock()
+    stage = Stage(clock)
 
     def tell(text: str, share: float) -> None:
         nonlocal last
-        now = time.perf_counter()
+        now, seconds = clock(), stage.left(share)
         if not sys.stderr.isatty() and now - last < EVERY:
             return
-        last, spent = now, now - began
-        left = f", about {spent * (1 - share) / share:.0f} s left of this stage" if 0.05 < share < 1.0 else ""
-        print(f"{spent:6.0f} s  {text} ({100 * share:.0f} %{left})", file=sys.stderr, flush=True)
+        last = now
+        left = "" if seconds is None else f", about {seconds:.0f} s left of this stage"
+        print(f"{now - began:6.0f} s  {text} ({100 * share:.0f} %{left})", file=sys.stderr, flush=True)
 
     return tell
 

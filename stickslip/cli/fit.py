@@ -54,7 +54,9 @@ def fit(
     out:
         Folder for result.json, arrays.nc and report.html.
     add:
-        Put an effect into the dynamic model: --add contact-ageing. May be given several times.
+        Put an effect into the dynamic model: --add contact-ageing. Another form of its law than the usual one:
+        --add machine-compliance:where=series. May be given several times. --add inertia fits how much mass moves with
+        the block, such as that of the spring.
     effect:
         A Python file with an effect of your own, to be used with --add. Its code is run.
     profile:
@@ -197,6 +199,12 @@ def _folded(text: str) -> str:
     return "\n".join(lines)
 
 
+def _named(model: list[str]) -> str:
+    """A list of tags as one name; the effect inertia, beside the inertia of the block, by what it does."""
+    first = model.index("inertia") if "inertia" in model else -1
+    return " + ".join("added mass" if tag == "inertia" and i != first else tag for i, tag in enumerate(model))
+
+
 def _gains_of_effects(ladder: list[dict[str, Any]]) -> list[str]:
     """What each added effect takes off the cost, and for how many parameters."""
     lines = []
@@ -221,7 +229,7 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
             lines += ["", result[key]["text"]]
     if result.get("ladder"):
         rows = [
-            [" + ".join(step["model"]), *(show.quantity(step[k], "1", 3) for k in ("train_error", "heldout_error"))]
+            [_named(step["model"]), *(show.quantity(step[k], "1", 3) for k in ("train_error", "heldout_error"))]
             for step in result["ladder"]
         ]
         lines += ["", show.table(["model", "error", "on unseen runs"], rows), *_gains_of_effects(result["ladder"])]

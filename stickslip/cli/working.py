@@ -8,8 +8,28 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 PATIENCE = 1.0  # s before anything is shown
+LEAST = 0.05  # share of a stage that tells how long the rest takes
 EVERY = 30.0  # s between lines where there is no terminal
 Tell = Callable[..., None]
+
+
+class Stage:
+    """How long a stage of long work may still take; a new one begins where the share that is done falls.
+
+    Args:
+        clock: gives the time in s.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._began, self._first, self._before = clock(), 0.0, 0.0
+
+    def left(self, share: float) -> float | None:
+        """Seconds until the whole stage is done of which ``share`` (0 to 1) is; None where too little tells."""
+        if share < self._before:
+            self._began, self._first = self._clock(), share
+        self._before, done = share, share - self._first
+        return (self._clock() - self._began) * (1.0 - share) / done if done > LEAST and share < 1.0 else None
 
 
 @contextmanager
@@ -40,7 +60,7 @@ def working(title: str) -> Iterator[Tell]:
         transient=True,
     )
     task = bar.add_task(title, total=None, text="", left="")
-    began, shown = time.monotonic(), False
+    began, shown, stage = time.monotonic(), False, Stage(time.monotonic)
 
     def tell(text: str, share: float | None = None) -> None:
         nonlocal shown
@@ -48,7 +68,8 @@ def working(title: str) -> Iterator[Tell]:
         if not shown and spent > PATIENCE:
             bar.start()
             shown = True
-        left = f"{spent / share * (1 - share):.0f} s left" if share and share > 0.02 else ""
+        seconds = None if share is None else stage.left(share)
+        left = "" if seconds is None else f"{seconds:.0f} s left"
         total = 1.0 if share is not None else None
         bar.update(task, text=text, total=total, completed=share or 0.0, left=left)
 
@@ -62,14 +83,16 @@ def working(title: str) -> Iterator[Tell]:
 def _lines(title: str) -> Tell:
     """Tells by a line on stderr now and then, for a log."""
     began = last = time.monotonic()
+    stage = Stage(time.monotonic)
 
     def tell(text: str, share: float | None = None) -> None:
         nonlocal last
         now = time.monotonic()
+        seconds = None if share is None else stage.left(share)
         if now - last < EVERY:
             return
         last, spent = now, now - began
-        left = f", about {spent / share * (1 - share):.0f} s left of this stage" if share and share > 0.02 else ""
+        left = "" if seconds is None else f", about {seconds:.0f} s left of this stage"
         print(f"{title}: {text} ({spent:.0f} s{left})", file=sys.stderr, flush=True)
 
     return tell

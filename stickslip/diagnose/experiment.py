@@ -1,10 +1,11 @@
-"""What to measure next: the experiment in which two fitted models would differ most."""
+"""What to measure next: the experiment in which fitted models would differ most."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -14,10 +15,9 @@ from ..fit.composition import Composition
 from ..fit.inertial import Fit
 from ..floors import Scatter
 from .bench import estimates, prepared, until_slips
-from .menu import BACK, MENU, Conditions, Experiment, quantity
+from .menu import BACK, HELD_AT, LONGEST, MENU, Conditions, Experiment, quantity
 from .outcome import FEATURES, Outcome, floor_of, outcome
 
-HELD_AT = 0.8  # of the stick: where a hold begins
 DRAWS = 4  # of the parameters of each model, for what its fit leaves open
 SLIPS = 3  # of a run: the third is past the start
 SLIDES = "slides"  # why there is no slip to be compared
@@ -116,16 +116,8 @@ def propose(
     Returns:
         One proposal for each experiment, the most telling first.
     """
-    known = Scatter() if scatter is None else scatter
-    rivals = [_Model(r, conditions, draws, seed) for r in (first, second)]
-    out = []
-    for i, experiment in enumerate(menu):
-        if progress is not None:
-            progress(experiment.name, i / len(menu))
-        held = _hold(rivals, experiment)
-        ran = [rival.draws(experiment, held) for rival in rivals]
-        out.append(_judged(experiment, ran, (first.tag, second.tag), conditions, known, factor))
-    return sorted(out, key=lambda p: -p.separation)
+    rows = _pairwise((first, second), conditions, scatter, factor, menu, draws, seed, progress)
+    return sorted((row[0] for row in rows), key=lambda p: -p.separation)
 
 
 def recommend(
@@ -135,13 +127,95 @@ def recommend(
 
     ``floors`` is infinite (no number in a file) where only one of the models slips. Arguments as of `propose`.
     """
-    found = propose(first, second, conditions, factor=factor, **options)
-    best = found[0]
-    text = best.text
-    if best.separation < TELLING:
-        text = f"no experiment of the menu tells {first.tag} from {second.tag}; best is: {text}"
-    menu = [{"experiment": p.name, "floors": p.separation, "text": p.text} for p in found]
-    return {"text": text, "separates": [first.tag, second.tag], "floors": best.separation, "menu": menu}
+    return recommend_among((first, second), conditions, factor=factor, **options)
+
+
+def recommend_among(
+    rivals: Sequence[Rival],
+    conditions: Conditions,
+    *,
+    scatter: Scatter | None = None,
+    factor: float = 1.0,
+    menu: Sequence[Experiment] = MENU,
+    draws: int = DRAWS,
+    seed: int = 0,
+    progress: Callable[[str, float], None] | None = None,
+) -> dict[str, Any]:
+    """The experiment in which the two models that stay nearest to each other, of two or more, differ most.
+
+    Where none tells all pairs apart it is the one that tells most of them, and the text names those that it leaves.
+
+    Args:
+        rivals: the models, at least two.
+        conditions, scatter, factor, menu, draws, seed, progress: as of `propose`.
+
+    Returns:
+        As of `recommend`; ``floors`` are those of the pair that differs least.
+    """
+    if len(rivals) < 2:
+        raise ValueError("an experiment separates at least two models")
+    tags = [r.tag for r in rivals]
+    pairs = list(combinations(tags, 2))
+    rows = _pairwise(rivals, conditions, scatter, factor, menu, draws, seed, progress)
+    rows = sorted(rows, key=_telling, reverse=True)
+    entries = [
+        {"experiment": row[0].name, "floors": min(p.separation for p in row), "text": _said(row, pairs)} for row in rows
+    ]
+    text = entries[0]["text"]
+    if not _telling(rows[0])[0]:
+        who = f"{tags[0]} from {tags[1]}" if len(tags) == 2 else f"any of {_listed(tags)} from another"
+        text = f"no experiment of the menu tells {who}; best is: {max(rows[0], key=lambda p: p.separation).text}"
+    return {"text": text, "separates": tags, "floors": entries[0]["floors"], "menu": entries}
+
+
+def _pairwise(
+    rivals: Sequence[Rival],
+    conditions: Conditions,
+    scatter: Scatter | None,
+    factor: float,
+    menu: Sequence[Experiment],
+    draws: int,
+    seed: int,
+    progress: Callable[[str, float], None] | None,
+) -> list[list[Proposal]]:
+    """For each experiment of the menu what it would tell of every pair, in the order of `combinations`."""
+    known = Scatter() if scatter is None else scatter
+    models = [_Model(r, conditions, draws, seed) for r in rivals]
+    rows = []
+    for i, experiment in enumerate(menu):
+        if progress is not None:
+            progress(f"next experiment, {experiment.name}", i / len(menu))
+        held = _hold(models, experiment)
+        ran = [(rival.tag, model.draws(experiment, held)) for rival, model in zip(rivals, models, strict=True)]
+        rows.append(
+            [_judged(experiment, (x, y), (a, b), conditions, known, factor) for (a, x), (b, y) in combinations(ran, 2)]
+        )
+    return rows
+
+
+def _telling(row: Sequence[Proposal]) -> tuple[int, list[float]]:
+    """By which experiments are ranked: how many pairs one tells apart, then the floors, those of the nearest first."""
+    floors = sorted(p.separation for p in row)
+    return sum(f >= TELLING for f in floors), floors
+
+
+def _said(row: Sequence[Proposal], pairs: Sequence[tuple[str, str]]) -> str:
+    """One sentence for all pairs of an experiment."""
+    order = sorted(range(len(row)), key=lambda i: -row[i].separation)
+    told = [i for i in order if row[i].separation >= TELLING]
+    if len(row) == 1 or not told:
+        return row[order[0]].text
+    if len(told) == len(row):
+        return f"{row[order[-1]].text}; every other pair of them differs more"
+    also = [f"{a} from {b}" for a, b in (pairs[i] for i in told[1:])]
+    left = [f"{a} from {b}" for a, b in (pairs[i] for i in order[len(told) :])]
+    more = f"; it also tells {_listed(also)}" if also else ""
+    return f"{row[told[0]].text}{more}; it does not tell {_listed(left, 'or')}"
+
+
+def _listed(words: Sequence[str], last: str = "and") -> str:
+    """``a, b and c``."""
+    return f" {last} ".join([part for part in (", ".join(words[:-1]), words[-1]) if part])
 
 
 class _Model:
@@ -172,9 +246,10 @@ class _Model:
         pieces, number, hold = [(1.0, v)], SLIPS, None
         if held is not None:
             pieces, hold = [(held, v), (experiment.hold, 0.0), (1.0, v)], (held, held + experiment.hold)
-        elif experiment.reversed:
-            back = _back(model, v)
-            pieces, number = [(back, -v), (1.0, v)], 1
+        elif experiment.first:
+            number = 1  # every run begins with a fresh contact
+            if experiment.reversed:
+                pieces = [(_back(model, v), -v), (1.0, v)]
         try:
             run, slips = until_slips(model, pieces, number)
         except StickslipError as error:
@@ -192,7 +267,7 @@ def _back(model: Any, v: float) -> float:
 
 
 def _hold(rivals: Sequence[_Model], experiment: Experiment) -> float | None:
-    """When the drive is held (s): the same for both, late in the stick before the third slip."""
+    """When the drive is held (s): the same for all, late in the stick before the third slip."""
     if not experiment.hold:
         return None
     plain = Experiment("as measured", experiment.of, experiment.speed)
@@ -211,6 +286,10 @@ def _judged(
 ) -> Proposal:
     what = experiment.words(conditions)
     best = [r[0] for r in ran]
+    lasts = max((r.outcome.recurrence for r in best if r.outcome is not None), default=0.0)
+    if lasts > LONGEST:
+        text = f"{what}: a cycle would last {lasts:.3g} s, and a diagnosis takes in no more than {LONGEST:.3g} s"
+        return Proposal(experiment.name, 0.0, "", text, {})
     if any(r.outcome is None for r in best):
         return _without(experiment, ran, tags, what)
     a, b = (r.outcome for r in best)
@@ -232,7 +311,9 @@ def _judged(
     words, unit, more, less = _WORDS[feature]
     if feature == "recurrence":
         after = "the first slip after it comes" if experiment.hold else words
-        words = "the first slip comes" if experiment.reversed else after
+        words = "the first slip comes" if experiment.first else after
+    elif experiment.first:
+        words = words.replace("the slip", "the first slip")
     gap = d.first - d.second
     text = (
         f"{what}: {words} {quantity(abs(gap), unit)} {more if gap > 0 else less} with {tags[0]} than with {tags[1]}, "

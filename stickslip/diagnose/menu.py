@@ -9,8 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..features.measurement import Measurement
+from ..forward import MOST_STEPS, longest
 
 BACK = 0.8  # of full friction, to which a reversed start pulls the other way
+HELD_AT = 0.8  # of the stick: where a hold begins
+LONGEST = longest(MOST_STEPS)  # s; a diagnosis leaves a cycle that lasts longer out of a record
+_HOLD = 5.0 * math.floor(0.9 * LONGEST / 5.0)  # s, round; the rest is for the stick around it
 _PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k"}
 
 
@@ -22,10 +26,11 @@ class Experiment:
         name: in one or two words.
         of: which of the measured velocities it takes: "slowest", "middle" or "fastest".
         speed: factor on that velocity.
-        hold: of the drive in the middle of a stick (s); 0 for none.
+        hold: of the drive late in a stick (s); 0 for none.
         load: factor on the normal load.
         mass: factor on the mass, with the load on the contacts kept.
         reversed: whether the contact is first pulled the other way, short of slipping.
+        lifted: whether the block is lifted off and set down first.
     """
 
     name: str
@@ -35,17 +40,25 @@ class Experiment:
     load: float = 1.0
     mass: float = 1.0
     reversed: bool = False
+    lifted: bool = False
+
+    @property
+    def first(self) -> bool:
+        """Whether the first slip of a fresh contact is what is compared, and not one of a series."""
+        return self.reversed or self.lifted
 
     def words(self, conditions: Conditions) -> str:
         """What to do, for a person."""
         if self.hold:
-            return f"hold the drive for {self.hold:g} s in the middle of a stick"
+            return f"hold the drive for {self.hold:g} s late in a stick (at {100 * HELD_AT:.0f} % of it)"
         if self.load != 1.0:
             return f"multiply the normal load by {self.load:g}"
         if self.mass != 1.0:
             return f"add {100 * (self.mass - 1):.0f} % of mass without loading the contacts more"
         if self.reversed:
             return f"start in reverse: pull the other way to {100 * BACK:.0f} % of the slip force, then forward"
+        if self.lifted:
+            return "lift the block off, set it down and pull"
         return f"drive at {quantity(conditions.velocity(self), 'm/s')}"
 
 
@@ -53,9 +66,10 @@ MENU = (
     Experiment("slow drive", "slowest", 0.25),
     Experiment("fast drive", "fastest", 4.0),
     Experiment("hold 10 s", hold=10.0),
-    Experiment("hold 100 s", hold=100.0),
+    Experiment(f"hold {_HOLD:g} s", hold=_HOLD),
     Experiment("double load", load=2.0),
     Experiment("added mass", mass=1.5),
+    Experiment("lift-off", lifted=True),
     Experiment("reversed start", reversed=True),
 )
 

@@ -123,4 +123,4 @@ def floor_of(
         real, sensor = math.hypot(k.hold * size, k.resolution), noise
     else:
         real, sensor = k.frequency * size, 0.0
-    return math.hypot(sensor, factor * real * (k.first if experiment.reversed else 1.0))
+    return math.hypot(sensor, factor * real * (k.first if experiment.first else 1.0))

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from stickslip.cli import run
+from stickslip.cli.diagnose import _teller
+from stickslip.errors import InputError
 from stickslip.runstore import open_run
-from stickslip.workflow import Pieces
+from stickslip.workflow import Pieces, diagnose_campaign
 
 CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 
@@ -22,6 +24,10 @@ CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign
         (["--candidates", " , "], "no effect is named"),
         (["--holdout", "v999.csv"], "v999"),
         (["--effect", "nowhere.py"], "nowhere.py"),
+        (["--jobs", "0"], "--jobs: out of range (got 0)\n  allowed: 1 or more\n  to mend: leave it out"),
+        (["--jobs", "-2"], "--jobs: out of range (got -2)"),
+        (["--max-effects", "0"], "--max-effects: out of range (got 0)\n  allowed: 1 or more\n  to mend: leave it out"),
+        (["--max-effects", "-1"], "--max-effects: out of range (got -1)"),
     ],
 )
 def test_bad_input_is_one_message(tmp_path, capsys, extra, words):
@@ -31,6 +37,44 @@ def test_bad_input_is_one_message(tmp_path, capsys, extra, words):
     assert words in error
     assert "Traceback" not in error
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("number", [{"jobs": 0}, {"jobs": -1}, {"max_effects": 0}])
+def test_numbers_are_refused_before_anything_is_read(tmp_path, number):
+    with pytest.raises(InputError, match="out of range"):
+        diagnose_campaign(tmp_path / "no such campaign.toml", tmp_path / "out", **number)
+
+
+def test_the_time_left_is_that_of_the_stage(capsys):
+    """Base fit of 100 s, then a sweep whose first share is told late; lines closer than half a minute are left out."""
+    now = [1000.0]
+    tell = _teller(lambda: now[0])
+    for at, text, share in (
+        (0, "begin", 0.0), (40, "base", 0.4), (50, "base", 0.5), (100, "base", 1.0),
+        (200, "sweep", 0.1), (240, "sweep", 0.3), (280, "sweep", 0.5), (320, "sweep", 1.0),
+        (400, "menu", 0.0), (440, "menu", 0.04), (490, "menu", 0.25),
+    ):  # fmt: skip
+        now[0] = 1000.0 + at
+        tell(text, share)
+    assert [line.strip() for line in capsys.readouterr().err.splitlines()] == [
+        "40 s  base (40 %, about 60 s left of this stage)",
+        "100 s  base (100 %)",
+        "200 s  sweep (10 %)",
+        "240 s  sweep (30 %, about 140 s left of this stage)",
+        "280 s  sweep (50 %, about 100 s left of this stage)",
+        "320 s  sweep (100 %)",
+        "400 s  menu (0 %)",
+        "440 s  menu (4 %)",
+        "490 s  menu (25 %, about 270 s left of this stage)",
+    ]
+
+
+def test_a_stage_begins_even_where_its_first_line_is_left_out(capsys):
+    now = [0.0]
+    tell = _teller(lambda: now[0])
+    for now[0], share in ((100.0, 1.0), (110.0, 0.0), (150.0, 0.2)):
+        tell("stage", share)
+    assert capsys.readouterr().err.splitlines()[-1].endswith("(20 %, about 160 s left of this stage)")
 
 
 def test_what_a_command_needs_is_named(capsys):

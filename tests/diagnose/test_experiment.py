@@ -11,8 +11,8 @@ import pytest
 from stickslip.contact import power_law_bank
 from stickslip.diagnose import experiment as proposals
 from stickslip.diagnose.bench import prepared, until_slips
-from stickslip.diagnose.experiment import TELLING, propose, recommend
-from stickslip.diagnose.menu import MENU, Conditions, Experiment
+from stickslip.diagnose.experiment import TELLING, propose, recommend, recommend_among
+from stickslip.diagnose.menu import LONGEST, MENU, Conditions, Experiment
 from stickslip.diagnose.outcome import outcome
 from stickslip.effects import catalogue
 from stickslip.errors import SolveError
@@ -61,8 +61,13 @@ def model(tag="base", std=0.0, effect=None, **changes):
 
 
 def ageing():
-    """An effect that a stick of a second hardly shows and one of a hundred does."""
-    return model("contact-ageing", effect=catalogue.make("contact-ageing", rate=0.01, onset_time=3.0, first_age=1.0))
+    """An effect that a stick of a second hardly shows and one of 25 s does."""
+    return aged("contact-ageing", rate=0.01, onset_time=3.0, first_age=1.0)
+
+
+def aged(tag, **values):
+    """The rig with ageing contacts, called ``tag``."""
+    return model(tag, effect=catalogue.make("contact-ageing", **values))
 
 
 def ran(experiment, pieces=None, wanted=3, **changes):
@@ -98,23 +103,59 @@ def test_a_slip_is_measured_as_physics_has_it():
 
 def test_ageing_is_told_by_the_longest_hold():
     found = propose(ageing(), model(), CONDITIONS, draws=0)
-    # sticks of 100 s, 10 s and 2 s; all others are shorter than those that were measured, or as long
-    assert [p.name for p in found[:3]] == ["hold 100 s", "hold 10 s", "slow drive"]
-    assert found[0].separation > 1.5 * found[1].separation > 1.5 * TELLING
+    # sticks of 25 s, 10 s and 2 s; all others are shorter than those that were measured, or as long
+    assert [p.name for p in found[:3]] == ["hold 25 s", "hold 10 s", "slow drive"]
+    assert found[0].separation > 1.4 * found[1].separation > 1.4 * TELLING
     assert found[1].separation > 1.5 * found[2].separation
     assert {p.name for p in found} == {e.name for e in MENU}
     best = found[0]
-    assert "hold the drive for 100 s" in best.text
-    # what a hold of 100 s adds to the strength, 0.01 ln(100/3) of 0.26 N, comes as time on a spring of 1000 N/m
+    assert best.text.startswith("hold the drive for 25 s late in a stick (at 80 % of it): ")
+    # what a hold of 25 s adds to the strength, 0.01 ln(1 + 25/3) of 0.26 N, comes as time on a spring of 1000 N/m
     first, second, _ = best.differences["recurrence"]
-    late = 0.01 * np.log1p(100 / 3.0) * 0.26 / 1000.0 / 2e-4
+    late = 0.01 * np.log1p(25 / 3.0) * 0.26 / 1000.0 / 2e-4
     assert first - second == pytest.approx(late, rel=0.25)
-    assert second == pytest.approx(ran(PLAIN)[0].recurrence + 100.0, abs=2e-3)
+    assert second == pytest.approx(ran(PLAIN)[0].recurrence + 25.0, abs=2e-3)
     turned = propose(model(), ageing(), CONDITIONS, draws=0, menu=HOLDS)[0]
     more, less = {"recurrence": ("later", "earlier"), "size": ("larger", "smaller")}[best.feature]
     assert f" {more} with contact-ageing than with base" in best.text
     assert f" {less} with base than with contact-ageing" in turned.text
     assert turned.separation == pytest.approx(best.separation)
+
+
+def test_only_a_fresh_contact_tells_models_that_differ_in_its_age():
+    """After the first slip both have forgotten how long the contact had been closed."""
+    young, old = (aged(tag, rate=0.002, onset_time=0.03, first_age=age) for tag, age in (("young", 0.1), ("old", 1e3)))
+    found = propose(young, old, CONDITIONS, draws=0)
+    assert [p.name for p in found[:2]] == ["lift-off", "reversed start"]
+    assert found[0].separation > TELLING
+    assert max(p.separation for p in found[2:]) < TELLING
+    assert found[0].text.startswith("lift the block off, set it down and pull: the first slip is ")
+    assert "smaller with young than with old" in found[0].text
+    # the growth of 0.26 N from one age at the slip, which comes after 1.3 s, to the other, as time on the spring
+    first, second, _ = found[0].differences["recurrence"]
+    grown = 0.002 * (np.log1p(1e3 / 0.03) - np.log1p((0.1 + 1.3) / 0.03))
+    assert second - first == pytest.approx(grown * 0.26 / 1000.0 / 2e-4, rel=0.1)
+
+
+def test_a_lift_off_starts_as_a_reversed_start_does_but_without_the_back_pull():
+    same = [e for e in MENU if e.first]
+    assert [e.name for e in same] == ["lift-off", "reversed start"]
+    found = {p.name: p for p in propose(model(), model("other", drop=0.19), CONDITIONS, draws=0, menu=same)}
+    virgin = ran(PLAIN, wanted=1)[0]
+    assert found["lift-off"].differences["recurrence"].first == pytest.approx(virgin.recurrence, rel=1e-6)
+    assert found["lift-off"].differences["size"].first == pytest.approx(virgin.size, rel=1e-6)
+    assert found["reversed start"].differences["recurrence"].first > 2 * virgin.recurrence
+
+
+def test_no_experiment_is_proposed_that_a_diagnosis_cannot_take_in():
+    assert max(e.hold for e in MENU) == 25.0
+    assert max(e.hold for e in MENU) + ran(PLAIN)[0].recurrence < LONGEST
+    # 2 s at 25 um/s are 40 s at 1.2 um/s
+    slow = CONDITIONS._replace(velocities=(5e-6, 2e-4))
+    found = propose(ageing(), model(), slow, draws=0, menu=[MENU[0]])[0]
+    assert found.separation == 0.0
+    assert "a cycle would last 4" in found.text
+    assert "no more than 30.7 s" in found.text
 
 
 def test_equal_models_differ_in_nothing():
@@ -158,7 +199,40 @@ def test_a_model_that_fails_says_so(monkeypatch):
 def test_the_recommendation_says_where_nothing_helps():
     best = recommend(ageing(), model(), CONDITIONS, draws=0, menu=HOLDS)
     assert best["separates"] == ["contact-ageing", "base"]
-    assert [m["experiment"] for m in best["menu"]] == ["hold 100 s", "hold 10 s"]
+    assert [m["experiment"] for m in best["menu"]] == ["hold 25 s", "hold 10 s"]
     assert best["text"] == best["menu"][0]["text"]
     none = recommend(model("a"), model("b"), CONDITIONS, draws=0, menu=[PLAIN])
     assert none["text"].startswith("no experiment of the menu tells a from b")
+
+
+def test_of_three_the_two_that_are_nearest_decide():
+    three = [ageing(), model(), model("damped", damping=14.0)]
+    told = []
+    found = recommend_among(three, CONDITIONS, draws=0, progress=lambda text, share: told.append((text, share)))
+    assert found["separates"] == ["contact-ageing", "base", "damped"]
+    alone = {p.name: [p] for p in propose(three[0], three[1], CONDITIONS, draws=0)}
+    for a, b in ((0, 2), (1, 2)):
+        for p in propose(three[a], three[b], CONDITIONS, draws=0):
+            alone[p.name].append(p)
+    least = {name: min(p.separation for p in pairs) for name, pairs in alone.items()}
+    best = max(least, key=lambda name: least[name])
+    assert found["menu"][0]["experiment"] == best
+    # where the drive is held depends on all of them a little
+    assert found["floors"] == pytest.approx(least[best], rel=0.01) and found["floors"] > TELLING
+    assert found["text"].endswith("; every other pair of them differs more")
+    assert [text for text, _ in told] == [f"next experiment, {e.name}" for e in MENU]
+    assert [share for _, share in told] == sorted(share for _, share in told)
+    assert told[0][1] == 0.0
+
+
+def test_what_an_experiment_leaves_of_three_is_named():
+    three = [ageing(), model(), model("twin")]
+    found = recommend_among(three, CONDITIONS, draws=0, menu=[PLAIN, *HOLDS])
+    assert found["floors"] == 0.0
+    assert found["menu"][0]["experiment"] == "hold 25 s"
+    assert found["text"].startswith("hold the drive for 25 s")
+    assert found["text"].endswith("; it also tells contact-ageing from twin; it does not tell base from twin")
+    none = recommend_among([model("a"), model("b"), model("c")], CONDITIONS, draws=0, menu=[PLAIN])
+    assert none["text"].startswith("no experiment of the menu tells any of a, b and c from another; best is: ")
+    with pytest.raises(ValueError, match="at least two"):
+        recommend_among([model("a")], CONDITIONS)
