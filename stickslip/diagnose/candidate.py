@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -13,7 +13,7 @@ from ..effects.base import Effect
 from ..errors import StickslipError
 from ..features.measurement import Measurement
 from ..fit.common import Common
-from ..fit.composition import Composition
+from ..fit.composition import PHASE, Composition, run_of
 from ..fit.inertial import Fit, certain, errors, fit, robust
 from ..fit.parameters import Free, effect_parameters
 from ..fit.problem import Problem
@@ -21,12 +21,12 @@ from ..floors import event_widths
 from ..params import specs
 from ..residual import Misfit
 from .heldout import HeldOut, held_out
-from .linear import Linear
+from .linear import Linear, Step
 from .periods import periods, phasor, within_record
 
 START = 0.02  # of the amplitude's range; scaled until its effect on the features is moderate
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
-MOST_STARTS = 4
+MOST_STARTS = 6
 PLAUSIBLE = 60.0  # floors, rms: by how much an amplitude moves the features at which everything else is refitted
 CARRIED = ((30.0, 6), (7.0, 6), (2.5, 7))  # stages of that refit, with the base's derivatives carried on
 OTHERS = 1  # further starts that a leader is fitted from
@@ -105,9 +105,24 @@ def starts(
     grid = [dict(zip(inner, values, strict=True)) for values in product(*inner.values())]
     if len(grid) <= MOST_STARTS:
         return grid
-    # spread over all parameters: an even stride would leave one of them at one value
-    chosen = np.random.default_rng(len(grid)).choice(len(grid), MOST_STARTS, replace=False)
-    return [grid[i] for i in sorted(chosen.tolist())]
+    return [grid[i] for i in _spread([len(values) for values in inner.values()], MOST_STARTS)]
+
+
+def _spread(lengths: list[int], number: int) -> list[int]:
+    """So many points of a grid (as numbers of `itertools.product`) that every pair of them differs in as many
+    parameters as can be, and each parameter has its values about equally often: an even stride through the grid would
+    leave one of them at one value."""
+    points = list(product(*(range(n) for n in lengths)))
+    chosen = [0]
+    while len(chosen) < number:
+        often = [np.bincount([points[j][i] for j in chosen], minlength=n) for i, n in enumerate(lengths)]
+
+        def worth(k: int, often: list[np.ndarray] = often) -> tuple[int, int]:
+            apart = min(sum(a != b for a, b in zip(points[k], points[j], strict=True)) for j in chosen)
+            return apart, -sum(int(often[i][value]) for i, value in enumerate(points[k]))
+
+        chosen.append(max((k for k in range(len(points)) if k not in chosen), key=worth))
+    return sorted(chosen)
 
 
 def try_effect(
@@ -270,8 +285,11 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
         if share >= explained:
             explained, likely = share, values
         tell(f"{effect.tag}: start {values}, explains {100 * share:.0f} %")
-    if effect.periodic is None and search.best is not None:
-        search.push(likely, PLAUSIBLE, use)
+    if search.best is not None:
+        if effect.periodic is None:
+            search.push(likely, PLAUSIBLE, use)
+        else:
+            search.settle(use)
         tell(f"{effect.tag}: everything else refitted around a plausible amplitude")
     if search.best is None:
         return Candidate(effect.tag, form, effect, explained, composition=composition, note="cannot be evaluated")
@@ -310,7 +328,11 @@ class _Search:
 
     def point(self, values: dict[str, float], amplitude: float, base: np.ndarray | None = None) -> np.ndarray:
         """Free parameters with the effect's inner ``values`` and its ``amplitude`` on the search scale."""
-        inner = [f.inward(f.starting(values.get(f.name.split(".", 1)[1], f.start)).start) for f in self.free]
+        names = [f.name.split(".", 1)[1] for f in self.free]
+        given = [
+            values.get(name, values.get(name.split(".")[0], f.start)) for name, f in zip(names, self.free, strict=True)
+        ]
+        inner = [f.inward(f.starting(value).start) for f, value in zip(self.free, given, strict=True)]
         low, high = self.free[self.amplitude].bounds
         inner[self.amplitude] = float(np.clip(amplitude, low + 1e-6, high - 1e-6))
         return np.concatenate([self.optimum.z if base is None else base, inner])
@@ -344,10 +366,12 @@ class _Search:
         known = [f for f in found if f is not None]
         if len(known) < len(lines):
             return 0.0
-        step = linear.step([f[0] for f in known])
-        size = float(np.hypot(*step.sizes)) if phased else float(step.sizes[0])
         if phased:
-            values = {**values, "phase": float(np.arctan2(step.sizes[1], step.sizes[0]))}
+            step, size, phases = self._each_run([f[0] for f in known], linear)
+            values = {**values, **phases}
+        else:
+            step = linear.step([known[0][0]])
+            size = float(step.sizes[0])
         bounds = np.array([f.bounds for f in self.optimum.free])
         first = self.best is None
         offers = []
@@ -366,6 +390,27 @@ class _Search:
         self.each.append(min(offers, key=lambda o: o[0]))
         return step.share
 
+    def _each_run(self, quarters: list[np.ndarray], linear: Linear) -> tuple[Step, float, dict[str, float]]:
+        """The linear step along an effect at phases of zero and a quarter turn, each run with a phase of its own.
+
+        Returns:
+            The step, the amplitude that most cycles ask for, and the phases by name.
+        """
+        cycles = self.valid.any(axis=-1).sum(axis=1)
+        runs = np.flatnonzero(cycles)
+        masks = [(np.arange(len(cycles)) == r)[:, None, None] for r in runs]
+        step = linear.step([change * mask for mask in masks for change in quarters])
+        pairs = step.sizes.reshape(-1, 2)
+        size = float(np.sqrt(np.average(np.sum(pairs**2, axis=1), weights=cycles[runs])))
+        return step, size, self._phases(dict(zip(runs.tolist(), np.arctan2(pairs[:, 1], pairs[:, 0]), strict=True)))
+
+    def _phases(self, told: Mapping[int, float]) -> dict[str, float]:
+        """Values of the phase's parameters from the phases of runs."""
+        own = [f.name.split(".", 1)[1] for f in self.free if run_of(f.name) is not None]
+        if not own:
+            return {PHASE: float(next(iter(told.values()), 0.0))}
+        return {name: float(told.get(int(name.split(".")[1]), 0.0)) for name in own}
+
     def _locked(self, values: dict[str, float], rate: np.ndarray) -> list[tuple]:
         """Starts with the amplitude and the phase that the measured onsets tell, which may be locked to the period.
 
@@ -376,11 +421,13 @@ class _Search:
         m, used = self.problem.measurement, self.valid.any(axis=-1)
         own = phasor(variable, m, self.bare, rate, period, used)
         late = phasor(variable, m, m.values, m.values - self.bare, period, used)
-        if own == 0.0:
+        known = np.flatnonzero((own != 0.0) & (late != 0.0))
+        if not known.size:
             return []
-        ratio = late / own
-        told = {**values, "phase": float(np.angle(ratio))}
-        return [self._offer(self.point(told, self.null + share * abs(ratio)), self.optimum.events) for share in LOCKED]
+        ratio = late[known] / own[known]
+        told = {**values, **self._phases(dict(zip(known.tolist(), np.angle(ratio), strict=True)))}
+        size = float(np.median(np.abs(ratio)))
+        return [self._offer(self.point(told, self.null + share * size), self.optimum.events) for share in LOCKED]
 
     def push(self, values: dict[str, float], rms: float, use: np.ndarray) -> None:
         """Refit everything from an amplitude that moves the features by ``rms`` floors, however little that promises.
@@ -398,12 +445,18 @@ class _Search:
             if 0.6 * rms < now < 1.6 * rms or (now < rms and share >= 0.5):
                 break
             share = float(np.clip(share * np.clip(rms / max(now, 1e-6), 0.02, 10.0), 1e-6, 0.5))
-        own = self.problem.columns(z, self.optimum.events, range(self.k, z.size), features)
+        self._refit(z, self.optimum.events, features, use)
+
+    def settle(self, use: np.ndarray) -> None:
+        """Refit everything from the best place seen: where an effect is periodic, its phase tells how large it is."""
+        assert self.best is not None
+        _, z, events, features = self.best
+        self._refit(z, events, features, use)
+
+    def _refit(self, z: np.ndarray, events: np.ndarray, features: np.ndarray, use: np.ndarray) -> None:
+        own = self.problem.columns(z, events, range(self.k, z.size), features)
         columns = np.concatenate([self.optimum.columns, own], axis=-1)
-        found = fit(
-            self.problem, self.floor, z=z, events=self.optimum.events, stages=CARRIED, use=use, columns=columns,
-            anew=False,
-        )  # fmt: skip
+        found = fit(self.problem, self.floor, z=z, events=events, stages=CARRIED, use=use, columns=columns, anew=False)
         self.each.append(self._keep(found.z, found.events, found.features - found.offsets))
         self.columns[found.z.tobytes()] = found.columns
 

@@ -12,28 +12,28 @@ from ..campaign import Campaign
 from ..effects import catalogue
 from ..errors import InputError
 from ..features.measurement import Measurement, measure
-from ..fit.composition import Composition
-from ..fit.inertial import Fit, certain, errors, fit
+from ..fit.inertial import Fit, certain, fit
 from ..fit.multistart import FURTHER, best_of
 from ..fit.problem import Problem
 from ..fit.start import FALLBACK_PERIOD, UNHEARD, base_composition, ringing
 from ..floors import floors
-from ..residual import Misfit, misfit
+from ..residual import misfit
 from ..segment import Segmentation, segment
 from ..trace import Trace
-from .candidate import MORE, MOST, Candidate
-from .heldout import HeldOut, held_out
+from .candidate import MORE, Candidate
+from .heldout import HeldOut
 from .holdout import training_cycles
-from .pieces import fit_arrays, fit_from
+from .revise import Named, done_without, told_apart
+from .rungs import Material, Rung, kept, make_rung
 from .static_rung import static_features
 from .sweep import Ground, Store, Sweep
 from .thresholds import THRESHOLDS, Thresholds
 from .verdict import (
     Judged,
     Verdict,
-    confidence,
     decide,
     finished,
+    grade,
     is_adequate,
     is_complete,
     judge,
@@ -43,30 +43,11 @@ from .verdict import (
     worst_phase,
 )
 
+Tell = Callable[[str, float], None]
 MOST_CYCLES = 14
 BASE_AGAIN = ((3.0, 4), (1.0, MORE)), ((1.0, MORE),)  # stages: by way of wide floors, and straight on
+SEVERAL = "unequal-contacts"  # means nothing where there is one
 FURTHER_FITS, ARRIVED = 4, 0.97  # of a model with a named effect, until one takes less than 3 % off its cost
-
-
-@dataclass(frozen=True)
-class Rung:
-    """One step of the ladder of models.
-
-    Attributes:
-        model: tags of what is in it.
-        added: what this rung added.
-        train, held: errors on the cycles fitted and on the others.
-        fit, composition: None for the static model.
-        features: of the model (R, n, F).
-    """
-
-    model: tuple[str, ...]
-    added: str | None
-    train: Misfit
-    held: HeldOut | None
-    composition: Composition | None
-    fit: Fit | None
-    features: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -88,7 +69,14 @@ class Round:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything a report needs."""
+    """Everything a report needs.
+
+    Attributes:
+        verdict, ladder, rounds: what was found, and how.
+        measurement, floor, train: the data, its floors, the cycles fitted (R, n).
+        dropped: what was left out, and why.
+        sets: of an ambiguous verdict: the effects of which one is missing, each as fitted in the last model.
+    """
 
     verdict: Verdict
     ladder: tuple[Rung, ...]
@@ -97,6 +85,7 @@ class Diagnosis:
     floor: np.ndarray
     train: np.ndarray
     dropped: tuple[str, ...] = field(default=())
+    sets: tuple[tuple[Candidate, ...], ...] = field(default=())
 
 
 def diagnose(
@@ -152,193 +141,191 @@ def diagnose(
     )
     holdout = holdout or [t.name for t in traces if t.role == "held-out" and t.name in data.names]
     train = training_cycles(data, holdout, [t.name for t in traces if t.role == "train"])
-    floor = floors(data)
+    material = Material(data, floors(data), train, store)
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]
+    if campaign.rig.contacts == 1 and SEVERAL in tags:
+        tags.remove(SEVERAL)
+        dropped.append(f"{SEVERAL}: not tried, for the rig has one contact")
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
 
+    ladder = _base(campaign, material, tell)
+    optimum = ladder[-1].fit
+    named: list[Named] = []
+    rounds: list[Round] = []
+    while True:
+        ladder[-1] = rung = _arrived(ladder[-1], named, material, limits, tell)
+        verdict = _stop(rung, named, max_effects, limits)
+        if verdict is not None:
+            break
+        taken = {n.tag for n in named}
+        ladder[-1], done = _round(
+            [t for t in tags if t not in taken], rung, material, jobs, f"round{len(rounds) + 1}", tell, limits
+        )
+        rounds.append(done)
+        best, close = decide(done.judged, limits)
+        if best is None:
+            verdict = nothing([n.tag for n in named], done.judged, done.base, limits, _forms(named))
+            break
+        top = _add(done.base, best.candidate, material)
+        ladder.append(top)
+        rivals = tuple(j.candidate for j in close[1:])
+        stays = bool(rivals) and is_adequate(top.train, top.held, limits)
+        named = [*(replace(n, fresh=False) for n in named), Named(best.candidate, rivals, done.judged, stays)]
+        if stays:
+            verdict = Verdict("missing")  # to be said below: of a set, nothing is added to
+            break
+    sets: tuple[tuple[Candidate, ...], ...] = ()
+    if verdict.kind == "missing":
+        if len(named) > 1 or any(n.rivals for n in named):
+            tell("trying to do without each effect, and with its rivals", 1.0)
+        ladder, named = done_without(ladder, named, material, limits)
+        ladder[-1], named = told_apart(ladder[-1], named, material, limits)
+        verdict = _said(ladder[-1], named, verdict, limits)
+        sets = tuple((n.candidate, *n.rivals) for n in named if n.rivals)
+    elif any(n.rivals for n in named):
+        every = tuple(dict.fromkeys(c.tag for n in named for c in (n.candidate, *n.rivals)))
+        verdict = replace(verdict, set=every)
+    if not any(ladder[-1].fit is f for f in (optimum, *(c.fit for r in rounds for c in r.candidates))):
+        tell("standard deviations", 1.0)
+        ladder[-1] = _certain(ladder[-1], material)
+    return Diagnosis(
+        verdict,
+        tuple(ladder),
+        tuple(rounds),
+        data,
+        material.floor,
+        train,
+        (*data.dropped, *dropped),
+        sets,
+    )
+
+
+def _base(campaign: Campaign, material: Material, tell: Tell) -> list[Rung]:
+    """The static model and the base model."""
+    data, floor, train, store = material
     base = base_composition(campaign, data)
     tell("fitting the base model", 0.0)
-    optimum = _kept(
+    optimum = kept(
         store,
         "base",
         lambda: best_of(
             Problem(base, data), floor, train, progress=lambda text, share: tell(f"base model, {text}", share)
         ),
     )
-    rung = _rung(("static", "inertia"), "inertia", base, optimum, data, floor, train)
     stiffness = base.fixed.get("rig.spring_stiffness", optimum.values.get("rig.spring_stiffness", np.nan))
-    ladder = [_static(data, floor, train, optimum, float(stiffness)), rung]
-    rounds: list[Round] = []
-    named: list[str] = []
-    sure = 1.0
-    while True:
-        assert rung.held is not None
-        for again in range(FURTHER_FITS if named else 0):
-            # before another effect is looked for: is it the fit that has not arrived?
-            if rung.held is None or rung.fit is None or is_complete(rung.train, rung.held, limits):
-                break
-            tell("the last model once more", 1.0)
-            before = rung.fit.cost
-            ladder[-1] = rung = _further(
-                rung, rung.fit, FURTHER, data, floor, train, store, f"named{len(named)}-{again + 1}"
-            )
-            if rung.fit is None or rung.fit.cost > ARRIVED * before:
-                break
-        assert rung.held is not None
+    rung = make_rung(("static", "inertia"), "inertia", base, optimum, material)
+    return [_static(material, optimum, float(stiffness)), rung]
+
+
+def _arrived(rung: Rung, named: Sequence[Named], material: Material, limits: Thresholds, tell: Tell) -> Rung:
+    """The last model fitted further before another effect is looked for: is it the fit that has not arrived?"""
+    for again in range(FURTHER_FITS if named else 0):
+        if rung.fit is None or is_complete(rung.train, rung.held, limits):
+            break
+        tell("the last model once more", 1.0)
+        before = rung.fit.cost
+        rung = _further(rung, rung.fit, FURTHER, material, f"named{len(named)}-{again + 1}")
+        if rung.fit is None or rung.fit.cost > ARRIVED * before:
+            break
+    return rung
+
+
+def _stop(rung: Rung, named: Sequence[Named], max_effects: int, limits: Thresholds) -> Verdict | None:
+    """The verdict where no further effect is looked for, or None."""
+    tags, forms = [n.tag for n in named], _forms(named)
+    left = grade(rung.train, rung.held, limits)
+    phase, worst = worst_phase(rung.train, rung.held, limits)
+    if left == 0:
+        return finished(tags, forms)
+    if named and left == 1:
+        return nearly(tags, phase, worst, tried=False, forms=forms)  # too little is left to name another effect by
+    if not named and worst > limits.failed:
+        return Verdict(
+            "unknown", text=f"The base model could not be fitted ({phase} is off by {worst:.0f} floors), so no "
+            "effect was ranked. Look at `stickslip inspect` for units, missed events and the rig's values.",
+        )  # fmt: skip
+    if len(named) < max_effects:
+        return None
+    if left == 2:
+        return nearly(tags, phase, worst, tried=False, forms=forms)
+    many = "1 effect was" if len(named) == 1 else f"{len(named)} effects were"
+    text = f"{many} added and {phase} is still off by {worst:.1f} floors."
+    return Verdict("unknown", tuple(tags), tuple(tags), text, forms=forms)
+
+
+def _said(rung: Rung, named: Sequence[Named], verdict: Verdict, limits: Thresholds) -> Verdict:
+    """The verdict on the last model, once it is known what may go and what cannot be told apart."""
+    forms = _forms(named)
+    groups = [[n.tag, *(r.tag for r in n.rivals)] for n in named if n.rivals]
+    sure = [n.tag for n in named if not n.rivals]
+    if groups:
+        found = undecided(sure, groups, forms)
+    elif is_complete(rung.train, rung.held, limits):
+        found = finished(sure, forms)
+    else:
         phase, worst = worst_phase(rung.train, rung.held, limits)
-        if is_complete(rung.train, rung.held, limits):
-            verdict = finished(named)
-            break
-        if named and is_adequate(rung.train, rung.held, limits, limits.remainder):
-            verdict = nearly(named, phase, worst, tried=False)  # too little is left to name another effect by
-            break
-        if not named and worst > limits.failed:
-            verdict = Verdict(
-                "unknown", text=f"The base model could not be fitted ({phase} is off by {worst:.0f} floors), so no "
-                "effect was ranked. Look at `stickslip inspect` for units, missed events and the rig's values.",
-            )  # fmt: skip
-            break
-        if len(named) >= max_effects:
-            verdict = Verdict(
-                "unknown", tuple(named), tuple(named),
-                f"{len(named)} effects were added and {phase} is still off by {worst:.1f} floors.",
-            )  # fmt: skip
-            break
-        rung, done = _round(
-            [t for t in tags if t not in named], rung, data, floor, train, jobs, store, len(rounds), tell
-        )
-        ladder[-1] = rung
-        assert rung.fit is not None
-        assert rung.held is not None
-        judged = [judge(c, rung.fit.cost, rung.held, limits) for c in done[0] if c.fit is not None and not c.note]
-        rounds.append(Round(tuple(done[0]), tuple(done[1]), tuple(judged), rung))
-        best, close = decide(judged, limits)
-        if best is None:
-            verdict = nothing(named, judged, rung, limits)
-            break
-        new = _add(rung, best.candidate, data, floor, train)
-        ladder.append(new)
-        assert new.held is not None
-        if len(close) > 1 and is_adequate(new.train, new.held, limits):
-            verdict = undecided(named, close)
-            sure *= confidence(judged, close)
-            break
-        sure *= confidence(judged, [best])
-        named.append(best.candidate.tag)
-        rung = new
-    if verdict.kind == "missing" and len(named) > 1:
-        tell("trying to do without each effect", 1.0)
-        ladder, left = _without(ladder, named, data, floor, train, limits)
-        if len(left) < len(named):
-            verdict = replace(finished(left), reasons=verdict.reasons)
-    if verdict.kind in ("missing", "ambiguous"):
-        verdict = replace(verdict, confidence=sure)
-    top = ladder[-1]
-    settled = [optimum, *(c.fit for r in rounds for c in r.candidates)]  # their standard deviations are known
-    if top.fit is not None and top.composition is not None and not any(top.fit is f for f in settled):
-        tell("standard deviations", 1.0)
-        last, composition = top.fit, top.composition
-        ladder[-1] = replace(top, fit=_kept(store, "last", lambda: certain(Problem(composition, data), floor, last)))
-    return Diagnosis(verdict, tuple(ladder), tuple(rounds), data, floor, train, (*data.dropped, *dropped))
+        found = nearly(sure, phase, worst, tried=bool(verdict.reasons), reasons=verdict.reasons, forms=forms)
+    return replace(found, confidence=float(np.prod([n.confidence for n in named])))
+
+
+def _forms(named: Sequence[Named]) -> dict[str, dict[str, str]]:
+    """tag -> form of its law, where it has several."""
+    return {c.tag: c.form for n in named for c in (n.candidate, *n.rivals) if c.form}
 
 
 def _round(
     tags: Sequence[str],
     rung: Rung,
-    data: Measurement,
-    floor: np.ndarray,
-    train: np.ndarray,
+    material: Material,
     jobs: int,
-    store: Store | None,
-    number: int,
-    tell: Callable[[str, float], None],
-) -> tuple[Rung, tuple[list[Candidate], list[Candidate]]]:
+    name: str,
+    tell: Tell,
+    limits: Thresholds,
+) -> tuple[Rung, Round]:
     """All candidates on a rung, and the rung fitted again from where the best of them arrived.
 
     A base less converged than its rivals would make a gain of nothing.
     """
     assert rung.composition is not None
     assert rung.fit is not None
+    data, floor, train, store = material
     ground = Ground(rung.composition, rung.fit, data, floor, train)
-    name = f"round{number + 1}"
-    done = Sweep(ground, jobs, store, name, tell).run(tags)
-    best = min((c for c in done[0] if not c.note), key=lambda c: c.cost, default=None)
-    if best is None or best.fit is None:
-        return rung, done
-    k = len(rung.composition.free)
-    begin = replace(rung.fit, z=best.fit.z[:k], events=best.fit.events)
-    for i, stages in enumerate(BASE_AGAIN):
-        rung = _further(rung, begin, stages, data, floor, train, store, f"{name}-again{i + 1}")
-    return rung, done
+    candidates, every = Sweep(ground, jobs, store, name, tell).run(tags)
+    best = min((c for c in candidates if not c.note), key=lambda c: c.cost, default=None)
+    if best is not None and best.fit is not None:
+        k = len(rung.composition.free)
+        begin = replace(rung.fit, z=best.fit.z[:k], events=best.fit.events)
+        for i, stages in enumerate(BASE_AGAIN):
+            rung = _further(rung, begin, stages, material, f"{name}-again{i + 1}")
+    assert rung.fit is not None
+    assert rung.held is not None
+    judged = [judge(c, rung.fit.cost, rung.held, limits) for c in candidates if c.fit is not None and not c.note]
+    return rung, Round(tuple(candidates), tuple(every), tuple(judged), rung)
 
 
-def _further(
-    rung: Rung,
-    begin: Fit,
-    stages: tuple[tuple[float, int], ...],
-    data: Measurement,
-    floor: np.ndarray,
-    train: np.ndarray,
-    store: Store | None,
-    name: str,
-) -> Rung:
+def _further(rung: Rung, begin: Fit, stages: tuple[tuple[float, int], ...], material: Material, name: str) -> Rung:
     """The rung fitted again from where ``begin`` is, if that is better."""
     assert rung.composition is not None
     assert rung.fit is not None
+    data, floor, train, store = material
     problem = Problem(rung.composition, data)
-    more = _kept(store, name, lambda: fit(problem, floor, z=begin.z, events=begin.events, stages=stages, use=train))
-    if more.cost >= rung.fit.cost:
+    more = kept(store, name, lambda: fit(problem, floor, z=begin.z, events=begin.events, stages=stages, use=train))
+    return rung if more.cost >= rung.fit.cost else make_rung(rung.model, rung.added, rung.composition, more, material)
+
+
+def _certain(rung: Rung, material: Material) -> Rung:
+    """The rung with the standard deviations of its fit."""
+    if rung.fit is None or rung.composition is None:
         return rung
-    return _rung(rung.model, rung.added, rung.composition, more, data, floor, train)
+    last, composition = rung.fit, rung.composition
+    data, floor, _, store = material
+    # named after what is in it, for an effect may have been taken out or exchanged since the piece was kept
+    name = "last-" + "-".join(rung.model[2:]) if len(rung.model) > 2 else "last"
+    return replace(rung, fit=kept(store, name, lambda: certain(Problem(composition, data), floor, last)))
 
 
-def _kept(store: Store | None, name: str, make: Callable[[], Fit]) -> Fit:
-    """The fit of that name from the store, or made and kept there."""
-    kept = store.load(name) if store is not None else None
-    if kept is not None:
-        return fit_from(kept)
-    found = make()
-    if store is not None:
-        store.save(name, fit_arrays(found))
-    return found
-
-
-def _without(
-    ladder: list[Rung], named: list[str], data: Measurement, floor: np.ndarray, train: np.ndarray, limits: Thresholds
-) -> tuple[list[Rung], list[str]]:
-    """The ladder without effects that are no longer needed once the later ones are in."""
-    top = ladder[-1]
-    assert top.composition is not None
-    assert top.fit is not None
-    for tag in named[:-1]:
-        smaller = top.composition.without(tag)
-        kept = [i for i, f in enumerate(top.composition.free) if f in smaller.free]
-        found = fit(
-            Problem(smaller, data), floor, z=top.fit.z[kept], events=top.fit.events, stages=((1.0, MOST),), use=train
-        )
-        left = [t for t in named if t != tag]
-        rung = _rung(("static", "inertia", *left), left[-1], smaller, found, data, floor, train)
-        assert rung.held is not None
-        if found.cost < limits.rival * top.fit.cost and is_complete(rung.train, rung.held, limits):
-            return [*ladder[:2], rung], left
-    return ladder, named
-
-
-def _rung(
-    model: tuple[str, ...],
-    added: str | None,
-    composition: Composition,
-    optimum: Fit,
-    data: Measurement,
-    floor: np.ndarray,
-    train: np.ndarray,
-) -> Rung:
-    unseen = np.asarray(data.cycles.used) & ~train
-    held = held_out(Problem(composition, data), optimum, floor, unseen, optimum.features)
-    return Rung(model, added, errors(data, optimum, floor), held, composition, optimum, optimum.features)
-
-
-def _static(data: Measurement, floor: np.ndarray, train: np.ndarray, optimum: Fit, stiffness: float) -> Rung:
+def _static(material: Material, optimum: Fit, stiffness: float) -> Rung:
+    data, floor, train, _ = material
     used = np.asarray(data.cycles.used)
     features = static_features(data, floor, optimum, stiffness, train & used)
     seen = replace(data, valid=data.valid & (train & used)[..., None])
@@ -348,7 +335,7 @@ def _static(data: Measurement, floor: np.ndarray, train: np.ndarray, optimum: Fi
     return Rung(("static",), None, misfit(seen, features, floor), held, None, None, features)
 
 
-def _add(rung: Rung, candidate: Candidate, data: Measurement, floor: np.ndarray, train: np.ndarray) -> Rung:
+def _add(rung: Rung, candidate: Candidate, material: Material) -> Rung:
     assert candidate.composition is not None
     assert candidate.fit is not None
-    return _rung((*rung.model, candidate.tag), candidate.tag, candidate.composition, candidate.fit, data, floor, train)
+    return make_rung((*rung.model, candidate.tag), candidate.tag, candidate.composition, candidate.fit, material)

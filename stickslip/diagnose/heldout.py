@@ -8,12 +8,13 @@ import numpy as np
 
 from ..features.layout import PHASES
 from ..fit.common import Common
-from ..fit.composition import START
+from ..fit.composition import START, run_of
 from ..fit.inertial import HUBER, Fit
 from ..fit.problem import Problem
 from ..floors import event_widths
 
 ITERATIONS = 3
+PHASES_TRIED, REFINED = 12, 4  # of a run that no fit has seen; halvings of the distance between two of them
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,9 @@ def held_out(
     """Evaluate a fit on ``cycles`` (R, n) with its event-wise factors there at their prior mean.
 
     In each cycle the two factors are then set to their most probable values, to first order. The elongation that a
-    run begins with is set by its recurrence, where no cycle of that run was fitted. What the unseen events have in
-    common is taken from them alone and counts: it is as much a misfit there as where the fit has looked.
+    run begins with, and the phase that it begins at, are set by its recurrence, where no cycle of that run was fitted.
+    What the unseen events have in common is taken from them alone and counts: it is as much a misfit there as where
+    the fit has looked.
     """
     m = problem.measurement
     cycles = cycles & np.asarray(m.cycles.used)
@@ -80,22 +82,48 @@ def held_out(
 
 
 def _starts(problem: Problem, fit: Fit, cycles: np.ndarray, model: np.ndarray) -> np.ndarray:
-    """The features with the starts of runs that no fit has seen set by their recurrence, shape (R, n, F)."""
+    """The features with what begins anew in runs that no fit has seen set by their recurrence, shape (R, n, F)."""
     m = problem.measurement
     at = m.layout.slices()["recurrence"].start
-    for i, f in enumerate(fit.free):
-        if not f.name.startswith(START):
+    own = [(i, r) for i, f in enumerate(fit.free) if (r := run_of(f.name)) is not None]
+    z = fit.z.copy()
+    for i, r in sorted(own, key=lambda pair: fit.free[pair[0]].name.startswith(START)):  # phases first
+        seen = m.valid[r, :, at] & cycles[r] & np.asarray(m.cycles.used)[r]
+        if (fit.use[r][:, None] & m.valid[r]).any() or not seen.any():
             continue
-        r = int(f.name[len(START) :])
-        if (fit.use[r][:, None] & m.valid[r]).any():
-            continue
-        ok = m.valid[r, :, at] & cycles[r] & np.asarray(m.cycles.used)[r] & (np.abs(fit.columns[r, :, at, i]) > 0)
-        if not ok.any():
-            continue
-        z = fit.z.copy()
-        for _ in range(ITERATIONS):
-            late = (m.values[r, ok, at] - model[r, ok, at]) / fit.columns[r, ok, at, i]
-            z[i] = np.clip(z[i] + np.median(late), *f.bounds)
-            model = problem.again(z, fit.events, r, model)
-            model[r] += fit.offsets[r]
+        if fit.free[i].name.startswith(START):
+            ok = seen & (np.abs(fit.columns[r, :, at, i]) > 0)
+            for _ in range(ITERATIONS if ok.any() else 0):
+                late = (m.values[r, ok, at] - model[r, ok, at]) / fit.columns[r, ok, at, i]
+                z[i] = np.clip(z[i] + np.median(late), *fit.free[i].bounds)
+                model = _again(problem, fit, z, r, model)
+        else:
+            z[i], model = _phase(problem, fit, z, i, r, seen, model)
     return model
+
+
+def _again(problem: Problem, fit: Fit, z: np.ndarray, run: int, model: np.ndarray) -> np.ndarray:
+    out = problem.again(z, fit.events, run, model)
+    out[run] += fit.offsets[run]
+    return out
+
+
+def _phase(
+    problem: Problem, fit: Fit, z: np.ndarray, i: int, run: int, seen: np.ndarray, model: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """The phase ``z[i]`` of a run that describes its recurrences best, and the features with it: those after the first,
+    which depends on what the run begins with."""
+    m, f = problem.measurement, fit.free[i]
+    at = m.layout.slices()["recurrence"].start
+    later = np.flatnonzero(seen)[1:] if seen.sum() > 1 else np.flatnonzero(seen)
+
+    def tried(phase: float) -> tuple[float, float, np.ndarray]:
+        new = _again(problem, fit, np.where(np.arange(len(z)) == i, f.inward(phase), z), run, model)
+        return float(np.nansum(np.abs(new[run, later, at] - m.values[run, later, at]))), phase, new
+
+    offers = [tried(phase) for phase in 2 * np.pi * np.arange(PHASES_TRIED) / PHASES_TRIED - np.pi]
+    for step in np.pi / PHASES_TRIED * 0.5 ** np.arange(REFINED):
+        best = min(offers, key=lambda offer: offer[0])
+        offers = [best, *(tried(best[1] + side * step) for side in (-1.0, 1.0))]
+    _, phase, new = min(offers, key=lambda offer: offer[0])
+    return f.inward(phase), new

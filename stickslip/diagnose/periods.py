@@ -15,10 +15,12 @@ from scipy.optimize import least_squares
 
 from ..effects.base import Effect
 from ..features.measurement import Measurement
+from ..fit.composition import PHASE
 from ..fit.parameters import Free
 
 Variable = Literal["time", "load point", "displacement"]
-MOST = 20_000  # frequencies tried
+MOST = 20_000  # frequencies tried, in PARTS
+PARTS = 20
 KEPT = 5
 FEWEST = 6  # slips
 LONGEST = 1.5  # times the record: a longer wave is a trend, which other effects describe
@@ -30,8 +32,8 @@ def periods(
 ) -> list[float]:
     """Periods (s or m) with which onsets and slip sizes deviate most, the strongest first.
 
-    A sine and a cosine over ``variable`` at the onsets are fitted to both for every frequency that the record resolves;
-    neighbours of a frequency already taken are left out.
+    A sine and a cosine over ``variable`` at the onsets are fitted to both for every frequency that the records resolve,
+    in every run with a phase of its own; neighbours of a frequency already taken are left out.
 
     Args:
         variable: over which the effect is periodic.
@@ -46,8 +48,8 @@ def periods(
     size = measurement.layout.slices()["size"].start
     off = measurement.values - model
     data = np.stack([_cut(_late(measurement, off)[ok]), _cut(off[..., size][ok])], axis=1)
-    at = _at(variable, measurement, measurement.values)[ok]
-    span = float(np.ptp(at))
+    at, run = _at(variable, measurement, measurement.values)[ok], np.nonzero(ok)[0]
+    span = max(float(np.ptp(at[run == r])) for r in set(run.tolist()))
     if span <= 0 or not np.any(data):
         return []
     low, high = max(1.0 / bounds[1], 0.3 / span), 1.0 / bounds[0]
@@ -55,10 +57,7 @@ def periods(
     frequency = np.arange(low, high, 0.2 / span)[:MOST]
     if frequency.size == 0:
         return [bounds[1]]
-    basis = _waves(frequency, at)
-    normal = np.swapaxes(basis, 1, 2) @ basis
-    explained = np.linalg.pinv(normal, hermitian=True) @ (np.swapaxes(basis, 1, 2) @ data)
-    rest = np.sum((data - basis @ explained) ** 2, axis=(1, 2))
+    rest = np.concatenate([_rest(_waves(some, at, run), data) for some in np.array_split(frequency, PARTS)])
     out: list[float] = []
     for i in np.argsort(rest):
         if all(abs(frequency[i] - 1.0 / p) > 0.5 / span for p in out):
@@ -69,12 +68,21 @@ def periods(
 
 
 def within_record(effect: Effect, free: Sequence[Free], measurement: Measurement) -> list[Free]:
-    """The effect's free parameters; if it is periodic, with no period beyond LONGEST times the longest run."""
+    """The effect's free parameters; if it is periodic, with no period beyond LONGEST times the longest run, and with a
+    phase for each run: no record begins where another did."""
     if effect.periodic is None:
         return list(free)
     name, variable = effect.periodic
     longest = LONGEST * _span(variable, measurement)
-    return [_limited(f, name, longest) if f.name == f"{effect.tag}.{name}" else f for f in free]
+    out = []
+    for f in free:
+        if f.name == f"{effect.tag}.{PHASE}" and measurement.runs > 1:
+            out += [
+                replace(f, name=f"{f.name}.{r}", doc=f"{f.doc}, in {run}") for r, run in enumerate(measurement.names)
+            ]
+        else:
+            out.append(_limited(f, name, longest) if f.name == f"{effect.tag}.{name}" else f)
+    return out
 
 
 def _limited(free: Free, name: str, longest: float) -> Free:
@@ -108,7 +116,7 @@ def _span(variable: Variable, m: Measurement) -> float:
 
 def phasor(
     variable: Variable, measurement: Measurement, onsets: np.ndarray, change: np.ndarray, period: float, use: np.ndarray
-) -> complex:
+) -> np.ndarray:
     """How far the onsets are late at this period: amplitude (m of the load point's way) and phase of a sine.
 
     Args:
@@ -118,16 +126,33 @@ def phasor(
         change: of the features, shape (R, n, F).
         period: s or m.
         use: cycles to look at, shape (R, n).
+
+    Returns:
+        One complex number for every run, shape (R,), with the amplitude that all have in common; zero for a run without
+        cycles.
     """
     ok = _complete(measurement, use) & np.isfinite(change[..., 0]) & np.isfinite(onsets[..., 0])
-    late = _late(measurement, change)[ok]
-    basis = _waves(np.array([1.0 / period]), _at(variable, measurement, onsets)[ok])[0]
+    told = np.zeros(measurement.runs, complex)
+    if not ok.any():
+        return told
+    late, run = _late(measurement, change)[ok], np.nonzero(ok)[0]
+    basis = _waves(np.array([1.0 / period]), _at(variable, measurement, onsets)[ok], run)[0]
     cut = np.median(late) + _width(late) * _cut(late)
     found = np.linalg.lstsq(basis, cut, rcond=None)[0]
     width = _width(late - basis @ found)
     if width > 0:  # what is far is told by what is left, not by how far a locked onset is late
         found = least_squares(lambda x: (basis @ x - late) / width, found, loss="soft_l1", x_scale=width).x
-    return complex(found[0], found[1])
+    for i, r in enumerate(sorted(set(run.tolist()))):
+        told[r] = complex(found[2 * i], found[2 * i + 1])
+    size = np.sqrt(np.average(np.abs(told) ** 2, weights=np.bincount(run, minlength=measurement.runs)))
+    return size * np.exp(1j * np.angle(told)) * (told != 0.0)
+
+
+def _rest(basis: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """Sum of squares that a basis (frequencies, N, k) leaves of the columns of ``data`` (N, d)."""
+    normal = np.swapaxes(basis, 1, 2) @ basis
+    explained = np.linalg.pinv(normal, hermitian=True) @ (np.swapaxes(basis, 1, 2) @ data)
+    return np.asarray(np.sum((data - basis @ explained) ** 2, axis=(1, 2)))
 
 
 def _complete(m: Measurement, use: np.ndarray) -> np.ndarray:
@@ -151,10 +176,11 @@ def _cut(values: np.ndarray) -> np.ndarray:
     return np.clip((values - np.median(values)) / (_width(values) or 1.0), -FAR, FAR)
 
 
-def _waves(frequency: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Sine, cosine and a constant, shape (frequencies, N, 3)."""
+def _waves(frequency: np.ndarray, at: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Sine and cosine of every run (``run``: of which each point is) and a constant, (frequencies, N, 2R + 1)."""
     turn = 2.0 * np.pi * frequency[:, None] * at
-    return np.stack([np.sin(turn), np.cos(turn), np.ones_like(turn)], axis=-1)
+    waves = [wave * (run == r) for r in sorted(set(run.tolist())) for wave in (np.sin(turn), np.cos(turn))]
+    return np.stack([*waves, np.ones_like(turn)], axis=-1)
 
 
 def _at(variable: Variable, m: Measurement, features: np.ndarray) -> np.ndarray:

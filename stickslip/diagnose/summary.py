@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,19 +13,26 @@ from ..fit.solved import solved
 from ..floors import scatter_factor
 from .candidate import Candidate
 from .caution import cautions
-from .engine import Diagnosis, Rung
-from .experiment import TELLING, recommend
+from .engine import Diagnosis, Round
+from .experiment import TELLING, recommend_among
 from .menu import Conditions
+from .rungs import Rung
 from .verdict import passed_over
 
 
-def summary(diagnosis: Diagnosis, rig: Any = None, asked: Sequence[str] = ()) -> dict[str, Any]:
+def summary(
+    diagnosis: Diagnosis,
+    rig: Any = None,
+    asked: Sequence[str] = (),
+    progress: Callable[[str, float], None] | None = None,
+) -> dict[str, Any]:
     """The verdict, the ladder, the ranking, parameters with units, what to measure next, and the last model.
 
     Args:
         diagnosis: what was found.
         rig: ``[rig]`` of the campaign, for the load on a contact.
         asked: tags the user wanted tried.
+        progress: told what is simulated for the next experiment, and the share done.
     """
     d = diagnosis
     used = np.asarray(d.measurement.cycles.used)
@@ -39,13 +46,15 @@ def summary(diagnosis: Diagnosis, rig: Any = None, asked: Sequence[str] = ()) ->
             "text": d.verdict.text,
             "reasons": list(d.verdict.reasons),
             "confidence": d.verdict.confidence,
+            "forms": {tag: dict(form) for tag, form in d.verdict.forms.items()},
         },
         "caution": cautions(d, asked),
         "ladder": [_rung(r) for r in d.ladder],
-        "ranking": [_ranked(c, d) for c in _order(d)],
-        "ranking_base": _ranking_base(d),
+        "ranking": _ranking(d.rounds[0]) if d.rounds else [],
+        "ranking_base": _ranking_base(d.rounds[0]) if d.rounds else None,
+        "later_rounds": [{"base": _ranking_base(r), "ranking": _ranking(r)} for r in d.rounds[1:]],
         "parameters": {} if last is None else _parameters(last),
-        "next_experiment": next_experiment(d),
+        "next_experiment": next_experiment(d, progress),
         "held_out": {
             n: [int(k) for k in (~d.train[r] & used[r]).nonzero()[0]] for r, n in enumerate(d.measurement.names)
         },
@@ -76,23 +85,21 @@ def _rung(rung: Rung) -> dict[str, Any]:
     }
 
 
-def _order(d: Diagnosis) -> list[Candidate]:
-    """Candidates of the first round, the best first; those that were not refitted last."""
-    first = [c for c in d.rounds[0].candidates if c.tag not in d.rounds[0].base.model] if d.rounds else []
-    return sorted(first, key=lambda c: (bool(c.note), -c.promise if c.note else c.cost))
+def _ranking(done: Round) -> list[dict[str, Any]]:
+    """Candidates of a round, the best first; those that were not refitted last."""
+    order = sorted(done.candidates, key=lambda c: (bool(c.note), -c.promise if c.note else c.cost))
+    return [_ranked(c, done) for c in order]
 
 
-def _ranking_base(d: Diagnosis) -> dict[str, Any] | None:
-    """What the candidates of the first round were added to."""
-    if not d.rounds:
-        return None
-    base = d.rounds[0].base
+def _ranking_base(done: Round) -> dict[str, Any]:
+    """What the candidates of a round were added to."""
+    base = done.base
     assert base.fit is not None
     held = None if base.held is None else base.held.error
     return {"model": list(base.model), "cost": base.fit.cost, "train_error": base.train.total, "heldout_error": held}
 
 
-def _ranked(c: Candidate, d: Diagnosis) -> dict[str, Any]:
+def _ranked(c: Candidate, done: Round) -> dict[str, Any]:
     out: dict[str, Any] = {
         "effect": c.tag,
         "form": c.form,
@@ -103,16 +110,21 @@ def _ranked(c: Candidate, d: Diagnosis) -> dict[str, Any]:
     }
     if c.fit is None or c.held is None or c.train is None or c.note:
         return out
-    first = d.rounds[0]
-    base = first.base.held
-    judged = next((j for j in first.judged if j.candidate is c), None)
-    forms = [e for e in first.every if e.tag == c.tag and e.fit is not None and not e.note]
+    base = done.base.held
+    gain = np.zeros(0) if base is None else base.per_cycle - c.held.per_cycle
+    gain = gain[np.isfinite(gain)]
+    judged = next((j for j in done.judged if j.candidate is c), None)
+    forms = [e for e in done.every if e.tag == c.tag and e.fit is not None and not e.note]
     out |= {
         "cost": c.fit.cost,
         "train_error": c.train.total,
         "heldout_error": c.held.error,
         "heldout_gain": None if base is None else 1.0 - c.held.score / base.score,
-        "failures": [] if judged is None else list(passed_over(judged, first.judged)),
+        "heldout_gain_std": None
+        if base is None or gain.size < 2
+        else float(np.std(gain, ddof=1) / np.sqrt(gain.size) / base.score),
+        "heldout_cycles": int(gain.size),
+        "failures": [] if judged is None else list(passed_over(judged, done.judged)),
         "forms": [{"form": e.form, "cost": e.cost} for e in sorted(forms, key=lambda e: e.cost)],
     }
     if c.amplitude is not None:
@@ -129,24 +141,22 @@ def _parameters(rung: Rung) -> dict[str, Any]:
     return {f.name: {"value": values[f.name], "std": sd[f.name], "unit": f.unit, "doc": f.doc} for f in rung.fit.free}
 
 
-def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
+def next_experiment(d: Diagnosis, progress: Callable[[str, float], None] | None = None) -> dict[str, Any] | None:
     """For effects these data cannot tell apart: the experiment in which their fitted models differ most.
 
     Where none of the menu tells them apart, what the catalogue knows of the two comes first.
     """
-    if d.verdict.kind != "ambiguous":
+    if d.verdict.kind != "ambiguous" or not d.sets:
         return None
-    pair = [t for t in d.verdict.set if t not in d.verdict.effects][:2]
-    if len(pair) < 2:
-        return None
-    a, b = (catalogue.get(t) for t in pair)
-    known = a.confused_with.get(pair[1]) or b.confused_with.get(pair[0])
-    rivals = [c for t in pair for c in d.rounds[-1].candidates if c.tag == t and c.fit is not None] if d.rounds else []
-    if len(rivals) == 2:
+    rivals = d.sets[0]
+    a, b = (catalogue.get(c.tag) for c in rivals[:2])
+    known = a.confused_with.get(b.tag) or b.confused_with.get(a.tag)
+    fitted = [c for c in rivals if c.fit is not None and c.composition is not None]
+    if len(fitted) > 1:
         factor = 1.0 + min(scatter_factor(d.measurement), 1.0)
-        found = recommend(rivals[0], rivals[1], Conditions.of(d.measurement), factor=factor)
-        if found["floors"] < TELLING and known is not None:
+        found = recommend_among(fitted, Conditions.of(d.measurement), factor=factor, progress=progress)
+        if found["floors"] < TELLING and known is not None and len(fitted) == 2:
             found["text"] = f"{known} ({found['text']})"
         return found
     text = "add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s, a virgin start"
-    return {"text": known or text, "separates": pair}
+    return {"text": known or text, "separates": [c.tag for c in rivals[:2]]}

@@ -71,29 +71,32 @@ class Sweep:
 
     def run(self, tags: Sequence[str]) -> tuple[list[Candidate], list[Candidate]]:
         """Every tag's candidate in its best form, in the order of ``tags``; and everything that was fitted."""
-        scored = self._score([forms_of(tag)[0] for tag in tags], 0.0, 0.4)
-        promising = sorted(scored, key=lambda c: -c.promise)[:PROMISING]
-        promising += [c for c in sorted(scored, key=lambda c: -c.score)[:EXPLAINING] if c not in promising]
-        few = sorted(self._refine(promising, FEW, "few", 0.4, 0.6), key=lambda c: c.cost)
+        scored = self._score([form for tag in tags for form in forms_of(tag)], 0.0, 0.5)
+        firsts = _firsts(sorted(scored, key=lambda c: -c.promise))  # each tag in the form that promises most
+        promising = firsts[:PROMISING]
+        explaining = _firsts(sorted(scored, key=lambda c: -c.score))[:EXPLAINING]
+        promising += [c for c in explaining if c.tag not in {p.tag for p in promising}]
+        few = sorted(self._refine(promising, FEW, "few", 0.5, 0.7), key=lambda c: c.cost)
         half = few[: max(LEAST, len(few) // 2)]
         half += [c for c in few[len(half) :] if c.cost < NEAR * few[0].cost]
-        forms = self._score([form for c in half[:LEAST] for form in forms_of(c.tag)[1:]], 0.6, 0.7)
+        leading = {c.tag for c in half[:LEAST]}
+        followed = {_word(c.effect) for c in half}
+        forms = [c for c in scored if c.tag in leading and _word(c.effect) not in followed]
         more = self._refine([*half, *forms], MORE, "more", 0.7, 0.8)
         leader = min(more, key=lambda c: c.cost, default=None)
         if leader is not None and leader.cost < WORTH * self.ground.optimum.cost:
             # what it may be taken for deserves the same, whatever its own score promised
             known = {c.tag for c in more}
-            like = [c for c in scored if c.tag in _like(leader.effect) and c.tag not in known]
+            like = [c for c in firsts if c.tag in _like(leader.effect) and c.tag not in known]
             more += self._refine(self._refine(like, FEW, "like", 0.8, 0.82), MORE, "like more", 0.82, 0.85)
         best = min((c.cost for c in more), default=np.inf)
         ranked = sorted(more, key=lambda c: c.cost)
         near = [c for c in ranked if c.cost < NEAR * best][:LEADERS]
         if near and best < WORTH * self.ground.optimum.cost:
             taken_for = _like(near[0].effect) - {c.tag for c in near}
-            firsts = {c.tag: c for c in reversed(ranked) if c.tag in taken_for}  # each in its best form
-            near += sorted(firsts.values(), key=lambda c: c.cost)[:LIKE]
+            near += _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]
         most = self._settle(near, 0.85, 1.0)
-        every = {_word(c.effect): c for c in (*scored, *forms, *few, *more, *most)}
+        every = {_word(c.effect): c for c in (*scored, *few, *more, *most)}
         out = {tag: min((c for c in every.values() if c.tag == tag), key=_rank) for tag in tags}
         return [out[tag] for tag in tags], list(every.values())
 
@@ -146,6 +149,14 @@ class Sweep:
             warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
             pool = Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1)
             yield from pool(delayed(_named)(key, job) for key, job in work.items())
+
+
+def _firsts(ranked: Sequence[Candidate]) -> list[Candidate]:
+    """The first of every tag."""
+    found: dict[str, Candidate] = {}
+    for candidate in ranked:
+        found.setdefault(candidate.tag, candidate)
+    return list(found.values())
 
 
 def _like(effect: Effect) -> set[str]:

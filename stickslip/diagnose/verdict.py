@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
-from ..effects import catalogue
+from ..fit.composition import PHASE
 from ..fit.inertial import DISPERSION
+from ..params import specs
 from ..residual import Misfit
 from .candidate import Candidate
 from .heldout import HeldOut
 from .thresholds import THRESHOLDS, Thresholds
 
+FEWEST = 2  # cycles that tell a standard error
 BORDER = 0.004  # share of a parameter's range: nearer to an end of it than this a fit has not stopped by itself
 
 
@@ -37,10 +39,11 @@ class Verdict:
     Attributes:
         kind: ``complete``, ``missing``, ``ambiguous`` or ``unknown``.
         effects: named, in the order added.
-        set: effects the data cannot tell apart, the best first.
+        set: effects the data cannot tell apart, the best first; the same as ``effects`` where there are none.
         text: for a person.
         confidence: how likely the named effects, or the set, are among the effects of the catalogue, 0 to 1 (see
             :func:`weights`); None where nothing is named.
+        forms: tag -> form of its law, of those said that have several.
     """
 
     kind: str
@@ -49,6 +52,7 @@ class Verdict:
     text: str = ""
     reasons: tuple[str, ...] = field(default=())
     confidence: float | None = None
+    forms: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 def errors(train: Misfit, held: HeldOut | None) -> dict[str, float]:
@@ -84,6 +88,14 @@ def is_adequate(
     return own and all(e <= factor * limits.alike for e in train.alike.values())
 
 
+def grade(train: Misfit, held: HeldOut | None, limits: Thresholds = THRESHOLDS) -> int:
+    """How good a model is: 0 complete, 1 with a small remainder, 2 good enough to trust a name, 3 not."""
+    if is_complete(train, held, limits):
+        return 0
+    factors = (limits.remainder, limits.adequate)
+    return next((i for i, f in enumerate(factors, start=1) if is_adequate(train, held, limits, f)), 3)
+
+
 @dataclass(frozen=True)
 class Judged:
     """A candidate and which of the conditions for a name it meets.
@@ -115,30 +127,45 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
     if share < limits.gain:
         fails.append(f"takes {f'only {100 * share:.0f} %' if share > 0 else 'nothing'} off the training cost")
     gain = base_held.per_cycle - candidate.held.per_cycle
-    if gain.size:
-        error = np.std(gain, ddof=1) / np.sqrt(gain.size) if gain.size > 1 else 0.0
+    gain = gain[np.isfinite(gain)]
+    if gain.size < FEWEST:
+        fails.append("too few unseen cycles can be compared")
+    else:
+        error = np.std(gain, ddof=1) / np.sqrt(gain.size)
         fall, errors_of_it = (limits.unseen, limits.standard_errors) if ample else (limits.plain, limits.clearly)
         for_little = "" if ample or share < limits.gain else " for so little on the fitted ones"
         if candidate.held.score > (1.0 - fall) * base_held.score:
             fails.append(f"the error on unseen cycles does not fall enough{for_little}")
         elif np.mean(gain) < errors_of_it * error:
             fails.append(f"the gain on unseen cycles is not significant{for_little and ' enough' + for_little}")
-    amplitude = candidate.amplitude
-    if amplitude is not None:
-        null = catalogue.amplitude(candidate.effect).null or 0.0
+    if candidate.amplitude is not None:
         own = sum(1 for f in candidate.fit.free if f.name.startswith(f"{candidate.tag}."))
         if base_cost - cost < limits.significant**2 * own:
             fails.append("its gain is not significant for the number of its parameters")
-        for f, z in zip(candidate.fit.free, candidate.fit.z, strict=True):
-            if not f.name.startswith(f"{candidate.tag}."):
-                continue
-            low, high = f.bounds
-            # near its null an amplitude is small, not implausible: whether it is there at all is judged by its gain
-            ends = [end for end in (f.lower, f.upper) if not (f.amplitude and end == null)]
-            if any(abs(z - f.inward(end)) < BORDER * (high - low) for end in ends):
-                fails.append(f"its '{f.name.split('.', 1)[1]}' ends at the border of its plausible range")
-                plausible = False
+        at_end = at_border(candidate)
+        fails += [f"its '{name}' ends at the border of its plausible range" for name in at_end]
+        plausible = not at_end
     return Judged(candidate, cost, tuple(fails), plausible)
+
+
+def at_border(candidate: Candidate) -> list[str]:
+    """Parameters of the effect whose fit was stopped by the end of a plausible range.
+
+    A range may also end where the law becomes a special case, or be that of an angle; a fit may arrive there.
+    """
+    assert candidate.fit is not None
+    table, out = specs(candidate.effect), []
+    for f, z in zip(candidate.fit.free, candidate.fit.z, strict=True):
+        tag, _, name = f.name.partition(".")
+        if tag != candidate.tag or (name.split(".")[0] == PHASE and candidate.effect.periodic is not None):
+            continue
+        # near its null an amplitude is small, not implausible: whether it is there at all is judged by its gain
+        harmless = {*table[name].ends, *([table[name].null or 0.0] if f.amplitude else [])}
+        low, high = f.bounds
+        ends = [end for end in (f.lower, f.upper) if end not in harmless]
+        if any(abs(z - f.inward(end)) < BORDER * (high - low) for end in ends):
+            out.append(name)
+    return out
 
 
 def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[Judged | None, list[Judged]]:
@@ -160,7 +187,7 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
         if j.cost < limits.rival * best.cost
         and not _contains(j, best)
         and j.plausible
-        and not _worse(j.candidate, best.candidate, limits)
+        and not worse(j.candidate.held, best.candidate.held, limits)
     ]
     seen: list[Judged] = [best]
     for j in close:
@@ -196,12 +223,13 @@ def _unseen(judged: Judged) -> float:
     return np.inf if held is None else held.score
 
 
-def _worse(one: Candidate, other: Candidate, limits: Thresholds) -> bool:
+def worse(one: HeldOut | None, other: HeldOut | None, limits: Thresholds = THRESHOLDS) -> bool:
     """Whether ``one`` describes the unseen cycles worse than ``other``, cycle by cycle and significantly."""
-    if one.held is None or other.held is None or one.held.per_cycle.size != other.held.per_cycle.size:
+    if one is None or other is None or one.per_cycle.size != other.per_cycle.size:
         return False
-    more = one.held.per_cycle - other.held.per_cycle
-    if more.size < 2:
+    more = one.per_cycle - other.per_cycle
+    more = more[np.isfinite(more)]
+    if more.size < FEWEST:
         return False
     return bool(np.mean(more) > limits.clearly * np.std(more, ddof=1) / np.sqrt(more.size))
 
@@ -232,7 +260,10 @@ def _contains(general: Judged, special: Judged) -> bool:
     return special.candidate.tag in general.candidate.effect.generalises
 
 
-def finished(named: Sequence[str]) -> Verdict:
+Forms = Mapping[str, Mapping[str, str]]  # tag -> form of its law
+
+
+def finished(named: Sequence[str], forms: Forms | None = None) -> Verdict:
     """The verdict when every phase is at its floor."""
     if not named:
         return Verdict("complete", text="Nothing is missing: every phase is described as well as the data allow.")
@@ -240,38 +271,57 @@ def finished(named: Sequence[str]) -> Verdict:
         "missing",
         tuple(named),
         tuple(named),
-        f"The base model lacks {_listed(named)}. With it every phase is described as well as the data allow.",
+        f"The base model lacks {_listed(named, forms)}. With {'it' if len(named) == 1 else 'them'} every phase is "
+        "described as well as the data allow.",
+        forms=forms or {},
     )
 
 
-def nearly(named: Sequence[str], phase: str, worst: float, *, tried: bool, reasons: tuple[str, ...] = ()) -> Verdict:
+def nearly(
+    named: Sequence[str],
+    phase: str,
+    worst: float,
+    *,
+    tried: bool,
+    reasons: tuple[str, ...] = (),
+    forms: Forms | None = None,
+) -> Verdict:
     """The verdict when what is left beside the named effects is small; ``tried``: whether others were, after them."""
     return Verdict(
         "missing",
         tuple(named),
         tuple(named),
-        f"The base model lacks {_listed(named)}. A small misfit remains ({phase}, {worst:.1f} floors)"
+        f"The base model lacks {_listed(named, forms)}. A small misfit remains ({phase}, {worst:.1f} floors)"
         + (" that no other effect that was tried explains." if tried else "."),
         reasons,
+        forms=forms or {},
     )
 
 
-def undecided(named: Sequence[str], close: Sequence[Judged]) -> Verdict:
-    """The verdict when several effects describe the data alike."""
-    tags = tuple(j.candidate.tag for j in close)
-    text = f"These data cannot tell {_listed(tags)} apart."
+def undecided(named: Sequence[str], groups: Sequence[Sequence[str]], forms: Forms | None = None) -> Verdict:
+    """The verdict when several effects describe the data alike: one of each of the ``groups`` is missing."""
+    apart = "; nor ".join(_listed(group, forms) for group in groups)
+    text = f"These data cannot tell {apart} apart."
     if named:
-        text = f"The base model lacks {_listed(named)}, and besides: {text[0].lower()}{text[1:]}"
-    return Verdict("ambiguous", tuple(named), tags, text)
+        text = f"The base model lacks {_listed(named, forms)}, and besides: {text[0].lower()}{text[1:]}"
+    tags = tuple(dict.fromkeys(tag for group in groups for tag in group))
+    return Verdict("ambiguous", tuple(named), tags, text, forms=forms or {})
 
 
-def nothing(named: Sequence[str], judged: Sequence[Judged], rung: _Errors, limits: Thresholds = THRESHOLDS) -> Verdict:
+def nothing(
+    named: Sequence[str],
+    judged: Sequence[Judged],
+    rung: _Errors,
+    limits: Thresholds = THRESHOLDS,
+    forms: Forms | None = None,
+) -> Verdict:
     """The verdict when something is missing and no candidate passes."""
     phase, worst = worst_phase(rung.train, rung.held, limits)
     nearest = min(judged, key=lambda j: j.cost, default=None)
     text = f"Something is missing ({phase} is off by {worst:.1f} floors) and no effect that was tried explains it"
     if nearest is not None:
-        text += f"; nearest is {nearest.candidate.tag}, but {'; '.join(nearest.failures) or 'it does not suffice'}"
+        said = described(nearest.candidate.tag, nearest.candidate.form)
+        text += f"; nearest is {said}, but {'; '.join(nearest.failures) or 'it does not suffice'}"
     reasons = nearest.failures if nearest is not None else ()
     if not named and is_adequate(rung.train, rung.held, limits, limits.remainder):
         return Verdict(
@@ -282,9 +332,18 @@ def nothing(named: Sequence[str], judged: Sequence[Judged], rung: _Errors, limit
     if not named:
         return Verdict("unknown", (), (), text + ".", reasons)
     if is_adequate(rung.train, rung.held, limits):
-        return nearly(named, phase, worst, tried=True, reasons=reasons)
-    return Verdict("unknown", tuple(named), tuple(named), f"{_listed(named)} helps, but: {text}.", reasons)
+        return nearly(named, phase, worst, tried=True, reasons=reasons, forms=forms)
+    text = f"{_listed(named, forms)} {'helps' if len(named) == 1 else 'help'}, but {text[0].lower()}{text[1:]}."
+    return Verdict("unknown", tuple(named), tuple(named), text, reasons, forms=forms or {})
 
 
-def _listed(tags: Sequence[str]) -> str:
+def described(tag: str, form: Mapping[str, str] | None = None) -> str:
+    """An effect in a sentence: its tag, and the form of its law where it has several."""
+    what = [] if tag != "inertia" else ["mass that moves with the block"]
+    what += [f"{name}: {chosen}" for name, chosen in (form or {}).items()]
+    return f"{tag} ({', '.join(what)})" if what else tag
+
+
+def _listed(tags: Sequence[str], forms: Forms | None = None) -> str:
+    tags = [described(tag, (forms or {}).get(tag)) for tag in tags]
     return tags[0] if len(tags) == 1 else f"{', '.join(tags[:-1])} and {tags[-1]}"

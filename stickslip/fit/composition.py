@@ -20,6 +20,14 @@ from ..model import Block, LoadPoint, Model, Weakening
 from .parameters import Free, to_si, vector
 
 START = "start."  # with the number of a run: when its first slip comes, where the record does not begin virgin
+PHASE = "phase"  # of an effect that is periodic; with the number of a run, for no record begins where another did
+
+
+def run_of(name: str) -> int | None:
+    """The run that a parameter belongs to, or None where it belongs to the model."""
+    head, _, number = name.rpartition(".")
+    own = head + "." == START or head.endswith(f".{PHASE}")
+    return int(number) if own and number.isdigit() else None
 
 
 class Numbers(NamedTuple):
@@ -125,17 +133,22 @@ class Composition:
         names = tuple(sorted(self._fixed() | self._moved()))
         return Family(self.contacts, self.bins, self.most_steps, names, jax.tree.structure(self.effects))
 
-    def numbers(self, z: np.ndarray) -> Numbers:
-        """All numbers, the free ones at ``z`` on the search scale, shape (n,)."""
-        values = self._fixed() | self._moved(z)
+    def numbers(self, z: np.ndarray, run: int | None = None) -> Numbers:
+        """All numbers, the free ones at ``z`` on the search scale, shape (n,); phases are those of a ``run``."""
+        values = self._fixed() | self._moved(z, run)
         return Numbers({name: np.float64(value) for name, value in sorted(values.items())}, self.effects)
 
     def _fixed(self) -> dict[str, float]:
         return {"rig.mass": self.mass, **self.fixed}
 
-    def _moved(self, z: np.ndarray | None = None) -> dict[str, float]:
+    def _moved(self, z: np.ndarray | None = None, run: int | None = None) -> dict[str, float]:
         moved = to_si(self.free, vector(self.free) if z is None else z)
-        return {name: value for name, value in moved.items() if not name.startswith(START)}
+        out = {name: value for name, value in moved.items() if run_of(name) is None}
+        for name, value in moved.items():
+            head, own = name.rpartition(".")[0], run_of(name)
+            if own is not None and not name.startswith(START) and (own == run or head not in out):
+                out[head] = value  # without a run the phase is that in the first
+        return out
 
     def later(self, z: np.ndarray, run: int) -> float:
         """How much later than at full strength a run that does not begin virgin first slips (m of the drive's way)."""

@@ -13,7 +13,7 @@ from ..features.measurement import Measurement
 from ..floors import event_widths, uncertain
 from ..residual import Misfit, misfit
 from .common import Common
-from .composition import START
+from .composition import run_of
 from .parameters import Free, to_si, vector
 from .problem import STEP, Problem
 
@@ -156,7 +156,7 @@ class _Residuals:
         What several parameters do together may be a thousandth of what each does alone, and is lost in the noise of
         differences taken apart: it is measured in a step of its own, long enough to be seen.
         """
-        apart = np.array([free.name.startswith(START) for free in self.free])  # of one run each
+        apart = np.array([run_of(free.name) is not None for free in self.free])  # of one run each
         widths = np.array([min(free.width, 1.0) for free in self.free])
         seen = np.nan_to_num(known)[self.valid] * widths
         whitened = np.clip(self.common(1.0)(seen[:, ~apart]), -1e6, 1e6)

@@ -27,7 +27,7 @@ from ..features.measurement import Measurement
 from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
 from .common import Common
-from .composition import START, Composition, Family, Numbers
+from .composition import Composition, Family, Numbers, run_of
 
 FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)  # errors below a floor
 COARSE = Tolerance(2e-3, 2e-11, 2e-8, 1.2e-2, 3e-7)  # of one to two: for floors that are widened more than that
@@ -131,11 +131,13 @@ class Problem:
 
     def track(self, z: np.ndarray, events: np.ndarray, run: int) -> Track:
         """The model through one run at ``z`` with the event-wise factors ``events`` (R, n, 2)."""
-        return self._track(self.composition.numbers(z), z, events, run)
+        return self._track(z, events, run)
 
-    def _track(self, numbers: Numbers, z: np.ndarray, events: np.ndarray, run: int) -> Track:
+    def _track(self, z: np.ndarray, events: np.ndarray, run: int) -> Track:
         cycles = self._data[run][0]
-        later = np.float64(self.composition.later(z, int(cycles.run)))
+        number = int(cycles.run)
+        numbers = self.composition.numbers(z, number)
+        later = np.float64(self.composition.later(z, number))
         program = _tracks(self.composition.family())
         found: Track = program(numbers, jnp.asarray(events[run]), cycles, later, self.tolerance)
         return found
@@ -163,8 +165,7 @@ class Problem:
 
     def _alone(self, i: int) -> int | None:
         """The run that a parameter acts on, or None if it acts on all."""
-        name = self.composition.free[i].name
-        return int(name[len(START) :]) if name.startswith(START) else None
+        return run_of(self.composition.free[i].name)
 
     def _call(
         self,
@@ -175,13 +176,12 @@ class Problem:
         """Features of every lane; a lane that concerns one run only has those of ``base`` in the others."""
         m = self.measurement
         only = only or [None] * len(lanes)
-        numbers = [self.composition.numbers(z) for z, _ in lanes]
         times = jnp.asarray([m.layout.settling, m.layout.shortest])
 
         def one(task: tuple[int, int]) -> np.ndarray:
             lane, r = task
             z, events = lanes[lane]
-            return np.asarray(_features(self._track(numbers[lane], z, events, r), self._data[r][1], times))
+            return np.asarray(_features(self._track(z, events, r), self._data[r][1], times))
 
         # the longest runs first, so that no thread is left with one at the end
         order = np.argsort([-np.count_nonzero(m.cycles.used[r]) for r in range(m.runs)])

@@ -15,7 +15,7 @@ from ..effects.base import Effect
 from ..features.measurement import Measurement
 from ..model import LoadPoint, Model
 from ..params import specs, variants
-from .composition import START, Composition
+from .composition import Composition, run_of
 from .inertial import Fit
 from .parameters import Free, to_si, vector
 
@@ -233,4 +233,4 @@ def _effect(entry: Mapping[str, Any]) -> Effect:
 
 def shared(name: str) -> bool:
     """Whether a parameter belongs to the model, and not to one run of a campaign alone."""
-    return not name.startswith(START)
+    return run_of(name) is None

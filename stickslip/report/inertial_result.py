@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..features.layout import PHASES
 from ..features.measurement import Measurement
-from ..fit.composition import START, Composition
+from ..fit.composition import Composition, run_of
 from ..fit.effective import EffectiveLine, effective_line
 from ..fit.inertial import Fit
 from ..fit.overlay import ModelledRun, modelled_runs
@@ -64,7 +64,7 @@ def identifiability(fit: Fit, rig: Any, line: dict[str, Any] | None) -> list[str
         rig: of the campaign.
         line: (H, h_rms) that the fit implies, from `effective`.
     """
-    shared = [i for i, f in enumerate(fit.free) if not f.name.startswith(START)]
+    shared = [i for i, f in enumerate(fit.free) if run_of(f.name) is None]
     free, z = [fit.free[i] for i in shared], [float(fit.z[i]) for i in shared]
     names, logs = [f.name for f in free], [f.scale == "log" for f in free]
     kept, covariance, lost = relative(names, z, fit.covariance[np.ix_(shared, shared)], logs)

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnose.engine import Diagnosis, Rung
+from ..diagnose.engine import Diagnosis
 from ..diagnose.missing_force import Curve, MissingForce, again, curves, learn, rung
 from ..diagnose.pieces import fit_arrays, fit_from
+from ..diagnose.rungs import Rung
 from ..diagnose.sweep import Store
 from ..diagnose.thresholds import THRESHOLDS
 from ..diagnose.verdict import is_complete

@@ -13,7 +13,7 @@ _KNOWN: dict[str, Any] = {
     "dropped": [], "inputs": [], "versions": {}, "static": None, "misfit": None, "next_experiment": None, "can": [],
     "cannot": [], "effective": None, "profiles": [], "ramps": None, "notes": [], "title": "", "kind": "run",
     "seconds": None, "summary": "", "caution": [], "ranking_base": None, "missing_force": None,
-    "learned_residual": None,
+    "learned_residual": None, "later_rounds": [],
 }  # fmt: skip
 
 

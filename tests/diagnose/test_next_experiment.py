@@ -1,4 +1,4 @@
-"""What a diagnosis proposes to measure next comes from the two fitted models that its data cannot tell apart."""
+"""What a diagnosis proposes to measure next comes from the fitted models that its data cannot tell apart."""
 
 from __future__ import annotations
 
@@ -14,14 +14,13 @@ from stickslip.diagnose.verdict import Verdict
 PAIR = ("contact-ageing", "wear")
 
 
-def diagnosis(kind="ambiguous", effects=(), fits=(True, True)):
+def diagnosis(kind="ambiguous", tags=PAIR, fits=(True, True)):
     """As much of a diagnosis as the question needs."""
-    candidates = tuple(
+    rivals = tuple(
         SimpleNamespace(tag=tag, composition=object(), fit=object() if f else None)
-        for tag, f in zip(PAIR, fits, strict=True)
+        for tag, f in zip(tags, fits, strict=True)
     )
-    done = SimpleNamespace(candidates=(*candidates, SimpleNamespace(tag="tilt", composition=None, fit=None)))
-    return SimpleNamespace(verdict=Verdict(kind, effects, (*effects, *PAIR)), rounds=(done,), measurement=object())
+    return SimpleNamespace(verdict=Verdict(kind, (), tags), sets=(rivals,), measurement=object())
 
 
 @pytest.fixture
@@ -29,22 +28,29 @@ def asked(monkeypatch):
     """Stands for the simulations; remembers whom it was asked about."""
     calls = []
 
-    def recommend(first, second, conditions, *, factor):
-        calls.append((first.tag, second.tag, factor))
-        return {"text": "hold the drive", "separates": [first.tag, second.tag], "floors": calls_floors[0], "menu": []}
+    def recommend_among(rivals, conditions, *, factor, progress):
+        tags = [r.tag for r in rivals]
+        calls.append((*tags, factor, progress))
+        return {"text": "hold the drive", "separates": tags, "floors": calls_floors[0], "menu": []}
 
     calls_floors = [8.0]
-    monkeypatch.setattr(summary, "recommend", recommend)
+    monkeypatch.setattr(summary, "recommend_among", recommend_among)
     monkeypatch.setattr(summary, "scatter_factor", lambda m: 0.7)
     monkeypatch.setattr(Conditions, "of", classmethod(lambda cls, m: "conditions"))
     return calls, calls_floors
 
 
-def test_the_two_best_of_the_set_are_simulated(asked):
+@pytest.mark.parametrize("tags", [PAIR, (*PAIR, "tilt")])
+def test_all_of_the_set_are_simulated(asked, tags):
     calls, _ = asked
-    found = summary.next_experiment(diagnosis(effects=("drive-ripple",)))
-    assert calls == [(*PAIR, 1.7)]
+    found = summary.next_experiment(diagnosis(tags=tags, fits=(True,) * len(tags)), print)
+    assert calls == [(*tags, 1.7, print)]
     assert found["text"] == "hold the drive"
+
+
+def test_those_that_were_not_fitted_are_left_out(asked):
+    summary.next_experiment(diagnosis(tags=(*PAIR, "tilt"), fits=(True, False, True)))
+    assert asked[0] == [("contact-ageing", "tilt", 1.7, None)]
 
 
 def test_where_no_experiment_helps_the_catalogue_speaks_first(asked):

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from stickslip.diagnose.candidate import Candidate, starts
-from stickslip.diagnose.engine import Rung
 from stickslip.diagnose.heldout import HeldOut
 from stickslip.diagnose.holdout import training_cycles
 from stickslip.diagnose.pieces import fit_arrays, fit_from
+from stickslip.diagnose.rungs import Rung
 from stickslip.diagnose.thresholds import THRESHOLDS
 from stickslip.diagnose.verdict import (
     confidence,

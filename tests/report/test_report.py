@@ -41,8 +41,16 @@ DIAGNOSIS = {
             "effect": "tilt",
             "score": 0.61,
             "refit": True,
+            "form": {"by": "contact"},
             "heldout_gain": 0.8,
+            "heldout_gain_std": 0.07,
             "amplitude": {"value": 0.01, "std": 0.0004, "unit": "1"},
+        }
+    ],
+    "later_rounds": [
+        {
+            "base": {"model": ["static", "inertia", "tilt"], "cost": 321.0, "train_error": 1.7, "heldout_error": 1.9},
+            "ranking": [{"effect": "sensor-drift", "score": 0.3, "note": "not refitted"}],
         }
     ],
     "parameters": {
@@ -134,6 +142,15 @@ def with_markup(value):
     if isinstance(value, list):
         return [with_markup(v) for v in value]
     return f"{value}{EVIL}" if isinstance(value, str) else value
+
+
+def test_candidates_of_every_round_are_listed_with_form_and_standard_error(tmp_path):
+    text = " ".join(Reader(write_report(folder(tmp_path)).read_text()).text.split())
+    assert "tilt (contact)" in text
+    assert "80 ± 7 %" in text
+    later = text[text.index("On top of static + inertia + tilt") :]
+    assert "321" in later
+    assert "sensor-drift" in later
 
 
 def test_markup_in_every_text_of_a_result_stays_text(tmp_path):

@@ -1,0 +1,251 @@
+"""The way from round to round, in a world where it is invented what every set of effects leaves over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stickslip.diagnose import engine, revise, rungs
+from stickslip.diagnose.candidate import Candidate
+from stickslip.diagnose.heldout import HeldOut
+from stickslip.diagnose.verdict import judge
+from stickslip.effects import catalogue
+from stickslip.fit.inertial import Fit
+from stickslip.fit.parameters import effect_parameters
+from stickslip.residual import Misfit
+
+DATA = SimpleNamespace(names=("a",), dropped=(), cycles=SimpleNamespace(used=np.ones((1, 1), bool)))
+CAMPAIGN = SimpleNamespace(rig=SimpleNamespace(contacts=4))
+TRACES = [SimpleNamespace(displacement=1, drive=1, name="a", role="")]
+
+
+@dataclass(frozen=True)
+class Tags:
+    """Stands for a composition: the effects that are in it."""
+
+    tags: tuple[str, ...] = ()
+    fixed = {"rig.spring_stiffness": 1000.0}
+
+    @property
+    def free(self):
+        return tuple(f for tag in self.tags for f in effect_parameters(catalogue.make(tag)))
+
+    def with_effect(self, effect, free):
+        assert [f.name.split(".")[0] for f in free] == [effect.tag] * len(free)
+        return Tags((*self.tags, effect.tag))
+
+    def without(self, tag):
+        assert tag in self.tags
+        return Tags(tuple(t for t in self.tags if t != tag))
+
+
+class World(dict):
+    """Set of effects -> cost and error (floors); what is not in it is as the largest part of it that is."""
+
+    def __init__(self, sets):
+        super().__init__({frozenset(tags): left for tags, left in sets.items()})
+        self.fits = 0
+
+    def left(self, composition):
+        inside = [known for known in self if known <= set(composition.tags)]
+        return min((self[known] for known in inside), default=(1000.0, 9.0))
+
+    def fit(self, problem, floor, *, z=None, events=None, **_):
+        self.fits += 1
+        free = problem.composition.free
+        assert z is None or len(z) == len(free)  # the vector belongs to these parameters
+        at = np.array([f.inward(f.start) for f in free])
+        shape = (1, 1, 3)
+        cost = self.left(problem.composition)[0]
+        return Fit(at, np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.zeros(shape), np.eye(len(at)), free,
+                   np.zeros((*shape, len(at))), np.ones((1, 1), bool), 1, 1)  # fmt: skip
+
+    def rung(self, model, added, composition, fit, material):
+        error = self.left(composition)[1]
+        return rungs.Rung(model, added, Misfit(error, {"creep": error}, {}), held(error), composition, fit, np.zeros(1))
+
+
+def held(error: float) -> HeldOut:
+    return HeldOut(error, error**2, {"creep": error}, error**2 * np.linspace(0.9, 1.1, 8))
+
+
+class Memory(dict):
+    def load(self, key):
+        return self.get(key)
+
+    def save(self, key, piece):
+        self[key] = piece
+
+
+@pytest.fixture
+def diagnose(monkeypatch):
+    def run(sets, *, max_effects=4, store=None, campaign=CAMPAIGN, candidates=None):
+        world = World({(): (1000.0, 9.0), **sets})
+
+        class Sweep:
+            def __init__(self, ground, jobs, store, name, tell):
+                self.ground = ground
+
+            def run(self, tags):
+                found = []
+                for tag in tags:
+                    composition = self.ground.composition.with_effect(e := catalogue.make(tag), effect_parameters(e))
+                    fit = world.fit(SimpleNamespace(composition=composition), None)
+                    rung = world.rung((), tag, composition, fit, None)
+                    form = {k: str(v) for k, v in vars(e).items() if isinstance(v, str)}
+                    found.append(Candidate(tag, form, e, 0.5, fit=fit, composition=composition, train=rung.train,
+                                           held=rung.held))  # fmt: skip
+                return found, found
+
+        for module in (engine, revise):
+            monkeypatch.setattr(module, "Problem", lambda composition, data: SimpleNamespace(composition=composition))
+            monkeypatch.setattr(module, "fit", world.fit)
+            monkeypatch.setattr(module, "make_rung", world.rung)
+        for name, value in {
+            "ringing": lambda *a: 2e-3, "segment": lambda t: None, "measure": lambda *a, **k: DATA,
+            "training_cycles": lambda *a: np.ones((1, 1), bool), "floors": lambda d: None, "Sweep": Sweep,
+            "base_composition": lambda *a: Tags(), "best_of": lambda problem, floor, train, **k: world.fit(problem, 0),
+            "_static": lambda *a: world.rung(("static",), None, Tags(), None, None), "certain": lambda p, f, last: last,
+        }.items():  # fmt: skip
+            monkeypatch.setattr(engine, name, value)
+        found = engine.diagnose(
+            campaign, TRACES, [None], max_effects=max_effects, store=store, candidates=candidates, jobs=1
+        )
+        return found, world
+
+    return run
+
+
+SMALL, LITTLE, MUCH = 0.5, 2.5, 4.0  # floors of creep: within its limit, within what a name may leave, beyond
+
+
+def test_an_effect_that_takes_all_is_named_with_its_form(diagnose):
+    found, _ = diagnose({("tilt",): (100.0, SMALL)})
+    assert found.verdict.kind == "missing"
+    assert found.verdict.effects == found.verdict.set == ("tilt",)
+    assert "tilt (by: spring)" in found.verdict.text
+    assert found.verdict.forms == {"tilt": {"by": "spring"}}
+    assert [r.added for r in found.ladder] == [None, "inertia", "tilt"]
+
+
+@pytest.mark.parametrize("most", [1, 4])
+def test_how_many_effects_are_allowed_does_not_change_what_is_enough(diagnose, most):
+    found, _ = diagnose({("wear",): (300.0, LITTLE)}, max_effects=most)
+    assert (found.verdict.kind, found.verdict.effects) == ("missing", ("wear",))
+    assert "small misfit remains" in found.verdict.text
+
+
+def test_too_much_left_with_all_that_are_allowed_is_unknown(diagnose):
+    found, _ = diagnose({("wear",): (300.0, MUCH)}, max_effects=1)
+    assert found.verdict.kind == "unknown"
+    assert "1 effect was added" in found.verdict.text
+
+
+PAIR = {("sensor-drift",): (300.0, MUCH), ("thermal-creep",): (305.0, MUCH)}
+
+
+def test_what_could_not_be_told_apart_before_another_effect_was_added_is_said(diagnose):
+    """Two alike, and wear: adding wear does not make one of the two right."""
+    after = {("sensor-drift", "wear"): (50.0, SMALL), ("thermal-creep", "wear"): (52.0, SMALL)}
+    found, _ = diagnose(PAIR | after)
+    assert found.verdict.kind == "ambiguous"
+    assert found.verdict.effects == ("wear",)
+    assert found.verdict.set == ("sensor-drift", "thermal-creep")
+    assert "lacks wear (changes: friction, course: linear), and besides: these data cannot tell" in found.verdict.text
+    assert [[c.tag for c in group] for group in found.sets] == [["sensor-drift", "thermal-creep"]]
+    assert [c.composition.tags for c in found.sets[0]] == [("sensor-drift", "wear"), ("wear", "thermal-creep")]
+
+
+def test_what_the_next_effect_tells_apart_is_named(diagnose):
+    after = {("sensor-drift", "wear"): (50.0, SMALL), ("thermal-creep", "wear"): (200.0, 1.6)}
+    found, _ = diagnose(PAIR | after)
+    assert (found.verdict.kind, found.verdict.effects) == ("missing", ("sensor-drift", "wear"))
+    assert found.sets == ()
+
+
+def test_the_rival_takes_the_place_where_it_is_better_in_the_end(diagnose):
+    after = {("sensor-drift", "wear"): (80.0, SMALL), ("thermal-creep", "wear"): (50.0, SMALL)}
+    found, _ = diagnose(PAIR | after)
+    assert (found.verdict.kind, found.verdict.effects) == ("missing", ("thermal-creep", "wear"))
+    assert found.ladder[-1].composition.tags == ("wear", "thermal-creep")
+    assert found.ladder[-1].model == ("static", "inertia", "thermal-creep", "wear")
+
+
+def test_a_set_that_is_good_enough_is_not_added_to(diagnose):
+    found, _ = diagnose({("sensor-drift",): (300.0, LITTLE), ("thermal-creep",): (305.0, LITTLE)})
+    assert (found.verdict.kind, found.verdict.set) == ("ambiguous", ("sensor-drift", "thermal-creep"))
+    assert len(found.rounds) == 1
+    assert found.verdict.confidence is not None
+
+
+def test_an_unknown_that_names_on_the_way_keeps_the_set(diagnose):
+    found, _ = diagnose(PAIR)
+    assert found.verdict.kind == "unknown"
+    assert found.verdict.effects == ("sensor-drift",)
+    assert found.verdict.set == ("sensor-drift", "thermal-creep")
+
+
+CHAIN = {
+    ("wear",): (500.0, 8.0), ("wear", "tilt"): (200.0, MUCH), ("wear", "tilt", "viscous-drag"): (50.0, SMALL),
+    ("tilt", "viscous-drag"): (52.0, SMALL),
+}  # fmt: skip
+
+
+def test_what_is_no_longer_needed_goes(diagnose):
+    found, _ = diagnose(CHAIN)
+    assert (found.verdict.kind, found.verdict.effects) == ("missing", ("tilt", "viscous-drag"))
+    assert found.ladder[-1].model == ("static", "inertia", "tilt", "viscous-drag")
+    assert len(found.ladder) == 3
+
+
+def test_and_so_does_the_next(diagnose):
+    found, _ = diagnose(CHAIN | {("viscous-drag",): (53.0, SMALL), ("tilt",): (900.0, 8.5)})
+    assert found.verdict.effects == ("viscous-drag",)
+
+
+def test_what_only_leaves_a_small_misfit_may_go_where_the_whole_leaves_one(diagnose):
+    small = {tags: (cost, 1.8 if error == SMALL else error) for tags, (cost, error) in CHAIN.items()}
+    found, _ = diagnose(small)
+    assert (found.verdict.kind, found.verdict.effects) == ("missing", ("tilt", "viscous-drag"))
+    assert "small misfit" in found.verdict.text
+
+
+def test_what_was_taken_out_or_exchanged_is_not_done_again(diagnose):
+    store = Memory()
+    sets = PAIR | {("sensor-drift", "wear"): (50.0, SMALL), ("thermal-creep", "wear"): (52.0, SMALL)}
+    first, world = diagnose(sets, store=store)
+    again, after = diagnose(sets, store=store)
+    assert again.verdict == first.verdict
+    swept = 30 + 29  # the invented sweep fits every candidate anew
+    assert after.fits == swept
+    assert world.fits > swept
+
+
+def test_one_contact_has_no_unequal_ones(diagnose):
+    one = SimpleNamespace(rig=SimpleNamespace(contacts=1))
+    found, _ = diagnose({("unequal-contacts",): (100.0, SMALL)}, campaign=one)
+    assert found.verdict.kind == "unknown"
+    assert any("unequal-contacts" in line for line in found.dropped)
+    assert diagnose({("unequal-contacts",): (100.0, SMALL)})[0].verdict.effects == ("unequal-contacts",)
+
+
+def test_a_cycle_without_a_feature_does_not_switch_off_the_test():
+    effect = catalogue.make("wear")
+    free = tuple(effect_parameters(effect))
+    fit = replace(World({}).fit(SimpleNamespace(composition=Tags(("wear",))), None), cost=300.0, free=free)
+    base = HeldOut(3.0, 9.0, {"creep": 3.0}, np.array([9.0, 9.0, 9.0, 9.0]))
+    mixed = HeldOut(2.8, 8.0, {"creep": 2.8}, np.array([-200.0, 9.0, 200.0, 8.0]))
+
+    def refused(own, other):
+        made = Candidate("wear", {}, effect, 0.5, fit=fit, train=Misfit(2.0, {"creep": 2.0}, {}), held=own)
+        return judge(made, 1000.0, other).failures
+
+    plain = refused(mixed, base)
+    assert any("not significant" in line for line in plain)
+    with_gap = replace(mixed, per_cycle=np.array([-200.0, np.nan, 200.0, 8.0]))
+    assert refused(with_gap, base) == plain
+    alone = replace(mixed, per_cycle=np.array([np.nan, np.nan, np.nan, 8.0]))
+    assert any("too few unseen cycles" in line for line in refused(alone, base))
