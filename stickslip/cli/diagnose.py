@@ -83,11 +83,12 @@ def _teller(clock: Callable[[], float] = time.perf_counter) -> Callable[[str, fl
     A stage begins where the share falls. How long it will take follows from the ``clock`` (s) and the share since then.
     """
     began = last = clock()
-    stage = Stage(clock)
+    stage = Stage(began)
 
     def tell(text: str, share: float) -> None:
         nonlocal last
-        now, seconds = clock(), stage.left(share)
+        now = clock()
+        seconds = stage.left(now, share)
         if not sys.stderr.isatty() and now - last < EVERY:
             return
         last = now

@@ -17,19 +17,18 @@ class Stage:
     """How long a stage of long work may still take; a new one begins where the share that is done falls.
 
     Args:
-        clock: gives the time in s.
+        began: time (s) at which the first one did.
     """
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        self._clock = clock
-        self._began, self._first, self._before = clock(), 0.0, 0.0
+    def __init__(self, began: float) -> None:
+        self._began, self._first, self._before = began, 0.0, 0.0
 
-    def left(self, share: float) -> float | None:
-        """Seconds until the whole stage is done of which ``share`` (0 to 1) is; None where too little tells."""
+    def left(self, now: float, share: float) -> float | None:
+        """Seconds from ``now`` until the stage is done of which ``share`` (0 to 1) is; None where too little tells."""
         if share < self._before:
-            self._began, self._first = self._clock(), share
+            self._began, self._first = now, share
         self._before, done = share, share - self._first
-        return (self._clock() - self._began) * (1.0 - share) / done if done > LEAST and share < 1.0 else None
+        return (now - self._began) * (1.0 - share) / done if done > LEAST and share < 1.0 else None
 
 
 @contextmanager
@@ -60,15 +59,17 @@ def working(title: str) -> Iterator[Tell]:
         transient=True,
     )
     task = bar.add_task(title, total=None, text="", left="")
-    began, shown, stage = time.monotonic(), False, Stage(time.monotonic)
+    began, shown = time.monotonic(), False
+    stage = Stage(began)
 
     def tell(text: str, share: float | None = None) -> None:
         nonlocal shown
-        spent = time.monotonic() - began
+        now = time.monotonic()
+        spent = now - began
         if not shown and spent > PATIENCE:
             bar.start()
             shown = True
-        seconds = None if share is None else stage.left(share)
+        seconds = None if share is None else stage.left(now, share)
         left = "" if seconds is None else f"{seconds:.0f} s left"
         total = 1.0 if share is not None else None
         bar.update(task, text=text, total=total, completed=share or 0.0, left=left)
@@ -83,12 +84,12 @@ def working(title: str) -> Iterator[Tell]:
 def _lines(title: str) -> Tell:
     """Tells by a line on stderr now and then, for a log."""
     began = last = time.monotonic()
-    stage = Stage(time.monotonic)
+    stage = Stage(began)
 
     def tell(text: str, share: float | None = None) -> None:
         nonlocal last
         now = time.monotonic()
-        seconds = None if share is None else stage.left(share)
+        seconds = None if share is None else stage.left(now, share)
         if now - last < EVERY:
             return
         last, spent = now, now - began

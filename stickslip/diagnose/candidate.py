@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import product, zip_longest
 
 import numpy as np
 
@@ -277,7 +277,9 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
         bounds = limits = (period.lower, period.upper)
         if effect.periodic[0] == "frequency":
             bounds = (1.0 / period.upper, 1.0 / period.lower)
-        hints = periods(effect.periodic[1], measurement, optimum.features - optimum.offsets, use, bounds)
+        model = optimum.features - optimum.offsets
+        both = [periods(effect.periodic[1], measurement, model, use, bounds, together=t) for t in (True, False)]
+        hints = list(dict.fromkeys(p for pair in zip_longest(*both) for p in pair if p is not None))
     search = _Search(problem, optimum, floor, valid, factor, free, k, effect)
     explained, likely = 0.0, {}
     for values in starts(effect, hints, limits):

@@ -28,12 +28,18 @@ FAR = 5.0  # standard deviations, from the median of the absolute deviations, at
 
 
 def periods(
-    variable: Variable, measurement: Measurement, model: np.ndarray, use: np.ndarray, bounds: tuple[float, float]
+    variable: Variable,
+    measurement: Measurement,
+    model: np.ndarray,
+    use: np.ndarray,
+    bounds: tuple[float, float],
+    *,
+    together: bool = False,
 ) -> list[float]:
     """Periods (s or m) with which onsets and slip sizes deviate most, the strongest first.
 
-    A sine and a cosine over ``variable`` at the onsets are fitted to both for every frequency that the records resolve,
-    in every run with a phase of its own; neighbours of a frequency already taken are left out.
+    A sine and a cosine over ``variable`` at the onsets are fitted to both for every frequency that the records resolve;
+    neighbours of a frequency already taken are left out.
 
     Args:
         variable: over which the effect is periodic.
@@ -41,6 +47,7 @@ def periods(
         model: features of the base, shape (R, n, F).
         use: cycles to look at, shape (R, n).
         bounds: shortest and longest period.
+        together: whether all runs began at the same phase, which tells more where it is so; else each has its own.
     """
     ok = _complete(measurement, use)
     if ok.sum() < FEWEST:
@@ -48,7 +55,7 @@ def periods(
     size = measurement.layout.slices()["size"].start
     off = measurement.values - model
     data = np.stack([_cut(_late(measurement, off)[ok]), _cut(off[..., size][ok])], axis=1)
-    at, run = _at(variable, measurement, measurement.values)[ok], np.nonzero(ok)[0]
+    at, run = _at(variable, measurement, measurement.values)[ok], np.nonzero(ok)[0] * (not together)
     span = max(float(np.ptp(at[run == r])) for r in set(run.tolist()))
     if span <= 0 or not np.any(data):
         return []

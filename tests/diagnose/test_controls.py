@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
+import random
 import re
 import shutil
 from pathlib import Path
 
 import pytest
 
+from stickslip.errors import InputError
 from stickslip.workflow import diagnose_campaign
 
 CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect"
+ORDERS = {"reversed": [3, 2, 1, 0], "slowest-two": [1, 0, 2, 3], "random": random.Random(1).sample(range(4), 4)}
 
 
-def shuffled(folder: Path) -> Path:
-    """The shipped campaign with the velocities of its steady runs in the opposite order."""
+def shuffled(folder: Path, order: list[int]) -> Path:
+    """The shipped campaign with the velocities of its steady runs, the slowest first, in another order."""
     shutil.copytree(CAMPAIGN, folder)
     path = folder / "campaign.toml"
     text = path.read_text(encoding="utf-8")
     speeds = re.findall(r'^drive_velocity = "(.*)"$', text, re.MULTILINE)
-    assert len(set(speeds)) >= 3
-    turned = iter(reversed(speeds))
+    assert len(set(speeds)) == len(speeds) == len(order)
+    turned = iter([speeds[i] for i in order])
     path.write_text(re.sub(r'(?m)^drive_velocity = ".*"$', lambda m: f'drive_velocity = "{next(turned)}"', text))
     return path
 
 
+def test_the_orders_are_different_and_none_is_the_true_one():
+    orders = [tuple(order) for order in ORDERS.values()]
+    assert len({*orders, (0, 1, 2, 3)}) == len(orders) + 1
+
+
 @pytest.mark.slow
-def test_velocities_shuffled_between_traces_give_no_name(tmp_path):
-    result = diagnose_campaign(shuffled(tmp_path / "campaign"), tmp_path / "out", jobs=2)
-    assert result["verdict"]["kind"] == "unknown"
-    assert result["verdict"]["effects"] == []
-    assert result["verdict"]["set"] == []
+@pytest.mark.parametrize("order", ORDERS.values(), ids=ORDERS)
+def test_velocities_shuffled_between_traces_give_no_name(tmp_path, order):
+    path = shuffled(tmp_path / "campaign", order)
+    try:
+        verdict = diagnose_campaign(path, tmp_path / "out", jobs=2)["verdict"]
+    except InputError as refused:
+        assert refused.key == "trace.drive_velocity"
+        return
+    assert verdict["kind"] == "unknown"
+    assert verdict["effects"] == []
+    assert verdict["set"] == []

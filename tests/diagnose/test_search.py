@@ -157,6 +157,9 @@ def test_onsets_locked_to_a_period_tell_it_with_amplitude_and_phase():
     assert np.ptp(late / np.array(data.velocities)[:, None]) * frequency > 0.5  # far beyond what a linear step sees
     found = periods("time", data, model, use, (1 / 50.0, 10.0))
     assert 1.0 / found[0] == pytest.approx(frequency, abs=0.3 / np.ptp(data.cycles.start))
+    same, expected, _ = locked(phases=(0.66, 0.66))
+    coherent = periods("time", same, expected, use, (1 / 50.0, 10.0), together=True)
+    assert 1.0 / coherent[0] == pytest.approx(frequency, abs=0.3 / np.ptp(data.cycles.start))
     told = phasor("time", data, data.values, data.values - model, 1.0 / frequency, use)
     assert np.abs(told) == pytest.approx(size, rel=0.02)
     assert np.angle(told) == pytest.approx(PHASES, abs=0.02)
