@@ -42,8 +42,12 @@ def _check_candidates(tags: Sequence[str]) -> None:
         )
 
 
-def _check_counts(max_effects: int, jobs: int | None) -> None:
-    """Numbers that a diagnosis could only fail on after its first fit."""
+def check_counts(max_effects: int, jobs: int | None = None) -> None:
+    """Refuse numbers that a diagnosis could only fail on after its first fit.
+
+    Raises:
+        InputError: fewer than one effect or process.
+    """
     for key, value, hint in (
         ("--max-effects", max_effects, "leave it out for up to 4; stickslip fit fits the base model alone"),
         ("--jobs", jobs, "leave it out for one process a core"),
@@ -52,7 +56,7 @@ def _check_counts(max_effects: int, jobs: int | None) -> None:
             raise InputError("out of range", key=key, value=value, allowed="1 or more", hint=hint)
 
 
-def _code(effect_files: Sequence[str | Path]) -> str:
+def code_digest(effect_files: Sequence[str | Path] = ()) -> str:
     """Digest of the package's own modules and of effects from elsewhere: pieces made by other code are not taken up.
 
     Of an installed package it has the version, and the modules that define the effects (which may be under work).
@@ -131,7 +135,7 @@ def diagnose_campaign(
         InputError: the campaign, a trace, a tag or a number cannot be used.
         RunFolderError: the folder cannot be written.
     """
-    _check_counts(max_effects, jobs)
+    check_counts(max_effects, jobs)
     out = Path(out)
     refuse_existing(out, force)
     began = time.perf_counter()
@@ -168,7 +172,7 @@ def diagnose_campaign(
                 "holdout": list(holdout),
                 "candidates": candidates,
                 "versions": versions(),
-                "code": _code(effect_files),
+                "code": code_digest(effect_files),
             }
         )
         segmentations, mended = true_gains(traces, events)

@@ -9,13 +9,13 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, RunFolderError, StickslipError
 from ..runstore import alone, json_text, versions, write_aside
-from ..workflow import diagnose_campaign
+from ..workflow import check_counts, code_digest, diagnose_campaign
 from .cluster import Workers, cluster
 from .one_case import REFUSED, Diagnosis, do_case, failures, is_done
 from .seal import CASES, RUNS, case_names, check_seal, digest
@@ -74,6 +74,7 @@ def run_challenge(
         RunFolderError: another run is at this challenge, or the disk is full or read-only.
         StickslipError: the cluster was lost.
     """
+    check_counts(max_effects)
     folder = Path(folder).resolve()
     seal = check_seal(folder, truth=False)
     runs = folder / RUNS
@@ -120,14 +121,6 @@ def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
                 f"this challenge was begun with other {key}", file=path, value=now[key], allowed=json_text(before[key]),
                 hint="one score must rest on one protocol: go on with the same settings, or remove the folder 'runs'",
             )  # fmt: skip
-
-
-@cache
-def code_digest() -> str:
-    """Digest of the package as this process found it."""
-    from ..workflow import _code
-
-    return _code(())
 
 
 def _go_on(runs: Path, cases: Sequence[str], waiting: Sequence[str]) -> None:

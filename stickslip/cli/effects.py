@@ -60,6 +60,8 @@ def effects(
     if picture is not None:
         _draw(cls, picture, force)
         print(f"\nwritten to {picture}")
+    elif cls.__module__.startswith("stickslip."):
+        print(f"picture of a trace with and without it: stickslip effects {cls.tag} --picture {cls.tag}.png")
     return 0
 
 

@@ -34,6 +34,7 @@ def test_the_orders_are_different_and_none_is_the_true_one():
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("order", ORDERS.values(), ids=ORDERS)
 def test_velocities_shuffled_between_traces_give_no_name(tmp_path, order):
     path = shuffled(tmp_path / "campaign", order)

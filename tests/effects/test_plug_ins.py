@@ -12,7 +12,7 @@ import pytest
 from stickslip.diagnose.candidate import forms_of
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
-from stickslip.workflow import _code
+from stickslip.workflow import code_digest
 
 MODULE = """
 from jax import Array
@@ -103,13 +103,13 @@ def test_one_that_fails_leaves_the_others(installed):
 
 
 def test_finished_pieces_of_another_version_are_not_taken_up(installed):
-    without = _code(())
+    without = code_digest()
     path = installed("humming = humming_friction:Humming")
-    first = _code(())
+    first = code_digest()
     assert first != without
-    assert _code(()) == first
+    assert code_digest() == first
     installed("humming = humming_friction:Humming", version="1.1")
-    second = _code(())
+    second = code_digest()
     assert second != first
     path.write_text(MODULE.replace("1.0 + self.size", "1.0 - self.size"))  # as in a package that is worked on
-    assert _code(()) != second
+    assert code_digest() != second
