@@ -30,10 +30,13 @@ def effect(**slots: float) -> np.ndarray:
     return out
 
 
-def test_energy_balance_is_of_second_order_in_the_step(bank: Bank) -> None:
+@pytest.mark.parametrize(("groups", "new_lines"), [(64, False), (None, False), (None, True)])
+def test_energy_balance_is_of_second_order_in_the_step(groups: int | None, new_lines: bool) -> None:
+    """In groups and with every spring by itself (some 2000), and where each slip gets new lines."""
+    bank = make_bank(Surface(points=4096), LOADS, 1, groups=groups, pool=6 if new_lines else 1)
     error = {}
     for dt in (4e-5, 2e-5, 1e-5):
-        r = simulate(Rig(), FAST, bank, duration=1.2, dt=dt, quiet=False, rate=1e3)
+        r = simulate(Rig(), FAST, bank, duration=1.2, dt=dt, quiet=False, rate=1e3, new_lines=new_lines)
         assert r.event_columns["onset"].size == 4
         error[dt] = np.abs(r.imbalance).max() / r.drive_work[-1]
         assert np.diff(r.dissipated).min() > -1e-12 * r.dissipated[-1]
@@ -218,6 +221,22 @@ def test_direct_effect_in_steady_sliding(bank: Bank, form: float, law) -> None:
         quiet=False,
     )
     assert r.contact_force[-1] / Rig().capacity == pytest.approx(1 + 0.01 * law(4e-4 / 1e-8), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("form", "x", "share"),
+    [(0.0, x, -np.expm1(-x) / x) for x in (0.2, 1.0, 3.0)] + [(1.0, x, 1.0 - x / 2) for x in (0.2, 0.5, 0.9)],
+)
+def test_junctions_that_die_keep_the_closed_form_share_of_friction(form: float, x: float, share: float) -> None:
+    """Equal springs in steady sliding, renewed x times on the way to their cap: mean of min(u/u_y, 1) over the ways u
+    since renewal, which are exponential where death is a Poisson process and uniform where lives are fixed."""
+    n, mu, reach = 400, 0.21, 1e-6
+    bank = join([[(np.full(n, 0.31 / n), np.full(n, mu * 0.31 / n / reach)) for _ in LOADS]])
+    rig = Rig(mu_k=mu, damping=50.0)
+    dying = effect(RENEW_RATE=x / reach, RENEW_FORM=form)
+    r = simulate(rig, FAST, bank, dying, duration=1.6, dt=1e-5, quiet=False, rate=1e3)
+    late = r.time > 0.9
+    assert r.contact_force[late].mean() / rig.capacity == pytest.approx(share, rel=0.012)
 
 
 def test_ageing_raises_the_breakaway_with_the_logarithm_of_rest(bank: Bank) -> None:
