@@ -1,0 +1,75 @@
+"""An effect in a user's own file is fitted and diagnosed like those of the catalogue, also by other processes."""
+
+from __future__ import annotations
+
+import pytest
+
+from stickslip.cli import run
+from stickslip.effects import catalogue
+from stickslip.runstore import read_result
+from stickslip.scenario import make_scenario, simulate
+from stickslip.scenario.demonstration import RIG
+from stickslip.scenario.writers import write_campaign
+
+SIZE = 0.05
+EFFECT = """
+from jax import Array
+from stickslip.effects import Threshold
+from stickslip.params import parameter
+
+class Finish(Threshold):
+    tag = "surface-finish"
+    summary = "the finish of the track becomes rougher along it"
+    equation = r"\\mu \\to \\mu\\,[1 + \\varepsilon x/\\ell]"
+    amplitude = "size"
+    size: Array = parameter(0.0, unit="1", lower=-0.2, upper=0.2, null=0.0, doc="relative change of friction over 1 mm")
+
+    def strength(self, state, motion, contact):
+        return 1.0 + self.size * motion.x / 1e-3
+"""
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch) -> tuple[str, str]:
+    """The effect's file, and a campaign of two short runs that were simulated with it."""
+    monkeypatch.setattr(catalogue, "_user", {})
+    path = tmp_path / "my_effect.py"
+    path.write_text(EFFECT, encoding="utf-8")
+    catalogue.load_file(path)
+    hidden = {"effect": [{"type": "surface-finish", "size": SIZE}], "sensor": {"white": 1e-11}}
+    runs = [make_scenario({**RIG, **hidden, "drive": {"velocity": v, "events": 6}}) for v in (2e-4, 4e-4)]
+    campaign = write_campaign(tmp_path, runs, [simulate(scenario) for scenario in runs])
+    catalogue._user.clear()  # the commands are to load it themselves
+    return str(path), str(campaign)
+
+
+@pytest.mark.slow
+def test_it_is_fitted(files, tmp_path):
+    path, campaign = files
+    out = tmp_path / "fit"
+    command = ["fit", campaign, "--effect", path, "--add", "surface-finish", "--starts", "1", "--out", str(out)]
+    assert run(command) == 0
+    result = read_result(out)
+    without, with_it = result["ladder"][-2:]
+    assert with_it["model"] == ["static", "inertia", "surface-finish"]
+    assert with_it["cost"] < 0.5 * without["cost"]
+    size = result["parameters"]["surface-finish.size"]
+    assert size["std"] < 0.3 * SIZE
+    assert abs(size["value"] - SIZE) < 4 * size["std"]
+
+
+@pytest.mark.slow
+def test_it_is_diagnosed_by_other_processes(files, tmp_path):
+    path, campaign = files
+    out = tmp_path / "diagnosis"
+    command = [
+        "diagnose", campaign, "--effect", path, "--candidates", "surface-finish,contact-ageing", "--jobs", "2",
+        "--max-effects", "1", "--out", str(out),
+    ]  # fmt: skip
+    assert run(command) == 0
+    result = read_result(out)
+    assert result["verdict"]["effects"] == ["surface-finish"]
+    (found,) = [c for c in result["ranking"] if c["effect"] == "surface-finish"]
+    assert found["refit"]
+    assert found["cost"] < 0.5 * result["ranking_base"]["cost"]
+    assert abs(found["amplitude"]["value"] - SIZE) < 4 * found["amplitude"]["std"]
