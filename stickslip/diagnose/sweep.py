@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from cloudpickle import register_pickle_by_value
+from cloudpickle import dumps, loads
 from joblib import Parallel, delayed
 
 from ..effects import catalogue
@@ -142,13 +142,12 @@ class Sweep:
             for key, (function, args) in work.items():
                 yield key, function(*args)
             return
-        for module in catalogue.user_modules():
-            register_pickle_by_value(module)  # a file's module cannot be imported by a worker
+        files = tuple(sorted(str(module.__file__) for module in catalogue.user_modules()))
         with warnings.catch_warnings():
             # a worker whose memory grew with what it compiled is replaced by a new one
             warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
             pool = Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1)
-            yield from pool(delayed(_named)(key, job) for key, job in work.items())
+            yield from pool(delayed(_named)(key, dumps(job), files) for key, job in work.items())
 
 
 def _firsts(ranked: Sequence[Candidate]) -> list[Candidate]:
@@ -165,8 +164,13 @@ def _like(effect: Effect) -> set[str]:
     return wider | set(effect.confused_with)
 
 
-def _named(key: str, job: Job) -> tuple[str, Candidate]:
-    function, args = job
+def _named(key: str, job: bytes, files: tuple[str, ...]) -> tuple[str, Candidate]:
+    """Do a job in a worker, which loads the user's files first: a class that were itself pickled would be no pytree."""
+    known = {getattr(module, "__file__", None) for module in catalogue.user_modules()}
+    for path in files:
+        if path not in known:
+            catalogue.load_file(path)
+    function, args = loads(job)
     return key, function(*args)
 
 
