@@ -80,6 +80,12 @@ def parameter(
     return eqx.field(default=float(default), converter=_as_float, metadata={"spec": spec})
 
 
+def phase(doc: str) -> Any:
+    """The angle at which an oscillation begins. A turn to either side: a fit may go round without meeting a border."""
+    turn = 2.0 * np.pi
+    return parameter(0.0, unit="rad", lower=-turn, upper=turn, grid=(0.0, turn / 4), symbol=r"\varphi", doc=doc)
+
+
 def variant(default: str, choices: tuple[str, ...], doc: str = "") -> Any:
     """A field that chooses between several forms of a law found in the literature (static: another compilation)."""
     return eqx.field(default=default, static=True, metadata={"choices": choices, "doc": doc})

@@ -246,7 +246,7 @@ def _stop(rung: Rung, named: Sequence[Named], max_effects: int, limits: Threshol
         )  # fmt: skip
     if len(named) < max_effects:
         return None
-    if left == 2:
+    if named and left == 2:
         return nearly(tags, phase, worst, tried=False, forms=forms)
     many = "1 effect was" if len(named) == 1 else f"{len(named)} effects were"
     text = f"{many} added and {phase} is still off by {worst:.1f} floors."

@@ -120,16 +120,6 @@ def propose(
     return sorted((row[0] for row in rows), key=lambda p: -p.separation)
 
 
-def recommend(
-    first: Rival, second: Rival, conditions: Conditions, *, factor: float = 1.0, **options: Any
-) -> dict[str, Any]:
-    """The best experiment as ``next_experiment`` of a result: ``text``, ``separates``, ``floors`` and the whole menu.
-
-    ``floors`` is infinite (no number in a file) where only one of the models slips. Arguments as of `propose`.
-    """
-    return recommend_among((first, second), conditions, factor=factor, **options)
-
-
 def recommend_among(
     rivals: Sequence[Rival],
     conditions: Conditions,
@@ -150,7 +140,8 @@ def recommend_among(
         conditions, scatter, factor, menu, draws, seed, progress: as of `propose`.
 
     Returns:
-        As of `recommend`; ``floors`` are those of the pair that differs least.
+        The ``next_experiment`` of a result: ``text``, ``separates``, ``floors`` of the pair that differs least (infinite,
+        no number in a file, where only one of two models slips) and the whole ``menu``.
     """
     if len(rivals) < 2:
         raise ValueError("an experiment separates at least two models")

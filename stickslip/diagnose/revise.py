@@ -101,7 +101,7 @@ def _less(top: Rung, tag: str, left: Sequence[str], material: Material) -> Rung:
     z = old.z[[i for i, f in enumerate(old.free) if not f.name.startswith(f"{tag}.")]]
     found = kept(
         store,
-        f"without-{tag}-of{len(left) + 1}",
+        f"left-{'-'.join(left)}",  # of what is in it: with other settings a piece may have come from other effects
         lambda: fit(Problem(smaller, data), floor, z=z, events=old.events, stages=((1.0, MOST),), use=train),
     )
     return make_rung(("static", "inertia", *left), " + ".join(left), smaller, found, material)
@@ -118,12 +118,12 @@ def _instead(top: Rung, tag: str, rival: Candidate, material: Material) -> tuple
     composition = top.composition.without(tag).with_effect(rival.effect, [rival.fit.free[i] for i in own])
     rest = old.z[[i for i, f in enumerate(old.free) if not f.name.startswith(f"{tag}.")]]
     z = np.concatenate([rest, rival.fit.z[own]])
+    model = tuple(rival.tag if t == tag else t for t in top.model)
     found = kept(
         store,
-        f"{rival.tag}-instead-of-{tag}",
+        f"instead-{'-'.join(model[2:])}",
         lambda: fit(Problem(composition, data), floor, z=z, events=old.events, stages=INSTEAD, use=train),
     )
-    model = tuple(rival.tag if t == tag else t for t in top.model)
     added = rival.tag if top.added == tag else top.added
     rung = make_rung(model, added, composition, found, material)
     return _fitted(rival, rung), rung

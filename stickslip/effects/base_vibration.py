@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from ..params import parameter
+from ..params import parameter, phase
 from .base import BodyForce, Contact, Motion
 from .catalogue import register
 
@@ -38,15 +38,7 @@ class BaseVibration(BodyForce):
     frequency: Array = parameter(
         20.0, unit="Hz", lower=1.0, upper=500.0, log=True, grid=(7.0, 20.0, 50.0), symbol="f", doc="frequency"
     )
-    phase: Array = parameter(
-        0.0,
-        unit="rad",
-        lower=-2 * np.pi,
-        upper=2 * np.pi,
-        grid=(0.0, np.pi / 2),
-        symbol=r"\varphi",
-        doc="phase at t = 0",
-    )
+    phase: Array = phase("phase at t = 0")
 
     def force(self, state: Any, motion: Motion, contact: Contact) -> Array:
         return -contact.mass * self.acceleration * jnp.sin(2.0 * np.pi * self.frequency * motion.t + self.phase)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from ..params import parameter
+from ..params import parameter, phase
 from .base import Drive
 from .catalogue import register
 
@@ -44,15 +44,7 @@ class DriveRipple(Drive):
         symbol=r"\ell",
         doc="travel of one period",
     )
-    phase: Array = parameter(
-        0.0,
-        unit="rad",
-        lower=-2 * np.pi,
-        upper=2 * np.pi,
-        grid=(0.0, np.pi / 2),
-        symbol=r"\varphi",
-        doc="phase at travel 0",
-    )
+    phase: Array = phase("phase at travel 0")
 
     def lead(self, t: Array, load_point: Array) -> Array:
         turn = 2.0 * np.pi * load_point / self.pitch

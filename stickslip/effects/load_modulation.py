@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from ..params import parameter
+from ..params import parameter, phase
 from .base import Contact, Motion, Threshold
 from .catalogue import register
 
@@ -43,15 +43,7 @@ class LoadModulation(Threshold):
     frequency: Array = parameter(
         10.0, unit="Hz", lower=0.1, upper=500.0, log=True, grid=(5.0, 10.0, 25.0, 50.0), symbol="f", doc="frequency"
     )
-    phase: Array = parameter(
-        0.0,
-        unit="rad",
-        lower=-2 * np.pi,
-        upper=2 * np.pi,
-        grid=(0.0, np.pi / 2),
-        symbol=r"\varphi",
-        doc="phase at t = 0",
-    )
+    phase: Array = phase("phase at t = 0")
 
     def strength(self, state: Any, motion: Motion, contact: Contact) -> Array:
         return 1.0 + self.depth * jnp.sin(2.0 * np.pi * self.frequency * motion.t + self.phase)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from ..params import parameter, variant
+from ..params import parameter, phase, variant
 from .base import Contact, Motion, Threshold
 from .catalogue import register
 
@@ -52,15 +52,7 @@ class PositionDependentFriction(Threshold):
         symbol=r"\lambda",
         doc="wavelength, or length of the trend",
     )
-    phase: Array = parameter(
-        0.0,
-        unit="rad",
-        lower=-2 * np.pi,
-        upper=2 * np.pi,
-        grid=(0.0, np.pi / 2),
-        symbol=r"\varphi",
-        doc="phase at x = 0",
-    )
+    phase: Array = phase("phase at x = 0")
     form: str = variant("wave", ("wave", "trend"), "periodic, or growing along the track")
 
     def formula(self) -> str:

@@ -11,7 +11,7 @@ import pytest
 from stickslip.contact import power_law_bank
 from stickslip.diagnose import experiment as proposals
 from stickslip.diagnose.bench import prepared, until_slips
-from stickslip.diagnose.experiment import TELLING, propose, recommend, recommend_among
+from stickslip.diagnose.experiment import TELLING, propose, recommend_among
 from stickslip.diagnose.menu import LONGEST, MENU, Conditions, Experiment
 from stickslip.diagnose.outcome import outcome
 from stickslip.effects import catalogue
@@ -197,11 +197,11 @@ def test_a_model_that_fails_says_so(monkeypatch):
 
 
 def test_the_recommendation_says_where_nothing_helps():
-    best = recommend(ageing(), model(), CONDITIONS, draws=0, menu=HOLDS)
+    best = recommend_among((ageing(), model()), CONDITIONS, draws=0, menu=HOLDS)
     assert best["separates"] == ["contact-ageing", "base"]
     assert [m["experiment"] for m in best["menu"]] == ["hold 25 s", "hold 10 s"]
     assert best["text"] == best["menu"][0]["text"]
-    none = recommend(model("a"), model("b"), CONDITIONS, draws=0, menu=[PLAIN])
+    none = recommend_among((model("a"), model("b")), CONDITIONS, draws=0, menu=[PLAIN])
     assert none["text"].startswith("no experiment of the menu tells a from b")
 
 
