@@ -140,8 +140,8 @@ def recommend_among(
         conditions, scatter, factor, menu, draws, seed, progress: as of `propose`.
 
     Returns:
-        The ``next_experiment`` of a result: ``text``, ``separates``, ``floors`` of the pair that differs least (infinite,
-        no number in a file, where only one of two models slips) and the whole ``menu``.
+        The ``next_experiment`` of a result: ``text``, ``separates``, ``floors`` of the pair that differs least
+        (infinite, no number in a file, where only one of two models slips) and the whole ``menu``.
     """
     if len(rivals) < 2:
         raise ValueError("an experiment separates at least two models")
