@@ -1,6 +1,8 @@
 """The numbers a verdict rests on: one place, the same for every campaign.
 
-Set on simulated development campaigns (see docs/diagnosis); not to be changed for a single case.
+Set on simulated development campaigns (see docs/diagnosis); not to be changed for a single case. Frozen on 22 November
+2026 together with the rules that use them (all code as of commit 31d6964), before the first case of the sealed run
+with seed 20261127 (docs/challenge.md).
 """
 
 from __future__ import annotations
