@@ -161,7 +161,7 @@ def learn(
     *,
     begin: MissingForce | None = None,
     evaluations: int = EVALUATIONS,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> MissingForce:
     """Fit a smooth force on top of a model, everything else free.
 
@@ -174,7 +174,7 @@ def learn(
         train: cycles that may be fitted, shape (R, n).
         begin: the picture of the same model: the force is one for prediction.
         evaluations: of the model, at most, besides Jacobians, at each of at most two widths of the floors.
-        progress: told what goes on.
+        progress: told what goes on and the share of the work done.
 
     Raises:
         FitError: the model gives no finite features.
@@ -192,8 +192,16 @@ def learn(
     fine = Problem(base.with_effect(blank(seen(measurement, train), optimum), free), measurement)
     problem = fine.coarser() if begin is None else fine
     stages = ((wide, evaluations // 2), (1.0, evaluations)) if wide > 1.5 else ((1.0, evaluations),)
+    done, most = 0, sum(n for _, n in stages) + MOST * evaluations + (evaluations if begin is None else 0)
+
+    def count(text: str) -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(text, min(done / most, 0.99))
+
     # some thirty weights: derivatives are taken once, and then only carried on
-    once = partial(fit, problem, floor, use=train, anew=False, progress=progress)
+    once = partial(fit, problem, floor, use=train, anew=False, progress=count)
     found = once(z=z, events=events, stages=stages, columns=columns)
     for _ in range(MOST):
         more = once(z=found.z, events=found.events, stages=((1.0, evaluations),), columns=found.columns)
@@ -203,9 +211,7 @@ def learn(
             break
     if begin is None:
         # derivatives that were carried on so far hold the solver's noise, which looks like knowledge of the weights
-        more = fit(
-            fine, floor, z=found.z, events=found.events, stages=((1.0, evaluations),), use=train, progress=progress
-        )
+        more = fit(fine, floor, z=found.z, events=found.events, stages=((1.0, evaluations),), use=train, progress=count)
         found = more if more.cost < found.cost else replace(found, columns=more.columns)
     return again(base, optimum, measurement, floor, train, found)
 

@@ -28,6 +28,7 @@ NO_EXPLANATION = (
     "conditions they were taken in, and names no cause. It takes no part in the verdict."
 )
 STANDS_OUT = 3.0  # standard deviations
+Tell = Callable[[str, float], None]
 _WORDS = {"displacement": "displacement", "velocity": "velocity", "time in contact": "age"}
 _UNITS = {"displacement": "m", "velocity": "m/s", "time in contact": "s"}
 
@@ -47,7 +48,7 @@ def missing_sections(
         store: keeps finished pieces.
         learn_residual: whether a force that may be used for prediction is fitted as well.
         rig: ``[rig]`` of the campaign, for the load on a contact.
-        progress: told what goes on.
+        progress: told what goes on and the share of the work done.
     """
     d, tell = diagnosis, progress or (lambda text, share: None)
     fitted_rungs = [r for r in d.ladder if r.fit is not None]
@@ -59,8 +60,9 @@ def missing_sections(
         # of a model that is complete nothing is missing; only what may be used for prediction is fitted on top of it
         last = top is not base and (learn_residual or not is_complete(top.train, top.held))
         for r in (base, top) if last else (base,):
-            tell(f"force missing from {' + '.join(r.model)}", 1.0)
-            found = _piece(f"missing-{len(r.model)}", r, d, store, None)
+            found = _piece(
+                f"missing-{len(r.model)}", r, d, store, None, tell, f"force missing from {' + '.join(r.model)}"
+            )
             worst = max(rung(found, r, d.measurement, d.floor, d.train).train.by_phase.values())
             if worst > THRESHOLDS.failed:
                 what = f"the fit failed ({worst:.0f} floors), and no smooth force mends that"
@@ -74,12 +76,13 @@ def missing_sections(
         return {"missing_force": {"label": LABEL, "text": text, "shown": []}, **nothing}, {}
     out: dict[str, Any] = {"missing_force": {"label": LABEL, "text": _text(shown), "shown": shown}}
     if learn_residual:
-        tell("learning the residual force", 1.0)
-        out["learned_residual"] = _learned(top, found, d, store, rig)
+        out["learned_residual"] = _learned(top, found, d, store, rig, tell)
     return out, variables
 
 
-def _piece(name: str, r: Rung, d: Diagnosis, store: Store | None, begin: MissingForce | None) -> MissingForce:
+def _piece(
+    name: str, r: Rung, d: Diagnosis, store: Store | None, begin: MissingForce | None, tell: Tell, stage: str
+) -> MissingForce:
     """Fitted, or taken up from a finished piece; with ``begin`` the force that may be used for prediction."""
     assert r.composition is not None
     assert r.fit is not None
@@ -87,7 +90,8 @@ def _piece(name: str, r: Rung, d: Diagnosis, store: Store | None, begin: Missing
     kept = store.load(name) if store is not None else None
     if kept is not None:
         return again(*where, fit_from(kept))
-    found = learn(*where, begin=begin)
+    tell(stage, 0.0)
+    found = learn(*where, begin=begin, progress=lambda text, share: tell(f"{stage}, {text}", share))
     if store is not None:
         store.save(name, fit_arrays(found.fit))
     return found
@@ -127,9 +131,11 @@ def _text(shown: list[dict[str, Any]]) -> str:
     return " ".join(lines)
 
 
-def _learned(top: Rung, begin: MissingForce | None, d: Diagnosis, store: Store | None, rig: Any) -> dict[str, Any]:
+def _learned(
+    top: Rung, begin: MissingForce | None, d: Diagnosis, store: Store | None, rig: Any, tell: Tell
+) -> dict[str, Any]:
     try:
-        found = _piece("learned", top, d, store, begin)
+        found = _piece("learned", top, d, store, begin, tell, "learning the residual force")
     except StickslipError as error:
         return {"text": f"Nothing was learned: {error}"}
     after = rung(found, top, d.measurement, d.floor, d.train)

@@ -59,8 +59,13 @@ def ground():
 
 
 @pytest.fixture(scope="module")
-def picture(ground):
-    return learn(*ground)
+def told():
+    return []
+
+
+@pytest.fixture(scope="module")
+def picture(ground, told):
+    return learn(*ground, progress=lambda text, share: told.append((text, share)))
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +114,15 @@ def test_friction_never_changes_its_sign():
     strength = type("Contact", (), {"strength": jnp.array([1e-3, 1e-3])})()
     for age in (0.0, 1.0, 1e6):
         assert float(force.strength((jnp.asarray(age), jnp.asarray(0.5)), None, strength)) > 0.0
+
+
+def test_it_says_after_every_evaluation_how_far_it_is(picture, told):
+    shares = [share for _, share in told]
+    assert len(shares) > 10
+    assert shares[0] < 0.1
+    assert shares == sorted(shares)
+    assert shares[-1] <= 0.99
+    assert all("error" in text for text, _ in told)
 
 
 def test_a_known_force_is_found_within_its_band(picture):
