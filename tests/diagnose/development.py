@@ -84,8 +84,24 @@ class LeftOut:
         return diagnose_campaign(campaign, out, jobs=1, missing_force=False, candidates=tried)
 
 
-def table(folder: Path) -> str:
-    """The answers and how many are right."""
+@dataclass(frozen=True)
+class Tally:
+    """How many campaigns of a part were answered, and how.
+
+    Attributes:
+        answered: how many.
+        exact: the answer is the truth. right: or a set of at most three that holds it.
+        table: every answer, a row each (Markdown).
+    """
+
+    answered: int
+    exact: int
+    right: int
+    table: str
+
+
+def tally(folder: Path) -> Tally:
+    """The answers so far."""
     rows, right, exact, number = (
         ["| hidden | lines | times detection | said | unseen error |", "|---|---|---|---|---|"],
         0,
@@ -103,7 +119,7 @@ def table(folder: Path) -> str:
         times = ", ".join(f"{e['multiple']:.3g}" for e in truth["effects"])
         lines = "new" if truth["new_lines"] else "same"
         rows.append(f"| {', '.join(tags) or 'nothing'} | {lines} | {times} | {_said(answer)} | {_errors(answer)} |")
-    return "\n".join([*rows, "", f"{number} answered: {exact} exact, {right} right"])
+    return Tally(number, exact, right, "\n".join(rows))
 
 
 def _said(answer: Answer) -> str:
@@ -122,6 +138,19 @@ def tell(p: Progress) -> None:
     )
 
 
+def measure(folder: Path, part: str, seed: int, number: int = 100, workers: int | None = None) -> Tally:
+    """Make the campaigns of a part in a folder, unless they are there, and diagnose those that are not yet."""
+    if not folder.exists():
+        own = cases(part, seed, number)
+        print("seal", make_challenge(folder, seed=seed, own=own, grouped=True))
+    read_seal(folder)
+    diagnosis = None
+    if part == "left-out":
+        diagnosis = LeftOut({case["name"]: case["effects"][0]["tag"] for case in read_truth(folder)["cases"]})
+    run_challenge(folder, workers=workers, diagnosis=diagnosis, tell=tell)
+    return tally(folder)
+
+
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -131,20 +160,9 @@ def main() -> None:
     parser.add_argument("--number", type=int, default=100)
     parser.add_argument("--workers", type=int)
     options = parser.parse_args()
-    folder = options.folder
-    if not folder.exists():
-        print(
-            "seal",
-            make_challenge(
-                folder, seed=options.seed, own=cases(options.part, options.seed, options.number), grouped=True
-            ),
-        )
-    read_seal(folder)
-    diagnosis = None
-    if options.part == "left-out":
-        diagnosis = LeftOut({case["name"]: case["effects"][0]["tag"] for case in read_truth(folder)["cases"]})
-    run_challenge(folder, workers=options.workers, diagnosis=diagnosis, tell=tell)
-    print(table(folder))
+    found = measure(options.folder, options.part, options.seed, options.number, options.workers)
+    print(found.table)
+    print(f"\n{found.answered} answered: {found.exact} exact, {found.right} right")
 
 
 if __name__ == "__main__":
