@@ -66,9 +66,11 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         *_forms(cls),
         "## With and without",
         f"![The demonstration rig with and without {cls.tag}]({cls.tag}.png)",
-        f"*The rig of `stickslip effects` with {_shown_amplitude(cls)} and everything else at its default: drawn at "
-        "200 µm/s, with a hold of 2 s; made by the program when these pages are built.*",
+        "*A small rig (89.4 g, 1 N/mm, four contacts; `stickslip/scenario/demonstration.py`) with "
+        f"{_shown_amplitude(cls)} and everything else at its default: drawn at 200 µm/s, with a hold of 2 s; made by "
+        "the program when these pages are built.*",
         *_numbers(numbers),
+        "In a scenario file:",
         "```toml\n" + _entry(cls) + "\n```",
         f"The same in a fit: `stickslip fit campaign.toml --add {cls.tag}`.",
         "## In a measurement",
@@ -139,9 +141,12 @@ def _parameters(cls: type[Effect]) -> Iterator[str]:
         )
     yield "\n".join(rows)
     grids = {name: spec for name, spec in specs(cls).items() if spec.grid}
+    if cls.periodic is not None:
+        grids.pop("phase", None)
     if grids:
         starts = "; ".join(f"`{name}` {', '.join(number(v) for v in spec.grid)}" for name, spec in grids.items())
-        yield f"A search starts from: {starts}."
+        instead = "" if cls.periodic is None else ", or from the periods that the onsets hint at"
+        yield f"A search starts from up to six combinations of {starts}{instead}."
 
 
 def _forms(cls: type[Effect]) -> Iterator[str]:
@@ -158,6 +163,7 @@ def _forms(cls: type[Effect]) -> Iterator[str]:
         yield display(cls(**form).formula())
 
 
+SLIPPED = 1e-6  # m: more than that is no creep
 # what `measured` gives: name, unit, factor from SI, format
 MEASURED = (
     ("time from the second slip to the third", "ms", 1e3, ".2f"),
@@ -197,6 +203,9 @@ def _numbers(numbers: Mapping[str, Sequence[float | None]] | None) -> Iterator[s
     rows = ["| in the sensor's reading | without | with | change |", "|---|---|---|---|"]
     for (name, unit, factor, form), a, b in zip(MEASURED, numbers["without"], numbers["with"], strict=True):
         if a is None or b is None:
+            continue
+        if name.startswith("displacement in the hold") and abs(b) > SLIPPED:
+            rows.append(f"| {name} / {unit} | {a * factor:{form}} | slips in the hold | |")
             continue
         share = f"{100 * (b - a) / abs(a):+.2g} %" if abs(a * factor) >= 0.5 and abs(b - a) < abs(a) else ""
         rows.append(f"| {name} / {unit} | {a * factor:{form}} | {b * factor:{form}} | {share} |")

@@ -2,7 +2,7 @@
 
     python docs/make_paper.py
 
-The rigs are those of scenarios/grzemba2014; takes about two minutes.
+The rigs are those of scenarios/grzemba2014; takes about a minute.
 """
 
 from __future__ import annotations

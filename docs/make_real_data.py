@@ -15,6 +15,7 @@ import contextlib
 import io
 import json
 import os
+import subprocess
 import sys
 import tempfile
 from datetime import date
@@ -246,8 +247,8 @@ The base model costs {found["ranking_base"]["cost"]:.0f}; what came nearest (who
     )
     return f"""### All records that slip, diagnosed together
 
-`stickslip diagnose` on five records: k = 168 N/m at 42 (260 to 300 s), 1100 and 4300 um/s and k = 1002 N/m at 1100 and 4300 um/s, all
-thirty effects. It says:
+`stickslip diagnose` on five records: k = 168 N/m at 42 (260 to 300 s), 1100 and 4300 um/s and k = 1002 N/m at 1100 and 4300 um/s;
+{len(found["ranking"] or [])} effects were tried. It says:
 
 {quote([*found["notes"], f"{found['verdict']['kind']}: {found['verdict']['text']}", *([found["next_experiment"]["text"]] if found["next_experiment"] else []), *found["caution"]])}
 | model | fitted cycles, floors | unseen | fitted, by phase | unseen, by phase |
@@ -371,9 +372,13 @@ def main() -> None:
         work = Path(name)
         sections = [paper(data, work, rows), together(data, work), robot(data, work, rows), fault(data, work, rows)]
     table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    told = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=DOCS, capture_output=True, text=True, check=False
+    )
+    commit = told.stdout.strip() or "unknown"
     text = f"""# Measured records
 
-Written by `python docs/make_real_data.py` on {date.today():%-d %B %Y} with version {__version__}; every number and picture is the program's. The records are others' and are not part of this
+Written by `python docs/make_real_data.py` on {date.today():%-d %B %Y} with version {__version__} (commit {commit}); every number and picture is the program's. The records are others' and are not part of this
 repository. Sources: Colas et al., Phys. Rev. E 2019 (paper slider, github.com/npusteln/stickslip, CeCILL-B); github.com/jorgevchin/Friction-Identification
 (robot joints); github.com/lauralaurenti/DNN-earthquake-prediction-forecasting (laboratory fault p5198, raw data by C. Marone's group).
 

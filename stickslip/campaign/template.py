@@ -13,7 +13,7 @@ title = "My rig"
 
 [rig]
 mass = "0.0894 kg"
-# not measured? give a guess and bounds, and it is fitted:
+# not measured? give a guess and bounds; the dynamic model fits it:
 spring_stiffness = { guess = "1000 N/m", lower = "200 N/m", upper = "5000 N/m" }
 contacts = 4
 normal_force = "0.31 N"                # of one contact

@@ -101,12 +101,12 @@ def detection(effect: Effect, form: str) -> float:
 
 
 def visible_forms(effect: Effect) -> list[Form]:
-    """The forms that can be seen at some amplitude at which the block still sticks and slips."""
+    """The forms that can be seen at some plausible amplitude."""
     return [form for form in effect.forms if effect.high >= detection(effect, form.name)]
 
 
 def largest_multiple(effect: Effect, form: str) -> float:
-    """The largest multiple to be drawn: 30, or less where the block would no longer stick and slip."""
+    """The largest multiple to be drawn: 30, or less where the plausible range ends before."""
     return min(LARGEST, effect.high / detection(effect, form))
 
 

@@ -18,7 +18,7 @@ UNRESOLVED = 3
 SCORE = ("score.json", "score.txt", "confusion.png", "confusion-by-amplitude.png", "amplitude.png")
 challenge = App(
     name="challenge",
-    help="Test the diagnosis blindly on campaigns with a hidden effect: make, run, score.",
+    help="Test the diagnosis blindly on campaigns with a hidden effect: make, seal, run, score.",
     help_format="plaintext",
 )
 

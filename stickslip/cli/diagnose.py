@@ -43,8 +43,8 @@ def diagnose(
     max_effects:
         Add at most so many, one after the other.
     holdout:
-        A run no fit may see; may be given several times. Default: runs whose role in the campaign is "held-out", or a
-        middle velocity and the later part of holds.
+        A run no fit may see; may be given several times. Default: runs whose role in the campaign is "held-out", or the
+        middle one of three or more velocities and the later part of runs with holds, or the last third of every run.
     effect:
         A Python file with an effect of your own, which is run and then tried with the others.
     jobs:

@@ -13,8 +13,8 @@ from ..features.measurement import Measurement
 def training_cycles(measurement: Measurement, holdout: Sequence[str] = (), keep: Sequence[str] = ()) -> np.ndarray:
     """Cycles a fit may use, shape (R, n).
 
-    By default the run of the middle velocity is held out if three or more velocities remain known without it, and the
-    later half of every run with holds. With a single run its last third is held out.
+    By default the run of the middle velocity is held out if there are three or more velocities, and the later half of
+    every run with holds; where neither applies, the last third of every run.
 
     Args:
         measurement: the data.

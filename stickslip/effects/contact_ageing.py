@@ -25,7 +25,7 @@ class ContactAgeing(Memory, Threshold):
     signature = "recurrence and slip size grow with hold time and with 1/v; the shape of creep stays"
     confused_with = {
         "rate-and-state": "velocity steps in steady sliding: ageing alone has no jump at the step",
-        "velocity-weakening": "holds of 1 s to 1000 s: only ageing remembers them",
+        "velocity-weakening": "holds of 1 s and 25 s: only ageing remembers them",
         "nonlinear-spring": "holds at one elongation of the spring",
         "wear": "go back over the same track after a hold",
     }

@@ -30,12 +30,12 @@ class RateAndState(Memory, Threshold):
         r"\quad \theta(0) = (L/v^*)\,(1 - e^{-v^*\,\theta_1/L})"
     )
     symbols = {r"\theta": "state of the contact (s)", "V": "velocity, not below the cut-off (m/s)"}
-    signature = "creep velocity as 1/(time to slip); overshoot after arrest; recurrence and slip size follow ln(hold)"
+    signature = "overshoot after arrest; recurrence and slip size follow ln(hold); creep velocity as 1/(time to slip)"
     confused_with = {
         "contact-ageing": "velocity steps in steady sliding: a jump that decays over the slip distance",
         "direct-effect": "velocity steps in steady sliding: a jump that decays over the slip distance",
         "slip-weakening": "slide-hold-slide",
-        "velocity-weakening": "holds of 1 s to 1000 s",
+        "velocity-weakening": "holds of 1 s and 25 s",
     }
     source = "Ruina, J. Geophys. Res. 88 (1983) 10359; Rice & Ruina, J. Appl. Mech. 50 (1983) 343"
     amplitude = "evolution"

@@ -18,7 +18,8 @@ CONTACTS = 4
 class UnequalContacts(Geometry):
     """The elements are dealt in turn to four equally loaded contacts, whose thresholds are stretched by exp(spread z).
 
-    The z are normal scores of mean zero. The curve is even in the spread: no effect of first order at zero.
+    The z are normal scores of mean zero. The curve is even in the spread: no effect of first order at zero. They are
+    four whatever the rig has; where it has one, a diagnosis does not try it.
     """
 
     tag = "unequal-contacts"

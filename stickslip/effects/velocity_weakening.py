@@ -30,7 +30,7 @@ class VelocityWeakening(Threshold):
     confused_with = {
         "residual-load": "lift the block off before an event",
         "sensor-low-pass": "tap the block: the sensor's bandwidth is known",
-        "contact-ageing": "holds of 1 s to 1000 s",
+        "contact-ageing": "holds of 1 s and 25 s",
         "viscous-drag": "velocities far above the slip's own",
     }
     source = "Stribeck (1902); Bo & Pavelescu, Wear 82 (1982) 277; Armstrong-Helouvry et al., Automatica 30 (1994) 1083"

@@ -1,7 +1,7 @@
 """How often a diagnosis is to be right on campaigns of the independent simulator: hours, in a folder that stays.
 
 ``STICKSLIP_DEVELOPMENT=FOLDER pytest -m slow tests/diagnose/test_aims.py`` makes and diagnoses the campaigns under
-FOLDER and goes on where it was stopped; docs/diagnosis.md has the figures.
+FOLDER and goes on where it was stopped; docs/diagnosis.md has the figures of what was measured so far.
 """
 
 from __future__ import annotations
