@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 PATIENCE = 20.0  # s for a scheduler to answer
 LOOK = 2.0  # s after which workers are counted again
 LONELY = 30.0  # s without a worker after which it is said
+NEVER = "1000 days"
 _TALKERS = ("distributed.client", "distributed.core", "distributed.utils")
 
 
@@ -32,6 +33,7 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         InputError: no scheduler answers there. StickslipError: dask.distributed is missing.
     """
     try:
+        import dask
         from distributed import Client, LocalCluster
     except ImportError:
         raise StickslipError(
@@ -54,6 +56,8 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         raise InputError("a cluster needs workers", key="--workers", value=workers, allowed="1 or more")
     with (
         _quiet(),
+        # else a worker that is between two lives so long after a death is given up for ever
+        dask.config.set({"distributed.deploy.lost-worker-timeout": NEVER}),
         LocalCluster(
             n_workers=workers or os.cpu_count() or 1,
             threads_per_worker=1,

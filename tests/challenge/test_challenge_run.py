@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import dask
 import pytest
 from invented import effect, make
 
@@ -231,6 +232,14 @@ def test_three_killers_do_not_take_the_others_down_with_them(tmp_path: Path) -> 
     found = run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log, dying="case-001 case-002 case-003"))
     assert found == {"done": 3, "failed": 3, "open": 0}
     assert [bool(failures(folder / RUNS, name)) for name in NAMES] == [True] * 3 + [False] * 3
+
+
+@pytest.mark.timeout(300)
+def test_a_worker_that_is_slow_to_come_back_is_waited_for(tmp_path: Path) -> None:
+    folder, log = challenge(tmp_path / "c", NAMES[:2]), tmp_path / "log"
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1ms"}):  # sooner than any process starts
+        found = run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log, dying="case-001"))
+    assert found == {"done": 1, "failed": 1, "open": 0}
 
 
 def test_a_diagnosis_without_a_result_is_a_failure(tmp_path: Path) -> None:
