@@ -29,14 +29,15 @@ MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small a
 MOST_STARTS = 6
 PLAUSIBLE = 60.0  # floors, rms: by how much an amplitude moves the features at which everything else is refitted
 CARRIED = ((30.0, 6), (7.0, 6), (2.5, 7))  # stages of that refit, with the base's derivatives carried on
-OTHERS = 1  # further starts that a leader is fitted from
+OTHERS = 2  # further starts that a leader is fitted from
 SHARES = (1.0, 0.4)  # of a linear step that are tried
 HOPEFUL = 0.2  # share of the misfit gone at the start from which a search that led nowhere is begun anew
 LOCKED = (1.0, 0.6)  # shares of the amplitude that locked onsets tell that are tried
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
-AGAIN, SETTLED = 4, 0.97  # a leader is refined again until that takes less than 3 % off its cost
+AGAIN, SETTLED = 6, 0.97  # a leader is refined again until that takes less than 3 % off its cost
+WIDELY = ((7.0, 8), (2.5, 8), (1.0, 14))  # by way of wide floors: a search that stands still in a bent valley goes on
 WIDEST = 30.0
 
 
@@ -177,23 +178,29 @@ def refine(
     train: np.ndarray,
     evaluations: int,
     *,
+    stages: tuple[tuple[float, int], ...] = (),
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Candidate:
-    """The same candidate after at most so many ``evaluations`` more: first at floors as wide as the misfit asks for."""
+    """The same candidate after at most so many ``evaluations`` more: first at floors as wide as the misfit asks for.
+
+    ``stages`` (factors on the floors, evaluations) are taken in place of those.
+    """
     if candidate.fit is None or candidate.composition is None:
         return candidate
     problem = Problem(candidate.composition, measurement, threads=threads)
     old = candidate.fit
     wide = ease(old, measurement, floor)
-    stages = ((wide, evaluations // 2), (1.0, evaluations - evaluations // 2)) if wide > 1.5 else ((1.0, evaluations),)
+    straight = ((1.0, evaluations),)
+    if not stages:
+        half = evaluations // 2
+        stages = ((wide, half), (1.0, evaluations - half)) if wide > 1.5 else straight
     try:
         # derivatives in the effect's own parameters are known where everything was refitted around it
         known = old.columns if np.any(old.columns[..., -1]) else None
         new = fit(problem, floor, z=old.z, events=old.events, stages=stages, use=train, columns=known)
         if new.cost >= old.cost and len(stages) > 1 and candidate.promise > HOPEFUL:
             # wide floors led away from a good place: straight on from there
-            straight = ((1.0, evaluations),)
             new = fit(problem, floor, z=old.z, events=old.events, stages=straight, use=train, columns=known)
     except StickslipError as error:
         return replace(candidate, note=str(error))
@@ -216,8 +223,8 @@ def settle(
     Its standard deviations are those of :func:`stickslip.fit.inertial.certain`.
     """
 
-    def go(candidate: Candidate, most: int) -> Candidate:
-        return refine(candidate, measurement, floor, train, most, threads=threads, progress=progress)
+    def go(candidate: Candidate, most: int, stages: tuple[tuple[float, int], ...] = ()) -> Candidate:
+        return refine(candidate, measurement, floor, train, most, stages=stages, threads=threads, progress=progress)
 
     best = go(candidate, MOST)
     if best.fit is None:
@@ -229,7 +236,7 @@ def settle(
             best = other
     for _ in range(AGAIN):
         before = best.cost
-        best = go(best, MOST)
+        best = go(best, MOST, WIDELY)
         if best.cost > SETTLED * before:
             break
     if best.fit is None or best.composition is None:
@@ -289,14 +296,15 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
         tell(f"{effect.tag}: start {values}, explains {100 * share:.0f} %")
     if search.best is not None:
         if effect.periodic is None:
-            search.push(likely, PLAUSIBLE, use)
+            for sign in (1.0, -1.0):
+                search.push(likely, sign, PLAUSIBLE, use)
         else:
             search.settle(use)
         tell(f"{effect.tag}: everything else refitted around a plausible amplitude")
     if search.best is None:
         return Candidate(effect.tag, form, effect, explained, composition=composition, note="cannot be evaluated")
     cost, z, events, features = search.best
-    others = tuple((o[1], o[2]) for o in sorted(search.each, key=lambda o: o[0])[1 : 1 + OTHERS])
+    others = tuple((o[1], o[2]) for o in search.others())
     promise = 1.0 - cost / search.cost(optimum.z, optimum.events, search.bare)
     columns = search.columns.get(z.tobytes())
     if columns is None:
@@ -326,6 +334,7 @@ class _Search:
         self.moderate: float | None = None
         self.columns: dict[bytes, np.ndarray] = {}  # derivatives where everything was refitted
         self.each: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []  # the best from every start
+        self.plausible: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []  # from plausible amplitudes
         self.bare = problem.features(self.point({}, self.null), optimum.events)  # the base at this tolerance
 
     def point(self, values: dict[str, float], amplitude: float, base: np.ndarray | None = None) -> np.ndarray:
@@ -431,13 +440,16 @@ class _Search:
         size = float(np.median(np.abs(ratio)))
         return [self._offer(self.point(told, self.null + share * size), self.optimum.events) for share in LOCKED]
 
-    def push(self, values: dict[str, float], rms: float, use: np.ndarray) -> None:
+    def push(self, values: dict[str, float], sign: float, rms: float, use: np.ndarray) -> None:
         """Refit everything from an amplitude that moves the features by ``rms`` floors, however little that promises.
 
-        What the base has bent itself to imitate shows no slope at an amplitude of zero.
+        What the base has bent itself to imitate shows no slope at an amplitude of zero. Nothing is done where the
+        amplitude cannot have that ``sign``.
         """
         low, high = self.free[self.amplitude].bounds
-        reach = high - self.null if high > self.null else low - self.null
+        reach = high - self.null if sign > 0.0 else low - self.null
+        if sign * reach <= 0.0:
+            return
         share = 0.1
         for _ in range(5):
             z = self.point(values, self.null + share * reach)
@@ -459,8 +471,13 @@ class _Search:
         own = self.problem.columns(z, events, range(self.k, z.size), features)
         columns = np.concatenate([self.optimum.columns, own], axis=-1)
         found = fit(self.problem, self.floor, z=z, events=events, stages=CARRIED, use=use, columns=columns, anew=False)
-        self.each.append(self._keep(found.z, found.events, found.features - found.offsets))
+        self.plausible.append(self._keep(found.z, found.events, found.features - found.offsets))
         self.columns[found.z.tobytes()] = found.columns
+
+    def others(self) -> list[tuple[float, np.ndarray, np.ndarray, np.ndarray]]:
+        """Further starts: those from plausible amplitudes before those near none, which end in one place as a rule."""
+        ranked = [o for kind in (self.plausible, self.each) for o in sorted(kind, key=lambda o: o[0])]
+        return [o for o in ranked if o is not self.best][:OTHERS]
 
     def cost(self, z: np.ndarray, events: np.ndarray, features: np.ndarray) -> float:
         """Robust chi-square at the widened floors, with the priors of the base; ``features`` of the model alone."""

@@ -20,7 +20,7 @@ from ..floors import floors
 from ..residual import misfit
 from ..segment import Segmentation, segment
 from ..trace import Trace
-from .candidate import MORE, Candidate
+from .candidate import AGAIN, MORE, SETTLED, WIDELY, Candidate
 from .heldout import HeldOut
 from .holdout import training_cycles
 from .revise import Named, done_without, told_apart
@@ -46,6 +46,7 @@ from .verdict import (
 Tell = Callable[[str, float], None]
 MOST_CYCLES = 14
 BASE_AGAIN = ((3.0, 4), (1.0, MORE)), ((1.0, MORE),)  # stages: by way of wide floors, and straight on
+BEGINS = 2  # cheapest candidates, from where each of which the base is fitted again
 SEVERAL = "unequal-contacts"  # means nothing where there is one
 FURTHER_FITS, ARRIVED = 4, 0.97  # of a model with a named effect, until one takes less than 3 % off its cost
 
@@ -282,7 +283,7 @@ def _round(
     tell: Tell,
     limits: Thresholds,
 ) -> tuple[Rung, Round]:
-    """All candidates on a rung, and the rung fitted again from where the best of them arrived.
+    """All candidates on a rung, and the rung fitted again from where the best two of them arrived.
 
     A base less converged than its rivals would make a gain of nothing.
     """
@@ -291,12 +292,19 @@ def _round(
     data, floor, train, store = material
     ground = Ground(rung.composition, rung.fit, data, floor, train)
     candidates, every = Sweep(ground, jobs, store, name, tell).run(tags)
-    best = min((c for c in candidates if not c.note), key=lambda c: c.cost, default=None)
-    if best is not None and best.fit is not None:
-        k = len(rung.composition.free)
-        begin = replace(rung.fit, z=best.fit.z[:k], events=best.fit.events)
-        for i, stages in enumerate(BASE_AGAIN):
-            rung = _further(rung, begin, stages, material, f"{name}-again{i + 1}")
+    k = len(rung.composition.free)
+    fitted = sorted((c for c in candidates if c.fit is not None and not c.note), key=lambda c: c.cost)
+    begins = [replace(rung.fit, z=c.fit.z[:k], events=c.fit.events) for c in fitted[:BEGINS] if c.fit is not None]
+    tries = [(begin, stages) for begin in begins for stages in BASE_AGAIN]
+    for i, (begin, stages) in enumerate(tries):
+        rung = _further(rung, begin, stages, material, f"{name}-again{i + 1}")
+    if begins:
+        for i in range(AGAIN):  # as long as a leader is
+            assert rung.fit is not None
+            before = rung.fit.cost
+            rung = _further(rung, rung.fit, WIDELY, material, f"{name}-wide{i + 1}")
+            if rung.fit is None or rung.fit.cost > SETTLED * before:
+                break
     assert rung.fit is not None
     assert rung.held is not None
     judged = [judge(c, rung.fit.cost, rung.held, limits) for c in candidates if c.fit is not None and not c.note]

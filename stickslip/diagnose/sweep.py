@@ -24,7 +24,7 @@ LEAST = 4  # of those that get more than the first steps
 NEAR = 1.3  # times the leader's cost: candidates that the data may not tell from it are followed to the end
 WORTH = 0.9  # times the base's cost: a leader below it may get a name, and is compared with all it may be taken for
 LEADERS = 5
-LIKE = 2  # of those a leader may be taken for that are followed to the end, however far from it they seem
+LIKE = 2  # of those a leader may be taken for that are followed to the end, in every form near their best one
 
 
 class Store(Protocol):
@@ -86,15 +86,16 @@ class Sweep:
         leader = min(more, key=lambda c: c.cost, default=None)
         if leader is not None and leader.cost < WORTH * self.ground.optimum.cost:
             # what it may be taken for deserves the same, whatever its own score promised
-            known = {c.tag for c in more}
-            like = [c for c in firsts if c.tag in _like(leader.effect) and c.tag not in known]
+            known = {_word(c.effect) for c in more}
+            like = [c for c in scored if c.tag in _like(leader.effect) and _word(c.effect) not in known]
             more += self._refine(self._refine(like, FEW, "like", 0.8, 0.82), MORE, "like more", 0.82, 0.85)
         best = min((c.cost for c in more), default=np.inf)
         ranked = sorted(more, key=lambda c: c.cost)
         near = [c for c in ranked if c.cost < NEAR * best][:LEADERS]
         if near and best < WORTH * self.ground.optimum.cost:
             taken_for = _like(near[0].effect) - {c.tag for c in near}
-            near += _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]
+            for first in _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]:
+                near += [c for c in ranked if c.tag == first.tag and c.cost < NEAR * first.cost]
         most = self._settle(near, 0.85, 1.0)
         every = {_word(c.effect): c for c in (*scored, *few, *more, *most)}
         out = {tag: min((c for c in every.values() if c.tag == tag), key=_rank) for tag in tags}

@@ -1,4 +1,5 @@
-"""What a search begins with: the linear step of everything, and the periods that residuals hint at."""
+"""What a search begins with (the linear step of everything, periods that residuals hint at, plausible amplitudes), and
+how long a leader is followed."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from stickslip.diagnose import candidate
 from stickslip.diagnose.candidate import starts
 from stickslip.diagnose.linear import Linear
 from stickslip.diagnose.periods import periods, phasor, within_record
@@ -166,3 +168,61 @@ def test_onsets_locked_to_a_period_tell_it_with_amplitude_and_phase():
     # at the onsets that the base expects it is quite another one
     wrong = phasor("time", data, model, data.values - model, 1.0 / frequency, use)
     assert np.abs(wrong[0] * np.exp(-1j * PHASES[0]) - size) > 0.3 * size
+
+
+class Invented:
+    """A problem whose features are a line times the amplitude: what a search asks of one."""
+
+    def __init__(self, data, line) -> None:
+        self.measurement, self.line = data, line
+
+    def features(self, z, events):
+        return self.measurement.values + z[-1] * self.line
+
+    def columns(self, z, events, which, base):
+        return np.repeat(self.line[..., None], len(list(which)), axis=-1)
+
+
+@pytest.mark.parametrize(("tag", "signs"), [("tilt", {-1.0, 1.0}), ("machine-compliance", {1.0})])
+def test_an_amplitude_that_may_have_two_signs_is_tried_with_both(tag, signs, monkeypatch):
+    data, _, line, fit, _ = made(2)
+    monkeypatch.setattr(candidate, "fit", lambda problem, floor, *, z, events, **_: replace(fit, z=z, events=events))
+    effect = catalogue.make(tag)
+    free = effect_parameters(effect)
+    floor = 1e-4 * np.ones_like(data.values)
+    problem = Invented(data, line * (1e-4 if tag == "tilt" else 1e2))
+    search = candidate._Search(problem, fit, floor, data.valid, 1.0, free, 2, effect)
+    search.best = (np.inf, fit.z, fit.events, data.values)
+    for sign in (1.0, -1.0):
+        search.push({}, sign, candidate.PLAUSIBLE, np.ones(data.values.shape[:2], bool))
+    pushed = [z[-1] for _, z, *_ in search.plausible]
+    assert sorted(float(np.sign(a)) for a in pushed) == sorted(signs)
+    assert search.best in search.plausible
+    # a leader is begun from the plausible amplitudes that are not the best before any that is near none
+    search.each = [(0.0, fit.z, fit.events, data.values)] * 3
+    assert search.others()[: len(pushed) - 1] == [o for o in search.plausible if o is not search.best]
+    assert len(search.others()) == candidate.OTHERS
+
+
+def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_stands(monkeypatch):
+    """Straight on, the fit stands still; from floors that are widened it takes a third of the way to 100 each time."""
+    data, columns, _, fit, _ = made(3)
+    fit = replace(fit, cost=1000.0, columns=columns)
+    taken = []
+
+    def step(problem, floor, *, z, events, stages, **_):
+        taken.append(stages)
+        now = now_cost[0]
+        now_cost[0] = 100.0 + (now - 100.0) * 2 / 3 if len(stages) > 1 else now
+        return replace(fit, cost=now_cost[0])
+
+    now_cost = [1000.0]
+    monkeypatch.setattr(candidate, "fit", step)
+    monkeypatch.setattr(candidate, "Problem", lambda *a, **k: None)
+    monkeypatch.setattr(candidate, "certain", lambda problem, floor, found: found)
+    monkeypatch.setattr(candidate, "ease", lambda *a: 1.0)
+    monkeypatch.setattr(candidate, "_with_fit", lambda c, found, *a: replace(c, fit=found))
+    begun = candidate.Candidate("tilt", {}, catalogue.make("tilt"), 0.1, 0.1, composition="invented", fit=fit)
+    found = candidate.settle(begun, data, np.ones_like(data.values), data.valid)
+    assert found.cost == pytest.approx(100.0 + 900.0 * (2 / 3) ** candidate.AGAIN)
+    assert taken[1:] == [candidate.WIDELY] * candidate.AGAIN

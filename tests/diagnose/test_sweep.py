@@ -112,3 +112,11 @@ def test_finished_pieces_are_not_done_again(calls):
     del store[lost]
     run(store)
     assert len(calls) == count + 1
+
+
+def test_what_the_leader_may_be_taken_for_is_tried_in_every_form(calls):
+    _, every, _ = run(tags=["wear", "position-dependent-friction"])
+    assert "position-dependent-friction" in catalogue.get("wear").confused_with
+    forms = [c for c in every if c.tag == "position-dependent-friction" and not c.note]
+    assert len(forms) == len(forms_of("position-dependent-friction")) > 1
+    assert calls.count(("settle", "position-dependent-friction")) == len(forms)
