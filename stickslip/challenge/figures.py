@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .answers import Answer
 from .marks import CIRCUMSTANCES, Marked, rate
 from .sizes import Size
 
@@ -184,11 +183,11 @@ def verdict_label(m: Marked) -> str:
     return m.answer.kind
 
 
-def name_label(answer: Answer) -> str:
+def name_label(m: Marked) -> str:
     """The answer in the words of the confusion matrix of names."""
-    if answer.kind == "missing":
-        return answer.named[0] if len(answer.named) == 1 else "several"
-    return {"complete": "nothing", "ambiguous": "a set"}.get(answer.kind, answer.kind)
+    if m.answer.kind == "missing":
+        return m.answer.named[0] if len(m.answer.named) == 1 else "several"
+    return "nothing" if m.answer.kind == "complete" else verdict_label(m)
 
 
 def _confusion(marked: Sequence[Marked]) -> dict[str, dict[str, dict[str, int]]]:
@@ -198,7 +197,7 @@ def _confusion(marked: Sequence[Marked]) -> dict[str, dict[str, dict[str, int]]]
         kinds[m.kind][verdict_label(m)] += 1
         if m.kind != "two":
             row = m.tags[0] if m.tags else "nothing"
-            names.setdefault(row, Counter())[name_label(m.answer)] += 1
+            names.setdefault(row, Counter())[name_label(m)] += 1
     return {
         "kinds": {row: dict(found) for row, found in kinds.items()},
         "names": {row: dict(names[row]) for row in sorted(names)},

@@ -14,7 +14,7 @@ from ..plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, styled
 from .figures import VERDICTS, WORDS
 
 ANSWERED = "answered (number of cases, right ones in red; grey: share of the row)"
-LAST = ("a set", "several", "unknown", "failed", "not run")
+LAST = ("set with it", "set without it", "several", "unknown", "failed", "not run")
 
 
 @styled
@@ -73,7 +73,7 @@ def _outside(score: Mapping[str, Any]) -> set[str]:
 
 
 def _right_name(outside: set[str], row: str, column: str) -> bool:
-    return column == "unknown" if row in outside else row == column
+    return column == "unknown" if row in outside else column in (row, "set with it")
 
 
 def _right_kind(row: str, column: str) -> bool:

@@ -134,7 +134,7 @@ def test_confusion_and_aims(folder: Path) -> None:
     s = score_challenge(folder)
     assert s["confusion"]["names"]["nothing"] == {"nothing": 2, "wear": 1, "failed": 1}
     assert s["confusion"]["names"]["sensor-low-pass"] == {"residual-load": 1}
-    assert s["confusion"]["names"]["sensor-drift"] == {"a set": 1}
+    assert s["confusion"]["names"]["sensor-drift"] == {"set with it": 1}
     assert s["confusion"]["kinds"]["two"] == {"named": 1, "named in part": 1}
     assert s["confusion"]["kinds"]["one"] == {
         "named": 2, "set with it": 1, "set without it": 1, "named wrongly": 1, "complete": 1,
