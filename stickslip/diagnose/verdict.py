@@ -315,7 +315,9 @@ def nothing(
     limits: Thresholds = THRESHOLDS,
     forms: Forms | None = None,
 ) -> Verdict:
-    """The verdict when something is missing and no candidate passes."""
+    """The verdict when no candidate passes: something is missing, unless the model, fitted once more, describes all."""
+    if is_complete(rung.train, rung.held, limits):
+        return finished(named, forms)
     phase, worst = worst_phase(rung.train, rung.held, limits)
     nearest = min(judged, key=lambda j: j.cost, default=None)
     text = f"Something is missing ({phase} is off by {worst:.1f} floors) and no effect that was tried explains it"

@@ -267,6 +267,10 @@ def test_what_is_left_decides_between_complete_and_unknown():
         return Rung((), None, Misfit(1.0, {"slip": factor * limit}, {}), None, None, None, np.zeros(0))
 
     assert nothing([], refused, left(THRESHOLDS.remainder - 0.05)).kind == "complete"
+    assert "remains" in nothing([], refused, left(THRESHOLDS.remainder - 0.05)).text
+    # the model is fitted once more after all were tried, and may be within its limits then
+    assert nothing([], refused, left(0.95)).text.startswith("Nothing is missing")
+    assert nothing(["tilt"], refused, left(0.95)).text.startswith("The base model lacks tilt. With it every phase")
     assert nothing([], refused, left(THRESHOLDS.remainder + 0.05)).kind == "unknown"
     assert nothing(["tilt"], refused, left(THRESHOLDS.adequate - 0.05)).kind == "missing"
     verdict = nothing(["tilt"], refused, left(THRESHOLDS.adequate + 0.05))
