@@ -214,13 +214,15 @@ def settle(
     measurement: Measurement,
     floor: np.ndarray,
     train: np.ndarray,
+    worth: float = np.inf,
     *,
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Candidate:
     """The same candidate refined to the end, from where it is and from its other starts; the best of them.
 
-    Its standard deviations are those of :func:`stickslip.fit.inertial.certain`.
+    It is followed by way of wide floors only where its cost is below ``worth`` by then. Its standard deviations are
+    those of :func:`stickslip.fit.inertial.certain`.
     """
 
     def go(candidate: Candidate, most: int, stages: tuple[tuple[float, int], ...] = ()) -> Candidate:
@@ -234,7 +236,7 @@ def settle(
         other = go(begun, FEW + MORE)
         if other.cost < best.cost:
             best = other
-    for _ in range(AGAIN):
+    for _ in range(AGAIN if best.cost < worth else 0):
         before = best.cost
         best = go(best, MOST, WIDELY)
         if best.cost > SETTLED * before:

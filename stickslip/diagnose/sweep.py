@@ -24,6 +24,7 @@ LEAST = 4  # of those that get more than the first steps
 NEAR = 1.3  # times the leader's cost: candidates that the data may not tell from it are followed to the end
 WORTH = 0.9  # times the base's cost: a leader below it may get a name, and is compared with all it may be taken for
 LEADERS = 5
+FOLLOWED = 0.95  # times the base's cost: a leader below it is followed by way of wide floors
 LIKE = 2  # of those a leader may be taken for that are followed to the end, in every form near their best one
 
 
@@ -120,7 +121,8 @@ class Sweep:
 
     def _settle(self, found: Sequence[Candidate], low: float, high: float) -> list[Candidate]:
         g = self.ground
-        work = {f"{self.name}-settle-{_word(c.effect)}": (settle, (c, g.data, g.floor, g.train)) for c in found}
+        worth = FOLLOWED * g.optimum.cost
+        work = {f"{self.name}-settle-{_word(c.effect)}": (settle, (c, g.data, g.floor, g.train, worth)) for c in found}
         return self._all(work, "to the end", low, high)
 
     def _all(self, work: Mapping[str, Job], stage: str, low: float, high: float) -> list[Candidate]:

@@ -223,6 +223,10 @@ def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_st
     monkeypatch.setattr(candidate, "ease", lambda *a: 1.0)
     monkeypatch.setattr(candidate, "_with_fit", lambda c, found, *a: replace(c, fit=found))
     begun = candidate.Candidate("tilt", {}, catalogue.make("tilt"), 0.1, 0.1, composition="invented", fit=fit)
+    hopeless = candidate.settle(begun, data, np.ones_like(data.values), data.valid, 900.0)
+    assert hopeless.cost == 1000.0
+    assert taken == [((1.0, candidate.MOST),)]
+    taken.clear()
     found = candidate.settle(begun, data, np.ones_like(data.values), data.valid)
     assert found.cost == pytest.approx(100.0 + 900.0 * (2 / 3) ** candidate.AGAIN)
     assert taken[1:] == [candidate.WIDELY] * candidate.AGAIN

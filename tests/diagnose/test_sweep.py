@@ -10,7 +10,7 @@ import pytest
 
 from stickslip.diagnose import sweep as module
 from stickslip.diagnose.candidate import Candidate, forms_of
-from stickslip.diagnose.sweep import EXPLAINING, LIKE, PROMISING, Ground, Sweep
+from stickslip.diagnose.sweep import EXPLAINING, FOLLOWED, LIKE, PROMISING, Ground, Sweep
 from stickslip.effects import catalogue
 from stickslip.fit.inertial import Fit
 
@@ -40,7 +40,8 @@ def calls(monkeypatch):
         cost = 150.0 if candidate.tag in FINAL else 900.0
         return replace(invented(candidate.effect, cost, candidate.promise), score=candidate.score)
 
-    def settle(candidate, data, floor, train):
+    def settle(candidate, data, floor, train, worth):
+        assert worth == FOLLOWED * 1000.0
         done.append(("settle", candidate.tag))
         return invented(candidate.effect, FINAL.get(candidate.tag, candidate.cost), candidate.promise)
 
