@@ -81,6 +81,10 @@ class Pieces:
     def _path(self, key: str) -> Path:
         return self._run.path(f"pieces/{key}.npz")
 
+    def ready(self) -> int:
+        """How many finished pieces of the same inputs there are."""
+        return sum(self.load(path.stem) is not None for path in self._run.path("pieces/any").parent.glob("*.npz"))
+
     def load(self, key: str) -> Mapping[str, np.ndarray] | None:
         """A finished piece of the same inputs, or None."""
         path = self._path(key)
@@ -178,17 +182,23 @@ def diagnose_campaign(
         segmentations, mended = true_gains(traces, events)
         traces, implied = with_displacements(traces, segmentations)
         pieces = Pieces(run, key)
-        found = diagnose(
-            loaded,
-            traces,
-            segmentations,
-            candidates=candidates,
-            max_effects=max_effects,
-            holdout=holdout,
-            jobs=jobs,
-            store=pieces,
-            progress=progress,
-        )
+        if progress is not None and (ready := pieces.ready()):
+            progress(f"going on from {ready} finished pieces", 0.0)
+        try:
+            found = diagnose(
+                loaded,
+                traces,
+                segmentations,
+                candidates=candidates,
+                max_effects=max_effects,
+                holdout=holdout,
+                jobs=jobs,
+                store=pieces,
+                progress=progress,
+            )
+        except KeyboardInterrupt:
+            text = f"{pieces.ready()} finished pieces are kept, and the same command goes on from them"
+            raise KeyboardInterrupt(text) from None
         result: dict[str, Any] = {
             "kind": "diagnose",
             "title": loaded.title,

@@ -82,7 +82,8 @@ def _teller(clock: Callable[[], float] = time.perf_counter) -> Callable[[str, fl
 
     A stage begins where the share falls. How long it will take follows from the ``clock`` (s) and the share since then.
     """
-    began = last = clock()
+    began = clock()
+    last = began - EVERY  # the first word at once
     stage = Stage(began)
 
     def tell(text: str, share: float) -> None:

@@ -129,7 +129,8 @@ def get(tag: str) -> type[Effect]:
     if tag in _unlisted:
         return _unlisted[tag]
     if tag not in everything:
-        raise InputError(f"there is no effect '{tag}'", hint=nearest(tag, everything))
+        hint = f"{nearest(tag, everything)}; one of your own needs --effect FILE.py"
+        raise InputError(f"there is no effect '{tag}'", hint=hint)
     return everything[tag]
 
 

@@ -57,6 +57,7 @@ def test_the_time_left_is_that_of_the_stage(capsys):
         now[0] = 1000.0 + at
         tell(text, share)
     assert [line.strip() for line in capsys.readouterr().err.splitlines()] == [
+        "0 s  begin (0 %)",
         "40 s  base (40 %, about 60 s left of this stage)",
         "100 s  base (100 %)",
         "200 s  sweep (10 %)",
@@ -111,3 +112,19 @@ def test_the_shipped_campaign_is_diagnosed(tmp_path):
     assert result["verdict"]["effects"] == ["contact-ageing"]
     errors = [rung["heldout_error"] for rung in result["ladder"]]
     assert errors[0] > errors[1] > 1.5 > errors[2]
+
+
+def test_an_interrupted_diagnosis_says_what_is_kept_and_goes_on_from_it(tmp_path, monkeypatch, capsys):
+    """The engine keeps two pieces and is stopped there; the second time it is told that they are there."""
+
+    def stopped(*args, store, **kwargs):
+        for key in ("base", "round1-score-tilt"):
+            store.save(key, {"z": np.arange(3.0)})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("stickslip.diagnose.engine.diagnose", stopped)
+    for _ in range(2):
+        assert run(["diagnose", str(CAMPAIGN), "--out", str(tmp_path / "run")]) == 130
+        said = capsys.readouterr().err
+        assert "interrupted; 2 finished pieces are kept, and the same command goes on from them" in said
+    assert "going on from 2 finished pieces" in said
