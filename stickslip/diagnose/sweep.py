@@ -25,7 +25,8 @@ NEAR = 1.3  # times the leader's cost: candidates that the data may not tell fro
 WORTH = 0.9  # times the base's cost: a leader below it may get a name, and is compared with all it may be taken for
 LEADERS = 5
 FOLLOWED = 0.95  # times the base's cost: a leader below it is followed by way of wide floors
-LIKE = 2  # of those a leader may be taken for that are followed to the end, in every form near their best one
+LIKE = 2  # of those a leader may be taken for that are followed to the end, however far from it they seem
+FORMS = 2  # of each of these: its most promising ones
 
 
 class Store(Protocol):
@@ -88,7 +89,9 @@ class Sweep:
         if leader is not None and leader.cost < WORTH * self.ground.optimum.cost:
             # what it may be taken for deserves the same, whatever its own score promised
             known = {_word(c.effect) for c in more}
-            like = [c for c in scored if c.tag in _like(leader.effect) and _word(c.effect) not in known]
+            promised = sorted(scored, key=lambda c: -c.promise)
+            like = [c for tag in sorted(_like(leader.effect)) for c in [c for c in promised if c.tag == tag][:FORMS]]
+            like = [c for c in like if _word(c.effect) not in known]
             more += self._refine(self._refine(like, FEW, "like", 0.8, 0.82), MORE, "like more", 0.82, 0.85)
         best = min((c.cost for c in more), default=np.inf)
         ranked = sorted(more, key=lambda c: c.cost)
@@ -96,7 +99,7 @@ class Sweep:
         if near and best < WORTH * self.ground.optimum.cost:
             taken_for = _like(near[0].effect) - {c.tag for c in near}
             for first in _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]:
-                near += [c for c in ranked if c.tag == first.tag and c.cost < NEAR * first.cost]
+                near += [c for c in ranked if c.tag == first.tag and c.cost < NEAR * first.cost][:FORMS]
         most = self._settle(near, 0.85, 1.0)
         every = {_word(c.effect): c for c in (*scored, *few, *more, *most)}
         out = {tag: min((c for c in every.values() if c.tag == tag), key=_rank) for tag in tags}
