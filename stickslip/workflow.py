@@ -83,7 +83,7 @@ class Pieces:
 
     def ready(self) -> int:
         """How many finished pieces of the same inputs there are."""
-        return sum(self.load(path.stem) is not None for path in self._run.path("pieces/any").parent.glob("*.npz"))
+        return sum(self.load(path.stem) is not None for path in self._path("any").parent.glob("*.npz"))
 
     def load(self, key: str) -> Mapping[str, np.ndarray] | None:
         """A finished piece of the same inputs, or None."""
