@@ -1,4 +1,5 @@
-"""The block's displacement where it was not measured: from the velocity, or from drive and spring force."""
+"""What a campaign's numbers say of each other before a model is fitted: whether they go together, and the block's
+displacement where it was not measured."""
 
 from __future__ import annotations
 
@@ -6,9 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .campaign import Campaign
 from .errors import InputError
 from .report.describe import gain_is_wrong, stick_gain
 from .report.pace import pace
+from .report.slip_time import slip_time
 from .segment import Segmentation, block_motion, segment
 from .trace import Trace
 
@@ -31,6 +34,20 @@ def check_pace(traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[s
                 "is cleared ('wrap', 'resets')",
             )  # fmt: skip
         notes.append(f"{trace.name}: {seen}: check the drive's velocity, and the units of time and displacement.")
+    return notes
+
+
+def slip_times(campaign: Campaign, traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[str]:
+    """A sentence for each trace whose slips are far shorter or longer than mass and spring, where both are known, let
+    them be."""
+    notes = []
+    for trace, events in zip(traces, found, strict=True):
+        rig = campaign.rig_of(trace.name)
+        if not (isinstance(rig.mass, float) and isinstance(rig.spring_stiffness, float)):
+            continue
+        said = slip_time(trace, events, rig.mass, rig.spring_stiffness)
+        if said is not None:
+            notes.append(f"{trace.name}: {said}: check mass and stiffness, and their units.")
     return notes
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import InputError, nearest
+from .errors import InputError
 from .runstore import Run, file_record, json_text, open_run, refuse_existing, versions
 
 if TYPE_CHECKING:
@@ -34,7 +34,9 @@ def _check_candidates(tags: Sequence[str]) -> None:
     known = catalogue.tags()
     wrong = [tag for tag in tags if tag not in known]
     if wrong:
-        hints = [f"{tag}: {nearest(tag, known)}" for tag in wrong] if len(wrong) > 1 else [nearest(wrong[0], known)]
+        hints = (
+            [f"{tag}: {catalogue.unknown(tag)}" for tag in wrong] if len(wrong) > 1 else [catalogue.unknown(wrong[0])]
+        )
         raise InputError(
             f"there is no effect {' and no effect '.join(repr(tag) for tag in wrong)}",
             key="--candidates",
@@ -150,7 +152,7 @@ def diagnose_campaign(
     from .diagnose.summary import summary
     from .effects import catalogue
     from .fit.problem import Problem
-    from .motion import check_pace, true_gains, with_displacements
+    from .motion import check_pace, slip_times, true_gains, with_displacements
     from .report import write_report
     from .report.describe import left_out
     from .report.inertial_result import fit_sections
@@ -206,7 +208,7 @@ def diagnose_campaign(
             "inputs": inputs,
             "versions": versions(),
         }
-        result["notes"] = [*notes, *mended, *implied]
+        result["notes"] = [*notes, *slip_times(loaded, traces, segmentations), *mended, *implied]
         result["dropped"] = [*left_out(traces, segmentations), *result["dropped"]]
         top = next((r for r in reversed(found.ladder) if r.fit is not None), None)
         if top is not None and top.fit is not None and top.composition is not None:

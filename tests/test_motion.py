@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stickslip.campaign import load_campaign, load_traces
 from stickslip.cli import run
 from stickslip.diagnose import engine
-from stickslip.motion import check_pace, true_gains, with_displacements
+from stickslip.motion import check_pace, slip_times, true_gains, with_displacements
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
 from stickslip.workflow import diagnose_campaign
@@ -104,3 +105,23 @@ def test_a_block_a_little_ahead_of_its_drive_is_pointed_out_and_fitted():
     (said,) = check_pace([trace], [segment(trace)])
     assert "x: from slip to slip the block moves 42 µm/s, the drive 25.2 µm/s" in said
     assert check_pace([trace.replace(drive=Drive.constant(SPEED, 0.0, t[-1]))], [segment(trace)]) == []
+
+
+@pytest.mark.parametrize(("mass", "off"), [("26 g", False), ("100 g", False), ("26 kg", True), ("26 mg", True)])
+def test_a_mass_wrong_by_a_thousand_is_pointed_out(tmp_path, mass, off):
+    """Slips of 40 ms on 168 N/m are those of 27 g."""
+    t, x = moved()
+    np.savetxt(tmp_path / "x.csv", np.stack([t, 1e6 * x], 1), delimiter=",", header="t [s],x [um]", comments="")
+    (tmp_path / "c.toml").write_text(
+        f'schema = 1\n[rig]\nmass = "{mass}"\nspring_stiffness = "{STIFFNESS} N/m"\n[[trace]]\nfile = "x.csv"\n'
+        f'time = {{ column = "t" }}\ndisplacement = {{ column = "x" }}\ndrive_velocity = "{1e6 * SPEED} um/s"\n'
+    )
+    campaign = load_campaign(tmp_path / "c.toml")
+    traces = load_traces(campaign)
+    said = slip_times(campaign, traces, [segment(t) for t in traces])
+    assert len(said) == off
+    if off:
+        assert "check mass and stiffness" in said[0]
+        assert f"half a period of {mass}" in said[0]
+        assert "a block of 2" in said[0]
+        assert "g would slip so" in said[0]

@@ -17,7 +17,7 @@ def creep(
     scenario: str,
     *more: str,
     out: Path | None = None,
-    set: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    set: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     points: int = 400,
     average: Literal["displacement", "force"] = "displacement",
     time: Literal["exact", "paper"] = "exact",

@@ -21,7 +21,7 @@ def effects(
     *,
     model: str | None = None,
     latex: Annotated[bool, Parameter(negative="")] = False,
-    effect: Annotated[tuple[Path, ...], Parameter(negative="")] = (),
+    effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
     picture: Path | None = None,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:

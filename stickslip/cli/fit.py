@@ -29,9 +29,9 @@ def fit(
     *,
     model: Literal["static", "inertial"] = "inertial",
     out: Path | None = None,
-    add: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    effect: Annotated[tuple[Path, ...], Parameter(negative="")] = (),
-    profile: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    add: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
+    effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
+    profile: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     starts: int = 4,
     align: Literal["consistent", "paper"] = "consistent",
     time: Literal["exact", "paper"] = "exact",
@@ -83,7 +83,7 @@ def fit(
     force:
         Replace an existing run folder.
     """
-    from ..motion import check_pace, true_gains
+    from ..motion import check_pace, slip_times, true_gains
     from ..report.describe import left_out
     from ..units import to_si
 
@@ -94,7 +94,7 @@ def fit(
     began = _now()
     loaded, traces, found = load_and_segment(campaign)
     try:
-        notes = check_pace(traces, found)
+        notes = [*check_pace(traces, found), *slip_times(loaded, traces, found)]
     except InputError as error:
         raise error.at(file=loaded.path) from None
     found, mended = true_gains(traces, found)

@@ -26,11 +26,11 @@ def simulate(
     scenario: str,
     *more: str,
     out: Path | None = None,
-    set: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    set: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     sweep: str | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,
     trace: str | None = None,
-    effect: Annotated[tuple[Path, ...], Parameter(negative="")] = (),
+    effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Simulate a scenario, or the model that a fit or a diagnosis found: trace, slip events, pictures.

@@ -273,9 +273,9 @@ def ease(optimum: Fit, measurement: Measurement, floor: np.ndarray) -> float:
 def _score(effect, form, base, optimum, measurement, floor, train, threads, tell) -> Candidate:
     free = within_record(effect, effect_parameters(effect), measurement)
     composition = base.with_effect(effect, free)
-    problem = Problem(composition, measurement, threads=threads).coarser()
     k = len(base.free)
     use = train & np.asarray(measurement.cycles.used)
+    problem = Problem(composition, measurement, threads=threads).coarser().seeing(use)
     valid = measurement.valid & use[..., None]
     factor = ease(optimum, measurement, floor)
     linear = Linear(problem, optimum, measurement, floor, valid, factor)
@@ -316,10 +316,9 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
     offsets, r = -common.offsets(off), robust(common(off[valid]))
     unknown = np.zeros((z.size, z.size))
     begun = Fit(z, events, r, r, features + offsets, offsets, unknown, composition.free, columns, use, 0, 0)
-    candidate = Candidate(
-        effect.tag, form, effect, explained, promise, factor, composition, note="not refitted", others=others
+    return Candidate(
+        effect.tag, form, effect, explained, promise, factor, composition, begun, note="not refitted", others=others
     )
-    return _with_fit(candidate, begun, problem, floor, train)
 
 
 class _Search:

@@ -73,6 +73,8 @@ def candidate_from(
     if "z" not in arrays:
         return candidate
     fit = fit_from(arrays)
+    if candidate.note:
+        return replace(candidate, fit=fit)
     used = np.asarray(measurement.cycles.used)
     return replace(
         candidate,

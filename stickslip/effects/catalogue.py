@@ -8,7 +8,7 @@ import inspect
 import re
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -129,9 +129,13 @@ def get(tag: str) -> type[Effect]:
     if tag in _unlisted:
         return _unlisted[tag]
     if tag not in everything:
-        hint = f"{nearest(tag, everything)}; one of your own needs --effect FILE.py"
-        raise InputError(f"there is no effect '{tag}'", hint=hint)
+        raise InputError(f"there is no effect '{tag}'", hint=unknown(tag))
     return everything[tag]
+
+
+def unknown(tag: str, others: Sequence[str] = ()) -> str:
+    """What to do about a tag that is none: the nearest of the catalogue and ``others``, or a file of one's own."""
+    return f"{nearest(tag, [*others, *tags()])}; one of your own needs --effect FILE.py"
 
 
 def make(tag: str, **params: Any) -> Effect:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..errors import InputError, nearest
+from ..errors import InputError
 from ..params import variants
 from . import catalogue
 from .base import Effect
@@ -32,7 +32,7 @@ def effects_of(words: Sequence[str]) -> tuple[list[Effect], bool]:
         raise InputError("no model is named", key=_OPTION, hint=EXAMPLE)
     for tag in tags:
         if tag != STATIC and tag not in catalogue.all():
-            raise InputError(f"there is no effect '{tag}'", key=_OPTION, hint=nearest(tag, [STATIC, *catalogue.tags()]))
+            raise InputError(f"there is no effect '{tag}'", key=_OPTION, hint=catalogue.unknown(tag, [STATIC]))
         if tags.count(tag) > 1:
             raise InputError(f"'{tag}' is named twice", key=_OPTION)
     inertial = "inertia" in tags

@@ -13,7 +13,7 @@ from ..features.measurement import Measurement
 from ..floors import event_widths, uncertain
 from ..residual import Misfit, misfit
 from .common import Common
-from .composition import run_of
+from .composition import START, run_of
 from .parameters import Free, to_si, vector
 from .problem import STEP, Problem
 
@@ -315,6 +315,8 @@ def fit(
     Raises:
         FitError: the model could not be evaluated at the start.
     """
+    whole, used = problem, np.asarray(problem.measurement.cycles.used)
+    problem = problem.seeing(used if use is None else used & use)
     res = _Residuals(problem, floor, event_scale, use)
     coarse = problem.coarser() if any(factor >= WIDE for factor, _ in stages) else problem
     low, high = res.bounds()
@@ -376,7 +378,7 @@ def fit(
             # what stands still with derivatives that were carried on may go on with new ones
             ahead = [(factor, most - found.nfev)]
     res.solve(problem)
-    raw = res.evaluate(x)
+    raw, columns = _with_unseen(whole, res, x)
     offsets = -res.common(1.0).offsets(res.misfit(x))
     data, prior = res.data(x, 1.0), res.priors(x)
     return Fit(
@@ -388,11 +390,30 @@ def fit(
         offsets,
         res.covariance(x),
         problem.composition.free,
-        res.columns(x),
+        columns,
         res.used,
         res.evaluations,
         res.jacobians,
     )
+
+
+def _with_unseen(whole: Problem, res: _Residuals, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Features and derivatives at ``x``, those of cycles that the fit has not seen added: there only what every event,
+    or a run, has of its own is derived by, for that is set anew where a fit is judged on them."""
+    features, columns = res.evaluate(x), res.columns(x)
+    unseen = np.asarray(whole.measurement.cycles.used) & ~res.used
+    if not unseen.any():
+        return features, columns
+    z, events = x[: res.k], res.events(x)
+    rest = whole.seeing(unseen)
+    features = np.where(unseen[..., None], rest.features(z, events), features)
+    columns = np.where(unseen[..., None, None], 0.0, columns)
+    names = [free.name for free in res.free]
+    begins = [i for i, name in enumerate(names) if name.startswith(START) and not res.used[run_of(name)].any()]
+    which = [names.index("contact.u_max"), names.index("contact.p"), *begins]
+    slopes = rest.columns(z, events, which, features, res.steps[which])
+    columns[..., which] += np.where(unseen[..., None, None], slopes, 0.0)
+    return features, columns
 
 
 def certain(problem: Problem, floor: np.ndarray, found: Fit) -> Fit:
@@ -402,11 +423,13 @@ def certain(problem: Problem, floor: np.ndarray, found: Fit) -> Fit:
     noise in the directions that the features hardly tell, and noise looks like knowledge: it makes standard deviations
     too small, by a factor of three in the worst case seen.
     """
-    res = _Residuals(problem, floor, 1.0, found.use)
+    res = _Residuals(problem.seeing(found.use), floor, 1.0, found.use)
     x = np.concatenate([found.z, found.events[res.used].ravel()])
     features, columns = res.evaluate(x), found.columns
     for _ in range(PASSES):  # the first on steps that noise has made too short
         columns = res._along(x, features, columns)
+    unseen = ~res.used[..., None, None]
+    columns = np.where(unseen, found.columns, columns)
     res.start(x, columns)
     evaluations = found.evaluations + PASSES * columns.shape[-1]
     jacobians = found.jacobians + PASSES

@@ -59,11 +59,24 @@ class Problem:
         self.runs_done = 0
         both = (measurement.cycles, measurement.anchors)
         self._data = [jax.tree.map(lambda a, r=r: a[r], both) for r in range(measurement.runs)]
+        self._seen = np.ones(np.shape(measurement.cycles.used), bool)
 
     def coarser(self) -> Problem:
         """The same at a tolerance that suffices where floors are widened."""
         other = copy(self)
         other.tolerance = COARSE
+        return other
+
+    def seeing(self, cycles: np.ndarray) -> Problem:
+        """The same for some cycles, shape (R, n): a run is integrated as far as the last of them, and one without any
+        not at all. Features of the others are those of the data, or of the ``base`` that is given.
+        """
+        other = copy(self)
+        needed = np.logical_or.accumulate((cycles & self._seen)[:, ::-1], axis=1)[:, ::-1]
+        other._seen = cycles & self._seen
+        other._data = [
+            (c._replace(used=c.used & until), anchors) for (c, anchors), until in zip(self._data, needed, strict=True)
+        ]
         return other
 
     def common(self, floor: np.ndarray, use: np.ndarray, factor: float = 1.0) -> Common:
@@ -185,6 +198,7 @@ class Problem:
 
         # the longest runs first, so that no thread is left with one at the end
         order = np.argsort([-np.count_nonzero(m.cycles.used[r]) for r in range(m.runs)])
+        order = order[self._seen[order].any(axis=1)]
         tasks = [(lane, int(r)) for r in order for lane in range(len(lanes)) if only[lane] in (None, r)]
         self.runs_done += len(tasks)
         if self.threads == 1:
@@ -194,7 +208,7 @@ class Problem:
                 done = dict(zip(tasks, pool.map(one, tasks), strict=True))
         out = [np.array(m.values if base is None else base) for _ in lanes]
         for (lane, r), found in done.items():
-            out[lane][r] = found
+            out[lane][r, self._seen[r]] = found[self._seen[r]]
         return out
 
 

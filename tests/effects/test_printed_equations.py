@@ -163,7 +163,11 @@ def test_what_cannot_be_chosen_is_said(words: list[str], message: str) -> None:
 def test_the_commands_say_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["effects", "--model", "static,inertia,velocity-weakening:form=hyperbolic"]) == 0
     assert "    μ → μ [1 - ε s/(1 + s)]\n" in capsys.readouterr().out
-    for words, message in (("", "no model is named"), ("static,contact-ageing", "static,inertia,contact-ageing")):
+    for words, message in (
+        ("", "no model is named"),
+        ("static,contact-ageing", "static,inertia,contact-ageing"),
+        ("static,inertia,my-effect", "one of your own needs --effect FILE.py"),
+    ):
         assert run(["effects", "--model", words]) == 2
         assert message in capsys.readouterr().err
     assert run(["effects", "rate-and-state"]) == 0

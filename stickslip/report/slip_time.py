@@ -1,0 +1,37 @@
+"""Whether the slips last as long as the mass and the spring want it: a mass in grams is found so."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..segment import Segmentation
+from ..trace import Trace
+from ..units import shown
+
+_FEW = 4  # slips from which their time is known
+_SAMPLES = 5  # of a slip, from which its time is that of the block and not of the sampling
+_OFF = 4.0  # factor between the two times, 16 of the mass, that weakening and damping do not make
+
+
+def slip_time(trace: Trace, found: Segmentation, mass: float, stiffness: float) -> str | None:
+    """A sentence about slips that last far longer or shorter than half a period of the block on its spring.
+
+    Args:
+        trace, found: the record and its events.
+        mass: of the block (kg).
+        stiffness: of the driving spring (N/m).
+
+    Returns:
+        None where the two go together, or there are too few slips or samples to tell.
+    """
+    times = [event.duration for event in found.events]
+    if len(times) < _FEW:
+        return None
+    seen, expected = float(np.median(times)), float(np.pi * np.sqrt(mass / stiffness))
+    if seen < _SAMPLES * float(np.median(np.diff(trace.time))) or 1 / _OFF < seen / expected < _OFF:
+        return None
+    wanted = stiffness * (seen / np.pi) ** 2
+    return (
+        f"slips last {shown(seen, 's', 2)}, half a period of {shown(mass, 'kg', 3)} on {shown(stiffness, 'N/m', 3)} "
+        f"is {shown(expected, 's', 2)}; on that spring a block of {shown(wanted, 'kg', 2)} would slip so"
+    )
