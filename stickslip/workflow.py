@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import InputError
+from .errors import InputError, nearest
 from .runstore import Run, file_record, json_text, open_run, refuse_existing, versions
 
 if TYPE_CHECKING:
@@ -34,13 +34,11 @@ def _check_candidates(tags: Sequence[str]) -> None:
     known = catalogue.tags()
     wrong = [tag for tag in tags if tag not in known]
     if wrong:
-        hints = (
-            [f"{tag}: {catalogue.unknown(tag)}" for tag in wrong] if len(wrong) > 1 else [catalogue.unknown(wrong[0])]
-        )
+        hints = [f"{tag}: {nearest(tag, known)}" for tag in wrong] if len(wrong) > 1 else [nearest(wrong[0], known)]
         raise InputError(
             f"there is no effect {' and no effect '.join(repr(tag) for tag in wrong)}",
             key="--candidates",
-            hint="\n  ".join(hints),
+            hint="\n  ".join([*hints, catalogue.OWN]),
         )
 
 

@@ -20,6 +20,7 @@ from ..registry import Registry
 from ..units import to_si
 from .base import Effect, Memory
 
+OWN = "one of your own needs --effect FILE.py"
 FAMILIES = ("contact", "friction", "block", "geometry", "drive", "sensor")
 
 _TAG = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
@@ -135,7 +136,7 @@ def get(tag: str) -> type[Effect]:
 
 def unknown(tag: str, others: Sequence[str] = ()) -> str:
     """What to do about a tag that is none: the nearest of the catalogue and ``others``, or a file of one's own."""
-    return f"{nearest(tag, [*others, *tags()])}; one of your own needs --effect FILE.py"
+    return f"{nearest(tag, [*others, *tags()])}; {OWN}"
 
 
 def make(tag: str, **params: Any) -> Effect:
