@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..campaign import Campaign
-from ..diagnose.candidate import forms_of, try_effect
+from ..diagnose.candidate import forms_of
 from ..diagnose.heldout import held_out
+from ..diagnose.refit import try_effect
 from ..diagnose.static_rung import static_features
 from ..effects import catalogue
 from ..effects.base import Effect

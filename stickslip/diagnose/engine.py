@@ -20,9 +20,10 @@ from ..floors import floors
 from ..residual import misfit
 from ..segment import Segmentation, segment
 from ..trace import Trace
-from .candidate import AGAIN, MORE, SETTLED, WIDELY, Candidate
+from .candidate import Candidate
 from .heldout import HeldOut
 from .holdout import training_cycles
+from .refit import AGAIN, MORE, SETTLED, WIDELY
 from .revise import Named, done_without, told_apart
 from .rungs import Material, Rung, kept, make_rung
 from .static_rung import static_features

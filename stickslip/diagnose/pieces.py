@@ -11,11 +11,10 @@ import numpy as np
 from ..effects import catalogue
 from ..features.measurement import Measurement
 from ..fit.composition import Composition
-from ..fit.inertial import Fit, errors
+from ..fit.inertial import Fit
 from ..fit.parameters import Free, effect_parameters
 from ..fit.problem import Problem
-from .candidate import Candidate
-from .heldout import held_out
+from .candidate import Candidate, with_fit
 from .periods import within_record
 
 _ARRAYS = ("z", "events", "features", "offsets", "covariance", "columns", "use")
@@ -75,10 +74,4 @@ def candidate_from(
     fit = fit_from(arrays)
     if candidate.note:
         return replace(candidate, fit=fit)
-    used = np.asarray(measurement.cycles.used)
-    return replace(
-        candidate,
-        fit=fit,
-        train=errors(measurement, fit, floor),
-        held=held_out(Problem(composition, measurement), fit, floor, used & ~train, fit.features),
-    )
+    return with_fit(candidate, fit, Problem(composition, measurement), floor, train)

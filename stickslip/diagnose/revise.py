@@ -9,7 +9,8 @@ import numpy as np
 
 from ..fit.inertial import fit
 from ..fit.problem import Problem
-from .candidate import MOST, Candidate
+from .candidate import Candidate
+from .refit import MOST
 from .rungs import Material, Rung, kept, make_rung
 from .thresholds import Thresholds
 from .verdict import Judged, at_border, confidence, grade, worse

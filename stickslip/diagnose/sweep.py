@@ -16,8 +16,10 @@ from ..effects.base import Effect
 from ..features.measurement import Measurement
 from ..fit.composition import Composition
 from ..fit.inertial import Fit
-from .candidate import FEW, MORE, Candidate, forms_of, refine, score, settle
+from .candidate import Candidate, forms_of
 from .pieces import candidate_arrays, candidate_from
+from .refit import FEW, MORE, refine, settle
+from .search import score
 
 PROMISING, EXPLAINING = 7, 3  # candidates that are refitted: by the best point seen, and by the linear score
 LEAST = 4  # of those that get more than the first steps

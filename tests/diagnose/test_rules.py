@@ -9,11 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.diagnose.candidate import Candidate, starts
+from stickslip.diagnose.candidate import Candidate
 from stickslip.diagnose.heldout import HeldOut
 from stickslip.diagnose.holdout import training_cycles
 from stickslip.diagnose.pieces import fit_arrays, fit_from
 from stickslip.diagnose.rungs import Rung
+from stickslip.diagnose.search import starts
 from stickslip.diagnose.thresholds import THRESHOLDS
 from stickslip.diagnose.verdict import (
     confidence,

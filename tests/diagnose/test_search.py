@@ -9,10 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.diagnose import candidate
-from stickslip.diagnose.candidate import starts
+from stickslip.diagnose import refit, search
+from stickslip.diagnose.candidate import Candidate
 from stickslip.diagnose.linear import Linear
 from stickslip.diagnose.periods import periods, phasor, within_record
+from stickslip.diagnose.search import Search, starts
 from stickslip.effects import catalogue
 from stickslip.fit.inertial import Fit
 from stickslip.fit.parameters import Free, effect_parameters
@@ -186,22 +187,22 @@ class Invented:
 @pytest.mark.parametrize(("tag", "signs"), [("tilt", {-1.0, 1.0}), ("machine-compliance", {1.0})])
 def test_an_amplitude_that_may_have_two_signs_is_tried_with_both(tag, signs, monkeypatch):
     data, _, line, fit, _ = made(2)
-    monkeypatch.setattr(candidate, "fit", lambda problem, floor, *, z, events, **_: replace(fit, z=z, events=events))
+    monkeypatch.setattr(search, "fit", lambda problem, floor, *, z, events, **_: replace(fit, z=z, events=events))
     effect = catalogue.make(tag)
     free = effect_parameters(effect)
     floor = 1e-4 * np.ones_like(data.values)
     problem = Invented(data, line * (1e-4 if tag == "tilt" else 1e2))
-    search = candidate._Search(problem, fit, floor, data.valid, 1.0, free, 2, effect)
-    search.best = (np.inf, fit.z, fit.events, data.values)
+    begun = Search(problem, fit, floor, data.valid, 1.0, free, 2, effect)
+    begun.best = (np.inf, fit.z, fit.events, data.values)
     for sign in (1.0, -1.0):
-        search.push({}, sign, candidate.PLAUSIBLE, np.ones(data.values.shape[:2], bool))
-    pushed = [z[-1] for _, z, *_ in search.plausible]
+        begun.push({}, sign, search.PLAUSIBLE, np.ones(data.values.shape[:2], bool))
+    pushed = [z[-1] for _, z, *_ in begun.plausible]
     assert sorted(float(np.sign(a)) for a in pushed) == sorted(signs)
-    assert search.best in search.plausible
+    assert begun.best in begun.plausible
     # a leader is begun from the plausible amplitudes that are not the best before any that is near none
-    search.each = [(0.0, fit.z, fit.events, data.values)] * 3
-    assert search.others()[: len(pushed) - 1] == [o for o in search.plausible if o is not search.best]
-    assert len(search.others()) == candidate.OTHERS
+    begun.each = [(0.0, fit.z, fit.events, data.values)] * 3
+    assert begun.others()[: len(pushed) - 1] == [o for o in begun.plausible if o is not begun.best]
+    assert len(begun.others()) == search.OTHERS
 
 
 def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_stands(monkeypatch):
@@ -217,16 +218,16 @@ def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_st
         return replace(fit, cost=now_cost[0])
 
     now_cost = [1000.0]
-    monkeypatch.setattr(candidate, "fit", step)
-    monkeypatch.setattr(candidate, "Problem", lambda *a, **k: None)
-    monkeypatch.setattr(candidate, "certain", lambda problem, floor, found: found)
-    monkeypatch.setattr(candidate, "ease", lambda *a: 1.0)
-    monkeypatch.setattr(candidate, "_with_fit", lambda c, found, *a: replace(c, fit=found))
-    begun = candidate.Candidate("tilt", {}, catalogue.make("tilt"), 0.1, 0.1, composition="invented", fit=fit)
-    hopeless = candidate.settle(begun, data, np.ones_like(data.values), data.valid, 900.0)
+    monkeypatch.setattr(refit, "fit", step)
+    monkeypatch.setattr(refit, "Problem", lambda *a, **k: None)
+    monkeypatch.setattr(refit, "certain", lambda problem, floor, found: found)
+    monkeypatch.setattr(refit, "ease", lambda *a: 1.0)
+    monkeypatch.setattr(refit, "with_fit", lambda c, found, *a: replace(c, fit=found))
+    begun = Candidate("tilt", {}, catalogue.make("tilt"), 0.1, 0.1, composition="invented", fit=fit)
+    hopeless = refit.settle(begun, data, np.ones_like(data.values), data.valid, 900.0)
     assert hopeless.cost == 1000.0
-    assert taken == [((1.0, candidate.MOST),)]
+    assert taken == [((1.0, refit.MOST),)]
     taken.clear()
-    found = candidate.settle(begun, data, np.ones_like(data.values), data.valid)
-    assert found.cost == pytest.approx(100.0 + 900.0 * (2 / 3) ** candidate.AGAIN)
-    assert taken[1:] == [candidate.WIDELY] * candidate.AGAIN
+    found = refit.settle(begun, data, np.ones_like(data.values), data.valid)
+    assert found.cost == pytest.approx(100.0 + 900.0 * (2 / 3) ** refit.AGAIN)
+    assert taken[1:] == [refit.WIDELY] * refit.AGAIN

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.diagnose import candidate
+from stickslip.diagnose import refit
 from stickslip.diagnose.candidate import Candidate
 from stickslip.effects import catalogue
 from stickslip.features.layout import PHASES
@@ -86,9 +86,9 @@ def test_standard_deviations_do_not_hang_on_the_solvers_noise(data, monkeypatch)
     assert rough.std()["contact.u_max"] < 0.4 * expected["contact.u_max"]
     noise = 0.2 * floor[..., None] * np.random.default_rng(2).standard_normal(rough.columns.shape)
     noisy = replace(rough, columns=rough.columns + noise)
-    monkeypatch.setattr(candidate, "refine", lambda found, *args, **kwargs: found)
+    monkeypatch.setattr(refit, "refine", lambda found, *args, **kwargs: found)
     led = Candidate("contact-ageing", {}, catalogue.make("contact-ageing"), 0.0, composition=composition(), fit=rough)
-    settled = candidate.settle(led, data, floor, rough.use).fit
+    settled = refit.settle(led, data, floor, rough.use).fit
     for fitted in (certain(problem, floor, rough), certain(problem, floor, noisy), settled):
         found = fitted.std()
         for name in expected.keys() - {"contact.spread"}:  # which two cycles tell least: known to a factor of three

@@ -1,0 +1,127 @@
+"""A candidate refitted from where its search began, everything else free, in stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects.base import Effect
+from ..errors import StickslipError
+from ..features.measurement import Measurement
+from ..fit.composition import Composition
+from ..fit.inertial import Fit, certain, fit
+from ..fit.problem import Problem
+from .candidate import Candidate, ease, with_fit
+from .search import score, silent
+
+HOPEFUL = 0.2  # share of the misfit gone at the start from which a search that led nowhere is begun anew
+FEW = 9  # evaluations for those that promise something
+MORE = 12  # more for the better half of them
+MOST = 30  # for the leaders
+AGAIN, SETTLED = 6, 0.97  # a leader is refined again until that takes less than 3 % off its cost
+WIDELY = ((7.0, 8), (2.5, 8), (1.0, 14))  # by way of wide floors: a search that stands still in a bent valley goes on
+
+
+def try_effect(
+    effect: Effect,
+    base: Composition,
+    optimum: Fit,
+    measurement: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    *,
+    threads: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Candidate:
+    """Score one effect on top of the base and refit everything with it to the end.
+
+    Args:
+        effect: with its form chosen.
+        base, optimum: the base composition and its fit.
+        measurement, floor: the data.
+        train: cycles that may be fitted, shape (R, n).
+        threads: runs integrated at the same time.
+        progress: told what goes on.
+    """
+    found = score(effect, base, optimum, measurement, floor, train, threads=threads, progress=progress)
+    found = refine(found, measurement, floor, train, FEW, threads=threads, progress=progress)
+    return settle(found, measurement, floor, train, threads=threads, progress=progress)
+
+
+def refine(
+    candidate: Candidate,
+    measurement: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    evaluations: int,
+    *,
+    stages: tuple[tuple[float, int], ...] = (),
+    threads: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Candidate:
+    """The same candidate after at most so many ``evaluations`` more: first at floors as wide as the misfit asks for.
+
+    ``stages`` (factors on the floors, evaluations) are taken in place of those.
+    """
+    if candidate.fit is None or candidate.composition is None:
+        return candidate
+    problem = Problem(candidate.composition, measurement, threads=threads)
+    old = candidate.fit
+    wide = ease(old, measurement, floor)
+    straight = ((1.0, evaluations),)
+    if not stages:
+        half = evaluations // 2
+        stages = ((wide, half), (1.0, evaluations - half)) if wide > 1.5 else straight
+    try:
+        # derivatives in the effect's own parameters are known where everything was refitted around it
+        known = old.columns if np.any(old.columns[..., -1]) else None
+        new = fit(problem, floor, z=old.z, events=old.events, stages=stages, use=train, columns=known)
+        if new.cost >= old.cost and len(stages) > 1 and candidate.promise > HOPEFUL:
+            # wide floors led away from a good place: straight on from there
+            new = fit(problem, floor, z=old.z, events=old.events, stages=straight, use=train, columns=known)
+    except StickslipError as error:
+        return replace(candidate, note=str(error))
+    (progress or silent)(f"{candidate.tag}: cost {old.cost:.0f} -> {new.cost:.0f}")
+    better = new if new.cost < old.cost or candidate.note else old
+    return with_fit(replace(candidate, note=""), better, problem, floor, train)
+
+
+def settle(
+    candidate: Candidate,
+    measurement: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    worth: float = np.inf,
+    *,
+    threads: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Candidate:
+    """The same candidate refined to the end, from where it is and from its other starts; the best of them.
+
+    It is followed by way of wide floors only where its cost is below ``worth`` by then. Its standard deviations are
+    those of :func:`stickslip.fit.inertial.certain`.
+    """
+
+    def go(candidate: Candidate, most: int, stages: tuple[tuple[float, int], ...] = ()) -> Candidate:
+        return refine(candidate, measurement, floor, train, most, stages=stages, threads=threads, progress=progress)
+
+    best = go(candidate, MOST)
+    if best.fit is None:
+        return best
+    for z, events in candidate.others:
+        begun = replace(candidate, fit=replace(best.fit, z=z, events=events), note="not refitted")
+        other = go(begun, FEW + MORE)
+        if other.cost < best.cost:
+            best = other
+    for _ in range(AGAIN if best.cost < worth else 0):
+        before = best.cost
+        best = go(best, MOST, WIDELY)
+        if best.cost > SETTLED * before:
+            break
+    if best.fit is None or best.composition is None:
+        return best
+    sure = certain(Problem(best.composition, measurement, threads=threads), floor, best.fit)
+    # its errors were taken with the derivatives it has
+    return replace(best, fit=replace(best.fit, covariance=sure.covariance))
