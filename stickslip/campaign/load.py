@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from ..errors import InputError, nearest
+from ..readers import beside
 from .models import CampaignFile, Rig, RigKeys, TraceEntry
 from .place import readable
 from .toml_file import read_toml
@@ -113,8 +114,8 @@ def trace_file(campaign: Path, name: str, *, outside: bool, key: str) -> tuple[P
             hint="move it beside the campaign, or write  outside = true  in this trace",
         )
     if not real.exists():
-        beside = [p.name for p in where.parent.iterdir() if p.is_file()] if where.parent.is_dir() else []
-        hint = nearest(where.name, beside) if beside else "names are relative to the campaign file's folder"
+        others = beside(where)
+        hint = nearest(where.name, others) if others else "names are relative to the campaign file's folder"
         raise InputError("the file is not there", file=campaign, key=key, value=name, hint=hint)
     if not real.is_file():
         raise InputError("not a file", file=campaign, key=key, value=name)

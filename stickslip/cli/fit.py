@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import sys
 import textwrap
 import time as clock
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from ..campaign import Campaign
     from ..segment import Segmentation
     from ..trace import Trace
+
+_BETWEEN = re.compile(r"(?<=\.) (?=[A-Z])")  # sentences
 
 
 def fit(
@@ -226,7 +229,7 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
     lines = [f"{result['title']}: {result['model']} model", *result["notes"]]
     for key in ("static", "ramps"):
         if result.get(key):
-            lines += ["", result[key]["text"]]
+            lines += ["", *_BETWEEN.split(result[key]["text"])]
     if result.get("ladder"):
         rows = [
             [_named(step["model"]), *(show.quantity(step[k], "1", 3) for k in ("train_error", "heldout_error"))]
@@ -259,4 +262,6 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
     lines.append(f"{result['seconds']:.1f} s")
     if out is not None:
         lines.append(f"written to {out}: report.html, result.json, arrays.nc")
+    else:
+        lines.append("nothing was written: --out FOLDER keeps it, with a report of pictures")
     return "\n".join(lines)

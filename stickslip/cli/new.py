@@ -40,8 +40,10 @@ def new(
         print(text, end="")
         return 0
     _write(path, text, force)
-    then = f"stickslip simulate {path}" if what == "scenario" else f"stickslip inspect {path}"
-    print(f"written to {path}; next: {then}")
+    if what == "scenario":
+        print(f"written to {path}; next: stickslip simulate {path}")
+    else:
+        print(f"written to {path}; next: name your records in it, then: stickslip inspect {path}")
     return 0
 
 

@@ -18,6 +18,7 @@ ALIKE = 2.0  # standard deviations; nor has one whose events have no more than t
 PAIRS = ((1.0, 1.0), (1.5, 3.0), (0.4, 1.0), (2.5, 0.5))
 FURTHER = ((5.0, 8), (1.0, 16))  # stages of a best fit that is begun again
 AGAIN, SETTLED = 2, 0.95  # so often at most, until that takes less than 5 % off its cost
+SEARCHED, CERTAIN = 0.7, 0.9  # shares of the work up to the best start taken again, and up to its deviations
 AWAY = 2  # stages at wide floors after which a start that does worse than the best so far is left
 
 
@@ -50,7 +51,7 @@ def best_of(
         def count(text: str, i: int = i) -> None:
             nonlocal done
             done += 1
-            tell(f"start {i + 1}/{starts}, {text}", min((i + done / most) / starts, 0.99))
+            tell(f"start {i + 1}/{starts}, {text}", SEARCHED * min((i + done / most) / starts, 1.0))
 
         try:
             found = fit(problem, floor, z=z, use=use, stages=STAGES[:AWAY], progress=count)
@@ -68,17 +69,22 @@ def best_of(
             break
     if best is None:
         raise failure or FitError("the fit was given no start")
+    once = sum(n for _, n in FURTHER)
     for again in range(AGAIN):
+        done = 0
 
         def last(text: str, again: int = again) -> None:
-            tell(f"the best start again ({again + 1}), {text}", 0.99)
+            nonlocal done
+            done += 1
+            share = min((again + done / once) / AGAIN, 1.0)
+            tell(f"the best start again ({again + 1}), {text}", SEARCHED + (CERTAIN - SEARCHED) * share)
 
         more = fit(problem, floor, z=best.z, events=best.events, use=use, stages=FURTHER, progress=last)
         arrived = more.cost > SETTLED * best.cost
         best = more if more.cost < best.cost else best
         if arrived:
             break
-    tell("standard deviations", 0.99)
+    tell("standard deviations", CERTAIN)
     return certain(problem, floor, best)
 
 

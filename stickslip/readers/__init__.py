@@ -48,6 +48,13 @@ def supported() -> str:
     return "; ".join(f"{reader.description}: {' '.join(reader.suffixes)}" for reader in readers)
 
 
+def beside(path: Path) -> list[str]:
+    """Names of files in the same folder that may hold a record: all but hidden ones and descriptions."""
+    if not path.parent.is_dir():
+        return []
+    return [p.name for p in path.parent.iterdir() if p.is_file() and p.suffix != ".toml" and p.name[0] != "."]
+
+
 def find_reader(path: str | Path, name: str | None = None) -> Reader:
     """The reader of a file, by name or by its content.
 
@@ -56,8 +63,8 @@ def find_reader(path: str | Path, name: str | None = None) -> Reader:
     """
     path = Path(path)
     if not path.exists():
-        beside = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
-        raise InputError("the file is not there", file=path, hint=nearest(path.name, beside) if beside else None)
+        others = beside(path)
+        raise InputError("the file is not there", file=path, hint=nearest(path.name, others) if others else None)
     if not path.is_file():
         raise InputError("not a file", file=path)
     try:
