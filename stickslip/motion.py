@@ -11,7 +11,7 @@ from .campaign import Campaign
 from .errors import InputError
 from .report.describe import gain_is_wrong, stick_gain
 from .report.pace import pace
-from .report.slip_time import slip_time
+from .report.slip_time import at_odds, slip_time
 from .segment import Segmentation, block_motion, segment
 from .trace import Trace
 
@@ -38,17 +38,14 @@ def check_pace(traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[s
 
 
 def slip_times(campaign: Campaign, traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[str]:
-    """A sentence for each trace whose slips are far shorter or longer than mass and spring, where both are known, let
-    them be."""
-    notes = []
+    """A sentence for each mass and spring, where both are known, that do not go with how long slips on them last."""
+    seen: dict[tuple[float, float], dict[str, float]] = {}
     for trace, events in zip(traces, found, strict=True):
-        rig = campaign.rig_of(trace.name)
-        if not (isinstance(rig.mass, float) and isinstance(rig.spring_stiffness, float)):
-            continue
-        said = slip_time(trace, events, rig.mass, rig.spring_stiffness)
-        if said is not None:
-            notes.append(f"{trace.name}: {said}: check mass and stiffness, and their units.")
-    return notes
+        rig, lasts = campaign.rig_of(trace.name), slip_time(trace, events)
+        if lasts is not None and isinstance(rig.mass, float) and isinstance(rig.spring_stiffness, float):
+            seen.setdefault((rig.mass, rig.spring_stiffness), {})[trace.name] = lasts
+    said = [(names, at_odds(list(names.values()), *rig)) for rig, names in seen.items()]
+    return [f"{', '.join(names)}: {text}: check mass and stiffness, and their units." for names, text in said if text]
 
 
 def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Segmentation], list[str]]:

@@ -166,7 +166,7 @@ def diagnose_campaign(
     inputs = input_records(loaded)
     events = [segment(t) for t in traces]
     try:
-        notes = check_pace(traces, events)
+        notes = [*check_pace(traces, events), *slip_times(loaded, traces, events)]
     except InputError as error:
         raise error.at(file=loaded.path) from None
     with open_run(out, force=force, resume=True) as run:
@@ -181,6 +181,8 @@ def diagnose_campaign(
         )
         segmentations, mended = true_gains(traces, events)
         traces, implied = with_displacements(traces, segmentations)
+        if progress is not None and notes:
+            progress("; ".join(notes), 0.0)  # before minutes of fitting, in which a wrong unit may be mended
         pieces = Pieces(run, key)
         if progress is not None and (ready := pieces.ready()):
             progress(f"going on from {ready} finished pieces", 0.0)
@@ -206,7 +208,7 @@ def diagnose_campaign(
             "inputs": inputs,
             "versions": versions(),
         }
-        result["notes"] = [*notes, *slip_times(loaded, traces, segmentations), *mended, *implied]
+        result["notes"] = [*notes, *mended, *implied]
         result["dropped"] = [*left_out(traces, segmentations), *result["dropped"]]
         top = next((r for r in reversed(found.ladder) if r.fit is not None), None)
         if top is not None and top.fit is not None and top.composition is not None:

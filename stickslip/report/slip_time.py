@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..segment import Segmentation
@@ -13,22 +15,25 @@ _SAMPLES = 5  # of a slip, from which its time is that of the block and not of t
 _OFF = 4.0  # factor between the two times, 16 of the mass, that weakening and damping do not make
 
 
-def slip_time(trace: Trace, found: Segmentation, mass: float, stiffness: float) -> str | None:
-    """A sentence about slips that last far longer or shorter than half a period of the block on its spring.
+def slip_time(trace: Trace, found: Segmentation) -> float | None:
+    """How long the slips of a record last (s, median), or None where slips or samples are too few to tell."""
+    times = [event.duration for event in found.events]
+    if len(times) < _FEW or np.median(times) < _SAMPLES * np.median(np.diff(trace.time)):
+        return None
+    return float(np.median(times))
+
+
+def at_odds(times: Sequence[float], mass: float, stiffness: float) -> str | None:
+    """A sentence about slips that last far longer or shorter than half a period of the block on its spring, or None.
 
     Args:
-        trace, found: the record and its events.
+        times: that slips last, of every record (s).
         mass: of the block (kg).
         stiffness: of the driving spring (N/m).
-
-    Returns:
-        None where the two go together, or there are too few slips or samples to tell.
     """
-    times = [event.duration for event in found.events]
-    if len(times) < _FEW:
-        return None
-    seen, expected = float(np.median(times)), float(np.pi * np.sqrt(mass / stiffness))
-    if seen < _SAMPLES * float(np.median(np.diff(trace.time))) or 1 / _OFF < seen / expected < _OFF:
+    expected = float(np.pi * np.sqrt(mass / stiffness))
+    seen = float(np.median(times))
+    if 1 / _OFF < seen / expected < _OFF:
         return None
     wanted = stiffness * (seen / np.pi) ** 2
     return (
