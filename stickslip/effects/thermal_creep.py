@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -58,13 +57,13 @@ class ThermalCreep(Flow):
     )
 
     def flow(self, state: Any, motion: Motion, force: Array, contact: Contact) -> Array:
-        cap = filled(contact.cap)
-        scale = self.activation * cap
-        y = jnp.clip(force / cap, -1.0, 1.0) / self.activation
-        rate = 2.0 * self.velocity * jnp.exp(-1.0 / self.activation) * contact.stiffness / scale
-        gone = -jnp.expm1(-rate * motion.dt * _loading(contact.stiffness * motion.dx / scale * jnp.tanh(y)))
-        left = 2.0 * (1.0 - gone) * jax.nn.sigmoid(y)
-        return force - scale * jnp.log((gone * jnp.exp(y) + left) / (gone + left))
+        scale = self.activation * filled(contact.cap)
+        per = 1.0 / scale
+        y = jnp.clip(force * per, -1.0 / self.activation, 1.0 / self.activation)
+        rate = 2.0 * self.velocity * jnp.exp(-1.0 / self.activation) * contact.stiffness * per
+        gone = -jnp.expm1(-rate * motion.dt * _loading(contact.stiffness * motion.dx * per * jnp.tanh(y)))
+        grown, kept = jnp.exp(y), 2.0 - gone
+        return force - scale * jnp.log(grown * (kept + gone * grown) / (gone + kept * grown))
 
 
 def _loading(rise: Array) -> Array:
