@@ -181,11 +181,12 @@ def diagnose_campaign(
         )
         segmentations, mended = true_gains(traces, events)
         traces, implied = with_displacements(traces, segmentations)
-        if progress is not None and notes:
-            progress("; ".join(notes), 0.0)  # before minutes of fitting, in which a wrong unit may be mended
         pieces = Pieces(run, key)
-        if progress is not None and (ready := pieces.ready()):
-            progress(f"going on from {ready} finished pieces", 0.0)
+        ready = pieces.ready()
+        # before minutes of fitting, in which a wrong unit may be mended
+        first = [*notes, *([f"going on from {ready} finished pieces"] if ready else [])]
+        if progress is not None and first:
+            progress(" ".join(first), 0.0)
         try:
             found = diagnose(
                 loaded,

@@ -202,7 +202,7 @@ def _climb(
     for effect in effects:
         tell(f"adding {effect.tag}")
         found = try_effect(effect, composition, optimum, m, floor, train, threads=problem.threads, progress=tell)
-        if found.fit is None or found.composition is None:
+        if found.fit is None or found.composition is None or found.note:
             raise FitError(f"{effect.tag} could not be fitted: {found.note or 'no finite model with it'}")
         # a model less converged than the one with the effect would make a gain of nothing
         tell(f"the model without {effect.tag} once more")

@@ -29,7 +29,8 @@ class Candidate:
         effect: the instance whose free fields the composition overwrites.
         score: share of the base's misfit that the effect explains to first order, everything else refitted.
         promise: share of the base's misfit, at floors ``wide`` times as wide, that is gone where a search would start.
-        fit: that start, or the refit; None where the effect was dropped before.
+        fit: that start, or the refit; None where the effect was dropped before. A start has the data's own features in
+            cycles that no fit has seen, and no errors.
         train: errors on the cycles fitted.
         held: errors on the others.
         note: why it was dropped, if it was.

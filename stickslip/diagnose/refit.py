@@ -76,7 +76,8 @@ def refine(
         stages = ((wide, half), (1.0, evaluations - half)) if wide > 1.5 else straight
     try:
         # derivatives in the effect's own parameters are known where everything was refitted around it
-        known = old.columns if np.any(old.columns[..., -1]) else None
+        own = [i for i, f in enumerate(old.free) if f.name.startswith(f"{candidate.tag}.")]
+        known = old.columns if np.any(old.columns[..., own]) else None
         new = fit(problem, floor, z=old.z, events=old.events, stages=stages, use=train, columns=known)
         if new.cost >= old.cost and len(stages) > 1 and candidate.promise > HOPEFUL:
             # wide floors led away from a good place: straight on from there

@@ -47,7 +47,7 @@ def score(
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Candidate:
-    """Score one effect and find where to start with it; arguments as :func:`try_effect`."""
+    """Score one effect and find where to start with it; arguments as :func:`stickslip.diagnose.refit.try_effect`."""
     form = {k: str(v) for k, v in vars(effect).items() if isinstance(v, str)}
     try:
         return _score(effect, form, base, optimum, measurement, floor, train, threads, progress or silent)

@@ -41,12 +41,14 @@ class Fit:
         events: event-wise ln factors, shape (R, n, 2).
         cost: robust chi-square, priors included.
         data_cost: of the data alone.
-        features: of the model at the optimum and what all events have in common, shape (R, n, F).
+        features: of the model at the optimum and what all events have in common, shape (R, n, F); of cycles that the
+            problem has not seen those of the data.
         offsets: what all events, or all of a run, have in common, as far as it is in ``features``, shape (R, n, F).
         covariance: of z, event-wise factors marginalised, shape (k, k); what the data tell is widened by MODEL_ERROR,
             which development campaigns asked for.
         free: what z means.
-        columns: derivatives of the features in z, the last ones used, shape (R, n, F, k).
+        columns: derivatives of the features in z, the last ones used, shape (R, n, F, k); in cycles that the fit has
+            not seen those in u_max, p and the start of a run alone.
         use: cycles the fit has seen, shape (R, n).
         evaluations, jacobians: features and Jacobians taken.
     """
@@ -81,7 +83,7 @@ class _Residuals:
     def __init__(self, problem: Problem, floor: np.ndarray, event_scale: float, use: np.ndarray | None) -> None:
         self.problem, self.floor = problem, floor
         m = problem.measurement
-        self.used = np.asarray(m.cycles.used) & (True if use is None else use)
+        self.used = np.asarray(m.cycles.used) & problem.seen & (True if use is None else use)
         self.valid = m.valid & self.used[..., None]
         self.widths = event_widths(m)[self.used].ravel() * event_scale
         self._common: dict[float, Common] = {}
@@ -401,7 +403,7 @@ def _with_unseen(whole: Problem, res: _Residuals, x: np.ndarray) -> tuple[np.nda
     """Features and derivatives at ``x``, those of cycles that the fit has not seen added: there only what every event,
     or a run, has of its own is derived by, for that is set anew where a fit is judged on them."""
     features, columns = res.evaluate(x), res.columns(x)
-    unseen = np.asarray(whole.measurement.cycles.used) & ~res.used
+    unseen = np.asarray(whole.measurement.cycles.used) & whole.seen & ~res.used
     if not unseen.any():
         return features, columns
     z, events = x[: res.k], res.events(x)
@@ -410,8 +412,12 @@ def _with_unseen(whole: Problem, res: _Residuals, x: np.ndarray) -> tuple[np.nda
     columns = np.where(unseen[..., None, None], 0.0, columns)
     names = [free.name for free in res.free]
     begins = [i for i, name in enumerate(names) if name.startswith(START) and not res.used[run_of(name)].any()]
-    which = [names.index("contact.u_max"), names.index("contact.p"), *begins]
-    slopes = rest.columns(z, events, which, features, res.steps[which])
+    own = [names.index("contact.u_max"), names.index("contact.p")]
+    # carried derivatives leave the steps as short as at first: these move features as far as those of a fit do
+    rates = np.abs(np.nan_to_num(columns[..., own])[res.valid] / res.floor[res.valid][:, None])
+    steps = [_moderate(rate, LARGEST[0]) for rate in rates.T] + [STEP] * len(begins)
+    which = [*own, *begins]
+    slopes = rest.columns(z, events, which, features, np.array(steps))
     columns[..., which] += np.where(unseen[..., None, None], slopes, 0.0)
     return features, columns
 

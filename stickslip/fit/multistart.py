@@ -51,7 +51,7 @@ def best_of(
         def count(text: str, i: int = i) -> None:
             nonlocal done
             done += 1
-            tell(f"start {i + 1}/{starts}, {text}", SEARCHED * min((i + done / most) / starts, 1.0))
+            tell(f"start {i + 1}/{starts}, {text}", SEARCHED * (i + min(done / most, 1.0)) / starts)
 
         try:
             found = fit(problem, floor, z=z, use=use, stages=STAGES[:AWAY], progress=count)
@@ -76,7 +76,7 @@ def best_of(
         def last(text: str, again: int = again) -> None:
             nonlocal done
             done += 1
-            share = min((again + done / once) / AGAIN, 1.0)
+            share = (again + min(done / once, 1.0)) / AGAIN
             tell(f"the best start again ({again + 1}), {text}", SEARCHED + (CERTAIN - SEARCHED) * share)
 
         more = fit(problem, floor, z=best.z, events=best.events, use=use, stages=FURTHER, progress=last)

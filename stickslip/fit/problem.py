@@ -45,6 +45,9 @@ class Problem:
         measurement: the data.
         tolerance: of the solver.
         threads: runs integrated at the same time.
+
+    Attributes:
+        seen: cycles whose features are those of the model, shape (R, n); see :meth:`seeing`.
     """
 
     def __init__(
@@ -59,7 +62,7 @@ class Problem:
         self.runs_done = 0
         both = (measurement.cycles, measurement.anchors)
         self._data = [jax.tree.map(lambda a, r=r: a[r], both) for r in range(measurement.runs)]
-        self._seen = np.ones(np.shape(measurement.cycles.used), bool)
+        self.seen = np.ones(np.shape(measurement.cycles.used), bool)
 
     def coarser(self) -> Problem:
         """The same at a tolerance that suffices where floors are widened."""
@@ -72,8 +75,8 @@ class Problem:
         not at all. Features of the others are those of the data, or of the ``base`` that is given.
         """
         other = copy(self)
-        needed = np.logical_or.accumulate((cycles & self._seen)[:, ::-1], axis=1)[:, ::-1]
-        other._seen = cycles & self._seen
+        other.seen = cycles & self.seen
+        needed = np.logical_or.accumulate(other.seen[:, ::-1], axis=1)[:, ::-1]
         other._data = [
             (c._replace(used=c.used & until), anchors) for (c, anchors), until in zip(self._data, needed, strict=True)
         ]
@@ -197,8 +200,8 @@ class Problem:
             return np.asarray(_features(self._track(z, events, r), self._data[r][1], times))
 
         # the longest runs first, so that no thread is left with one at the end
-        order = np.argsort([-np.count_nonzero(m.cycles.used[r]) for r in range(m.runs)])
-        order = order[self._seen[order].any(axis=1)]
+        order = np.argsort([-np.count_nonzero(cycles.used) for cycles, _ in self._data])
+        order = order[self.seen[order].any(axis=1)]
         tasks = [(lane, int(r)) for r in order for lane in range(len(lanes)) if only[lane] in (None, r)]
         self.runs_done += len(tasks)
         if self.threads == 1:
@@ -208,7 +211,7 @@ class Problem:
                 done = dict(zip(tasks, pool.map(one, tasks), strict=True))
         out = [np.array(m.values if base is None else base) for _ in lanes]
         for (lane, r), found in done.items():
-            out[lane][r, self._seen[r]] = found[self._seen[r]]
+            out[lane][r, self.seen[r]] = found[self.seen[r]]
         return out
 
 

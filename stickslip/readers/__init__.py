@@ -19,7 +19,7 @@ from .tdms import TdmsReader
 from .text import TextReader
 from .uff import UffReader
 
-__all__ = ["READERS", "Columns", "Reader", "find_reader", "read_columns", "split_unit", "supported"]
+__all__ = ["READERS", "Columns", "Reader", "beside", "find_reader", "read_columns", "split_unit", "supported"]
 
 
 def _instance(loaded: object) -> Reader:
