@@ -45,7 +45,8 @@ def slip_times(campaign: Campaign, traces: Sequence[Trace], found: Sequence[Segm
         if lasts is not None and isinstance(rig.mass, float) and isinstance(rig.spring_stiffness, float):
             seen.setdefault((rig.mass, rig.spring_stiffness), {})[trace.name] = lasts
     said = [(names, at_odds(list(names.values()), *rig)) for rig, names in seen.items()]
-    return [f"{', '.join(names)}: {text}: check mass and stiffness, and their units." for names, text in said if text]
+    check = "check mass and stiffness, and the units, also that of time"
+    return [f"{', '.join(names)}: {text}: {check}." for names, text in said if text]
 
 
 def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Segmentation], list[str]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from stickslip.campaign import load_campaign, load_traces
 from stickslip.cli import run
 from stickslip.diagnose import engine
 from stickslip.motion import check_pace, slip_times, true_gains, with_displacements
+from stickslip.report.slip_time import at_odds, slip_time
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
 from stickslip.workflow import diagnose_campaign
@@ -108,7 +111,7 @@ def test_a_block_a_little_ahead_of_its_drive_is_pointed_out_and_fitted():
 
 
 @pytest.mark.parametrize(("mass", "off"), [("26 g", False), ("100 g", False), ("26 kg", True), ("26 mg", True)])
-def test_a_mass_wrong_by_a_thousand_is_pointed_out(tmp_path, mass, off):
+def test_a_mass_wrong_by_a_thousand_is_pointed_out(tmp_path, capsys, mass, off):
     """Slips of 40 ms on 168 N/m are those of 27 g."""
     t, x = moved()
     np.savetxt(tmp_path / "x.csv", np.stack([t, 1e6 * x], 1), delimiter=",", header="t [s],x [um]", comments="")
@@ -120,8 +123,35 @@ def test_a_mass_wrong_by_a_thousand_is_pointed_out(tmp_path, mass, off):
     traces = load_traces(campaign)
     said = slip_times(campaign, traces, [segment(t) for t in traces])
     assert len(said) == off
+    assert run(["inspect", str(tmp_path / "c.toml")]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert ("check mass and stiffness" in shown) == off
     if off:
-        assert "check mass and stiffness" in said[0]
+        assert said[0] in shown
         assert f"half a period of {mass}" in said[0]
         assert "a block of 2" in said[0]
         assert "g would slip so" in said[0]
+
+
+def test_a_guessed_mass_and_slips_that_are_not_resolved_are_not_judged(tmp_path):
+    t, x = moved()
+    np.savetxt(tmp_path / "x.csv", np.stack([t, 1e6 * x], 1), delimiter=",", header="t [s],x [um]", comments="")
+    (tmp_path / "c.toml").write_text(
+        'schema = 1\n[rig]\nmass = { guess = "26 kg", lower = "1 g", upper = "100 kg" }\n'
+        f'spring_stiffness = "{STIFFNESS} N/m"\n[[trace]]\nfile = "x.csv"\ntime = {{ column = "t" }}\n'
+        f'displacement = {{ column = "x" }}\ndrive_velocity = "{1e6 * SPEED} um/s"\n'
+    )
+    campaign = load_campaign(tmp_path / "c.toml")
+    (trace,) = load_traces(campaign)
+    found = segment(trace)
+    assert slip_times(campaign, [trace], [found]) == []
+    assert slip_time(trace, found) == pytest.approx(0.04, rel=0.05)
+    assert slip_time(trace, replace(found, settings=replace(found.settings, window=0.01))) is None
+    assert slip_time(trace, replace(found, events=found.events[:3])) is None
+    assert slip_time(trace.replace(time=20.0 * trace.time), found) is None
+
+
+@pytest.mark.parametrize(("ratio", "off"), [(1 / 5, True), (1 / 3, False), (1.0, False), (8.0, False), (13.0, True)])
+def test_strong_damping_makes_slips_last_but_nothing_makes_them_short(ratio, off):
+    half = np.pi * np.sqrt(0.1 / 1000.0)
+    assert bool(at_odds([0.9 * ratio * half, ratio * half, 2.0 * ratio * half], 0.1, 1000.0)) == off

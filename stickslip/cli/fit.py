@@ -106,6 +106,8 @@ def fit(
     else:
         from ._inertial import Options, fit_inertial
 
+        for text in notes:  # before minutes of fitting, in which a wrong unit may be mended
+            print(text, file=sys.stderr)
         options = Options(add, effect, profile, starts, 1.0 if new_lines else None, most_events, most_steps)
         result, variables = fit_inertial(loaded, traces, found, options)
     result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}

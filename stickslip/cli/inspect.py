@@ -84,6 +84,7 @@ def inspection(
     loaded: Campaign, traces: list[Trace], found: list[Segmentation]
 ) -> tuple[dict[str, Any], dict[str, tuple]]:
     """``result.json`` of an inspection, and the arrays its pictures need."""
+    from ..motion import slip_times
     from ..report import abilities, describe_trace, trace_pieces
     from ..report.ripple import stick_ripple
 
@@ -99,7 +100,7 @@ def inspection(
         variables |= trace_pieces(trace, segmentation, i)
         rows.append(row)
     able = abilities(traces, found)
-    cannot = [*able.cannot, *_lacking(loaded, traces, found)]
+    cannot = [*able.cannot, *slip_times(loaded, traces, found), *_lacking(loaded, traces, found)]
     dropped = [f"{t['name']}: {text}" for t in rows for text in (*t["repairs"], *t["dropped"])]
     result = {
         **head(loaded, "inspect"),

@@ -11,16 +11,15 @@ from ..trace import Trace
 from ..units import shown
 
 _FEW = 4  # slips from which their time is known
-_SAMPLES = 5  # of a slip, from which its time is that of the block and not of the sampling
-_OFF = 4.0  # factor between the two times, 16 of the mass, that weakening and damping do not make
+_WINDOWS = 5  # of the estimator (and samples) in a slip, from which its time is that of the block
+_SHORTER, _LONGER = 4.0, 12.0  # factors on half a period; strong damping makes a slip last up to ten times as long
 
 
 def slip_time(trace: Trace, found: Segmentation) -> float | None:
-    """How long the slips of a record last (s, median), or None where slips or samples are too few to tell."""
+    """How long the slips of a record last (s, median), or None where it has too few or resolves them too poorly."""
     times = [event.duration for event in found.events]
-    if len(times) < _FEW or np.median(times) < _SAMPLES * np.median(np.diff(trace.time)):
-        return None
-    return float(np.median(times))
+    shortest = _WINDOWS * max(float(np.median(np.diff(trace.time))), found.settings.window)
+    return float(np.median(times)) if len(times) >= _FEW and np.median(times) >= shortest else None
 
 
 def at_odds(times: Sequence[float], mass: float, stiffness: float) -> str | None:
@@ -33,7 +32,7 @@ def at_odds(times: Sequence[float], mass: float, stiffness: float) -> str | None
     """
     expected = float(np.pi * np.sqrt(mass / stiffness))
     seen = float(np.median(times))
-    if 1 / _OFF < seen / expected < _OFF:
+    if 1 / _SHORTER < seen / expected < _LONGER:
         return None
     wanted = stiffness * (seen / np.pi) ** 2
     return (

@@ -231,3 +231,29 @@ def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_st
     found = refit.settle(begun, data, np.ones_like(data.values), data.valid)
     assert found.cost == pytest.approx(100.0 + 900.0 * (2 / 3) ** refit.AGAIN)
     assert taken[1:] == [refit.WIDELY] * refit.AGAIN
+
+
+def test_derivatives_of_a_periodic_effect_are_carried_on_where_the_last_run_is_held_out(monkeypatch):
+    """Its last parameter is the phase of that run, in which nothing is known of any slope."""
+    data, columns, _, fit, _ = made(4)
+    base = tuple(fit.free)
+    own = tuple(Free(n, "1", 1.0, 0.0, 0.0, 1.0, -9.0, 9.0) for n in ("wave.size", "wave.phase.0", "wave.phase.1"))
+    known = np.concatenate([columns, columns[..., :1], columns[..., :1], np.zeros_like(columns[..., :1])], axis=-1)
+    begun = replace(fit, free=base + own, z=np.zeros(5), cost=1000.0, columns=known)
+    given = []
+
+    def step(problem, floor, *, z, events, columns=None, **_):
+        given.append(columns)
+        return replace(begun, cost=900.0)
+
+    monkeypatch.setattr(refit, "fit", step)
+    monkeypatch.setattr(refit, "Problem", lambda *a, **k: None)
+    monkeypatch.setattr(refit, "ease", lambda *a: 1.0)
+    monkeypatch.setattr(refit, "with_fit", lambda c, found, *a: replace(c, fit=found))
+    floor, train = np.ones_like(data.values), data.valid.any(axis=-1)
+    candidate = Candidate("wave", {}, catalogue.make("tilt"), 0.1, 0.1, composition="invented", fit=begun)
+    refit.refine(candidate, data, floor, train, 9)
+    nothing_known = replace(begun, columns=np.where(np.arange(5) < 2, known, 0.0))
+    refit.refine(replace(candidate, fit=nothing_known), data, floor, train, 9)
+    assert given[0] is known
+    assert given[1] is None
