@@ -326,6 +326,7 @@ def fit(
     ev = np.zeros((*res.used.shape, 2)) if events is None else events
     x = np.clip(np.concatenate([start, ev[res.used].ravel()]), low + 1e-9, high - 1e-9)
     res.anew = anew
+    res.solve(coarse if stages[0][0] >= WIDE else problem)
     if columns is not None:
         res.start(x, columns)
     scale = np.concatenate([[min(f.width, 1.0) for f in res.free], res.widths])

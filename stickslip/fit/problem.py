@@ -60,22 +60,27 @@ class Problem:
         self.composition, self.measurement, self.threads = composition, measurement, threads
         self.tolerance = FINE if tolerance is None else tolerance
         self.runs_done = 0
+        self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         both = (measurement.cycles, measurement.anchors)
         self._data = [jax.tree.map(lambda a, r=r: a[r], both) for r in range(measurement.runs)]
         self.seen = np.ones(np.shape(measurement.cycles.used), bool)
 
     def coarser(self) -> Problem:
         """The same at a tolerance that suffices where floors are widened."""
+        if self.tolerance is COARSE:
+            return self
         other = copy(self)
-        other.tolerance = COARSE
+        other.tolerance, other._last = COARSE, None
         return other
 
     def seeing(self, cycles: np.ndarray) -> Problem:
         """The same for some cycles, shape (R, n): a run is integrated as far as the last of them, and one without any
         not at all. Features of the others are those of the data, or of the ``base`` that is given.
         """
+        if not np.any(self.seen & ~cycles):
+            return self
         other = copy(self)
-        other.seen = cycles & self.seen
+        other.seen, other._last = cycles & self.seen, None
         needed = np.logical_or.accumulate(other.seen[:, ::-1], axis=1)[:, ::-1]
         other._data = [
             (c._replace(used=c.used & until), anchors) for (c, anchors), until in zip(self._data, needed, strict=True)
@@ -87,8 +92,12 @@ class Problem:
         return Common(self.measurement, floor, use, factor)
 
     def features(self, z: np.ndarray, events: np.ndarray) -> np.ndarray:
-        """Features of the model, shape (R, n, F)."""
-        return self._call([(np.asarray(z, float), events)])[0]
+        """Features of the model, shape (R, n, F); those asked for last are remembered."""
+        last = self._last
+        if last is None or not (np.array_equal(last[0], z) and np.array_equal(last[1], events)):
+            found = self._call([(np.asarray(z, float), events)])[0]
+            self._last = last = np.array(z, float), np.array(events), found
+        return last[2].copy()
 
     def again(self, z: np.ndarray, events: np.ndarray, run: int, base: np.ndarray) -> np.ndarray:
         """The features ``base`` with those of one run taken anew, shape (R, n, F)."""
