@@ -23,6 +23,7 @@ from stickslip.challenge.make import make_challenge
 from stickslip.challenge.mix import Case, Hidden, case_seed
 from stickslip.challenge.run import Progress, run_challenge
 from stickslip.challenge.seal import RUNS, read_seal, read_truth
+from stickslip.runstore import read_result
 from stickslip.workflow import diagnose_campaign
 
 MULTIPLE = 10.0  # of detection, or the largest at which the block slips
@@ -92,34 +93,39 @@ class Tally:
         answered: how many.
         exact: the answer is the truth. right: or a set of at most three that holds it.
         table: every answer, a row each (Markdown).
+        shown: in how many the base model alone is not within its limits, so that an effect was looked for.
+        shown_exact, shown_right: of these.
     """
 
     answered: int
     exact: int
     right: int
     table: str
+    shown: int
+    shown_exact: int
+    shown_right: int
 
 
 def tally(folder: Path) -> Tally:
     """The answers so far."""
-    rows, right, exact, number = (
-        ["| hidden | lines | times detection | said | unseen error |", "|---|---|---|---|---|"],
-        0,
-        0,
-        0,
-    )
+    rows = ["| hidden | lines | times detection | looked for | said | unseen error |", "|---|---|---|---|---|---|"]
+    answers: list[tuple[bool, bool, bool]] = []
     for truth in read_truth(folder)["cases"]:
         answer = read_answer(folder / RUNS, truth["name"])
         if answer.kind == "not run":
             continue
         tags = tuple(e["tag"] for e in truth["effects"])
-        number += 1
-        right += is_right(truth["kind"], tags, answer)
-        exact += is_exact(truth["kind"], tags, answer)
+        looked = answer.kind != "failed" and bool(read_result(folder / RUNS / truth["name"])["ranking"])
+        answers.append((looked, is_exact(truth["kind"], tags, answer), is_right(truth["kind"], tags, answer)))
         times = ", ".join(f"{e['multiple']:.3g}" for e in truth["effects"])
         lines = "new" if truth["new_lines"] else "same"
-        rows.append(f"| {', '.join(tags) or 'nothing'} | {lines} | {times} | {_said(answer)} | {_errors(answer)} |")
-    return Tally(number, exact, right, "\n".join(rows))
+        rows.append(
+            f"| {', '.join(tags) or 'nothing'} | {lines} | {times} | {'yes' if looked else 'no'} | {_said(answer)} | "
+            f"{_errors(answer)} |"
+        )
+    _, exact, right = (sum(a[i] for a in answers) for i in range(3))
+    shown, shown_exact, shown_right = (sum(a[0] and a[i] for a in answers) for i in range(3))
+    return Tally(len(answers), exact, right, "\n".join(rows), shown, shown_exact, shown_right)
 
 
 def _said(answer: Answer) -> str:
@@ -163,6 +169,7 @@ def main() -> None:
     found = measure(options.folder, options.part, options.seed, options.number, options.workers)
     print(found.table)
     print(f"\n{found.answered} answered: {found.exact} exact, {found.right} right")
+    print(f"{found.shown} in which something was looked for: {found.shown_exact} exact, {found.shown_right} right")
 
 
 if __name__ == "__main__":
