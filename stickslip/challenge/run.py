@@ -47,6 +47,7 @@ def run_challenge(
     workers: int | None = None,
     candidates: Sequence[str] | None = None,
     max_effects: int = 4,
+    only: Sequence[str] | None = None,
     retry: bool = False,
     diagnosis: Diagnosis | None = None,
     tell: Callable[[Progress], None] | None = None,
@@ -61,6 +62,7 @@ def run_challenge(
         folder: of the challenge. Workers on other machines must see it under the same path.
         scheduler, workers: see :func:`stickslip.challenge.cluster.cluster`.
         candidates, max_effects: of the diagnosis; fixed by the first run of this challenge.
+        only: names of cases, done in this order, the others left open; default all.
         retry: try cases again that failed before.
         diagnosis: called with the campaign file and the run folder to write; default the package's own.
         tell: told of every finished case.
@@ -70,13 +72,16 @@ def run_challenge(
         How many cases are ``done``, ``failed`` and ``open``.
 
     Raises:
-        SealError: a campaign is not as sealed. InputError: other settings than before; no scheduler answers.
+        SealError: a campaign is not as sealed. InputError: other settings than before; a case that there is not; no
+            scheduler answers.
         RunFolderError: another run is at this challenge, or the disk is full or read-only.
         StickslipError: the cluster was lost.
     """
     check_counts(max_effects)
     folder = Path(folder).resolve()
     seal = check_seal(folder, truth=False)
+    cases = case_names(seal)
+    wanted = cases if only is None else _known(only, cases, folder)
     runs = folder / RUNS
     tags = None if candidates is None else list(candidates)
     if diagnosis is None:
@@ -84,8 +89,7 @@ def run_challenge(
     with alone(runs):
         runs.mkdir(exist_ok=True)
         _protocol(runs, digest(folder), {"candidates": tags, "max_effects": max_effects})
-        cases = case_names(seal)
-        waiting = [c for c in cases if not is_done(runs, c) and (retry or not failures(runs, c))]
+        waiting = [c for c in wanted if not is_done(runs, c) and (retry or not failures(runs, c))]
         if waiting:
             _go_on(runs, cases, waiting)
             with cluster(scheduler, workers) as client:
@@ -98,6 +102,16 @@ def run_challenge(
     done = sum(is_done(runs, c) for c in cases)
     failed = sum(not is_done(runs, c) and bool(failures(runs, c)) for c in cases)
     return {"done": done, "failed": failed, "open": len(cases) - done - failed}
+
+
+def _known(only: Sequence[str], cases: Sequence[str], folder: Path) -> list[str]:
+    for name in only:
+        if name not in cases:
+            raise InputError(
+                "no such case", file=folder, value=name, allowed=f"{cases[0]} to {cases[-1]}",
+                hint="name the cases as the folder 'cases' does, with commas between them",
+            )  # fmt: skip
+    return list(dict.fromkeys(only))
 
 
 def _workers(number: int) -> str:

@@ -60,6 +60,7 @@ def run(
     workers: int | None = None,
     candidates: str | None = None,
     max_effects: int = 4,
+    only: str | None = None,
     retry: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Diagnose every case; what is finished is not done again, and a case cut off goes on from its pieces.
@@ -76,12 +77,14 @@ def run(
         Try these effects only: contact-ageing,drive-ripple.
     max_effects:
         Add at most so many, one after the other.
+    only:
+        Diagnose these cases only, in this order, and leave the others open: case-003,case-001.
     retry:
         Try cases again that failed.
     """
     from ..challenge.run import run_challenge
 
-    chosen = None if candidates is None else [c.strip() for c in candidates.split(",") if c.strip()]
+    chosen, some = _names(candidates), _names(only)
     try:
         found = run_challenge(
             folder,
@@ -89,6 +92,7 @@ def run(
             workers=workers,
             candidates=chosen,
             max_effects=max_effects,
+            only=some,
             retry=retry,
             tell=_tell,
             note=_note,
@@ -99,6 +103,10 @@ def run(
     if found["failed"]:
         print(f"failures are described in {folder / 'runs'}; try again with --retry")
     return 0 if not found["open"] and not found["failed"] else UNRESOLVED
+
+
+def _names(text: str | None) -> list[str] | None:
+    return None if text is None else [n.strip() for n in text.split(",") if n.strip()]
 
 
 def _tell(p: Progress) -> None:
