@@ -95,8 +95,8 @@ def run_challenge(
             with cluster(scheduler, workers) as client:
                 there = Workers(client, note)
                 if note is not None:
-                    note(f"{len(waiting)} of {len(cases)} cases to do, {_workers(there.number)}")
-                _work(client, there, folder, waiting, len(cases), diagnosis, tell)
+                    note(f"{len(waiting)} of {len(wanted)} cases to do, {_workers(there.number)}")
+                _work(client, there, folder, waiting, len(wanted), diagnosis, tell)
             with suppress(OSError):  # who reads the protocol finds it out as well
                 _keep(runs, codes_of(runs, read_protocol(runs), cases))
     done = sum(is_done(runs, c) for c in cases)

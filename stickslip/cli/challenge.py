@@ -102,7 +102,8 @@ def run(
     print(f"{found['done']} diagnosed, {found['failed']} failed, {found['open']} open")
     if found["failed"]:
         print(f"failures are described in {folder / 'runs'}; try again with --retry")
-    return 0 if not found["open"] and not found["failed"] else UNRESOLVED
+    left_open = found["open"] and some is None
+    return UNRESOLVED if left_open or found["failed"] else 0
 
 
 def _names(text: str | None) -> list[str] | None:

@@ -109,6 +109,43 @@ def test_local_cluster_runs_every_case_once_and_keeps_failures(tmp_path: Path) -
     assert next(c["failed_before"] for c in score["list"] if c["case"] == "case-003") == 1
 
 
+def test_some_cases_first(tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, log = challenge(tmp_path / "c"), tmp_path / "log"
+    told: list[Progress] = []
+    noted: list[str] = []
+    some = {"workers": 1, "diagnosis": invented_diagnosis(log), "tell": told.append, "note": noted.append}
+    found = run_challenge(folder, only=["case-005", "case-002", "case-005"], **some)
+    assert found == {"done": 2, "failed": 0, "open": 4}
+    assert noted == ["2 of 2 cases to do, 1 worker"]
+    assert [name for name, _ in started(log)] == ["case-005", "case-002"]
+    assert [(p.done, p.total) for p in told] == [(1, 2), (2, 2)]
+    score = score_challenge(folder)
+    assert (score["finished"], score["cases"]) == (2, 6)
+
+    run_challenge(folder, only=["case-001", "case-002"], **some)
+    assert noted[1:] == ["1 of 2 cases to do, 1 worker"]
+    assert [name for name, _ in started(log)[2:]] == ["case-001"]
+    with pytest.raises(InputError, match="no such case") as error:
+        run_challenge(folder, only=["case-001", "case-7"], **some)
+    assert error.value.value == "case-7"
+    assert error.value.allowed == "case-001 to case-006"
+    assert run_challenge(folder, **some) == {"done": 6, "failed": 0, "open": 0}
+    assert [name for name, _ in started(log)[3:]] == ["case-003", "case-004", "case-006"]
+
+    asked: list[Any] = []
+
+    def instead(folder: Path, **options: Any) -> dict[str, int]:
+        asked.append(options["only"])
+        return {"done": 2, "failed": len(asked) - 1, "open": 4}
+
+    monkeypatch.setattr("stickslip.challenge.run.run_challenge", instead)
+    command = ["challenge", "run", str(folder), "--only", "case-005, case-002"]
+    assert run(command) == 0  # what was asked for is done
+    assert run(command) == 3
+    assert asked == [["case-005", "case-002"]] * 2
+    assert "2 diagnosed, 0 failed, 4 open" in capsys.readouterr().out
+
+
 def test_other_code_goes_on_and_is_written_down(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, log = challenge(tmp_path / "c", NAMES[:4]), tmp_path / "log"
     path = folder / RUNS / PROTOCOL
