@@ -62,7 +62,8 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
             n_workers=workers or os.cpu_count() or 1,
             threads_per_worker=1,
             processes=True,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # no page, but a port of its own beside another run on this machine
+            scheduler_kwargs={"dashboard": False},
             memory_limit=None,  # a case is all a worker holds; pausing it would not free anything
             silence_logs=logging.CRITICAL,
         ) as local,

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -17,6 +18,7 @@ import dask
 import pytest
 from invented import effect, make
 
+from stickslip.challenge.cluster import cluster
 from stickslip.challenge.one_case import failures
 from stickslip.challenge.run import PROTOCOL, UNRECORDED, Progress, code_digest, run_challenge, time_left
 from stickslip.challenge.score import score_challenge
@@ -277,6 +279,13 @@ def test_a_worker_that_is_slow_to_come_back_is_waited_for(tmp_path: Path) -> Non
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "1ms"}):  # sooner than any process starts
         found = run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log, dying="case-001"))
     assert found == {"done": 1, "failed": 1, "open": 0}
+
+
+def test_two_clusters_on_one_machine_do_not_speak_of_ports() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with cluster(None, 1) as one, cluster(None, 1) as other:
+            assert [one.submit(sum, [1, 2]).result(), other.submit(sum, [1, 3]).result()] == [3, 4]
 
 
 def test_a_diagnosis_without_a_result_is_a_failure(tmp_path: Path) -> None:
