@@ -12,6 +12,7 @@ import numpy as np
 from ..campaign import Campaign
 from ..diagnose.candidate import forms_of
 from ..diagnose.heldout import held_out
+from ..diagnose.holdout import training_cycles
 from ..diagnose.refit import try_effect
 from ..diagnose.static_rung import static_features
 from ..effects import catalogue
@@ -37,6 +38,10 @@ from .working import Tell, working
 
 REFIT = ((2.5, 4), (1.0, 8))  # of a profile's points, from the neighbouring optimum
 AGAIN = ((1.0, 12),)  # of a model, from where the same with one effect more arrived
+NOTHING_UNSEEN = (
+    "every run is fitted, so nothing is known of unseen ones: --holdout RUN, or role = \"held-out\" in the campaign, "
+    "keeps one aside"
+)
 PIN = 1e-3  # width of the prior that holds a profiled parameter, on the search scale
 
 
@@ -47,6 +52,7 @@ class Options:
     add: tuple[str, ...]
     files: tuple[Path, ...]
     profiles: tuple[str, ...]
+    holdout: tuple[str, ...]
     starts: int
     scatter: float | None
     most_events: int
@@ -94,9 +100,11 @@ def fit_inertial(
     base = replace(base_composition(loaded, m), most_steps=options.most_steps)
     _check_names(options.profiles, base, effects)
     try:
-        train = _training(m, traces)
+        train = _training(m, traces, options.holdout)
     except InputError as error:
         raise error.at(file=loaded.path) from None
+    if train.sum() == m.cycles.used.sum():
+        notes.append(NOTHING_UNSEEN)
     with working("fitting") as tell:
         composition, optimum, ladder = _climb(m, base, effects, floor, train, options.starts, tell)
         problem = Problem(composition, m)
@@ -173,13 +181,10 @@ def _check_names(names: tuple[str, ...], base: Composition, effects: list[Any]) 
             raise InputError("no free parameter of that name", key="--profile", value=name, hint=nearest(name, known))
 
 
-def _training(m: Measurement, traces: list[Trace]) -> np.ndarray:
+def _training(m: Measurement, traces: list[Trace], holdout: tuple[str, ...]) -> np.ndarray:
     """Cycles that are fitted, shape (R, n): those of all runs that are not held out."""
-    roles = {t.name: t.role for t in traces}
-    held = np.array([roles[name] == "held-out" for name in m.names])
-    if held.all():
-        raise InputError("every run is held out", key="role", hint='leave role = "held-out" to some of the runs')
-    return np.asarray(m.cycles.used) & ~held[:, None]
+    held = holdout or tuple(t.name for t in traces if t.role == "held-out" and t.name in m.names)
+    return training_cycles(m, held) if held else np.asarray(m.cycles.used)
 
 
 def _climb(

@@ -35,6 +35,7 @@ def fit(
     add: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
     profile: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
+    holdout: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     starts: int = 4,
     align: Literal["consistent", "paper"] = "consistent",
     time: Literal["exact", "paper"] = "exact",
@@ -64,6 +65,9 @@ def fit(
         A Python file with an effect of your own, to be used with --add. Its code is run.
     profile:
         Profile likelihood of a parameter: --profile contact.u_max. May be given several times.
+    holdout:
+        A run the dynamic fit may not see, on which every model is tried: --holdout v400.csv. May be given several
+        times. Default: runs whose role in the campaign is "held-out", else none.
     starts:
         Starts of the dynamic fit: the first from the data, the others spread by the priors.
     align:
@@ -91,7 +95,8 @@ def fit(
     from ..units import to_si
 
     speed = to_si(v_lim, "m/s", key="--v-lim")
-    _check(model, add, profile, speed, starts=starts, most_events=most_events, most_steps=most_steps)
+    dynamic = {"--add": add, "--profile": profile, "--holdout": holdout}
+    _check(model, dynamic, speed, starts=starts, most_events=most_events, most_steps=most_steps)
     if out is not None:
         refuse_existing(out, force)
     began = _now()
@@ -108,7 +113,7 @@ def fit(
 
         for text in notes:  # before minutes of fitting, in which a wrong unit may be mended
             print(text, file=sys.stderr)
-        options = Options(add, effect, profile, starts, 1.0 if new_lines else None, most_events, most_steps)
+        options = Options(add, effect, profile, holdout, starts, 1.0 if new_lines else None, most_events, most_steps)
         result, variables = fit_inertial(loaded, traces, found, options)
     result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
     result["notes"] = [*notes, *mended, *result.get("notes", ())]
@@ -125,9 +130,8 @@ def _now() -> float:
     return clock.perf_counter()
 
 
-def _check(model: str, add: tuple[str, ...], profile: tuple[str, ...], speed: float, **counts: int) -> None:
-    if model == "static" and (add or profile):
-        what = "--add" if add else "--profile"
+def _check(model: str, dynamic: dict[str, tuple[str, ...]], speed: float, **counts: int) -> None:
+    for what in (flag for flag, given in dynamic.items() if given and model == "static"):
         raise InputError(f"{what} belongs to the dynamic model", key=what, hint="leave it out, or use --model inertial")
     for name, (least, most) in {"starts": (1, 100), "most_events": (1, 200), "most_steps": (512, 100_000)}.items():
         if not least <= counts[name] <= most:

@@ -26,7 +26,9 @@ MOST_TRACES = 12
 def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str, str, Figure]]:
     """(section, caption, figure) of everything this result can show."""
     if len(result.get("ladder") or []) > 1:
-        yield "ladder", "Error of every model by phase, on fitted and on unseen runs.", ladder_picture(result["ladder"])
+        unseen = any(step.get("heldout_error") is not None for step in result["ladder"])
+        runs = "on fitted and on unseen runs" if unseen else "on fitted runs; no run was kept aside"
+        yield "ladder", f"Error of every model by phase, {runs}.", ladder_picture(result["ladder"])
     misfit = result.get("misfit") or {}
     if misfit.get("table"):
         yield "misfit", "Error by phase of the cycle and drive velocity.", heat_map(misfit["table"])
