@@ -135,6 +135,8 @@ def _parameters(cls: type[Effect]) -> Iterator[str]:
         null = "" if spec.null is None else number(spec.null)
         unit = "" if spec.unit == "1" else spec.unit
         span = f"{number(spec.lower)} ... {number(spec.upper)}{', logarithmic' if spec.log else ''}"
+        if spec.usual is not None:
+            span += f"; usually {number(spec.usual[0])} ... {number(spec.usual[1])}"
         value = number(float(getattr(default, name)))
         rows.append(
             f"| {symbol} | `{name}` | {cell(spec.doc)} | {cell(unit)} | {value} | {span} | {null} | {known[name]} |"

@@ -37,6 +37,8 @@ class Spec:
         width: standard deviation of that knowledge: of the natural logarithm for a parameter that is sought on a
             logarithmic scale, else in SI (an amplitude is never sought on one); infinite where nothing is known.
             ``None`` leaves it to the rule of :func:`stickslip.fit.parameters.effect_parameters`.
+        usual: from where to where values lie as a rule, if that is less than lower to upper; one beyond is doubted in
+            words, and not refused.
     """
 
     unit: str
@@ -51,6 +53,17 @@ class Spec:
     ends: tuple[float, ...] = ()
     prior: float | None = None
     width: float | None = None
+    usual: tuple[float, float] | None = None
+
+    @property
+    def range(self) -> str:
+        """``"0 ... 0.05 m/s"``."""
+        return span(self.lower, self.upper, self.unit)
+
+
+def span(lower: float, upper: float, unit: str) -> str:
+    """A range with its unit, which a pure number does not have."""
+    return f"{lower:g} ... {upper:g}{'' if unit == '1' else f' {unit}'}"
 
 
 def _as_float(value: Any) -> Any:
@@ -74,9 +87,10 @@ def parameter(
     ends: tuple[float, ...] = (),
     prior: float | None = None,
     width: float | None = None,
+    usual: tuple[float, float] | None = None,
 ) -> Any:
     """A field of a physical class: a 64-bit float with its :class:`Spec`. Arguments as there."""
-    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, source, symbol, ends, prior, width)
+    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, source, symbol, ends, prior, width, usual)
     return eqx.field(default=float(default), converter=_as_float, metadata={"spec": spec})
 
 
@@ -118,7 +132,7 @@ def check(thing: Any, *, where: str = "") -> None:
                 f"{spec.doc or name} is outside its range",
                 key=f"{prefix}{name}",
                 value=number.tolist(),
-                allowed=f"{spec.lower:g} ... {spec.upper:g} {spec.unit}",
+                allowed=spec.range,
             )
     for name, choices in variants(thing).items():
         if getattr(thing, name) not in choices:

@@ -72,14 +72,13 @@ def to_si(value: float | int | str, unit: str, *, key: str | None = None, file: 
     """
     where = {"key": key, "file": str(file) if file else None}
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        allowed = f"a number in {unit} or text such as '1 {unit}'"
-        raise InputError("not a quantity", value=value, allowed=allowed, **where)
+        raise InputError("not a quantity", value=value, allowed=_allowed(unit), **where)
     if isinstance(value, str):
         number = _parse(value, unit, where)
     else:
         number = float(value)
     if not math.isfinite(number):
-        raise InputError("not a finite number", value=value, allowed=f"a finite number in {unit}", **where)
+        raise InputError("not a finite number", value=value, allowed=f"finite: {_allowed(unit)}", **where)
     return number
 
 
@@ -133,6 +132,10 @@ def _unbounded(text: str) -> bool:
     return of_numbers > 1
 
 
+def _allowed(unit: str) -> str:
+    return "a number without a unit" if unit in ("1", "") else f"a number in {unit}, or text such as '1 {unit}'"
+
+
 def _parse(text: str, unit: str, where: dict) -> float:
     simple = _simple(text, unit)
     if simple is not None:
@@ -140,7 +143,7 @@ def _parse(text: str, unit: str, where: dict) -> float:
     import pint
 
     registry: Any = unit_registry()
-    example = f"a number in {unit}, or text such as '1 {unit}'"
+    example = _allowed(unit)
     if len(text) > 100:
         raise InputError("not a quantity", value=text[:40] + "...", allowed=example, **where)
     if _unbounded(text):
@@ -162,8 +165,9 @@ def _parse(text: str, unit: str, where: dict) -> float:
     try:
         return float(quantity.to(unit if unit not in ("1", "") else "dimensionless").magnitude)
     except pint.DimensionalityError:
-        raise InputError(
-            f"the unit '{quantity.units:~}' is not one of {unit}", value=text, allowed=example, **where
-        ) from None
+        what = f"the unit '{quantity.units:~}' is not one of {unit}"
+        if unit in ("1", ""):
+            what = f"a pure number has no unit '{quantity.units:~}'"
+        raise InputError(what, value=text, allowed=example, **where) from None
     except (TypeError, ValueError, OverflowError):
         raise InputError("not a quantity", value=text, allowed=example, **where) from None

@@ -34,7 +34,12 @@ def _check_candidates(tags: Sequence[str]) -> None:
     known = catalogue.tags()
     wrong = [tag for tag in tags if tag not in known]
     if wrong:
-        hints = [f"{tag}: {nearest(tag, known)}" for tag in wrong] if len(wrong) > 1 else [nearest(wrong[0], known)]
+        named = {tag: nearest(tag, known) for tag in wrong}
+        every = nearest("", known)  # said once, not for each that is near none
+        hints = [f"{tag}: {hint}" for tag, hint in named.items() if hint != every]
+        hints += [every] if every in named.values() else []
+        if len(wrong) == 1:
+            hints = [*named.values()]
         raise InputError(
             f"there is no effect {' and no effect '.join(repr(tag) for tag in wrong)}",
             key="--candidates",

@@ -362,6 +362,9 @@ def test_equations_of_a_model(capsys):
     assert run(["effects", "--model", "static,inertia,contact-ageing", "--latex"]) == 0
     latex = capsys.readouterr().out
     assert r"\ddot x" in latex and r"\begin{align*}" in latex
+    for other in ([], ["contact-ageing"]):
+        assert run(["effects", *other, "--latex"]) == 2
+        assert "belongs to --model" in capsys.readouterr().err
 
 
 OWN = """
@@ -451,6 +454,9 @@ def test_a_picture_of_an_effect(tmp_path, capsys):
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert run(["effects", "sensor-drift", "--picture", str(picture)]) == 2
     assert run(["effects", "--picture", str(picture)]) == 2
+    capsys.readouterr()
+    assert run(["effects", "sensor-drift", "--picture", str(tmp_path / "drift.jpg")]) == 2
+    assert capsys.readouterr().out == ""
 
 
 def test_compiled_code_is_kept_and_can_be_switched_off(scenario, tmp_path_factory):

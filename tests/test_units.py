@@ -58,6 +58,16 @@ def test_a_prefix_is_not_taken_out_of_a_power_or_a_quotient():
         to_si("5 s", "m")
 
 
+def test_a_pure_number_has_no_unit_in_messages_either():
+    assert to_si("0.3", "1") == 0.3
+    with pytest.raises(InputError, match=r"(?s)no unit 'mm'.*allowed: a number without a unit$"):
+        to_si("3 mm", "1")
+    with pytest.raises(InputError, match=r"(?s)not a quantity.*allowed: a number without a unit$"):
+        to_si([3], "1")
+    with pytest.raises(InputError, match=r"(?s)allowed: finite: a number in m, or text such as '1 m'$"):
+        to_si(float("nan"), "m")
+
+
 def test_a_scenario_of_plain_units_needs_neither_pint_nor_xarray():
     """What makes the command line start quickly."""
     code = (

@@ -39,7 +39,7 @@ from .working import Tell, working
 REFIT = ((2.5, 4), (1.0, 8))  # of a profile's points, from the neighbouring optimum
 AGAIN = ((1.0, 12),)  # of a model, from where the same with one effect more arrived
 NOTHING_UNSEEN = (
-    "every run is fitted, so nothing is known of unseen ones: --holdout RUN, or role = \"held-out\" in the campaign, "
+    'every run is fitted, so nothing is known of unseen ones: --holdout RUN, or role = "held-out" in the campaign, '
     "keeps one aside"
 )
 PIN = 1e-3  # width of the prior that holds a profiled parameter, on the search scale

@@ -45,6 +45,13 @@ def effects(
     """
     if picture is not None and tag is None:
         raise InputError("a picture needs a tag", hint="stickslip effects contact-ageing --picture ageing.png")
+    if latex and model is None:
+        hint = (
+            "the explanation of an effect holds its LaTeX" if tag else "--model static,inertia,contact-ageing --latex"
+        )
+        raise InputError("--latex belongs to --model", key="--latex", hint=hint)
+    if picture is not None:
+        _check_picture(picture, force)
     from ..effects import catalogue
 
     for path in effect:
@@ -58,7 +65,7 @@ def effects(
     cls = catalogue.get(tag)
     print(_explained(cls))
     if picture is not None:
-        _draw(cls, picture, force)
+        _draw(cls, picture)
         print(f"\nwritten to {picture}")
     elif cls.__module__.startswith("stickslip."):
         print(f"picture of a trace with and without it: stickslip effects {cls.tag} --picture {cls.tag}.png")
@@ -121,7 +128,7 @@ def _forms(cls: type[Effect]) -> Iterator[str]:
 def _parameters(cls: type[Effect]) -> Iterator[str]:
     from ..effects.plain import plain
     from ..fit.parameters import priors
-    from ..params import specs
+    from ..params import span, specs
 
     effect = cls()
     known = priors(effect)
@@ -130,7 +137,7 @@ def _parameters(cls: type[Effect]) -> Iterator[str]:
         symbol = f" ({plain(spec.symbol)})" if spec.symbol else ""
         null = "" if spec.null is None else f", absent at {spec.null:g}"
         default = float(getattr(effect, name))
-        bounds = f"[{spec.lower:g} ... {spec.upper:g}{unit}]"
+        bounds = f"[{spec.range}{'' if spec.usual is None else f', usually {span(*spec.usual, spec.unit)}'}]"
         yield f"{name}{symbol} = {default:.6g}{unit} {bounds}: {spec.doc}{null}; prior: {known[name]}"
 
 
@@ -138,11 +145,14 @@ def _wrapped(head: str, text: str) -> list[str]:
     return textwrap.wrap(f"{head}: {text}", 110, subsequent_indent="    ") if text else []
 
 
-def _draw(cls: type[Effect], path: Path, force: bool) -> None:
+def _check_picture(path: Path, force: bool) -> None:
     if path.suffix.lower() != ".png":
         raise InputError("a picture is a PNG file", key="--picture", value=str(path), allowed="a name with .png")
     if path.exists() and not (force and path.is_file()):
         raise RunFolderError("the picture exists already", file=path, hint="choose another name, or use --force")
+
+
+def _draw(cls: type[Effect], path: Path) -> None:
     from ..plots import effect_figure, save
     from ..scenario.demonstration import with_and_without
 

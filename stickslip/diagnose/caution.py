@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..effects import catalogue
+from ..units import shown
 from .engine import Diagnosis
 from .thresholds import THRESHOLDS, Thresholds
 
@@ -31,6 +32,7 @@ def cautions(d: Diagnosis, asked: Sequence[str] = (), limits: Thresholds = THRES
             "is taken for granted by the confidence and cannot be told from these data. In blind tests on foreign data "
             "names were often wrong (documentation, 'The blind challenge')."
         )
+        out += _unusual(d)
         out += [line for tag in d.verdict.effects for line in _checks(tag)]
     return out
 
@@ -44,6 +46,20 @@ def _complete(asked: Sequence[str], limits: Thresholds) -> str:
         "weakening, damping and roughness of the base can, is not excluded. To look for one that you suspect: "
         f"stickslip fit CAMPAIGN --add {asked[0] if asked else 'contact-ageing'}."
     )
+
+
+def _unusual(d: Diagnosis) -> list[str]:
+    """Values of named effects that are possible in the model and hardly in a machine."""
+    last = d.ladder[-1]
+    if last.fit is None:
+        return []
+    std = last.fit.std()
+    return [
+        f"{f.name} is {shown(last.fit.values[f.name], f.unit)}, {found}: something else may have been put into it, "
+        "or the effect is not what is missing."
+        for f in last.fit.free
+        if f.name.split(".")[0] in d.verdict.effects and (found := f.unusual(last.fit.values[f.name], std[f.name]))
+    ]
 
 
 def _checks(tag: str) -> list[str]:

@@ -34,6 +34,7 @@ class Adhesion(Geometry):
         unit="1",
         lower=0.0,
         upper=0.3,
+        usual=(0.0, 0.01),
         null=0.0,
         symbol=r"\varepsilon",
         doc="adhesive over applied load (steel in air: below 0.01)",

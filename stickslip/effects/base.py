@@ -101,6 +101,8 @@ class Effect(eqx.Module):
         amplitude: name of the parameter whose null value makes the effect vanish.
         generalises: tags of effects that this law contains as special cases; where both describe the data, the special
             case is named.
+        family: under which it is listed: contact, friction, block, geometry, drive or sensor. A drive or a sensor may
+            put energy in; all others are held to be passive by the conformance suite.
         periodic: of a wave: the parameter that is its period (or "frequency"), and over what it is periodic: "time",
             "load point" or "displacement". A parameter called ``phase`` gets a value for each run.
     """

@@ -72,9 +72,12 @@ def accept(cls: object) -> type[Effect]:
 
 def _accept_prior(spec: Spec, key: str, amplitude: bool) -> None:
     if spec.prior is not None and not spec.lower <= spec.prior <= spec.upper:
-        allowed = f"{spec.lower:g} ... {spec.upper:g} {spec.unit}"
         raise InputError(
-            "the prior of a parameter is centred beyond its bounds", key=key, value=spec.prior, allowed=allowed
+            "the prior of a parameter is centred beyond its bounds", key=key, value=spec.prior, allowed=spec.range
+        )
+    if spec.usual is not None and not spec.lower <= spec.usual[0] < spec.usual[1] <= spec.upper:
+        raise InputError(
+            "the usual range of a parameter is not within its bounds", key=key, value=spec.usual, allowed=spec.range
         )
     if spec.width is not None and not spec.width > 0.0:
         raise InputError("the width of a parameter's prior must be positive", key=key, value=spec.width)

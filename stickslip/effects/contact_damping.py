@@ -37,6 +37,7 @@ class ContactDamping(BodyForce):
         unit="s",
         lower=0.0,
         upper=1e-3,
+        usual=(0.0, 3e-5),
         null=0.0,
         symbol=r"\eta",
         doc="damping of a stuck element over its stiffness",

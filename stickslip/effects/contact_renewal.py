@@ -66,6 +66,7 @@ class ContactRenewal(Memory, Threshold, Flow):
         unit="1/m",
         lower=0.0,
         upper=2e6,
+        usual=(0.0, 1e6),
         null=0.0,
         symbol=r"1/\ell",
         doc="share of the junctions that break per metre of slip",

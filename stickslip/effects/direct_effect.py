@@ -51,6 +51,7 @@ class DirectEffect(Threshold):
         unit="m/s",
         lower=1e-10,
         upper=1e-4,
+        usual=(1e-9, 1e-7),
         log=True,
         grid=(1e-9, 1e-8, 1e-7),
         symbol="v^*",

@@ -36,6 +36,7 @@ class LoadModulation(Threshold):
         unit="1",
         lower=-0.05,
         upper=0.05,
+        usual=(-0.01, 0.01),
         null=0.0,
         symbol=r"\varepsilon",
         doc="amplitude of the load as a share of the load",

@@ -10,7 +10,7 @@ from ..params import variants
 from . import catalogue
 from .base import Effect
 
-STATIC = "static"
+STATIC, INERTIA = "static", "inertia"
 EXAMPLE = "--model static,inertia,contact-ageing"
 _OPTION = "--model"
 
@@ -20,7 +20,8 @@ def effects_of(words: Sequence[str]) -> tuple[list[Effect], bool]:
 
     Args:
         words: ``"static"`` and tags, each with ``:name=value`` for every form or parameter that is not the default;
-            values in SI, or with their unit.
+            values in SI, or with their unit. The first bare ``"inertia"`` is that of the block, which every model of
+            slips has; a second one, or one with a value, is the effect: mass that moves with it.
 
     Raises:
         InputError: nothing named, an unknown name (names the nearest), one named twice, a wrong value, or effects
@@ -28,20 +29,23 @@ def effects_of(words: Sequence[str]) -> tuple[list[Effect], bool]:
     """
     split = [[part.strip() for part in word.split(":")] for word in words if word.strip()]
     tags = [tag for tag, *_ in split]
+    inertial = INERTIA in tags
+    if [INERTIA] in split:
+        split.remove([INERTIA])
+    added = [tag for tag, *_ in split]
     if not tags:
         raise InputError("no model is named", key=_OPTION, hint=EXAMPLE)
     for tag in tags:
         if tag != STATIC and tag not in catalogue.all():
             raise InputError(f"there is no effect '{tag}'", key=_OPTION, hint=catalogue.unknown(tag, [STATIC]))
-        if tags.count(tag) > 1:
+        if added.count(tag) > 1:
             raise InputError(f"'{tag}' is named twice", key=_OPTION)
-    inertial = "inertia" in tags
     if not inertial and any(tag != STATIC for tag in tags):
         raise InputError(
             "the model without inertia has constant friction and no effects; whatever else acts is solved with inertia",
             key=_OPTION,
             value=",".join(tags),
-            hint=f"--model {','.join([STATIC, 'inertia', *(tag for tag in tags if tag != STATIC)])}",
+            hint=f"--model {','.join([STATIC, INERTIA, *(tag for tag in tags if tag != STATIC)])}",
         )
     return [_made(tag, options) for tag, *options in split if tag != STATIC or options], inertial
 

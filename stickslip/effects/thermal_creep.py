@@ -41,6 +41,7 @@ class ThermalCreep(Flow):
         unit="m/s",
         lower=0.0,
         upper=1e-6,
+        usual=(0.0, 1e-7),
         null=0.0,
         symbol="v_1",
         doc="slip velocity of an element that is just below its cap",

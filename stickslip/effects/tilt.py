@@ -39,6 +39,7 @@ class Tilt(Threshold):
         unit="1",
         lower=-0.3,
         upper=0.3,
+        usual=(-0.1, 0.1),
         null=0.0,
         symbol=r"\kappa",
         doc="relative change of the normal load at the full friction force",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..effects.base import Effect
-from ..params import specs
+from ..params import span, specs
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class Free:
         lower, upper: hard bounds (SI).
         doc: in words.
         amplitude: whether its null value removes an effect.
+        usual: from where to where such values lie as a rule (SI), if that is less than the bounds.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Free:
     upper: float
     doc: str = ""
     amplitude: bool = False
+    usual: tuple[float, float] | None = None
 
     def inward(self, value: float) -> float:
         """SI -> search scale."""
@@ -66,6 +68,13 @@ class Free:
         deviation = self.width * float(self.scale)
         share = " (half its range)" if np.isclose(deviation, 0.5 * (self.upper - self.lower)) else ""
         return f"normal around {self.prior:.3g}{unit}, standard deviation {deviation:.3g}{unit}{share}"
+
+    def unusual(self, value: float, std: float) -> str:
+        """Where values usually lie, if this one is beyond by more than its standard deviation; else nothing."""
+        if self.usual is None:
+            return ""
+        low, high = self.usual
+        return f"usually {span(low, high, self.unit)}" if value + std < low or value - std > high else ""
 
     def starting(self, value: float) -> Free:
         """The same, starting at ``value`` (SI), kept within its bounds."""
@@ -111,8 +120,11 @@ def effect_parameters(effect: Effect, amplitude: float | None = None) -> list[Fr
         if spec.width is not None:
             width = spec.width if scale == "log" else spec.width / float(scale)
         out.append(
-            Free(f"{effect.tag}.{name}", spec.unit, scale, start, centre, width, lower, upper, spec.doc, is_amplitude)
-        )
+            Free(
+                f"{effect.tag}.{name}", spec.unit, scale, start, centre, width, lower, upper, spec.doc, is_amplitude,
+                spec.usual,
+            )
+        )  # fmt: skip
     return out
 
 

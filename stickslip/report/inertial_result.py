@@ -42,6 +42,7 @@ def parameters(composition: Composition, fit: Fit) -> dict[str, dict[str, Any]]:
             note = "at its bound"
         elif np.isfinite(f.width) and std[f.name] / max(abs(f.slope(float(z))), 1e-300) > 0.8 * f.width:
             note = "not determined by the data: this is its prior"
+        note = "; ".join(filter(None, [note, f.unusual(values[f.name], std[f.name])]))
         out[f.name] = {"value": values[f.name], "std": std[f.name], "unit": f.unit, "doc": f.doc, "note": note}
     for name, value in composition.fixed.items():
         out[name] = {

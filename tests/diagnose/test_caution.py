@@ -10,10 +10,13 @@ from stickslip.diagnose.caution import cautions
 from stickslip.diagnose.thresholds import Thresholds
 from stickslip.diagnose.verdict import finished, nothing
 from stickslip.effects import catalogue
+from stickslip.fit.parameters import effect_parameters
+
+UNFITTED = SimpleNamespace(fit=None)
 
 
-def said(verdict, asked=(), **more):
-    return cautions(SimpleNamespace(verdict=verdict, rounds=()), asked, **more)
+def said(verdict, asked=(), last=UNFITTED, **more):
+    return cautions(SimpleNamespace(verdict=verdict, rounds=(), ladder=(last,)), asked, **more)
 
 
 def test_complete_says_that_nothing_was_tried_and_by_which_limits():
@@ -42,6 +45,22 @@ def test_a_name_comes_with_what_it_may_be_taken_for(tag):
     for (other, what), line in zip(known.items(), checks, strict=True):
         assert line.startswith(f"{tag} may be taken for {other}")
         assert what in line
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "doubted"), [(0.03, 0.005, True), (0.012, 0.005, False), (0.009, 0.001, False)]
+)
+def test_a_value_that_a_machine_hardly_has_is_doubted(value, std, doubted):
+    free = effect_parameters(catalogue.make("adhesion"))
+    fit = SimpleNamespace(
+        free=free, values={"adhesion.attraction": value}, std=lambda: {"adhesion.attraction": std}
+    )  # fmt: skip
+    lines = [line for line in said(finished(["adhesion"]), last=SimpleNamespace(fit=fit)) if "usually" in line]
+    assert len(lines) == doubted
+    if doubted:
+        assert lines[0].startswith("adhesion.attraction is 0.03, usually 0 ... 0.01: ")
+    # of an effect that is not named nothing is said
+    assert not any("usually" in line for line in said(finished(["tilt"]), last=SimpleNamespace(fit=fit)))
 
 
 def test_where_nothing_is_named_nothing_is_cautioned_against():

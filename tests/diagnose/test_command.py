@@ -21,6 +21,7 @@ CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign
     [
         (["--candidates", "contact-aging"], "contact-ageing"),
         (["--candidates", "wer,tilt,contact-aging"], "'wear'?\n  contact-aging: did you mean 'contact-ageing'"),
+        (["--candidates", "qqq,wer,xxx"], "'xxx'\n  to mend: wer: did you mean 'wear'?\n  one of: adhesion, base-vib"),
         (["--candidates", " , "], "no effect is named"),
         (["--holdout", "v999.csv"], "v999"),
         (["--effect", "nowhere.py"], "nowhere.py"),

@@ -89,6 +89,8 @@ def test_loading_again_replaces(tmp_path: Path, no_user_effects: None) -> None:
         (("null=0.0, ", ""), "needs an amplitude"),
         (("parameter(0.0,", "parameter(0.5,"), "outside its range"),
         (("lower=-0.1", "lower=0.3"), "bounds"),
+        (("null=0.0,", "null=0.0, usual=(0.0, 0.2),"), r"usual range.*allowed: -0\.1 \.\.\. 0\.1$"),
+        (("null=0.0,", "null=0.0, usual=(0.1, 0.0),"), "usual range"),
         (("(Threshold)", ""), "no effect"),
     ],
 )

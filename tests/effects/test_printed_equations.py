@@ -135,6 +135,17 @@ def test_what_is_chosen_is_what_is_printed() -> None:
     assert "y = x" in of_tags(["static", "inertia", "machine-compliance"]).text()
 
 
+def test_the_inertia_of_the_block_is_no_effect() -> None:
+    """The title of a fit is ``static + inertia + ...``, and mass that moves with the block is an effect besides."""
+    assert effects_of(["static", "inertia"]) == ([], True)
+    assert [e.tag for e in effects_of(["static", "inertia", "tilt"])[0]] == ["tilt"]
+    assert "m → m" not in of_tags(["static", "inertia", "contact-ageing"]).text()
+    for words in (["inertia", "inertia:share=0.05"], ["inertia:share=0.05"], ["inertia:share=0.05", "inertia"]):
+        (effect,), inertial = effects_of(["static", *words])
+        assert (effect.tag, float(effect.share), inertial) == ("inertia", 0.05, True)
+    assert "m → m (1 + α)" in of_tags(["static", "inertia", "inertia"]).text()
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -145,6 +156,7 @@ def test_what_is_chosen_is_what_is_printed() -> None:
         (["static", "contact-ageing"], r"(?s)solved with inertia.*--model static,inertia,contact-ageing"),
         (["contact-ageing"], r"(?s)solved with inertia.*--model static,inertia,contact-ageing"),
         (["static", "inertia", "tilt", "tilt"], "twice"),
+        (["static", "inertia", "inertia", "inertia"], "twice"),
         (["static", "inertia", "tilt:by=spring:by=contact"], "twice"),
         (["static:p=3"], "no forms or parameters"),
         (["static", "inertia", "tilt:by"], "by=contact"),
