@@ -30,7 +30,10 @@ def fit_arrays(fit: Fit) -> dict[str, np.ndarray]:
 def fit_from(arrays: Mapping[str, np.ndarray]) -> Fit:
     """The inverse of :func:`fit_arrays`."""
     cost, data_cost, evaluations, jacobians = arrays["numbers"].tolist()
-    free = tuple(Free(**f) for f in json.loads(str(arrays["free"])))
+    free = tuple(
+        Free(**{**f, "usual": None if f["usual"] is None else tuple(f["usual"])})  # JSON has no tuples
+        for f in json.loads(str(arrays["free"]))
+    )
     z, events, features, offsets, covariance, columns, use = (np.asarray(arrays[name]) for name in _ARRAYS)
     return Fit(
         z,

@@ -77,7 +77,7 @@ def told_apart(top: Rung, named: Sequence[Named], material: Material, limits: Th
             continue
         inside = {n.tag for n in named}
         others = [_instead(top, one.tag, r, material) for r in one.rivals if r.tag not in inside]
-        offers = [(one.candidate, top), *((c, rung) for c, rung in others if not at_border(c))]
+        offers = [(one.candidate, top), *((c, rung) for c, rung in others if not at_border(c, limits))]
         offers = [(c, rung) for c, rung in offers if _grade(rung, limits) <= _grade(top, limits)]
         best = min(offers, key=lambda offer: _cost(offer[1]))
         if limits.rival * _cost(best[1]) >= _cost(top) or worse(best[1].held, top.held, limits):

@@ -2,7 +2,7 @@
 
 Set on simulated development campaigns (see docs/diagnosis); not to be changed for a single case. Frozen on 22 November
 2026 together with the rules that use them (all code as of commit 31d6964), before the first case of the sealed run
-with seed 20261127 (docs/challenge.md).
+with seed 20261127 (docs/challenge.md); ``border`` and ``fewest`` had the same values then, in ``verdict``.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ class Thresholds:
         clearly: by how many of them a rival must be worse on unseen cycles to be left out: what fits as well stays a
             rival until the unseen cycles speak plainly. And the least gain over its standard error where that on the
             fitted cycles is not ample.
+        border: share of a parameter's range: nearer to an end of it than this a fit has not stopped by itself.
+        fewest: unseen cycles that tell a standard error.
     """
 
     complete: Mapping[str, float] = field(
@@ -54,6 +56,8 @@ class Thresholds:
     plain: float = 0.25
     standard_errors: float = 1.0
     clearly: float = 2.0
+    border: float = 0.004
+    fewest: int = 2
 
 
 THRESHOLDS = Thresholds()

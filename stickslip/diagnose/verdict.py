@@ -16,9 +16,6 @@ from .candidate import Candidate
 from .heldout import HeldOut
 from .thresholds import THRESHOLDS, Thresholds
 
-FEWEST = 2  # cycles that tell a standard error
-BORDER = 0.004  # share of a parameter's range: nearer to an end of it than this a fit has not stopped by itself
-
 
 class _Errors(Protocol):
     """What a step of the ladder leaves."""
@@ -128,7 +125,7 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
         fails.append(f"takes {f'only {100 * share:.0f} %' if share > 0 else 'nothing'} off the training cost")
     gain = base_held.per_cycle - candidate.held.per_cycle
     gain = gain[np.isfinite(gain)]
-    if gain.size < FEWEST:
+    if gain.size < limits.fewest:
         fails.append("too few unseen cycles can be compared")
     else:
         error = np.std(gain, ddof=1) / np.sqrt(gain.size)
@@ -142,13 +139,13 @@ def judge(candidate: Candidate, base_cost: float, base_held: HeldOut, limits: Th
         own = sum(1 for f in candidate.fit.free if f.name.startswith(f"{candidate.tag}."))
         if base_cost - cost < limits.significant**2 * own:
             fails.append("its gain is not significant for the number of its parameters")
-        at_end = at_border(candidate)
+        at_end = at_border(candidate, limits)
         fails += [f"its '{name}' ends at the border of its plausible range" for name in at_end]
         plausible = not at_end
     return Judged(candidate, cost, tuple(fails), plausible)
 
 
-def at_border(candidate: Candidate) -> list[str]:
+def at_border(candidate: Candidate, limits: Thresholds = THRESHOLDS) -> list[str]:
     """Parameters of the effect whose fit was stopped by the end of a plausible range.
 
     A range may also end where the law becomes a special case, or be that of an angle; a fit may arrive there.
@@ -163,7 +160,7 @@ def at_border(candidate: Candidate) -> list[str]:
         harmless = {*table[name].ends, *([table[name].null or 0.0] if f.amplitude else [])}
         low, high = f.bounds
         ends = [end for end in (f.lower, f.upper) if end not in harmless]
-        if any(abs(z - f.inward(end)) < BORDER * (high - low) for end in ends):
+        if any(abs(z - f.inward(end)) < limits.border * (high - low) for end in ends):
             out.append(name)
     return out
 
@@ -229,7 +226,7 @@ def worse(one: HeldOut | None, other: HeldOut | None, limits: Thresholds = THRES
         return False
     more = one.per_cycle - other.per_cycle
     more = more[np.isfinite(more)]
-    if more.size < FEWEST:
+    if more.size < limits.fewest:
         return False
     return bool(np.mean(more) > limits.clearly * np.std(more, ddof=1) / np.sqrt(more.size))
 

@@ -96,6 +96,7 @@ class Tally:
         table: every answer, a row each (Markdown).
         shown: in how many the base model alone is not within its limits, so that an effect was looked for.
         shown_exact, shown_right: of these.
+        passed_by: of these, in how many something hidden was scored and not refitted.
     """
 
     answered: int
@@ -105,28 +106,31 @@ class Tally:
     shown: int
     shown_exact: int
     shown_right: int
+    passed_by: int
 
 
 def tally(folder: Path) -> Tally:
     """The answers so far."""
     rows = ["| hidden | lines | times detection | looked for | said | unseen error |", "|---|---|---|---|---|---|"]
-    answers: list[tuple[bool, bool, bool]] = []
+    answers: list[tuple[bool, bool, bool, bool]] = []
     for truth in read_truth(folder)["cases"]:
         answer = read_answer(folder / RUNS, truth["name"])
         if answer.kind == "not run":
             continue
         tags = tuple(e["tag"] for e in truth["effects"])
-        looked = answer.kind != "failed" and bool(read_result(folder / RUNS / truth["name"])["ranking"])
-        answers.append((looked, is_exact(truth["kind"], tags, answer), is_right(truth["kind"], tags, answer)))
+        ranking = read_result(folder / RUNS / truth["name"])["ranking"] if answer.kind != "failed" else []
+        refitted = {r["effect"] for r in ranking if r["refit"]}
+        passed_by = bool({r["effect"] for r in ranking if r["effect"] in tags} - refitted)
+        right = is_exact(truth["kind"], tags, answer), is_right(truth["kind"], tags, answer)
+        answers.append((bool(ranking), *right, passed_by))
         times = ", ".join(f"{e['multiple']:.3g}" for e in truth["effects"])
         lines = "new" if truth["new_lines"] else "same"
         rows.append(
-            f"| {', '.join(tags) or 'nothing'} | {lines} | {times} | {'yes' if looked else 'no'} | {_said(answer)} | "
-            f"{_errors(answer)} |"
+            f"| {', '.join(tags) or 'nothing'} | {lines} | {times} | {'yes' if ranking else 'no'}"
+            f"{', not refitted' if passed_by else ''} | {_said(answer)} | {_errors(answer)} |"
         )
-    _, exact, right = (sum(a[i] for a in answers) for i in range(3))
-    shown, shown_exact, shown_right = (sum(a[0] and a[i] for a in answers) for i in range(3))
-    return Tally(len(answers), exact, right, "\n".join(rows), shown, shown_exact, shown_right)
+    exact, right = (sum(a[i] for a in answers) for i in (1, 2))
+    return Tally(len(answers), exact, right, "\n".join(rows), *(sum(a[0] and a[i] for a in answers) for i in range(4)))
 
 
 def _said(answer: Answer) -> str:
@@ -182,7 +186,10 @@ def main() -> None:
     found = measure(options.folder, options.part, options.seed, options.number, options.workers, options.only)
     print(found.table)
     print(f"\n{found.answered} answered: {found.exact} exact, {found.right} right")
-    print(f"{found.shown} in which something was looked for: {found.shown_exact} exact, {found.shown_right} right")
+    print(
+        f"{found.shown} in which something was looked for: {found.shown_exact} exact, {found.shown_right} right, "
+        f"{found.passed_by} with something hidden that was not refitted"
+    )
 
 
 if __name__ == "__main__":
