@@ -6,12 +6,12 @@ still makes is a sine of the *measured* onset, however far that is from where th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize_scalar
 
 from ..effects.base import Effect
 from ..features.measurement import Measurement
@@ -21,9 +21,10 @@ from ..fit.parameters import Free
 Variable = Literal["time", "load point", "displacement"]
 MOST = 20_000  # frequencies tried, in PARTS
 PARTS = 20
-KEPT = 5
+REFINED, KEPT = 20, 5
 FEWEST = 6  # slips
 LONGEST = 1.5  # times the record: a longer wave is a trend, which other effects describe
+LEAST = 0.03  # of a column's width: what few slips leave by chance is no smaller noise
 FAR = 5.0  # standard deviations, from the median of the absolute deviations, at which a deviation is cut
 
 
@@ -38,8 +39,10 @@ def periods(
 ) -> list[float]:
     """Periods (s or m) with which onsets and slip sizes deviate most, the strongest first.
 
-    A sine and a cosine over ``variable`` at the onsets are fitted to both for every frequency that the records resolve;
-    neighbours of a frequency already taken are left out.
+    A sine and a cosine over ``variable`` at the onsets are fitted to both for every frequency that the records resolve,
+    and ranked by the likelihood of noise of unknown size in either: sizes may tell nothing where onsets tell all. Any
+    scale is as likely beforehand (a density of 1/frequency), so of waves that slips at even distances cannot tell
+    apart the longest comes first. Neighbours of a frequency already taken are left out.
 
     Args:
         variable: over which the effect is periodic.
@@ -64,13 +67,32 @@ def periods(
     frequency = np.arange(low, high, 0.2 / span)[:MOST]
     if frequency.size == 0:
         return [bounds[1]]
-    rest = np.concatenate([_rest(_waves(some, at, run), data) for some in np.array_split(frequency, PARTS)])
+
+    def unlikely(some: np.ndarray) -> np.ndarray:
+        left = _rest(_waves(some, at, run), data) + len(data) * LEAST**2
+        return np.asarray(0.5 * len(data) * np.log(left).sum(axis=1) + np.log(some))
+
+    rest = np.concatenate([unlikely(some) for some in np.array_split(frequency, PARTS)])
+    # between the steps lies what decides between waves that are nearly as good
+    step = frequency[min(1, frequency.size - 1)] - low
+    peaks = [_lowest(unlikely, f, step) for f in _apart(frequency[np.argsort(rest)], 0.5 / span, REFINED)]
+    return [1.0 / f for f in _apart([f for _, f in sorted(peaks)], 0.5 / span, KEPT)]
+
+
+def _lowest(unlikely: Callable[[np.ndarray], np.ndarray], at: float, step: float) -> tuple[float, float]:
+    """The least value within a step of a frequency, and where it is."""
+    found = minimize_scalar(
+        lambda f: float(unlikely(np.array([f]))[0]), bounds=(max(at - step, 0.5 * at), at + step), method="bounded"
+    )
+    return float(found.fun), float(found.x)
+
+
+def _apart(frequencies: Iterable[float], least: float, most: int) -> list[float]:
+    """The first so many that are not neighbours of one before."""
     out: list[float] = []
-    for i in np.argsort(rest):
-        if all(abs(frequency[i] - 1.0 / p) > 0.5 / span for p in out):
-            out.append(float(1.0 / frequency[i]))
-        if len(out) == KEPT:
-            break
+    for f in frequencies:
+        if len(out) < most and all(abs(f - other) > least for other in out):
+            out.append(float(f))
     return out
 
 
@@ -156,10 +178,10 @@ def phasor(
 
 
 def _rest(basis: np.ndarray, data: np.ndarray) -> np.ndarray:
-    """Sum of squares that a basis (frequencies, N, k) leaves of the columns of ``data`` (N, d)."""
+    """Sums of squares (frequencies, d) that a basis (frequencies, N, k) leaves of the columns of ``data`` (N, d)."""
     normal = np.swapaxes(basis, 1, 2) @ basis
     explained = np.linalg.pinv(normal, hermitian=True) @ (np.swapaxes(basis, 1, 2) @ data)
-    return np.asarray(np.sum((data - basis @ explained) ** 2, axis=(1, 2)))
+    return np.asarray(np.sum((data - basis @ explained) ** 2, axis=1))
 
 
 def _complete(m: Measurement, use: np.ndarray) -> np.ndarray:

@@ -215,9 +215,10 @@ def from_record(section: Mapping[str, Any]) -> Fitted:
 
 def _free(entry: Mapping[str, Any]) -> Free:
     """A free parameter that starts at its fitted value; no prior is written as no number."""
-    known = {name: entry[name] for name in Free.__dataclass_fields__}
+    known = {name: entry[name] for name in Free.__dataclass_fields__ if name != "usual"}
+    usual = entry.get("usual")  # what was written before it was kept has none
     known["width"] = math.inf if known["width"] is None else float(known["width"])
-    return Free(**{**known, "start": float(entry["value"])})
+    return Free(**{**known, "start": float(entry["value"]), "usual": None if usual is None else tuple(usual)})
 
 
 def _effect(entry: Mapping[str, Any]) -> Effect:

@@ -83,6 +83,27 @@ def test_a_period_in_the_residual_is_found(variable, scale):
     assert len(found) <= 5
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_sizes_that_tell_nothing_do_not_hide_a_period_of_the_onsets(seed):
+    """Few slips at even distances, so that many waves go through scattered sizes; a ripple moves the onsets alone."""
+    velocities, n, true = (5e-5, 1e-4, 4e-4), 7, 4.34e-4
+    rng = np.random.default_rng(seed)
+    data = measurement(velocities, n, ())
+    start = np.zeros(data.values.shape[:2])
+    values, off = data.values.copy(), np.zeros_like(data.values)
+    for r, v in enumerate(velocities):
+        distance = (6.9e-5 + 1e-6 * r) * (1.0 + 0.002 * rng.standard_normal(n))
+        start[r], values[r, :, 0] = (np.cumsum(distance) - distance) / v, distance / v
+        off[r, :, 0] = 1.4e-6 / v * np.sin(2 * np.pi * np.cumsum(distance) / true + 2.0 * r)
+        off[r, :, 0] += 1.4e-8 / v * rng.standard_normal(n)
+        off[r, :, 1] = 1e-7 * rng.standard_normal(n)
+    nodes = np.tile([0.0, 1.0], (3, 1)), np.array([[0.0, v] for v in velocities])
+    cycles = data.cycles._replace(start=start, load_times=nodes[0], load_positions=nodes[1])
+    data = replace(data, cycles=cycles, values=values)
+    found = periods("load point", data, values - off, np.ones((3, n), bool), (1e-6, 1e-2))
+    assert found[0] == pytest.approx(true, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("tag", "name"),
     [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -59,3 +61,15 @@ def test_the_rig_is_kept_where_it_is_known():
     assert section["free"][0]["std"] == pytest.approx(0.26 * 0.01)
     bare = fitted(composition(), optimum(), m)
     assert (bare.normal_force, bare.friction) == (None, None)
+
+
+def test_where_a_value_usually_lies_is_kept_and_older_records_do_not_have_it():
+    free = tuple(replace(f, usual=(0.1, 0.4)) for f in composition().free)
+    found = fitted(
+        replace(composition(), free=free), replace(optimum(), free=free), measurement([0.0, 1.0], [0.0, 2e-4])
+    )
+    section = json.loads(json.dumps(record(found)))
+    assert {f.usual for f in from_record(section).composition.free} == {(0.1, 0.4)}
+    for entry in section["free"]:
+        del entry["usual"]
+    assert {f.usual for f in from_record(section).composition.free} == {None}
