@@ -12,6 +12,7 @@ import pytest
 from stickslip.campaign.fields import Unmeasured
 from stickslip.fit.inertial import Fit
 from stickslip.fit.record import fitted, from_record, record
+from stickslip.runstore import json_text
 
 from .synthetic import composition, truth
 
@@ -65,10 +66,9 @@ def test_the_rig_is_kept_where_it_is_known():
 
 def test_where_a_value_usually_lies_is_kept_and_older_records_do_not_have_it():
     free = tuple(replace(f, usual=(0.1, 0.4)) for f in composition().free)
-    found = fitted(
-        replace(composition(), free=free), replace(optimum(), free=free), measurement([0.0, 1.0], [0.0, 2e-4])
-    )
-    section = json.loads(json.dumps(record(found)))
+    driven = measurement([0.0, 1.0], [0.0, 2e-4])
+    found = fitted(replace(composition(), free=free), replace(optimum(), free=free), driven)
+    section = json.loads(json_text(record(found)))
     assert {f.usual for f in from_record(section).composition.free} == {(0.1, 0.4)}
     for entry in section["free"]:
         del entry["usual"]
