@@ -76,7 +76,7 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         "## In a measurement",
         f"{prose(cls.signature[:1].upper() + cls.signature[1:])}.",
         "| may be taken for | the experiment that separates the two |\n|---|---|\n"
-        + "\n".join(f"| [{tag}]({tag}.md) | {cell(text)} |" for tag, text in cls.confused_with.items()),
+        + "\n".join(f"| [{tag}]({tag}.md) | {cell(text)} |" for tag, text in catalogue.alike(cls.tag).items()),
         "## Source",
         f"{prose(cls.source.rstrip('.'))}.",
     ]

@@ -93,14 +93,15 @@ def _catalogue(known: dict[str, type[Effect]]) -> str:
 
 
 def _explained(cls: type[Effect]) -> str:
-    from ..effects.catalogue import roles
+    from ..effects.catalogue import alike, roles
 
     lines = [f"{cls.tag} ({cls.family}): {cls.summary}", "", *_formula(cls.equation), ""]
     lines += ["parameters:", *(f"  {line}" for line in _parameters(cls)), *_forms(cls)]
     lines += ["", f"acts as: {', '.join(roles(cls))}", *_wrapped("signature", cls.signature)]
-    if cls.confused_with:
+    confused = alike(cls.tag)
+    if confused:
         lines.append("confused with:")
-        for other, experiment in cls.confused_with.items():
+        for other, experiment in confused.items():
             lines += _wrapped(f"  {other}", experiment)
     return "\n".join([*lines, *_wrapped("source", cls.source)])
 

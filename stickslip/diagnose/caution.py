@@ -64,5 +64,5 @@ def _unusual(d: Diagnosis) -> list[str]:
 
 def _checks(tag: str) -> list[str]:
     """What an effect may be taken for, and the experiments that separate the two."""
-    found = catalogue.get(tag).confused_with
+    found = catalogue.alike(tag)
     return [f"{tag} may be taken for {other}; to separate them: {what}." for other, what in found.items()]

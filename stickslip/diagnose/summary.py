@@ -150,7 +150,7 @@ def next_experiment(d: Diagnosis, progress: Callable[[str, float], None] | None 
         return None
     rivals = d.sets[0]
     a, b = (catalogue.get(c.tag) for c in rivals[:2])
-    known = a.confused_with.get(b.tag) or b.confused_with.get(a.tag)
+    known = catalogue.alike(a.tag).get(b.tag)
     fitted = [c for c in rivals if c.fit is not None and c.composition is not None]
     if len(fitted) > 1:
         factor = 1.0 + min(scatter_factor(d.measurement), 1.0)

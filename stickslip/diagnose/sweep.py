@@ -169,7 +169,7 @@ def _firsts(ranked: Sequence[Candidate]) -> list[Candidate]:
 def _like(effect: Effect) -> set[str]:
     """Tags that an effect is confused with, and those whose law contains its own."""
     wider = {tag for tag, cls in catalogue.all().items() if effect.tag in cls.generalises}
-    return wider | set(effect.confused_with)
+    return wider | set(catalogue.alike(effect.tag))
 
 
 def _named(key: str, job: bytes, files: tuple[str, ...]) -> tuple[str, Candidate]:

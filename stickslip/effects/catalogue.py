@@ -137,6 +137,13 @@ def get(tag: str) -> type[Effect]:
     return everything[tag]
 
 
+def alike(tag: str) -> dict[str, str]:
+    """Tag of every effect that this one may be taken for -> the experiment that separates the two; either may say so."""
+    told = {other: cls.confused_with[tag] for other, cls in all().items() if tag in cls.confused_with}
+    own = get(tag).confused_with
+    return own | {other: text for other, text in told.items() if other not in own}
+
+
 def unknown(tag: str, others: Sequence[str] = ()) -> str:
     """What to do about a tag that is none: the nearest of the catalogue and ``others``, or a file of one's own."""
     return f"{nearest(tag, [*others, *tags()])}; {OWN}"

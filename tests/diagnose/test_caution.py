@@ -40,7 +40,7 @@ def test_complete_after_a_round_does_not_say_that_nothing_was_tried():
 def test_a_name_comes_with_what_it_may_be_taken_for(tag):
     first, *checks = said(finished([tag]))
     assert "a suspicion, not a finding" in first
-    known = catalogue.get(tag).confused_with
+    known = catalogue.alike(tag)
     assert len(checks) == len(known)
     for (other, what), line in zip(known.items(), checks, strict=True):
         assert line.startswith(f"{tag} may be taken for {other}")

@@ -83,9 +83,9 @@ def test_every_tag_comes_back_and_the_leaders_are_followed_to_the_end(calls):
     assert set(FINAL) <= settled
     # and two of those that the leader may be taken for, however far from it they seem
     assert len(settled - set(FINAL)) == LIKE
-    assert settled - set(FINAL) <= set(catalogue.get("contact-ageing").confused_with) | wider("contact-ageing")
+    assert settled - set(FINAL) <= set(catalogue.alike("contact-ageing")) | wider("contact-ageing")
     followed = {tag for what, tag in calls if what.startswith("refine")}
-    like = {tag for tag in catalogue.tags() if tag in catalogue.get("contact-ageing").confused_with}
+    like = {tag for tag in catalogue.tags() if tag in catalogue.alike("contact-ageing")}
     assert like <= followed  # what the leader may be taken for, whatever its own score promised
     assert len(followed - like) <= PROMISING + EXPLAINING
     assert all(c.note == "not refitted" for c in best if c.tag not in followed)
@@ -117,7 +117,7 @@ def test_finished_pieces_are_not_done_again(calls):
 
 def test_what_the_leader_may_be_taken_for_is_tried_in_its_two_most_promising_forms(calls):
     _, every, _ = run(tags=["wear", "position-dependent-friction"])
-    assert "position-dependent-friction" in catalogue.get("wear").confused_with
+    assert "position-dependent-friction" in catalogue.alike("wear")
     forms = [c for c in every if c.tag == "position-dependent-friction" and not c.note]
     assert len(forms) == len(forms_of("position-dependent-friction")) == FORMS
     assert calls.count(("settle", "position-dependent-friction")) == len(forms)

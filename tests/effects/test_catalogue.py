@@ -122,6 +122,16 @@ def test_names_and_values_are_checked() -> None:
         catalogue.make("tilt", by="weight")
 
 
+def test_what_is_confused_is_confused_both_ways() -> None:
+    for tag in catalogue.tags():
+        for other, experiment in catalogue.alike(tag).items():
+            assert tag in catalogue.alike(other), (tag, other)
+            own = catalogue.get(tag).confused_with
+            assert experiment == own.get(other, catalogue.get(other).confused_with.get(tag))
+    assert "viscoelastic-contact" not in catalogue.get("sensor-drift").confused_with
+    assert "hold" in catalogue.alike("sensor-drift")["viscoelastic-contact"]
+
+
 def test_forms_start_with_the_default() -> None:
     assert list(catalogue.forms(catalogue.get("tilt"))) == [{"by": "spring"}, {"by": "contact"}]
     assert list(catalogue.forms(catalogue.get("inertia"))) == [{}]
