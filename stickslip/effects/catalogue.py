@@ -138,7 +138,7 @@ def get(tag: str) -> type[Effect]:
 
 
 def alike(tag: str) -> dict[str, str]:
-    """Tag of every effect that this one may be taken for -> the experiment that separates the two; either may say so."""
+    """Tag of every effect that this one may be taken for -> the experiment that separates the two; by either."""
     told = {other: cls.confused_with[tag] for other, cls in all().items() if tag in cls.confused_with}
     own = get(tag).confused_with
     return own | {other: text for other, text in told.items() if other not in own}
