@@ -10,6 +10,7 @@ import pytest
 
 from stickslip.diagnose import sweep as module
 from stickslip.diagnose.candidate import Candidate, forms_of
+from stickslip.diagnose.refit import FEW, MORE
 from stickslip.diagnose.sweep import EXPLAINING, FOLLOWED, FORMS, LIKE, PROMISING, Ground, Sweep
 from stickslip.effects import catalogue
 from stickslip.fit.inertial import Fit
@@ -121,3 +122,24 @@ def test_what_the_leader_may_be_taken_for_is_tried_in_its_two_most_promising_for
     forms = [c for c in every if c.tag == "position-dependent-friction" and not c.note]
     assert len(forms) == len(forms_of("position-dependent-friction")) == FORMS
     assert calls.count(("settle", "position-dependent-friction")) == len(forms)
+
+
+def test_where_nothing_promised_leads_all_others_get_a_few_steps(calls, monkeypatch):
+    """An effect that promised least is found by refitting it, and no more go on than otherwise."""
+    hidden = min(catalogue.tags(), key=lambda tag: (tag in FINAL, -catalogue.tags().index(tag)))
+
+    def refine(candidate, data, floor, train, evaluations):
+        calls.append((f"refine {evaluations}", candidate.tag))
+        cost = 700.0 if candidate.tag == hidden else 950.0 + catalogue.tags().index(candidate.tag)
+        return replace(invented(candidate.effect, cost, candidate.promise), score=candidate.score)
+
+    monkeypatch.setattr(module, "refine", refine)
+    monkeypatch.setattr(module, "settle", lambda candidate, *rest: candidate)
+    best, _, told = run()
+    assert {tag for what, tag in calls if what == f"refine {FEW}"} == set(catalogue.tags())
+    assert min(best, key=lambda c: c.cost).tag == hidden
+    own = {hidden} | set(catalogue.alike(hidden)) | wider(hidden)
+    more = {tag for what, tag in calls if what == f"refine {MORE}"}
+    assert hidden in more
+    assert len(more - own) < PROMISING + EXPLAINING
+    assert told == sorted(told)
