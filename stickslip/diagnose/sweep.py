@@ -80,11 +80,12 @@ class Sweep:
         promising = firsts[:PROMISING]
         explaining = _firsts(sorted(scored, key=lambda c: -c.score))[:EXPLAINING]
         promising += [c for c in explaining if c.tag not in {p.tag for p in promising}]
-        few = sorted(self._refine(promising, FEW, "few", 0.5, 0.65), key=lambda c: c.cost)
+        begun = self._refine(promising, FEW, "few", 0.5, 0.65)
+        few = sorted(begun, key=lambda c: c.cost)
         if not any(c.cost < WORTH * self.ground.optimum.cost for c in few):
             # then promises told nothing: few steps for all others, of which the best take the places of the worst
             others = [c for c in firsts if c.tag not in {p.tag for p in promising}]
-            begun = [*few, *self._refine(others, FEW, "few", 0.65, 0.7)]
+            begun += self._refine(others, FEW, "few", 0.65, 0.7)
             few = sorted(begun, key=lambda c: c.cost)[: len(few)]
         half = few[: max(LEAST, len(few) // 2)]
         half += [c for c in few[len(half) :] if c.cost < NEAR * few[0].cost]
@@ -108,7 +109,7 @@ class Sweep:
             for first in _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]:
                 near += [c for c in ranked if c.tag == first.tag and c.cost < NEAR * first.cost][:FORMS]
         most = self._settle(near, 0.85, 1.0)
-        every = {_word(c.effect): c for c in (*scored, *few, *more, *most)}
+        every = {_word(c.effect): c for c in (*scored, *begun, *more, *most)}
         out = {tag: min((c for c in every.values() if c.tag == tag), key=_rank) for tag in tags}
         return [out[tag] for tag in tags], list(every.values())
 

@@ -138,6 +138,7 @@ def test_where_nothing_promised_leads_all_others_get_a_few_steps(calls, monkeypa
     best, _, told = run()
     assert {tag for what, tag in calls if what == f"refine {FEW}"} == set(catalogue.tags())
     assert min(best, key=lambda c: c.cost).tag == hidden
+    assert not any(c.note for c in best)
     own = {hidden} | set(catalogue.alike(hidden)) | wider(hidden)
     more = {tag for what, tag in calls if what == f"refine {MORE}"}
     assert hidden in more
