@@ -36,10 +36,8 @@ def _check_candidates(tags: Sequence[str]) -> None:
     if wrong:
         named = {tag: nearest(tag, known) for tag in wrong}
         every = nearest("", known)  # said once, not for each that is near none
-        hints = [f"{tag}: {hint}" for tag, hint in named.items() if hint != every]
+        hints = [f"{tag}: {hint}" if len(wrong) > 1 else hint for tag, hint in named.items() if hint != every]
         hints += [every] if every in named.values() else []
-        if len(wrong) == 1:
-            hints = [*named.values()]
         raise InputError(
             f"there is no effect {' and no effect '.join(repr(tag) for tag in wrong)}",
             key="--candidates",

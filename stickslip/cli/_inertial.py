@@ -103,7 +103,7 @@ def fit_inertial(
         train = _training(m, traces, options.holdout)
     except InputError as error:
         raise error.at(file=loaded.path) from None
-    if train.sum() == m.cycles.used.sum():
+    if m.runs > 1 and train.sum() == m.cycles.used.sum():
         notes.append(NOTHING_UNSEEN)
     with working("fitting") as tell:
         composition, optimum, ladder = _climb(m, base, effects, floor, train, options.starts, tell)
