@@ -2,9 +2,10 @@
 
 ``python -m tests.diagnose.development FOLDER PART --seed S`` makes the campaigns of a part, diagnoses each (going on
 where it was stopped), and prints the answers as a table and the rate. Parts: ``one`` (every effect that can be seen,
-once with the same lines at every event and once with new ones), ``nothing``, ``two``, and ``left-out`` (as ``one``
-with the same lines, but the effect and laws that contain it are not in the catalogue that is tried). All of a part
-take days: ``--only 3 1`` diagnoses these.
+once with the same lines at every event and once with new ones), ``nothing``, ``two``, ``left-out`` (as ``one``
+with the same lines, but the effect and laws that contain it are not in the catalogue that is tried), and ``strong``
+(as ``one`` with the same lines, at the largest amplitude that is plausible, where that is more). All of a part take
+days: ``--only 3 1`` diagnoses these.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from stickslip.workflow import diagnose_campaign
 
 MULTIPLE = 10.0  # of detection, or the largest at which the block slips
 VELOCITIES, HOLDS = (5e-5, 1e-4, 2e-4, 4e-4), (1.0, 5.0)  # m/s, s
-PARTS = {"one": "one", "nothing": "nothing", "two": "two", "left-out": "outside"}
+PARTS = {"one": "one", "nothing": "nothing", "two": "two", "left-out": "outside", "strong": "one"}
 
 
 def visible() -> list[str]:
@@ -41,10 +42,15 @@ def _textbook(tag: str) -> list[str]:
     return [form.name for form in visible_forms(EFFECTS[tag]) if not form.own]
 
 
-def hidden(tag: str, sign: float) -> Hidden:
-    """An effect in its first textbook form at MULTIPLE times detection."""
+def largest(tag: str) -> float:
+    """The largest plausible multiple of detection of an effect in its first textbook form."""
+    return largest_multiple(EFFECTS[tag], _textbook(tag)[0])
+
+
+def hidden(tag: str, sign: float, multiple: float = MULTIPLE) -> Hidden:
+    """An effect in its first textbook form at a multiple of detection, or the largest plausible one if that is less."""
     form = _textbook(tag)[0]
-    multiple = min(MULTIPLE, largest_multiple(EFFECTS[tag], form))
+    multiple = min(multiple, largest(tag))
     return Hidden(tag, multiple, amplitude(EFFECTS[tag], form, multiple, sign), form)
 
 
@@ -57,11 +63,14 @@ def cases(part: str, seed: int, number: int) -> list[Case]:
     elif part == "two":
         pairs = [rng.choice(visible(), 2, replace=False) for _ in range(number)]
         sets = ((tuple(str(t) for t in pair), bool(i % 2)) for i, pair in enumerate(pairs))
+    elif part == "strong":
+        sets = (((tag,), False) for tag in visible() if largest(tag) > MULTIPLE)
     else:
         sets = (((tag,), new) for tag in visible() for new in ((False,) if part == "left-out" else (False, True)))
     made = []
     for i, (tags, new_lines) in enumerate(sets, start=1):
-        effects = tuple(hidden(tag, 1.0 if rng.random() < 0.5 else -1.0) for tag in tags)
+        multiple = np.inf if part == "strong" else MULTIPLE
+        effects = tuple(hidden(tag, 1.0 if rng.random() < 0.5 else -1.0, multiple) for tag in tags)
         spring_known, virgin = part != "nothing" or bool(i // 2 % 2), bool(rng.random() < 0.5)
         made.append(
             Case(

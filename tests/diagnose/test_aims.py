@@ -14,7 +14,7 @@ import pytest
 from .development import PARTS, Tally, cases, measure, visible
 
 FOLDER = "STICKSLIP_DEVELOPMENT"
-SEEDS = {"one": 33, "nothing": 34, "two": 35, "left-out": 36}
+SEEDS = {"one": 33, "nothing": 34, "two": 35, "left-out": 36, "strong": 37}
 NUMBERS = {"nothing": 100, "two": 40}
 
 
@@ -26,6 +26,8 @@ def test_a_part_has_the_campaigns_that_it_speaks_of():
     assert len(cases("nothing", SEEDS["nothing"], NUMBERS["nothing"])) >= 100
     assert not any(c.hidden for c in cases("nothing", SEEDS["nothing"], 5))
     assert all(len({e.tag for e in c.hidden}) == 2 for c in cases("two", SEEDS["two"], NUMBERS["two"]))
+    usual = {c.hidden[0].tag: c.hidden[0].multiple for c in one}
+    assert all(c.hidden[0].multiple > usual[c.hidden[0].tag] for c in cases("strong", SEEDS["strong"], 0))
 
 
 def _measured(part: str) -> Tally:
@@ -42,6 +44,14 @@ def _measured(part: str) -> Tally:
 @pytest.mark.timeout(0)
 def test_one_effect_is_named_or_in_a_set_of_three():
     found = _measured("one")
+    assert found.right >= 0.90 * found.answered
+    assert found.exact >= 0.75 * found.answered
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(0)
+def test_a_strong_effect_is_named_or_in_a_set_of_three():
+    found = _measured("strong")
     assert found.right >= 0.90 * found.answered
     assert found.exact >= 0.75 * found.answered
 
