@@ -57,6 +57,12 @@ class Family(NamedTuple):
     names: tuple[str, ...]
     structure: Any
 
+    def own(self) -> bool:
+        """Whether all effects are of this package."""
+        effects = jax.tree.unflatten(self.structure, [0.0] * self.structure.num_leaves)
+        package = __name__.split(".")[0]
+        return all(type(e).__module__.split(".")[0] == package for e in effects)
+
     def model(
         self,
         numbers: Numbers,

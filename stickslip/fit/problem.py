@@ -18,7 +18,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, export
 
 from ..features.curve import StepCurve
 from ..features.evaluate import Anchors, features
@@ -28,6 +28,7 @@ from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
 from .common import Common
 from .composition import Composition, Family, Numbers, run_of
+from .program import Program
 
 FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)  # errors below a floor
 COARSE = Tolerance(2e-3, 2e-11, 2e-8, 1.2e-2, 3e-7)  # of one to two: for floors that are widened more than that
@@ -35,6 +36,7 @@ STEP = 0.01  # of a difference, on the search scale, until it is known better
 TINY = 0.1  # share of a step that is taken beyond a border where there is no room to either side
 BROKEN = 0.3  # change of a slip's size within such a step that can only be another event
 THREADS = max(1, min(4, os.cpu_count() or 1))
+export.register_namedtuple_serialization(Track, serialized_name="stickslip.forward.Track")  # what is kept returns one
 
 
 class Problem:
@@ -226,7 +228,10 @@ class Problem:
 
 @lru_cache(maxsize=128)
 def _tracks(family: Family) -> Any:
-    """The compiled integration of one run. What the features ask of it is compiled apart, once for all models."""
+    """The compiled integration of one run. What the features ask of it is compiled apart, once for all models.
+
+    Of effects from elsewhere no trace is kept: what their law depends on is not known.
+    """
 
     def one_run(numbers: Numbers, events: Array, cycles: Cycles, later: Any, tolerance: Tolerance) -> Track:
         start = (later, cycles.virgin, cycles.stretch)
@@ -238,7 +243,7 @@ def _tracks(family: Family) -> Any:
             family.most_steps,
         )
 
-    return jax.jit(one_run)
+    return Program(one_run, repr(family) if family.own() else None)
 
 
 @jax.jit

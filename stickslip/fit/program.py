@@ -1,0 +1,121 @@
+"""Compiled functions whose traces are kept on disk, where compiled code is (:mod:`stickslip.cache`).
+
+JAX finds what it has compiled by the traced function, so every process would trace each model again, which takes three
+times as long as to load it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shutil
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import jax
+import numpy as np
+from jax import export
+
+from ..cache import folder_for
+
+PACKAGE = Path(__file__).parents[1]
+MADE_WITH = ("jax", "jaxlib", "diffrax", "equinox", "lineax", "optimistix", "numpy")  # and with this package's code
+FORGOTTEN = 30 * 86400.0  # s after which traces of other versions are removed
+_DIGEST = hashlib.sha256().digest_size
+
+
+class Program:
+    """``jax.jit`` of a function, the trace of which is kept.
+
+    Args:
+        function: of pytrees of arrays.
+        name: says all that decides about the trace besides the arguments' shapes and the package's code; None keeps
+            no trace.
+    """
+
+    def __init__(self, function: Callable[..., Any], name: str | None) -> None:
+        self._function, self._traced, self._name = function, jax.jit(function), name
+        self._ready: dict[Any, Callable[..., Any]] = {}
+        self._lock = Lock()
+
+    def __call__(self, *args: Any) -> Any:
+        """The function's result."""
+        folder = None if self._name is None else _folder()
+        if folder is None:
+            return self._traced(*args)
+        leaves, structure = jax.tree.flatten(args)
+        kinds = structure, tuple((np.shape(a), str(getattr(a, "dtype", type(a)))) for a in leaves)
+        with self._lock:
+            if kinds not in self._ready:
+                path = folder / hashlib.sha256(f"{self._name} {kinds}".encode()).hexdigest()
+                self._ready[kinds] = self._restored(leaves, structure, path)
+        return self._ready[kinds](*leaves)
+
+    def _restored(self, leaves: list[Any], structure: Any, path: Path) -> Callable[..., Any]:
+        """The function of its arguments' leaves, from its trace on disk; that is made where it is not there."""
+
+        def flat(*leaves: Any) -> Any:
+            return self._function(*jax.tree.unflatten(structure, leaves))
+
+        kept = _read(path)
+        if kept is None:
+            try:
+                kept = bytes(export.export(jax.jit(flat))(*leaves).serialize())
+            except (NotImplementedError, ValueError):  # it calls back into Python
+                return jax.jit(flat)
+            _write(path, kept)
+        return jax.jit(export.deserialize(bytearray(kept)).call)
+
+
+def _read(path: Path) -> bytes | None:
+    """What was kept, or None where it is not there or damaged."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    digest, kept = content[:_DIGEST], content[_DIGEST:]
+    return kept if hashlib.sha256(kept).digest() == digest else None
+
+
+def _write(path: Path, kept: bytes) -> None:
+    aside = path.with_suffix(f".{os.getpid()}")
+    try:
+        aside.write_bytes(hashlib.sha256(kept).digest() + kept)
+        aside.replace(path)
+    except OSError:
+        aside.unlink(missing_ok=True)  # a full disk: it is traced again next time
+
+
+def _folder() -> Path | None:
+    """Where traces are kept, or None where compiled code is not kept either."""
+    kept: str | None = jax.config.jax_compilation_cache_dir  # type: ignore[attr-defined]  # made when JAX starts
+    return _of_this_version() if kept else None
+
+
+@lru_cache(maxsize=1)
+def _of_this_version() -> Path | None:
+    """The folder for traces of this version of everything; those of others are removed when they are old."""
+    above = folder_for("traced")
+    if above is None:
+        return None
+    digest = hashlib.sha256(platform.python_version().encode())
+    for name in MADE_WITH:
+        digest.update(version(name).encode())
+    for path in sorted(PACKAGE.rglob("*.py")):
+        digest.update(path.relative_to(PACKAGE).as_posix().encode() + path.read_bytes())
+    folder = above / digest.hexdigest()
+    try:
+        folder.mkdir(exist_ok=True)
+        folder.touch()
+        for other in above.iterdir():
+            if other.stat().st_mtime < time.time() - FORGOTTEN:
+                shutil.rmtree(other, ignore_errors=True)
+    except OSError:
+        return None
+    return folder

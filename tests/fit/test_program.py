@@ -1,0 +1,141 @@
+"""Traces that outlive a process: the same numbers, and nothing kept that could be wrong."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections import namedtuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from stickslip.effects import catalogue
+from stickslip.effects.base import Effect
+from stickslip.fit import program
+from stickslip.fit.composition import Family
+from stickslip.fit.program import Program
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(program, "_folder", lambda: tmp_path)
+    return tmp_path
+
+
+class Counted:
+    """A function that knows how often it was traced."""
+
+    def __init__(self):
+        self.times = 0
+
+    def __call__(self, parts, factor):
+        self.times += 1
+        return jnp.sin(parts["a"]) * factor + parts["b"]
+
+
+PARTS = {"a": np.linspace(0.0, 1.0, 5), "b": np.float64(2.0)}
+
+
+def test_a_kept_trace_is_not_made_again_and_gives_the_same_numbers(folder):
+    function = Counted()
+    first = Program(function, "one")(PARTS, 3.0)
+    assert len(list(folder.iterdir())) == function.times == 1
+    later = Program(function, "one")
+    np.testing.assert_array_equal(later(PARTS, 3.0), first)
+    np.testing.assert_array_equal(later(PARTS, 4.0), jax.jit(function)(PARTS, 4.0))
+    assert function.times == 2  # the second time for the comparison
+
+
+@pytest.mark.parametrize(
+    "name, parts", [("other", PARTS), ("one", {**PARTS, "a": np.zeros(6)}), ("one", {**PARTS, "a": np.arange(5)})]
+)
+def test_another_name_shape_or_kind_of_number_is_another_trace(folder, name, parts):
+    function = Counted()
+    Program(function, "one")(PARTS, 3.0)
+    np.testing.assert_array_equal(Program(function, name)(parts, 3.0), jax.jit(function)(parts, 3.0))
+    assert len(list(folder.iterdir())) == 2
+
+
+def test_a_damaged_trace_is_made_anew(folder):
+    function = Counted()
+    first = Program(function, "one")(PARTS, 3.0)
+    (path,) = folder.iterdir()
+    whole = path.read_bytes()
+    for broken in (whole[:100], b"", whole[:-1] + bytes([whole[-1] ^ 1])):
+        path.write_bytes(broken)
+        np.testing.assert_array_equal(Program(function, "one")(PARTS, 3.0), first)
+        assert len(path.read_bytes()) == len(whole)
+
+
+def test_nothing_is_kept_without_a_name_or_of_what_calls_back_into_python(folder):
+    Program(Counted(), None)(PARTS, 3.0)
+
+    def calls(x):
+        return jax.pure_callback(np.sin, jax.ShapeDtypeStruct(x.shape, x.dtype), x, vmap_method="sequential")
+
+    np.testing.assert_array_equal(Program(calls, "calls")(PARTS["a"]), np.sin(PARTS["a"]))
+    assert not list(folder.iterdir())
+
+
+def test_a_folder_that_cannot_be_written_does_no_harm(folder, monkeypatch):
+    monkeypatch.setattr(program, "_folder", lambda: folder / "gone")
+    function = Counted()
+    np.testing.assert_array_equal(Program(function, "one")(PARTS, 3.0), jax.jit(function)(PARTS, 3.0))
+
+
+def test_an_output_that_is_no_known_container_is_traced_every_time(folder):
+    pair = namedtuple("pair", "x y")
+    found = Program(lambda x: pair(x, 2.0 * x), "pair")(np.ones(2))
+    np.testing.assert_array_equal(found.y, 2.0)
+    assert not list(folder.iterdir())
+
+
+ADDS = """
+from stickslip import cache
+cache.enable()
+from stickslip.fit.program import Program
+print(Program(lambda x: x + 1.0, "adds")(1.0))
+"""
+
+
+@pytest.mark.parametrize("off, number", [("0", 1), ("1", 0)])
+def test_traces_are_kept_where_compiled_code_is(tmp_path, off, number):
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "STICKSLIP_NO_CACHE": off}
+    environment.pop("JAX_COMPILATION_CACHE_DIR", None)
+    done = subprocess.run([sys.executable, "-c", ADDS], env=environment, capture_output=True, text=True, check=True)
+    assert float(done.stdout) == 2.0
+    assert len(list(tmp_path.glob("stickslip/traced/*/*"))) == number
+
+
+def test_traces_belong_to_the_code_and_old_ones_of_other_code_go(tmp_path, monkeypatch):
+    package, cache = tmp_path / "package", tmp_path / "cache"
+    package.mkdir(), cache.mkdir()
+    (package / "law.py").write_text("x = 1")
+    monkeypatch.setattr(program, "PACKAGE", package)
+    monkeypatch.setattr(program, "folder_for", lambda name: cache)
+    of = program._of_this_version.__wrapped__
+    first = of()
+    assert of() == first
+    (package / "law.py").write_text("x = 2")
+    second = of()
+    assert second != first
+    assert {first, second} == set(cache.iterdir())
+    os.utime(first, (0.0, 0.0))
+    assert of() == second
+    assert set(cache.iterdir()) == {second}
+
+
+def test_traces_of_effects_from_elsewhere_are_not_kept():
+    class Elsewhere(Effect):
+        tag = "elsewhere"
+
+    def of(*effects):
+        return Family(4, 64, 3072, (), jax.tree.structure(effects))
+
+    wear = catalogue.get("wear")()
+    assert of().own()
+    assert of(wear).own()
+    assert not of(wear, Elsewhere()).own()
