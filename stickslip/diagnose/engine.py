@@ -27,7 +27,7 @@ from .refit import AGAIN, MORE, SETTLED, WIDELY
 from .revise import Named, done_without, told_apart
 from .rungs import Material, Rung, kept, make_rung
 from .static_rung import static_features
-from .sweep import Ground, Store, Sweep
+from .sweep import Ground, Store, Sweep, best_forms
 from .thresholds import THRESHOLDS, Thresholds
 from .verdict import (
     Judged,
@@ -286,30 +286,61 @@ def _round(
 ) -> tuple[Rung, Round]:
     """All candidates on a rung, and the rung fitted again from where the best two of them arrived.
 
-    A base less converged than its rivals would make a gain of nothing.
+    A base less converged than its rivals would make a gain of nothing. An effect gets a name only after what it may be
+    taken for was refitted, and the rung from where it arrived.
     """
     assert rung.composition is not None
     assert rung.fit is not None
     data, floor, train, store = material
     ground = Ground(rung.composition, rung.fit, data, floor, train)
-    candidates, every = Sweep(ground, jobs, store, name, tell).run(tags)
-    k = len(rung.composition.free)
-    fitted = sorted((c for c in candidates if c.fit is not None and not c.note), key=lambda c: c.cost)
-    begins = [replace(rung.fit, z=c.fit.z[:k], events=c.fit.events) for c in fitted[:BEGINS] if c.fit is not None]
-    tries = [(begin, stages) for begin in begins for stages in BASE_AGAIN]
-    for i, (begin, stages) in enumerate(tries):
-        rung = _further(rung, begin, stages, material, f"{name}-again{i + 1}")
+    sweep = Sweep(ground, jobs, store, name, tell)
+    candidates, every = sweep.run(tags)
+    begins = sorted((c for c in candidates if c.fit is not None and not c.note), key=lambda c: c.cost)[:BEGINS]
     if begins:
-        for i in range(AGAIN):  # as long as a leader is
-            assert rung.fit is not None
-            before = rung.fit.cost
-            rung = _further(rung, rung.fit, WIDELY, material, f"{name}-wide{i + 1}")
-            if rung.fit is None or rung.fit.cost > SETTLED * before:
-                break
+        rung = _widely(_from(rung, begins, material, name), material, name)
+    judged = _judged(candidates, rung, limits)
+    best, _ = decide(judged, limits)
+    compared: set[str] = set()
+    while best is not None and best.candidate.tag not in compared:
+        tag = best.candidate.tag
+        compared.add(tag)
+        every = sweep.rivals(best.candidate, every)
+        candidates = best_forms(tags, every)
+        if all(c.tag != tag for c in begins):
+            nearer = _from(rung, [best.candidate], material, f"{name}-{tag}")
+            rung = rung if nearer is rung else _widely(nearer, material, f"{name}-{tag}")
+        judged = _judged(candidates, rung, limits)
+        best, _ = decide(judged, limits)
+    return rung, Round(tuple(candidates), tuple(every), tuple(judged), rung)
+
+
+def _judged(candidates: Sequence[Candidate], rung: Rung, limits: Thresholds) -> list[Judged]:
+    """The conditions that each refitted candidate meets beside a rung."""
     assert rung.fit is not None
     assert rung.held is not None
-    judged = [judge(c, rung.fit.cost, rung.held, limits) for c in candidates if c.fit is not None and not c.note]
-    return rung, Round(tuple(candidates), tuple(every), tuple(judged), rung)
+    return [judge(c, rung.fit.cost, rung.held, limits) for c in candidates if c.fit is not None and not c.note]
+
+
+def _from(rung: Rung, begins: Sequence[Candidate], material: Material, name: str) -> Rung:
+    """The rung fitted again from where candidates arrived, if that is better."""
+    assert rung.composition is not None
+    assert rung.fit is not None
+    k = len(rung.composition.free)
+    places = [replace(rung.fit, z=c.fit.z[:k], events=c.fit.events) for c in begins if c.fit is not None]
+    for i, (begin, stages) in enumerate((place, stages) for place in places for stages in BASE_AGAIN):
+        rung = _further(rung, begin, stages, material, f"{name}-again{i + 1}")
+    return rung
+
+
+def _widely(rung: Rung, material: Material, name: str) -> Rung:
+    """The rung followed by way of wide floors, as long as a leader is."""
+    for i in range(AGAIN):
+        assert rung.fit is not None
+        before = rung.fit.cost
+        rung = _further(rung, rung.fit, WIDELY, material, f"{name}-wide{i + 1}")
+        if rung.fit is None or rung.fit.cost > SETTLED * before:
+            break
+    return rung
 
 
 def _further(rung: Rung, begin: Fit, stages: tuple[tuple[float, int], ...], material: Material, name: str) -> Rung:

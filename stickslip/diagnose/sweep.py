@@ -97,9 +97,7 @@ class Sweep:
         if leader is not None and leader.cost < WORTH * self.ground.optimum.cost:
             # what it may be taken for deserves the same, whatever its own score promised
             known = {_word(c.effect) for c in more}
-            promised = sorted(scored, key=lambda c: -c.promise)
-            like = [c for tag in sorted(_like(leader.effect)) for c in [c for c in promised if c.tag == tag][:FORMS]]
-            like = [c for c in like if _word(c.effect) not in known]
+            like = [c for c in _taken_for(leader, scored) if _word(c.effect) not in known]
             more += self._refine(self._refine(like, FEW, "like", 0.8, 0.82), MORE, "like more", 0.82, 0.85)
         best = min((c.cost for c in more), default=np.inf)
         ranked = sorted(more, key=lambda c: c.cost)
@@ -109,9 +107,17 @@ class Sweep:
             for first in _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]:
                 near += [c for c in ranked if c.tag == first.tag and c.cost < NEAR * first.cost][:FORMS]
         most = self._settle(near, 0.85, 1.0)
-        every = {_word(c.effect): c for c in (*scored, *begun, *more, *most)}
-        out = {tag: min((c for c in every.values() if c.tag == tag), key=_rank) for tag in tags}
-        return [out[tag] for tag in tags], list(every.values())
+        every = list({_word(c.effect): c for c in (*scored, *begun, *more, *most)}.values())
+        return best_forms(tags, every), every
+
+    def rivals(self, named: Candidate, every: Sequence[Candidate]) -> list[Candidate]:
+        """Everything that was fitted, with what the effect to be named may be taken for refitted as well, and followed
+        to the end where it is near: it need not be what the cheapest of all may be taken for."""
+        refitted = {c.tag for c in every if not c.note}
+        like = [c for c in _taken_for(named, every) if c.tag not in refitted]
+        begun = self._refine(self._refine(like, FEW, "rivals", 1.0, 1.0), MORE, "rivals more", 1.0, 1.0)
+        near = self._settle([c for c in begun if not c.note and c.cost < NEAR * named.cost], 1.0, 1.0)
+        return list({_word(c.effect): c for c in (*every, *begun, *near)}.values())
 
     def _score(self, effects: Sequence[Effect], low: float, high: float) -> list[Candidate]:
         g = self.ground
@@ -164,6 +170,11 @@ class Sweep:
             yield from pool(delayed(_named)(key, dumps(job), files) for key, job in work.items())
 
 
+def best_forms(tags: Sequence[str], every: Sequence[Candidate]) -> list[Candidate]:
+    """Every tag's candidate in its best form: refitted ones first, by cost."""
+    return [min((c for c in every if c.tag == tag), key=_rank) for tag in tags]
+
+
 def _firsts(ranked: Sequence[Candidate]) -> list[Candidate]:
     """The first of every tag."""
     found: dict[str, Candidate] = {}
@@ -176,6 +187,12 @@ def _like(effect: Effect) -> set[str]:
     """Tags that an effect is confused with, and those whose law contains its own."""
     wider = {tag for tag, cls in catalogue.all().items() if effect.tag in cls.generalises}
     return wider | set(catalogue.alike(effect.tag))
+
+
+def _taken_for(leader: Candidate, found: Sequence[Candidate]) -> list[Candidate]:
+    """What an effect may be taken for, in its most promising forms."""
+    promised = sorted(found, key=lambda c: -c.promise)
+    return [c for tag in sorted(_like(leader.effect)) for c in [c for c in promised if c.tag == tag][:FORMS]]
 
 
 def _named(key: str, job: bytes, files: tuple[str, ...]) -> tuple[str, Candidate]:

@@ -11,7 +11,7 @@ import pytest
 from stickslip.diagnose import sweep as module
 from stickslip.diagnose.candidate import Candidate, forms_of
 from stickslip.diagnose.refit import FEW, MORE
-from stickslip.diagnose.sweep import EXPLAINING, FOLLOWED, FORMS, LIKE, PROMISING, Ground, Sweep
+from stickslip.diagnose.sweep import EXPLAINING, FOLLOWED, FORMS, LIKE, PROMISING, Ground, Sweep, best_forms
 from stickslip.effects import catalogue
 from stickslip.fit.inertial import Fit
 
@@ -122,6 +122,30 @@ def test_what_the_leader_may_be_taken_for_is_tried_in_its_two_most_promising_for
     forms = [c for c in every if c.tag == "position-dependent-friction" and not c.note]
     assert len(forms) == len(forms_of("position-dependent-friction")) == FORMS
     assert calls.count(("settle", "position-dependent-friction")) == len(forms)
+
+
+def test_what_is_to_be_named_is_compared_with_what_it_may_be_taken_for(calls):
+    """Also where it is not the cheapest: all that it may be taken for are refitted, and the near ones followed."""
+    store = Memory()
+    _, every, _ = run(store)
+    left = [t for t in catalogue.tags() if len(set(catalogue.alike(t)) & {c.tag for c in every if c.note}) > 1]
+    named = next(c for c in every if c.tag == left[0])
+    like = (set(catalogue.alike(named.tag)) | wider(named.tag)) & {c.tag for c in every if c.note}
+    named = replace(named, fit=replace(named.fit, cost=800.0), note="")
+    sweep = Sweep(Ground(None, SimpleNamespace(cost=1000.0), None, None, None), 1, store, "round1", lambda *a: None)
+    calls.clear()
+    after = sweep.rivals(named, every)
+    assert {tag for _, tag in calls} == like
+    assert {tag for what, tag in calls if what == "settle"} == like  # 900 is near 800
+    assert not any(c.note for c in best_forms(sorted(like), after))
+    assert {(c.tag, *c.form.values()) for c in after} == {(c.tag, *c.form.values()) for c in every}
+    count = len(calls)
+    assert sweep.rivals(named, every) is not None
+    assert len(calls) == count  # from the store
+    calls.clear()
+    store.clear()
+    sweep.rivals(replace(named, fit=replace(named.fit, cost=600.0)), every)
+    assert not [tag for what, tag in calls if what == "settle"]  # and far from 600
 
 
 def test_where_nothing_promised_leads_all_others_get_a_few_steps(calls, monkeypatch):
