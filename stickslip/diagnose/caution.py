@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..effects import catalogue
 from ..units import shown
-from .engine import Diagnosis
+from .engine import Diagnosis, Round
 from .thresholds import THRESHOLDS, Thresholds
 
 TRIED = (
@@ -33,6 +33,7 @@ def cautions(d: Diagnosis, asked: Sequence[str] = (), limits: Thresholds = THRES
             "names were often wrong (documentation, 'The blind challenge')."
         )
         out += _unusual(d)
+        out += [line for tag in d.verdict.effects for line in _passed_over(tag, d.rounds)]
         out += [line for tag in d.verdict.effects for line in _checks(tag)]
     return out
 
@@ -59,6 +60,21 @@ def _unusual(d: Diagnosis) -> list[str]:
         "or the effect is not what is missing."
         for f in last.fit.free
         if f.name.split(".")[0] in d.verdict.effects and (found := f.unusual(last.fit.values[f.name], std[f.name]))
+    ]
+
+
+def _passed_over(tag: str, rounds: Sequence[Round]) -> list[str]:
+    """Effects that describe the fitted cycles better than one that is named, which the unseen cycles speak for."""
+    judged = next((r.judged for r in reversed(rounds) if any(j.candidate.tag == tag for j in r.judged)), ())
+    own = min((j.cost for j in judged if j.candidate.tag == tag), default=0.0)
+    wider = {t for t, cls in catalogue.all().items() if tag in cls.generalises}
+    cheaper = sorted((j for j in judged if j.cost < own and j.candidate.tag not in wider), key=lambda j: j.cost)
+    if not cheaper:
+        return []
+    several = ", ".join(f"{j.candidate.tag} ({j.cost:.0f})" for j in cheaper)
+    return [
+        f"{tag} is named for what it does on unseen cycles: the fitted ones are described better by {several}; its "
+        f"cost is {own:.0f}. The confidence counts the fitted cycles alone."
     ]
 
 

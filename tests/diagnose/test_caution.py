@@ -63,6 +63,31 @@ def test_a_value_that_a_machine_hardly_has_is_doubted(value, std, doubted):
     assert not any("usually" in line for line in said(finished(["tilt"]), last=SimpleNamespace(fit=fit)))
 
 
+def judged(**costs):
+    return SimpleNamespace(
+        judged=[SimpleNamespace(cost=c, candidate=SimpleNamespace(tag=t.replace("_", "-"))) for t, c in costs.items()]
+    )
+
+
+def test_what_describes_the_fitted_cycles_better_is_said():
+    first = judged(wear=900.0, tilt=800.0, viscous_drag=700.0, direct_effect=950.0)
+    later = judged(tilt=500.0, direct_effect=550.0)  # wear is in the model by then
+    rounds = (first, later)
+    named = SimpleNamespace(verdict=finished(["wear"]), rounds=rounds, ladder=(UNFITTED,))
+    (line,) = (line for line in cautions(named) if "named for what it does on unseen cycles" in line)
+    assert "by viscous-drag (700), tilt (800); its cost is 900" in line
+    assert "direct-effect (" not in line
+    cheapest = SimpleNamespace(verdict=finished(["tilt"]), rounds=rounds, ladder=(UNFITTED,))
+    assert not any("unseen cycles" in line for line in cautions(cheapest))
+    # a law that contains the one named could be no worse
+    wider = SimpleNamespace(
+        verdict=finished(["contact-ageing"]), rounds=(judged(contact_ageing=90.0, rate_and_state=89.0),),
+        ladder=(UNFITTED,),
+    )  # fmt: skip
+    assert "contact-ageing" in catalogue.get("rate-and-state").generalises
+    assert not any("unseen cycles" in line for line in cautions(wider))
+
+
 def test_where_nothing_is_named_nothing_is_cautioned_against():
     rung = SimpleNamespace(train=SimpleNamespace(by_phase={"creep": 9.0}, alike={}, total=9.0), held=None)
     assert said(nothing([], [], rung)) == []
