@@ -35,6 +35,7 @@ class Candidate:
         held: errors on the others.
         note: why it was dropped, if it was.
         others: further places to start from, each free parameters and event-wise factors.
+        settled: whether it was refined to the end.
     """
 
     tag: str
@@ -49,6 +50,7 @@ class Candidate:
     held: HeldOut | None = None
     note: str = ""
     others: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    settled: bool = False
 
     @property
     def amplitude(self) -> Free | None:

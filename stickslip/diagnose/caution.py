@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from ..effects import catalogue
 from ..units import shown
-from .engine import Diagnosis, Round
+from .engine import Diagnosis
 from .thresholds import THRESHOLDS, Thresholds
+from .verdict import contains, decide, unseen
 
 TRIED = (
     "Effects were tried, and none explains the little that is left (see the candidates). One that acts otherwise than "
@@ -33,7 +34,7 @@ def cautions(d: Diagnosis, asked: Sequence[str] = (), limits: Thresholds = THRES
             "names were often wrong (documentation, 'The blind challenge')."
         )
         out += _unusual(d)
-        out += [line for tag in d.verdict.effects for line in _passed_over(tag, d.rounds)]
+        out += [line for tag in d.verdict.effects for line in _cheaper(tag, d, limits)]
         out += [line for tag in d.verdict.effects for line in _checks(tag)]
     return out
 
@@ -63,18 +64,22 @@ def _unusual(d: Diagnosis) -> list[str]:
     ]
 
 
-def _passed_over(tag: str, rounds: Sequence[Round]) -> list[str]:
-    """Effects that describe the fitted cycles better than one that is named, which the unseen cycles speak for."""
-    judged = next((r.judged for r in reversed(rounds) if any(j.candidate.tag == tag for j in r.judged)), ())
-    own = min((j.cost for j in judged if j.candidate.tag == tag), default=0.0)
-    wider = {t for t, cls in catalogue.all().items() if tag in cls.generalises}
-    cheaper = sorted((j for j in judged if j.cost < own and j.candidate.tag not in wider), key=lambda j: j.cost)
+def _cheaper(tag: str, d: Diagnosis, limits: Thresholds) -> list[str]:
+    """Effects that describe the fitted cycles better than one that is named, and the unseen ones worse."""
+    for done in d.rounds:
+        best, _ = decide(done.judged, limits)
+        if best is not None and best.candidate.tag == tag:
+            break
+    else:
+        return []
+    cheaper = [j for j in done.judged if j.plausible and j.cost < best.cost and unseen(j) > unseen(best)]
+    cheaper = [j for j in cheaper if j.candidate.tag not in d.verdict.effects and not contains(j, best)]
     if not cheaper:
         return []
-    several = ", ".join(f"{j.candidate.tag} ({j.cost:.0f})" for j in cheaper)
+    several = ", ".join(f"{j.candidate.tag} ({j.cost:.0f})" for j in sorted(cheaper, key=lambda j: j.cost))
     return [
-        f"{tag} is named for what it does on unseen cycles: the fitted ones are described better by {several}; its "
-        f"cost is {own:.0f}. The confidence counts the fitted cycles alone."
+        f"{tag} is named with a cost of {best.cost:.0f}. The fitted cycles are described better by {several}, the "
+        "unseen ones worse; the confidence counts the fitted cycles alone."
     ]
 
 

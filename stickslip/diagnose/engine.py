@@ -284,7 +284,7 @@ def _round(
     tell: Tell,
     limits: Thresholds,
 ) -> tuple[Rung, Round]:
-    """All candidates on a rung, and the rung fitted again from where the best two of them arrived.
+    """All candidates on a rung, and the rung fitted again from where the best two of them arrived, and what is named.
 
     A base less converged than its rivals would make a gain of nothing. An effect gets a name only after what it may be
     taken for was refitted, and the rung from where it arrived.

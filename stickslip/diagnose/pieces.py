@@ -53,7 +53,7 @@ def fit_from(arrays: Mapping[str, np.ndarray]) -> Fit:
 
 def candidate_arrays(candidate: Candidate) -> dict[str, np.ndarray]:
     """A candidate as named arrays."""
-    facts = ("tag", "form", "score", "promise", "wide", "note")
+    facts = ("tag", "form", "score", "promise", "wide", "note", "settled")
     head = json.dumps({name: getattr(candidate, name) for name in facts})
     others = {name: np.array([o[i] for o in candidate.others]) for i, name in enumerate(("others_z", "others_events"))}
     return {"head": np.array(head)} | others | (fit_arrays(candidate.fit) if candidate.fit is not None else {})

@@ -125,4 +125,4 @@ def settle(
         return best
     sure = certain(Problem(best.composition, measurement, threads=threads), floor, best.fit)
     # its errors were taken with the derivatives it has
-    return replace(best, fit=replace(best.fit, covariance=sure.covariance))
+    return replace(best, fit=replace(best.fit, covariance=sure.covariance), settled=True)

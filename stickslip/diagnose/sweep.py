@@ -106,18 +106,20 @@ class Sweep:
             taken_for = _like(near[0].effect) - {c.tag for c in near}
             for first in _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]:
                 near += [c for c in ranked if c.tag == first.tag and c.cost < NEAR * first.cost][:FORMS]
-        most = self._settle(near, 0.85, 1.0)
-        every = list({_word(c.effect): c for c in (*scored, *begun, *more, *most)}.values())
+        most = self._settle(near, "settle", 0.85, 1.0)
+        every = _latest(*scored, *begun, *more, *most)
         return best_forms(tags, every), every
 
     def rivals(self, named: Candidate, every: Sequence[Candidate]) -> list[Candidate]:
-        """Everything that was fitted, with what the effect to be named may be taken for refitted as well, and followed
-        to the end where it is near: it need not be what the cheapest of all may be taken for."""
-        refitted = {c.tag for c in every if not c.note}
-        like = [c for c in _taken_for(named, every) if c.tag not in refitted]
-        begun = self._refine(self._refine(like, FEW, "rivals", 1.0, 1.0), MORE, "rivals more", 1.0, 1.0)
-        near = self._settle([c for c in begun if not c.note and c.cost < NEAR * named.cost], 1.0, 1.0)
-        return list({_word(c.effect): c for c in (*every, *begun, *near)}.values())
+        """Everything that was fitted, after what is about to be named, and what that may be taken for, got what the
+        cheapest of all got in :meth:`run`: each was refitted, and those near it were followed to the end."""
+        like = _taken_for(named, every)
+        begun = [c for c in like if c.note]
+        begun = self._refine(self._refine(begun, FEW, "rivals", 1.0, 1.0), MORE, "rivals more", 1.0, 1.0)
+        every = _latest(*every, *begun)
+        words = {_word(c.effect) for c in (named, *like)}
+        near = [c for c in every if _word(c.effect) in words and not c.note and c.cost < NEAR * named.cost]
+        return _latest(*every, *self._settle([c for c in near if not c.settled], "rivals settle", 1.0, 1.0))
 
     def _score(self, effects: Sequence[Effect], low: float, high: float) -> list[Candidate]:
         g = self.ground
@@ -136,10 +138,10 @@ class Sweep:
         }
         return self._all(work, f"{stage} steps", low, high)
 
-    def _settle(self, found: Sequence[Candidate], low: float, high: float) -> list[Candidate]:
+    def _settle(self, found: Sequence[Candidate], stage: str, low: float, high: float) -> list[Candidate]:
         g = self.ground
         worth = FOLLOWED * g.optimum.cost
-        work = {f"{self.name}-settle-{_word(c.effect)}": (settle, (c, g.data, g.floor, g.train, worth)) for c in found}
+        work = {f"{self.name}-{stage}-{_word(c.effect)}": (settle, (c, g.data, g.floor, g.train, worth)) for c in found}
         return self._all(work, "to the end", low, high)
 
     def _all(self, work: Mapping[str, Job], stage: str, low: float, high: float) -> list[Candidate]:
@@ -173,6 +175,16 @@ class Sweep:
 def best_forms(tags: Sequence[str], every: Sequence[Candidate]) -> list[Candidate]:
     """Every tag's candidate in its best form: refitted ones first, by cost."""
     return [min((c for c in every if c.tag == tag), key=_rank) for tag in tags]
+
+
+def _latest(*found: Candidate) -> list[Candidate]:
+    """The last result of every form; one that failed does not take the place of one that did not."""
+    out: dict[str, Candidate] = {}
+    for candidate in found:
+        word = _word(candidate.effect)
+        if word not in out or not candidate.note or out[word].note:
+            out[word] = candidate
+    return list(out.values())
 
 
 def _firsts(ranked: Sequence[Candidate]) -> list[Candidate]:

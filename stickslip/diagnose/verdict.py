@@ -172,9 +172,9 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
     if not passed:
         return None, []
     # what the fitted cycles cannot tell apart, the unseen ones may
-    best = min((j for j in passed if j.cost < limits.rival * passed[0].cost), key=_unseen)
+    best = min((j for j in passed if j.cost < limits.rival * passed[0].cost), key=unseen)
     # a special case within reach of the law that contains it: nothing speaks for the rest of that law
-    simpler = [j for j in passed if j.cost < limits.rival * best.cost and _contains(best, j)]
+    simpler = [j for j in passed if j.cost < limits.rival * best.cost and contains(best, j)]
     best = simpler[0] if simpler else best
     # a rival counts even where it gains too little by itself, unless it needs what is not plausible or is clearly worse
     # on cycles that no fit has seen
@@ -182,7 +182,7 @@ def decide(judged: Sequence[Judged], limits: Thresholds = THRESHOLDS) -> tuple[J
         j
         for j in ranked
         if j.cost < limits.rival * best.cost
-        and not _contains(j, best)
+        and not contains(j, best)
         and j.plausible
         and not worse(j.candidate.held, best.candidate.held, limits)
     ]
@@ -203,7 +203,7 @@ def passed_over(judged: Judged, others: Sequence[Judged], limits: Thresholds = T
         return judged.failures
     if judged is best:
         return ()
-    if _contains(judged, best):
+    if contains(judged, best):
         return (f"it contains {best.candidate.tag}, and what it has beyond that takes too little off the cost",)
     if judged.candidate.tag == best.candidate.tag:
         return ("another form of it describes the data better",)
@@ -214,7 +214,7 @@ def passed_over(judged: Judged, others: Sequence[Judged], limits: Thresholds = T
     return (f"{best.candidate.tag} describes the unseen cycles better",)
 
 
-def _unseen(judged: Judged) -> float:
+def unseen(judged: Judged) -> float:
     """Score on unseen cycles; infinite where there are none."""
     held = judged.candidate.held
     return np.inf if held is None else held.score
@@ -249,11 +249,12 @@ def weights(judged: Sequence[Judged]) -> dict[str, float]:
 def confidence(judged: Sequence[Judged], said: Sequence[Judged]) -> float:
     """Weight of the effects said, with that of the laws that contain one of them."""
     tags = {s.candidate.tag for s in said}
-    tags |= {j.candidate.tag for j in judged if any(_contains(j, s) for s in said)}
+    tags |= {j.candidate.tag for j in judged if any(contains(j, s) for s in said)}
     return float(sum(w for tag, w in weights(judged).items() if tag in tags))
 
 
-def _contains(general: Judged, special: Judged) -> bool:
+def contains(general: Judged, special: Judged) -> bool:
+    """Whether the law of one effect has that of another as a special case."""
     return special.candidate.tag in general.candidate.effect.generalises
 
 

@@ -1,7 +1,7 @@
-"""Compiled functions whose traces are kept on disk, where compiled code is (:mod:`stickslip.cache`).
+"""Compiled functions whose traces are kept on disk.
 
-JAX finds what it has compiled by the traced function, so every process would trace each model again, which takes three
-times as long as to load it.
+JAX finds what it has compiled (:mod:`stickslip.cache`) by the traced function, so every process would trace each model
+again, which takes three times as long as to load it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import os
 import platform
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -28,10 +29,14 @@ PACKAGE = Path(__file__).parents[1]
 MADE_WITH = ("jax", "jaxlib", "diffrax", "equinox", "lineax", "optimistix", "numpy")  # and with this package's code
 FORGOTTEN = 30 * 86400.0  # s after which traces of other versions are removed
 _DIGEST = hashlib.sha256().digest_size
+_IMPORTED = time.time()
 
 
 class Program:
-    """``jax.jit`` of a function, the trace of which is kept.
+    """A function of pytrees of numbers, compiled; where its trace is kept, only its values can be asked for.
+
+    Attributes:
+        function: itself, for derivatives and for lanes.
 
     Args:
         function: of pytrees of arrays.
@@ -40,20 +45,21 @@ class Program:
     """
 
     def __init__(self, function: Callable[..., Any], name: str | None) -> None:
-        self._function, self._traced, self._name = function, jax.jit(function), name
+        self.function, self.name = function, name
+        self._traced = jax.jit(function)
         self._ready: dict[Any, Callable[..., Any]] = {}
         self._lock = Lock()
 
     def __call__(self, *args: Any) -> Any:
         """The function's result."""
-        folder = None if self._name is None else _folder()
+        folder = None if self.name is None else _folder()
         if folder is None:
             return self._traced(*args)
         leaves, structure = jax.tree.flatten(args)
         kinds = structure, tuple((np.shape(a), str(getattr(a, "dtype", type(a)))) for a in leaves)
         with self._lock:
             if kinds not in self._ready:
-                path = folder / hashlib.sha256(f"{self._name} {kinds}".encode()).hexdigest()
+                path = folder / hashlib.sha256(f"{self.name} {kinds}".encode()).hexdigest()
                 self._ready[kinds] = self._restored(leaves, structure, path)
         return self._ready[kinds](*leaves)
 
@@ -61,7 +67,7 @@ class Program:
         """The function of its arguments' leaves, from its trace on disk; that is made where it is not there."""
 
         def flat(*leaves: Any) -> Any:
-            return self._function(*jax.tree.unflatten(structure, leaves))
+            return self.function(*jax.tree.unflatten(structure, leaves))
 
         kept = _read(path)
         if kept is None:
@@ -84,12 +90,14 @@ def _read(path: Path) -> bytes | None:
 
 
 def _write(path: Path, kept: bytes) -> None:
+    """Keep a trace, unless the code may be another by now than the one it was made with."""
     aside = path.with_suffix(f".{os.getpid()}")
-    try:
-        aside.write_bytes(hashlib.sha256(kept).digest() + kept)
-        aside.replace(path)
-    except OSError:
-        aside.unlink(missing_ok=True)  # a full disk: it is traced again next time
+    with suppress(OSError):  # a full disk, or one that cannot be written: it is traced again next time
+        if max(p.stat().st_mtime for p in _code()) < _IMPORTED:
+            aside.write_bytes(hashlib.sha256(kept).digest() + kept)
+            aside.replace(path)
+    with suppress(OSError):
+        aside.unlink(missing_ok=True)
 
 
 def _folder() -> Path | None:
@@ -98,24 +106,36 @@ def _folder() -> Path | None:
     return _of_this_version() if kept else None
 
 
+def _code() -> Iterator[Path]:
+    return PACKAGE.rglob("*.py")
+
+
+def _digest() -> str | None:
+    """Of the code as it is on disk, and of all else that a trace depends on."""
+    parts = [platform.python_version(), jax.default_backend(), os.environ.get("EQX_ON_ERROR", "")]
+    found = hashlib.sha256(" ".join([*parts, *map(version, MADE_WITH)]).encode())
+    try:
+        for path in sorted(_code()):
+            found.update(path.relative_to(PACKAGE).as_posix().encode() + path.read_bytes())
+    except OSError:
+        return None
+    return found.hexdigest()
+
+
 @lru_cache(maxsize=1)
 def _of_this_version() -> Path | None:
     """The folder for traces of this version of everything; those of others are removed when they are old."""
-    above = folder_for("traced")
-    if above is None:
+    above, digest = folder_for("traced"), _digest()
+    if above is None or digest is None:
         return None
-    digest = hashlib.sha256(platform.python_version().encode())
-    for name in MADE_WITH:
-        digest.update(version(name).encode())
-    for path in sorted(PACKAGE.rglob("*.py")):
-        digest.update(path.relative_to(PACKAGE).as_posix().encode() + path.read_bytes())
-    folder = above / digest.hexdigest()
+    folder = above / digest
     try:
         folder.mkdir(exist_ok=True)
         folder.touch()
-        for other in above.iterdir():
-            if other.stat().st_mtime < time.time() - FORGOTTEN:
-                shutil.rmtree(other, ignore_errors=True)
     except OSError:
         return None
+    for other in above.iterdir():
+        with suppress(OSError):
+            if other.stat().st_mtime < time.time() - FORGOTTEN:
+                shutil.rmtree(other)
     return folder

@@ -286,6 +286,8 @@ def test_two_clusters_on_one_machine_do_not_speak_of_ports() -> None:
         warnings.simplefilter("error")
         with cluster(None, 1) as one, cluster(None, 1) as other:
             assert [one.submit(sum, [1, 2]).result(), other.submit(sum, [1, 3]).result()] == [3, 4]
+            # dask's own setting has memory given back after every evaluation
+            assert one.submit(os.environ.get, "MALLOC_TRIM_THRESHOLD_").result() is None
 
 
 def test_a_diagnosis_without_a_result_is_a_failure(tmp_path: Path) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from stickslip.diagnose.caution import cautions
+from stickslip.diagnose.heldout import HeldOut
 from stickslip.diagnose.thresholds import Thresholds
 from stickslip.diagnose.verdict import finished, nothing
 from stickslip.effects import catalogue
@@ -63,29 +65,44 @@ def test_a_value_that_a_machine_hardly_has_is_doubted(value, std, doubted):
     assert not any("usually" in line for line in said(finished(["tilt"]), last=SimpleNamespace(fit=fit)))
 
 
-def judged(**costs):
-    return SimpleNamespace(
-        judged=[SimpleNamespace(cost=c, candidate=SimpleNamespace(tag=t.replace("_", "-"))) for t, c in costs.items()]
-    )
+def a_round(**found):
+    """Effects with their cost, score on unseen cycles, and what they fail."""
+
+    def judged(tag, cost, score, *failures):
+        effect = catalogue.make(tag)
+        held = HeldOut(score**0.5, score, {}, score * np.linspace(0.9, 1.1, 8))
+        candidate = SimpleNamespace(tag=tag, effect=effect, held=held)
+        return SimpleNamespace(
+            cost=cost, candidate=candidate, failures=failures, passed=not failures, plausible="border" not in failures
+        )  # fmt: skip
+
+    return SimpleNamespace(judged=[judged(tag.replace("_", "-"), *rest) for tag, rest in found.items()])
+
+
+def better(effects, *rounds):
+    found = SimpleNamespace(verdict=finished(effects), rounds=rounds, ladder=(UNFITTED,))
+    return [line for line in cautions(found) if "described better" in line]
 
 
 def test_what_describes_the_fitted_cycles_better_is_said():
-    first = judged(wear=900.0, tilt=800.0, viscous_drag=700.0, direct_effect=950.0)
-    later = judged(tilt=500.0, direct_effect=550.0)  # wear is in the model by then
-    rounds = (first, later)
-    named = SimpleNamespace(verdict=finished(["wear"]), rounds=rounds, ladder=(UNFITTED,))
-    (line,) = (line for line in cautions(named) if "named for what it does on unseen cycles" in line)
-    assert "by viscous-drag (700), tilt (800); its cost is 900" in line
-    assert "direct-effect (" not in line
-    cheapest = SimpleNamespace(verdict=finished(["tilt"]), rounds=rounds, ladder=(UNFITTED,))
-    assert not any("unseen cycles" in line for line in cautions(cheapest))
-    # a law that contains the one named could be no worse
-    wider = SimpleNamespace(
-        verdict=finished(["contact-ageing"]), rounds=(judged(contact_ageing=90.0, rate_and_state=89.0),),
-        ladder=(UNFITTED,),
+    first = a_round(
+        wear=(900.0, 1.0), tilt=(800.0, 2.0, "unseen"), viscous_drag=(700.0, 2.0, "unseen"),
+        adhesion=(600.0, 2.0, "border"), curvature=(650.0, 0.9, "too little"), direct_effect=(950.0, 2.0, "unseen"),
     )  # fmt: skip
+    later = a_round(tilt=(500.0, 0.9), direct_effect=(550.0, 1.9))  # wear is in the model by then
+    (line,) = better(["wear"], first, later)
+    assert "wear is named with a cost of 900" in line
+    assert "by viscous-drag (700), tilt (800), the unseen ones worse" in line
+    # not what is itself named, nor of the cheapest
+    (line,) = better(["wear", "tilt"], first, later)
+    assert "by viscous-drag (700), the unseen" in line
+    # one that took another's place in the end was chosen in no round
+    assert better(["direct-effect"], first, later) == []
+
+
+def test_a_law_that_contains_the_one_named_is_no_better():
     assert "contact-ageing" in catalogue.get("rate-and-state").generalises
-    assert not any("unseen cycles" in line for line in cautions(wider))
+    assert better(["contact-ageing"], a_round(contact_ageing=(90.0, 1.0), rate_and_state=(89.0, 1.1))) == []
 
 
 def test_where_nothing_is_named_nothing_is_cautioned_against():

@@ -140,9 +140,12 @@ def test_an_effect_that_takes_all_is_named_with_its_form(diagnose):
 
 
 def test_what_is_named_was_compared_with_all_that_it_may_be_taken_for(diagnose):
-    """The cheapest effect does worse on unseen cycles than what is named, which is none of its doubles."""
+    """The cheapest effect is worse on unseen cycles than what would be named, whose double it is not."""
     assert "residual-load" in catalogue.alike("sensor-low-pass")
-    sets = {("sensor-low-pass",): (300.0, LITTLE), ("residual-load",): (100.0, SMALL)}
+    assert "residual-load" not in catalogue.alike("curvature")
+    sets = {("curvature",): (290.0, 8.9), ("sensor-low-pass",): (300.0, LITTLE), ("residual-load",): (100.0, SMALL)}
+    passed = diagnose({k: v for k, v in sets.items() if k != ("residual-load",)})[0]
+    assert passed.verdict.effects == ("sensor-low-pass",)
     found, _ = diagnose(sets, passed_by={"residual-load"})
     assert found.verdict.effects == ("residual-load",)
     candidates = {c.tag: c for c in found.rounds[0].candidates}
@@ -152,9 +155,14 @@ def test_what_is_named_was_compared_with_all_that_it_may_be_taken_for(diagnose):
 def test_a_name_is_not_given_for_what_the_base_does_from_the_same_place(diagnose):
     sets = {("wear",): (690.0, 8.8), ("tilt",): (695.0, 8.9), ("viscous-drag",): (700.0, LITTLE)}
     assert diagnose(sets)[0].verdict.effects == ("viscous-drag",)
-    found, _ = diagnose(sets, base_from={"viscous-drag": (710.0, LITTLE)})
-    assert (found.verdict.kind, found.verdict.effects) == ("unknown", ())
-    assert found.ladder[-1].fit.cost == 710.0
+    store = Memory()
+    for _ in range(2):  # the second time from what was kept
+        found, _ = diagnose(sets, base_from={"viscous-drag": (710.0, LITTLE)}, store=store)
+        assert (found.verdict.kind, found.verdict.effects) == ("unknown", ())
+        assert found.ladder[-1].fit.cost == 710.0
+    again = {key for key in store if "again" in key}
+    assert {f"round1-viscous-drag-again{i}" for i in (1, 2)} < again
+    assert any(key.startswith("round1-viscous-drag-wide") for key in store)
 
 
 @pytest.mark.parametrize("most", [1, 4])

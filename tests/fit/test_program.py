@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
 from collections import namedtuple
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +18,7 @@ from stickslip.effects import catalogue
 from stickslip.effects.base import Effect
 from stickslip.fit import program
 from stickslip.fit.composition import Family
+from stickslip.fit.problem import _tracks
 from stickslip.fit.program import Program
 
 
@@ -80,10 +83,32 @@ def test_nothing_is_kept_without_a_name_or_of_what_calls_back_into_python(folder
     assert not list(folder.iterdir())
 
 
-def test_a_folder_that_cannot_be_written_does_no_harm(folder, monkeypatch):
-    monkeypatch.setattr(program, "_folder", lambda: folder / "gone")
+@pytest.mark.parametrize("how", ["gone", "read-only"])
+def test_a_folder_that_cannot_be_written_does_no_harm(folder, monkeypatch, how):
+    if how == "gone":
+        monkeypatch.setattr(program, "_folder", lambda: folder / "gone")
+    else:
+
+        def refuse(*args, **kwargs):
+            raise OSError(errno.EROFS, "read-only file system")
+
+        for name in ("write_bytes", "unlink", "replace"):
+            monkeypatch.setattr(Path, name, refuse)
     function = Counted()
     np.testing.assert_array_equal(Program(function, "one")(PARTS, 3.0), jax.jit(function)(PARTS, 3.0))
+    assert not list(folder.iterdir())
+
+
+def test_no_trace_is_kept_of_code_that_was_changed_since_it_was_loaded(folder, tmp_path_factory, monkeypatch):
+    package = tmp_path_factory.mktemp("package")
+    monkeypatch.setattr(program, "PACKAGE", package)
+    (package / "law.py").write_text("x = 1")
+    os.utime(package / "law.py", (0.0, 0.0))
+    Program(Counted(), "one")(PARTS, 3.0)
+    assert len(list(folder.iterdir())) == 1
+    (package / "law.py").write_text("x = 2")
+    Program(Counted(), "other")(PARTS, 3.0)
+    assert len(list(folder.iterdir())) == 1
 
 
 def test_an_output_that_is_no_known_container_is_traced_every_time(folder):
@@ -126,6 +151,14 @@ def test_traces_belong_to_the_code_and_old_ones_of_other_code_go(tmp_path, monke
     os.utime(first, (0.0, 0.0))
     assert of() == second
     assert set(cache.iterdir()) == {second}
+    for change in (
+        lambda: monkeypatch.setattr(program, "version", lambda name: f"{name} 9.9"),
+        lambda: monkeypatch.setenv("EQX_ON_ERROR", "breakpoint"),
+        lambda: monkeypatch.setattr(jax, "default_backend", lambda: "another"),
+    ):
+        change()
+        assert of() not in {first, second}
+        second = of()
 
 
 def test_traces_of_effects_from_elsewhere_are_not_kept():
@@ -135,7 +168,37 @@ def test_traces_of_effects_from_elsewhere_are_not_kept():
     def of(*effects):
         return Family(4, 64, 3072, (), jax.tree.structure(effects))
 
-    wear = catalogue.get("wear")()
-    assert of().own()
-    assert of(wear).own()
-    assert not of(wear, Elsewhere()).own()
+    wear, other = catalogue.get("wear")(), catalogue.get("wear")(course="saturating")
+    assert _tracks(of(wear, Elsewhere())).name is None
+    names = {_tracks(f).name for f in (of(), of(wear), of(other), of(wear)._replace(bins=32))}
+    assert None not in names
+    assert len(names) == 4
+
+
+CAMPAIGN = """
+import sys
+from pathlib import Path
+import numpy as np
+from stickslip.fit import program
+from stickslip.fit.problem import Problem, _tracks
+from tests.fit import synthetic
+
+campaign = synthetic.measured(synthetic.traces())
+events = np.zeros((*campaign.values.shape[:2], 2))
+
+def features(folder):
+    program._folder = lambda: folder
+    _tracks.cache_clear()
+    return Problem(synthetic.composition(), campaign).features(synthetic.truth(), events)
+
+folder = Path(sys.argv[1])
+first, again, none = features(folder), features(folder), features(None)
+assert len(list(folder.iterdir())) == 1
+np.testing.assert_array_equal(again, first)
+np.testing.assert_array_equal(none, first)
+"""
+
+
+def test_a_campaign_has_the_same_features_from_a_kept_trace(tmp_path):
+    environment = {**os.environ, "EQX_ON_ERROR": "nan"}  # as where compiled code is kept; what raises calls back
+    subprocess.run([sys.executable, "-c", CAMPAIGN, str(tmp_path)], env=environment, check=True)
