@@ -73,7 +73,7 @@ class Program:
         if kept is None:
             try:
                 kept = bytes(export.export(jax.jit(flat))(*leaves).serialize())
-            except (NotImplementedError, ValueError):  # it calls back into Python
+            except (NotImplementedError, ValueError):  # calls back into Python, or returns no known container
                 return jax.jit(flat)
             _write(path, kept)
         return jax.jit(export.deserialize(bytearray(kept)).call)
@@ -90,10 +90,10 @@ def _read(path: Path) -> bytes | None:
 
 
 def _write(path: Path, kept: bytes) -> None:
-    """Keep a trace, unless the code may be another by now than the one it was made with."""
+    """Keep a trace, unless it may be of other code than what is on disk by now."""
     aside = path.with_suffix(f".{os.getpid()}")
     with suppress(OSError):  # a full disk, or one that cannot be written: it is traced again next time
-        if max(p.stat().st_mtime for p in _code()) < _IMPORTED:
+        if _as_loaded():
             aside.write_bytes(hashlib.sha256(kept).digest() + kept)
             aside.replace(path)
     with suppress(OSError):
@@ -110,11 +110,18 @@ def _code() -> Iterator[Path]:
     return PACKAGE.rglob("*.py")
 
 
+def _as_loaded() -> bool:
+    """Whether the code on disk is older than this process' own."""
+    return max(path.stat().st_mtime for path in _code()) < _IMPORTED
+
+
 def _digest() -> str | None:
-    """Of the code as it is on disk, and of all else that a trace depends on."""
+    """Of the code and of all else that a trace depends on; None where the code on disk is not what was loaded."""
     parts = [platform.python_version(), jax.default_backend(), os.environ.get("EQX_ON_ERROR", "")]
     found = hashlib.sha256(" ".join([*parts, *map(version, MADE_WITH)]).encode())
     try:
+        if not _as_loaded():
+            return None
         for path in sorted(_code()):
             found.update(path.relative_to(PACKAGE).as_posix().encode() + path.read_bytes())
     except OSError:

@@ -44,16 +44,9 @@ def _measured(part: str) -> Tally:
 
 @pytest.mark.slow
 @pytest.mark.timeout(0)
-def test_one_effect_is_named_or_in_a_set_of_three():
-    found = _measured("one")
-    assert found.right >= 0.90 * found.answered
-    assert found.exact >= 0.75 * found.answered
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(0)
-def test_a_strong_effect_is_named_or_in_a_set_of_three():
-    found = _measured("strong")
+@pytest.mark.parametrize("part", ["one", "strong"])
+def test_one_effect_is_named_or_in_a_set_of_three(part):
+    found = _measured(part)
     assert found.right >= 0.90 * found.answered
     assert found.exact >= 0.75 * found.answered
 

@@ -142,9 +142,12 @@ def test_traces_belong_to_the_code_and_old_ones_of_other_code_go(tmp_path, monke
     monkeypatch.setattr(program, "PACKAGE", package)
     monkeypatch.setattr(program, "folder_for", lambda name: cache)
     of = program._of_this_version.__wrapped__
+    assert of() is None  # changed since it was loaded: neither are traces of the new code those of this process
+    os.utime(package / "law.py", (0.0, 0.0))
     first = of()
     assert of() == first
     (package / "law.py").write_text("x = 2")
+    os.utime(package / "law.py", (0.0, 0.0))
     second = of()
     assert second != first
     assert {first, second} == set(cache.iterdir())
