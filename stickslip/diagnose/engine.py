@@ -27,7 +27,7 @@ from .refit import AGAIN, MORE, SETTLED, WIDELY
 from .revise import Named, done_without, told_apart
 from .rungs import Material, Rung, kept, make_rung
 from .static_rung import static_features
-from .sweep import Ground, Store, Sweep, best_forms
+from .sweep import SWEPT, Ground, Store, Sweep, best_forms
 from .thresholds import THRESHOLDS, Thresholds
 from .verdict import (
     Judged,
@@ -297,6 +297,7 @@ def _round(
     candidates, every = sweep.run(tags)
     begins = sorted((c for c in candidates if c.fit is not None and not c.note), key=lambda c: c.cost)[:BEGINS]
     if begins:
+        tell(f"{name}: the model without them fitted again", SWEPT)
         rung = _widely(_from(rung, begins, material, name), material, name)
     judged = _judged(candidates, rung, limits)
     best, _ = decide(judged, limits)

@@ -29,6 +29,7 @@ LEADERS = 5
 FOLLOWED = 0.95  # times the base's cost: a leader below it is followed by way of wide floors
 LIKE = 2  # of those a leader may be taken for that are followed to the end, however far from it they seem
 FORMS = 2  # of each of these: its most promising ones
+SWEPT = 0.93  # share of a round that is done then, before the model is fitted again and what may get a name compared
 
 
 class Store(Protocol):
@@ -75,30 +76,30 @@ class Sweep:
 
     def run(self, tags: Sequence[str]) -> tuple[list[Candidate], list[Candidate]]:
         """Every tag's candidate in its best form, in the order of ``tags``; and everything that was fitted."""
-        scored = self._score([form for tag in tags for form in forms_of(tag)], 0.0, 0.5)
+        scored = self._score([form for tag in tags for form in forms_of(tag)], 0.0, 0.55)
         firsts = _firsts(sorted(scored, key=lambda c: -c.promise))  # each tag in the form that promises most
         promising = firsts[:PROMISING]
         explaining = _firsts(sorted(scored, key=lambda c: -c.score))[:EXPLAINING]
         promising += [c for c in explaining if c.tag not in {p.tag for p in promising}]
-        begun = self._refine(promising, FEW, "few", 0.5, 0.65)
+        begun = self._refine(promising, FEW, "few", 0.55, 0.62)
         few = sorted(begun, key=lambda c: c.cost)
         if not any(c.cost < WORTH * self.ground.optimum.cost for c in few):
             # then promises told nothing: few steps for all others, of which the best take the places of the worst
             others = [c for c in firsts if c.tag not in {p.tag for p in promising}]
-            begun += self._refine(others, FEW, "few", 0.65, 0.7)
+            begun += self._refine(others, FEW, "few", 0.62, 0.67)
             few = sorted(begun, key=lambda c: c.cost)[: len(few)]
         half = few[: max(LEAST, len(few) // 2)]
         half += [c for c in few[len(half) :] if c.cost < NEAR * few[0].cost]
         leading = {c.tag for c in half[:LEAST]}
         followed = {_word(c.effect) for c in half}
         forms = [c for c in scored if c.tag in leading and _word(c.effect) not in followed]
-        more = self._refine([*half, *forms], MORE, "more", 0.7, 0.8)
+        more = self._refine([*half, *forms], MORE, "more", 0.67, 0.71)
         leader = min(more, key=lambda c: c.cost, default=None)
         if leader is not None and leader.cost < WORTH * self.ground.optimum.cost:
             # what it may be taken for deserves the same, whatever its own score promised
             known = {_word(c.effect) for c in more}
             like = [c for c in _taken_for(leader, scored) if _word(c.effect) not in known]
-            more += self._refine(self._refine(like, FEW, "like", 0.8, 0.82), MORE, "like more", 0.82, 0.85)
+            more += self._refine(self._refine(like, FEW, "like", 0.71, 0.74), MORE, "like more", 0.74, 0.77)
         best = min((c.cost for c in more), default=np.inf)
         ranked = sorted(more, key=lambda c: c.cost)
         near = [c for c in ranked if c.cost < NEAR * best][:LEADERS]
@@ -106,7 +107,7 @@ class Sweep:
             taken_for = _like(near[0].effect) - {c.tag for c in near}
             for first in _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]:
                 near += [c for c in ranked if c.tag == first.tag and c.cost < NEAR * first.cost][:FORMS]
-        most = self._settle(near, "settle", 0.85, 1.0)
+        most = self._settle(near, "settle", 0.77, SWEPT)
         every = _latest(*scored, *begun, *more, *most)
         return best_forms(tags, every), every
 
@@ -115,11 +116,11 @@ class Sweep:
         cheapest of all got in :meth:`run`: each was refitted, and those near it were followed to the end."""
         like = _taken_for(named, every)
         begun = [c for c in like if c.note]
-        begun = self._refine(self._refine(begun, FEW, "rivals", 1.0, 1.0), MORE, "rivals more", 1.0, 1.0)
+        begun = self._refine(self._refine(begun, FEW, "rivals", SWEPT, 0.95), MORE, "rivals more", 0.95, 0.97)
         every = _latest(*every, *begun)
         words = {_word(c.effect) for c in (named, *like)}
         near = [c for c in every if _word(c.effect) in words and not c.note and c.cost < NEAR * named.cost]
-        return _latest(*every, *self._settle([c for c in near if not c.settled], "rivals settle", 1.0, 1.0))
+        return _latest(*every, *self._settle([c for c in near if not c.settled], "rivals settle", 0.97, 1.0))
 
     def _score(self, effects: Sequence[Effect], low: float, high: float) -> list[Candidate]:
         g = self.ground
