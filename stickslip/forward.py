@@ -1,8 +1,9 @@
 """The model through the events of a measured run: multiple shooting with the clock and position of the data.
 
 A run is a chain of cycles, each from one arrest to the next. Within a cycle the model is on its own; at each arrest its
-clock and position are set to what was measured, so drive phase and holds stay where the data have them and no event
-can be paired wrongly. The contact's state (forces, weakening, memory of every effect) is the model's own throughout.
+clock is set to what was measured, and its position to where its sensor shows what was measured, so drive phase and
+holds stay where the data have them and no event can be paired wrongly. The contact's state (forces, weakening, memory
+of every effect) is the model's own throughout.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from .contact.memory import loading_displacement
 from .effects.base import Motion
 from .model import Model, State
 from .solve.integrate import _TERM, step_control
@@ -94,11 +96,15 @@ def cut_short(tracks: Track, cycles: Cycles) -> np.ndarray:
     return np.asarray(cycles.used) & ~np.asarray(tracks.arrested) & early
 
 
+def _reading(model: Model, t: Any, y: State) -> Array:
+    """What the sensor shows of a state (m)."""
+    still = Motion(t + 0.0 * y.x, 1e-12 + 0.0 * y.x, y.x, y.v, 0.0 * y.x, 0.0 * y.x, model.lead(t))
+    return model.read(y, still, jnp.sum(y.force))
+
+
 def _observe(t: Any, y: State, args: Any) -> tuple[Array, ...]:
     model, *_ = args
-    lead = model.lead(t)
-    still = Motion(t + 0.0 * y.x, 1e-12 + 0.0 * y.x, y.x, y.v, 0.0 * y.x, 0.0 * y.x, lead)
-    seen = t + 0.0 * y.x, y.x, y.v, model.read(y, still, jnp.sum(y.force))
+    seen = t + 0.0 * y.x, y.x, y.v, _reading(model, t, y)
     return (*seen, model.rising(y)) if model.late else seen
 
 
@@ -171,6 +177,17 @@ def _share(new: Array, old: Array) -> Array:
     return jnp.where(old > 0, new / jnp.where(old > 0, old, 1.0), 1.0)
 
 
+def _in_stick(model: Model, pull: Array) -> Array:
+    """Forces (N) of the elements of a contact that rests under a ``pull`` (N) at full strength, some time after an
+    arrest: there each was at its weakened cap; since then all were moved alike."""
+    bank = model.bank
+    left = bank.strength * model.weakening.ratio
+    load = pull - jnp.sum(left)
+    further = loading_displacement(bank.stiffness, bank.strength - left, load)
+    back = jnp.minimum(load, 0.0) / jnp.sum(bank.stiffness)
+    return jnp.clip(left + bank.stiffness * (further + back), -bank.strength, bank.strength)
+
+
 def run_cycles(
     build: Callable[[Any, tuple[Array, Array]], Model],
     events: Any,
@@ -193,12 +210,8 @@ def run_cycles(
     nodes = (cycles.load_times, cycles.load_positions)
     first = build(jax.tree.map(lambda a: a[0], events), nodes)
     start = first.rest(cycles.start[0], cycles.position[0])
-    # a run that does not start virgin starts as after an arrest: every element at its weakened cap
-    worn = first.bank.strength * first.weakening.ratio
-    virgin = cycles.virgin
-    start = eqx.tree_at(
-        lambda s: (s.force, s.psi), start, (jnp.where(virgin, start.force, worn), jnp.where(virgin, start.psi, 0.0))
-    )
+    pull = first.pull(first.lead(cycles.start[0]) - start.x)
+    start = eqx.tree_at(lambda s: s.force, start, jnp.where(cycles.virgin, start.force, _in_stick(first, pull)))
 
     def cycle(carry: tuple, item: tuple) -> tuple[tuple, Track]:
         y, past, offset, strength = carry
@@ -222,7 +235,8 @@ def run_cycles(
         return (end, late, end.x - track.reading[-1] + back, model.bank.strength), track
 
     zero = jnp.zeros(())
+    ahead = start.x - _reading(first, cycles.start[0], start)  # of the reading, as at every later arrest
     items = (events, cycles.start, cycles.position, cycles.limit, cycles.least_slip, cycles.used)
     tracks: Track
-    _, tracks = jax.lax.scan(cycle, (start, zero, zero, first.bank.strength), items)
+    _, tracks = jax.lax.scan(cycle, (start, zero, ahead, first.bank.strength), items)
     return tracks

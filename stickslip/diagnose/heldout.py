@@ -12,6 +12,7 @@ from ..fit.composition import START, run_of
 from ..fit.inertial import HUBER, Fit
 from ..fit.problem import Problem
 from ..floors import event_widths
+from .begin import beginning
 
 ITERATIONS = 3
 PHASES_TRIED, REFINED = 12, 4  # of a run that no fit has seen; halvings of the distance between two of them
@@ -92,10 +93,8 @@ def _starts(problem: Problem, fit: Fit, cycles: np.ndarray, model: np.ndarray) -
         if (fit.use[r][:, None] & m.valid[r]).any() or not seen.any():
             continue
         if fit.free[i].name.startswith(START):
-            ok = seen & (np.abs(fit.columns[r, :, at, i]) > 0)
-            for _ in range(ITERATIONS if ok.any() else 0):
-                late = (m.values[r, ok, at] - model[r, ok, at]) / fit.columns[r, ok, at, i]
-                z[i] = np.clip(z[i] + np.median(late), *fit.free[i].bounds)
+            for _ in range(ITERATIONS if np.any(fit.columns[r, seen, at, i]) else 0):
+                z[i] = beginning(m, fit.free[i], z[i], model, fit.columns[..., i], m.values, seen)
                 model = _again(problem, fit, z, r, model)
         else:
             z[i], model = _phase(problem, fit, z, i, r, seen, model)

@@ -13,6 +13,8 @@ from ..features.measurement import Measurement
 from ..fit.composition import Composition
 from ..fit.inertial import Fit, certain, fit
 from ..fit.problem import Problem
+from ..params import specs
+from .begin import begun
 from .candidate import Candidate, ease, with_fit
 from .search import score, silent
 
@@ -20,7 +22,7 @@ HOPEFUL = 0.2  # share of the misfit gone at the start from which a search that 
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
-AGAIN, SETTLED = 6, 0.97  # a leader is refined again until that takes less than 3 % off its cost
+AGAIN, SETTLED = 8, 0.97  # a leader is refined again until that takes less than 3 % off its cost
 WIDELY = ((7.0, 8), (2.5, 8), (1.0, 14))  # by way of wide floors: a search that stands still in a bent valley goes on
 
 
@@ -101,8 +103,9 @@ def settle(
 ) -> Candidate:
     """The same candidate refined to the end, from where it is and from its other starts; the best of them.
 
-    It is followed by way of wide floors only where its cost is below ``worth`` by then. Its standard deviations are
-    those of :func:`stickslip.fit.inertial.certain`.
+    It is followed by way of wide floors only where its cost is below ``worth`` by then: from twice its amplitude again
+    and again, until that leads no further, and then from where it is, until it stands still. Its standard deviations
+    are those of :func:`stickslip.fit.inertial.certain`.
     """
 
     def go(candidate: Candidate, most: int, stages: tuple[tuple[float, int], ...] = ()) -> Candidate:
@@ -116,13 +119,35 @@ def settle(
         other = go(begun, FEW + MORE)
         if other.cost < best.cost:
             best = other
-    for _ in range(AGAIN if best.cost < worth else 0):
-        before = best.cost
-        best = go(best, MOST, WIDELY)
-        if best.cost > SETTLED * before:
-            break
     if best.fit is None or best.composition is None:
         return best
-    sure = certain(Problem(best.composition, measurement, threads=threads), floor, best.fit)
+    problem = Problem(best.composition, measurement, threads=threads)
+    grows = True
+    for _ in range(AGAIN if best.cost < worth else 0):
+        before = best.cost
+        begins = _larger(best, problem, train) if grows else best
+        best = min(best, go(begins, MOST, WIDELY), key=lambda c: c.cost)
+        if best.cost > SETTLED * before:
+            if not grows:
+                break
+            grows = False
+    assert best.fit is not None
+    sure = certain(problem, floor, best.fit)
     # its errors were taken with the derivatives it has
     return replace(best, fit=replace(best.fit, covariance=sure.covariance), settled=True)
+
+
+def _larger(candidate: Candidate, problem: Problem, train: np.ndarray) -> Candidate:
+    """The candidate at twice its amplitude, to be refitted: a small one may be a bend of the valley that leads on."""
+    assert candidate.fit is not None
+    old = candidate.fit
+    use = train & np.asarray(problem.measurement.cycles.used)
+    i = next(i for i, f in enumerate(old.free) if f.amplitude and f.name.startswith(f"{candidate.tag}."))
+    free, spec = old.free[i], specs(candidate.effect)[old.free[i].name.split(".", 1)[1]]
+    null = free.inward(spec.null or 0.0)
+    z = old.z.copy()
+    z[i] = np.clip(null + 2.0 * (z[i] - null), *np.array(free.bounds) + np.array([1e-6, -1e-6]))
+    z, _ = begun(problem.seeing(use), z, old.events, old.columns, old.free, old.features - old.offsets, use)
+    # the derivatives are those of another place, and its cost is not this one's
+    far = replace(old, z=z, cost=np.inf, columns=np.zeros_like(old.columns))
+    return replace(candidate, fit=far, note="not refitted")

@@ -18,6 +18,7 @@ from ..fit.parameters import effect_parameters
 from ..fit.problem import Problem
 from ..floors import event_widths
 from ..params import specs
+from .begin import begun
 from .candidate import Candidate, ease
 from .linear import Linear, Step
 from .periods import periods, phasor, within_record
@@ -271,8 +272,8 @@ class Search:
     def push(self, values: dict[str, float], sign: float, rms: float, use: np.ndarray) -> None:
         """Refit everything from an amplitude that moves the features by ``rms`` floors, however little that promises.
 
-        What the base has bent itself to imitate shows no slope at an amplitude of zero. Nothing is done where the
-        amplitude cannot have that ``sign``.
+        What the base has bent itself to imitate shows no slope at an amplitude of zero. Runs that do not begin virgin
+        begin so that their slips come when they did. Nothing is done where the amplitude cannot have that ``sign``.
         """
         low, high = self.free[self.amplitude].bounds
         reach = high - self.null if sign > 0.0 else low - self.null
@@ -281,7 +282,8 @@ class Search:
         share = 0.1
         for _ in range(5):
             z = self.point(values, self.null + share * reach)
-            features = self.problem.features(z, self.optimum.events)
+            o = self.optimum
+            z, features = begun(self.problem, z, o.events, o.columns, o.free, self.bare, use)
             moved = np.abs(np.nan_to_num((features - self.bare) / self.floor, nan=1e3))[self.valid]
             now = float(np.sqrt(np.mean(np.minimum(moved, 1e3) ** 2)))
             if 0.6 * rms < now < 1.6 * rms or (now < rms and share >= 0.5):

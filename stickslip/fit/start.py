@@ -180,7 +180,7 @@ def base_composition(
         free.append(log("rig.mass", "kg", mass, mass_width, lightest, heaviest, "mass of the block", mass))
     for r in np.flatnonzero(~np.asarray(m.cycles.virgin)).tolist():
         doc = f"how far beyond full strength the load point is at the first slip of run {m.names[r]}"
-        # the model slips a little before its full strength; a tenth of the elongation is far more than that
-        beyond = 0.1 * nominal / stiffness
-        free.append(Free(f"{START}{r}", "m", 0.1 * beyond, 0.0, 0.0, 3.0, -beyond, beyond, doc))
+        # the base slips a little before its full strength; effects may change the force at which it slips by a third
+        full = nominal / stiffness
+        free.append(Free(f"{START}{r}", "m", 0.01 * full, 0.0, 0.0, 15.0, -0.5 * full, 0.5 * full, doc))
     return Composition(mass, contacts, bins, tuple(free), fixed)

@@ -244,6 +244,7 @@ def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_st
     monkeypatch.setattr(refit, "certain", lambda problem, floor, found: found)
     monkeypatch.setattr(refit, "ease", lambda *a: 1.0)
     monkeypatch.setattr(refit, "with_fit", lambda c, found, *a: replace(c, fit=found))
+    monkeypatch.setattr(refit, "_larger", lambda candidate, *a: candidate)
     begun = Candidate("tilt", {}, catalogue.make("tilt"), 0.1, 0.1, composition="invented", fit=fit)
     hopeless = refit.settle(begun, data, np.ones_like(data.values), data.valid, 900.0)
     assert hopeless.cost == 1000.0
@@ -252,6 +253,32 @@ def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_st
     found = refit.settle(begun, data, np.ones_like(data.values), data.valid)
     assert found.cost == pytest.approx(100.0 + 900.0 * (2 / 3) ** refit.AGAIN)
     assert taken[1:] == [refit.WIDELY] * refit.AGAIN
+
+
+@pytest.mark.parametrize(("best", "expected"), [(0.055, 0.04), (0.012, 0.01), (0.3, 0.3)])
+def test_a_leader_is_tried_at_twice_its_amplitude_as_long_as_that_leads_on(best, expected, monkeypatch):
+    """Where each fit stands still at the amplitude it began with, and the least cost is at another one."""
+    data, _, _, fit, _ = made(3)
+    (free,) = effect_parameters(catalogue.make("tilt"))
+    begun = []
+
+    def step(problem, floor, *, z, events, stages, **_):
+        begun.append(free.outward(z[-1]))
+        return replace(fit, z=z, cost=1000.0 + 1e4 * abs(np.log(free.outward(z[-1]) / best)))
+
+    monkeypatch.setattr(refit, "fit", step)
+    monkeypatch.setattr(refit, "Problem", lambda *a, **k: SimpleNamespace(measurement=data, seeing=lambda use: None))
+    monkeypatch.setattr(refit, "begun", lambda problem, z, *a: (z, None))
+    monkeypatch.setattr(refit, "certain", lambda problem, floor, found: found)
+    monkeypatch.setattr(refit, "ease", lambda *a: 1.0)
+    monkeypatch.setattr(refit, "with_fit", lambda c, found, *a: replace(c, fit=found))
+    at = np.append(fit.z, free.inward(0.01))
+    fit = replace(fit, z=at, cost=1e6, free=(*fit.free, free), columns=np.zeros((*data.values.shape, at.size)))
+    small = Candidate("tilt", {}, catalogue.make("tilt"), 0.1, 0.1, composition="invented", fit=fit)
+    found = refit.settle(small, data, np.ones_like(data.values), data.valid[..., 0])
+    assert found.fit.values["tilt.coupling"] == pytest.approx(expected)
+    assert max(begun) <= free.upper
+    assert found.settled
 
 
 def test_derivatives_of_a_periodic_effect_are_carried_on_where_the_last_run_is_held_out(monkeypatch):

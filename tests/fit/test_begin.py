@@ -1,0 +1,90 @@
+"""Records that do not begin virgin: where the spring stands at their first slip, and what the sensor shows there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.diagnose.begin import begun
+from stickslip.effects import catalogue
+from stickslip.fit.problem import COARSE, Problem
+from stickslip.floors import floors
+from stickslip.residual import misfit
+
+from . import synthetic
+
+CUT = 2.85e-4  # m of the drive's way, in the second stick
+
+
+def records(effect=None, zero=0.0):
+    made = synthetic.traces(slips=5.6, effect=effect)
+    return synthetic.measured([synthetic.begun_later(t, CUT, zero) for t in made])
+
+
+def begun_with(effect, data):
+    """The model with an effect and the true parameters of the base, its runs begun as the data's are."""
+    family = synthetic.with_starts(synthetic.composition(), data.runs)
+    events = np.zeros((*data.values.shape[:2], 2))
+    use = np.asarray(data.cycles.used)
+    z = np.concatenate([synthetic.truth(), np.zeros(data.runs)])
+    base = Problem(family, data, tolerance=COARSE)
+    columns = base.columns(z, events, range(z.size - data.runs, z.size), base.features(z, events))
+    columns = np.concatenate([np.zeros((*data.values.shape, z.size - data.runs)), columns], axis=-1)
+    problem = base if effect is None else Problem(family.with_effect(effect, ()), data, tolerance=COARSE)
+    for _ in range(5):
+        z, features = begun(problem, z, events, columns, family.free, data.values, use)
+    return z, features
+
+
+@pytest.fixture(scope="module")
+def tilted():
+    effect = catalogue.make("tilt", coupling=-0.1)
+    data = records(effect)
+    return data, *begun_with(effect, data)
+
+
+def test_runs_begin_where_their_slips_come_when_they_do(tilted):
+    """A tilt of -0.1 has the block slip at 10/11 of its strength."""
+    data, z, features = tilted
+    at = data.layout.slices()["recurrence"].start
+    seen = np.asarray(data.cycles.used) & data.valid[..., at]
+    late = (features - data.values)[..., at][seen] / data.values[..., at][seen]
+    assert seen.sum() > 5
+    assert np.max(np.abs(late)) < 2e-3
+    shift = z[-data.runs :] * 0.01 * 0.26 / 1000.0
+    assert shift == pytest.approx(np.full(data.runs, (1 / 1.1 - 1) * 0.26 / 1000.0), abs=1e-6)
+
+
+def test_the_model_describes_what_was_recorded_from_within_a_run(tilted):
+    data, _, features = tilted
+    error = misfit(data, features, floors(data))
+    assert error.by_phase["creep"] < 1.0
+    assert error.by_phase["slip"] < 1.0
+    assert error.by_phase["recurrence"] < 1.0
+
+
+def test_nothing_is_moved_where_all_begin_virgin():
+    data = synthetic.measured(synthetic.traces())
+    problem = Problem(synthetic.composition(), data, tolerance=COARSE)
+    events = np.zeros((*data.values.shape[:2], 2))
+    z = synthetic.truth()
+    columns = np.zeros((*data.values.shape, z.size))
+    found, features = begun(problem, z, events, columns, synthetic.composition().free, data.values, data.valid[..., 0])
+    assert found is z
+    assert np.array_equal(features, problem.features(z, events))
+
+
+@pytest.mark.parametrize(
+    ("tag", "values"),
+    [("sensor-gain", {"gain": 0.04}), ("machine-compliance", {"compliance": 1e-6, "where": "read-out"})],
+)
+def test_a_cycle_begins_where_the_sensor_shows_what_was_measured_also_the_first(tag, values):
+    """Of a record that begins elsewhere than its sensor's zero: else the first slip alone comes at another time."""
+    effect = catalogue.make(tag, **values)
+    data = records(effect, zero=1e-4)
+    _, features = begun_with(effect, data)
+    at = data.layout.slices()["recurrence"].start
+    seen = np.asarray(data.cycles.used) & data.valid[..., at]
+    late = (features - data.values)[..., at][seen] / data.values[..., at][seen]
+    assert np.asarray(data.cycles.position)[:, 0] == pytest.approx([1e-4, 1e-4], abs=1e-7)
+    assert np.max(np.abs(late)) < 2e-3
