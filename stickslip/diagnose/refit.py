@@ -122,7 +122,7 @@ def settle(
     if best.fit is None or best.composition is None:
         return best
     problem = Problem(best.composition, measurement, threads=threads)
-    grows = True
+    grows = _amplitude(best) is not None
     for _ in range(AGAIN if best.cost < worth else 0):
         before = best.cost
         begins = _larger(best, problem, train) if grows else best
@@ -137,12 +137,19 @@ def settle(
     return replace(best, fit=replace(best.fit, covariance=sure.covariance), settled=True)
 
 
+def _amplitude(candidate: Candidate) -> int | None:
+    """Which of the free parameters is the amplitude of the effect, or none where that is not free."""
+    assert candidate.fit is not None
+    own = (i for i, f in enumerate(candidate.fit.free) if f.amplitude and f.name.startswith(f"{candidate.tag}."))
+    return next(own, None)
+
+
 def _larger(candidate: Candidate, problem: Problem, train: np.ndarray) -> Candidate:
     """The candidate at twice its amplitude, to be refitted: a small one may be a bend of the valley that leads on."""
     assert candidate.fit is not None
-    old = candidate.fit
+    old, i = candidate.fit, _amplitude(candidate)
+    assert i is not None
     use = train & np.asarray(problem.measurement.cycles.used)
-    i = next(i for i, f in enumerate(old.free) if f.amplitude and f.name.startswith(f"{candidate.tag}."))
     free, spec = old.free[i], specs(candidate.effect)[old.free[i].name.split(".", 1)[1]]
     null = free.inward(spec.null or 0.0)
     z = old.z.copy()

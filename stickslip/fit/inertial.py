@@ -381,9 +381,10 @@ def fit(
             # what stands still with derivatives that were carried on may go on with new ones
             ahead = [(factor, most - found.nfev)]
     res.solve(problem)
-    raw, columns = _with_unseen(whole, res, x)
     offsets = -res.common(1.0).offsets(res.misfit(x))
     data, prior = res.data(x, 1.0), res.priors(x)
+    x = _begun_alike(res, x)
+    raw, columns = _with_unseen(whole, res, x)
     return Fit(
         x[: res.k],
         res.events(x),
@@ -398,6 +399,18 @@ def fit(
         res.evaluations,
         res.jacobians,
     )
+
+
+def _begun_alike(res: _Residuals, x: np.ndarray) -> np.ndarray:
+    """The parameters with runs that the fit has not seen begun as far from full strength as those it has, which an
+    effect may have moved by far: only from near there their first slip tells how far it is."""
+    runs = {i: run_of(free.name) for i, free in enumerate(res.free) if free.name.startswith(START)}
+    seen = [x[i] for i, run in runs.items() if res.used[run].any()]
+    unseen = [i for i, run in runs.items() if not res.used[run].any()]
+    x = x.copy()
+    if seen:
+        x[unseen] = np.median(seen)
+    return x
 
 
 def _with_unseen(whole: Problem, res: _Residuals, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
