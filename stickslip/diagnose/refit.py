@@ -24,6 +24,7 @@ MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
 AGAIN, SETTLED = 8, 0.97  # a leader is refined again until that takes less than 3 % off its cost
 WIDELY = ((7.0, 8), (2.5, 8), (1.0, 14))  # by way of wide floors: a search that stands still in a bent valley goes on
+FAR = ((30.0, 8), *WIDELY)  # the same from another amplitude
 
 
 def try_effect(
@@ -125,8 +126,8 @@ def settle(
     grows = _amplitude(best) is not None
     for _ in range(AGAIN if best.cost < worth else 0):
         before = best.cost
-        begins = _larger(best, problem, train) if grows else best
-        best = min(best, go(begins, MOST, WIDELY), key=lambda c: c.cost)
+        begins, stages = (_larger(best, problem, train), FAR) if grows else (best, WIDELY)
+        best = min(best, go(begins, MOST, stages), key=lambda c: c.cost)
         if best.cost > SETTLED * before:
             if not grows:
                 break
@@ -145,7 +146,10 @@ def _amplitude(candidate: Candidate) -> int | None:
 
 
 def _larger(candidate: Candidate, problem: Problem, train: np.ndarray) -> Candidate:
-    """The candidate at twice its amplitude, to be refitted: a small one may be a bend of the valley that leads on."""
+    """The candidate at twice its amplitude, to be refitted: a small one may be a bend of the valley that leads on.
+
+    Its events begin anew at their prior's mean: they have bent themselves to what the smaller amplitude leaves.
+    """
     assert candidate.fit is not None
     old, i = candidate.fit, _amplitude(candidate)
     assert i is not None
@@ -154,7 +158,8 @@ def _larger(candidate: Candidate, problem: Problem, train: np.ndarray) -> Candid
     null = free.inward(spec.null or 0.0)
     z = old.z.copy()
     z[i] = np.clip(null + 2.0 * (z[i] - null), *np.array(free.bounds) + np.array([1e-6, -1e-6]))
-    z, _ = begun(problem.seeing(use), z, old.events, old.columns, old.free, old.features - old.offsets, use)
+    events = np.zeros_like(old.events)
+    z, _ = begun(problem.seeing(use), z, events, old.columns, old.free, old.features - old.offsets, use)
     # the derivatives are those of another place, and its cost is not this one's
-    far = replace(old, z=z, cost=np.inf, columns=np.zeros_like(old.columns))
+    far = replace(old, z=z, events=events, cost=np.inf, columns=np.zeros_like(old.columns))
     return replace(candidate, fit=far, note="not refitted")

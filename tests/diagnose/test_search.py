@@ -263,6 +263,8 @@ def test_a_leader_is_tried_at_twice_its_amplitude_as_long_as_that_leads_on(best,
     begun = []
 
     def step(problem, floor, *, z, events, stages, **_):
+        anew = stages == refit.FAR
+        assert np.any(events) != anew, "what is begun elsewhere begins with events of its own"
         begun.append(free.outward(z[-1]))
         return replace(fit, z=z, cost=1000.0 + 1e4 * abs(np.log(free.outward(z[-1]) / best)))
 
@@ -273,7 +275,7 @@ def test_a_leader_is_tried_at_twice_its_amplitude_as_long_as_that_leads_on(best,
     monkeypatch.setattr(refit, "ease", lambda *a: 1.0)
     monkeypatch.setattr(refit, "with_fit", lambda c, found, *a: replace(c, fit=found))
     at = np.append(fit.z, free.inward(0.01))
-    fit = replace(fit, z=at, cost=1e6, free=(*fit.free, free), columns=np.zeros((*data.values.shape, at.size)))
+    fit = replace(fit, z=at, events=np.ones_like(fit.events), cost=1e6, free=(*fit.free, free), columns=np.zeros((*data.values.shape, at.size)))
     small = Candidate("tilt", {}, catalogue.make("tilt"), 0.1, 0.1, composition="invented", fit=fit)
     found = refit.settle(small, data, np.ones_like(data.values), data.valid[..., 0])
     assert found.fit.values["tilt.coupling"] == pytest.approx(expected)
