@@ -23,7 +23,7 @@ _FACTORS: dict[tuple[str, str | None], float] = {
     ("viscous-drag", None): 1e-3,  # N s/m against the force at 1 mm/s
     ("tilt", None): -1.0,  # the generator's pull lifts
     ("nonlinear-spring", "quadratic"): 1 / 2.5e-4,  # at 0.25 mm against per metre
-    ("nonlinear-spring", "cubic"): 1e-3 / 2.5e-4**2,
+    ("nonlinear-spring", "cubic"): 1e-4 / 2.5e-4**2,
     # the strongest sine of a wave that is none
     ("load-modulation", "triangle"): 8 / pi**2,
     ("drive-ripple", "triangle"): 8 / pi**2,

@@ -293,7 +293,7 @@ def _round(
     assert rung.fit is not None
     data, floor, train, store = material
     ground = Ground(rung.composition, rung.fit, data, floor, train)
-    sweep = Sweep(ground, jobs, store, name, tell)
+    sweep = Sweep(ground, jobs, store, name, tell, limits)
     candidates, every = sweep.run(tags)
     begins = sorted((c for c in candidates if c.fit is not None and not c.note), key=lambda c: c.cost)[:BEGINS]
     if begins:

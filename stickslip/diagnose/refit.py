@@ -16,7 +16,7 @@ from ..fit.problem import Problem
 from ..params import specs
 from .begin import begun
 from .candidate import Candidate, ease, with_fit
-from .search import score, silent
+from .search import plausible, score, silent
 
 HOPEFUL = 0.2  # share of the misfit gone at the start from which a search that led nowhere is begun anew
 FEW = 9  # evaluations for those that promise something
@@ -136,6 +136,38 @@ def settle(
     sure = certain(problem, floor, best.fit)
     # its errors were taken with the derivatives it has
     return replace(best, fit=replace(best.fit, covariance=sure.covariance), settled=True)
+
+
+def afar(
+    candidate: Candidate,
+    optimum: Fit,
+    measurement: Measurement,
+    floor: np.ndarray,
+    train: np.ndarray,
+    *,
+    threads: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Candidate:
+    """The candidate refitted from plausible amplitudes, everything else as in the ``optimum`` of the model without it.
+
+    It is the way of :func:`stickslip.diagnose.search.score` with derivatives of its own, and with events that begin at
+    their prior's mean: where an effect is strong, those of the optimum lead nowhere. A periodic effect has a phase,
+    and no such start.
+    """
+    if candidate.fit is None or candidate.composition is None or candidate.effect.periodic is not None:
+        return candidate
+    problem = Problem(candidate.composition, measurement, threads=threads)
+    events = np.zeros_like(optimum.events)
+    best = candidate
+    try:
+        for z in plausible(candidate, optimum, measurement, floor, train, threads):
+            new = fit(problem, floor, z=z, events=events, stages=FAR, use=train)
+            (progress or silent)(f"{candidate.tag}: cost {best.cost:.0f}, from afar {new.cost:.0f}")
+            if best.note or new.cost < best.cost:
+                best = with_fit(replace(candidate, note="", settled=False), new, problem, floor, train)
+    except StickslipError as error:
+        return best if not best.note else replace(best, note=str(error))
+    return best
 
 
 def _amplitude(candidate: Candidate) -> int | None:

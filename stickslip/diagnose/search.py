@@ -98,6 +98,24 @@ def _spread(lengths: list[int], number: int) -> list[int]:
     return sorted(chosen)
 
 
+def plausible(
+    candidate: Candidate, optimum: Fit, measurement: Measurement, floor: np.ndarray, train: np.ndarray, threads: int
+) -> list[np.ndarray]:
+    """Free parameters with the candidate's effect at plausible amplitudes, of either sign where it may have both, and
+    everything else as the model without it has it."""
+    assert candidate.composition is not None
+    assert candidate.fit is not None
+    use = train & np.asarray(measurement.cycles.used)
+    problem = Problem(candidate.composition, measurement, threads=threads).coarser().seeing(use)
+    k = len(optimum.free)
+    free = candidate.fit.free[k:]
+    valid = measurement.valid & use[..., None]
+    search = Search(problem, optimum, floor, valid, candidate.wide, free, k, candidate.effect)
+    inner = {f.name.split(".", 1)[1]: candidate.fit.values[f.name] for f in free}
+    found = [search.far(inner, sign, PLAUSIBLE, use) for sign in (1.0, -1.0)]
+    return [far[0] for far in found if far is not None]
+
+
 def _score(effect, form, base, optimum, measurement, floor, train, threads, tell) -> Candidate:
     free = within_record(effect, effect_parameters(effect), measurement)
     composition = base.with_effect(effect, free)
@@ -272,13 +290,25 @@ class Search:
     def push(self, values: dict[str, float], sign: float, rms: float, use: np.ndarray) -> None:
         """Refit everything from an amplitude that moves the features by ``rms`` floors, however little that promises.
 
-        What the base has bent itself to imitate shows no slope at an amplitude of zero. Runs that do not begin virgin
-        begin so that their slips come when they did. Nothing is done where the amplitude cannot have that ``sign``.
+        What the base has bent itself to imitate shows no slope at an amplitude of zero. Nothing is done where the
+        amplitude cannot have that ``sign``.
+        """
+        far = self.far(values, sign, rms, use)
+        if far is not None:
+            self._refit(far[0], self.optimum.events, far[1], use)
+
+    def far(
+        self, values: dict[str, float], sign: float, rms: float, use: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Free parameters with an amplitude that moves the features by ``rms`` floors, and the features there.
+
+        Runs that do not begin virgin begin so that their slips come when they did. None where the amplitude cannot
+        have that ``sign``.
         """
         low, high = self.free[self.amplitude].bounds
         reach = high - self.null if sign > 0.0 else low - self.null
         if sign * reach <= 0.0:
-            return
+            return None
         share = 0.1
         for _ in range(5):
             z = self.point(values, self.null + share * reach)
@@ -289,7 +319,7 @@ class Search:
             if 0.6 * rms < now < 1.6 * rms or (now < rms and share >= 0.5):
                 break
             share = float(np.clip(share * np.clip(rms / max(now, 1e-6), 0.02, 10.0), 1e-6, 0.5))
-        self._refit(z, self.optimum.events, features, use)
+        return z, features
 
     def settle(self, use: np.ndarray) -> None:
         """Refit everything from the best place seen: where an effect is periodic, its phase tells how large it is."""

@@ -18,8 +18,10 @@ from ..fit.composition import Composition
 from ..fit.inertial import Fit
 from .candidate import Candidate, forms_of
 from .pieces import candidate_arrays, candidate_from
-from .refit import FEW, MORE, refine, settle
+from .refit import FEW, MORE, afar, refine, settle
 from .search import score
+from .thresholds import THRESHOLDS, Thresholds
+from .verdict import grade
 
 PROMISING, EXPLAINING = 7, 3  # candidates that are refitted: by the best point seen, and by the linear score
 LEAST = 4  # of those that get more than the first steps
@@ -66,6 +68,7 @@ class Sweep:
         store: keeps finished pieces.
         name: of this sweep in the store.
         tell: told the stage and the share of the sweep done.
+        limits: of what counts as described.
     """
 
     ground: Ground
@@ -73,6 +76,7 @@ class Sweep:
     store: Store | None
     name: str
     tell: Callable[[str, float], None]
+    limits: Thresholds = THRESHOLDS
 
     def run(self, tags: Sequence[str]) -> tuple[list[Candidate], list[Candidate]]:
         """Every tag's candidate in its best form, in the order of ``tags``; and everything that was fitted."""
@@ -107,9 +111,26 @@ class Sweep:
             taken_for = _like(near[0].effect) - {c.tag for c in near}
             for first in _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]:
                 near += [c for c in ranked if c.tag == first.tag and c.cost < NEAR * first.cost][:FORMS]
-        most = self._settle(near, "settle", 0.77, SWEPT)
+        most = self._settle(near, "settle", 0.77, 0.85)
         every = _latest(*scored, *begun, *more, *most)
+        if not any(self._described(c) for c in most):
+            every = self._afar(tags, every)
+        self.tell(f"{self.name}: {len(tags)} effects tried", SWEPT)
         return best_forms(tags, every), every
+
+    def _described(self, candidate: Candidate) -> bool:
+        """Whether little is left with it (see `grade`)."""
+        return candidate.train is not None and grade(candidate.train, candidate.held, self.limits) < 2
+
+    def _afar(self, tags: Sequence[str], every: Sequence[Candidate]) -> list[Candidate]:
+        """Everything fitted, after what leads nowhere from near an amplitude of zero was begun far from there."""
+        g = self.ground
+        far = [c for c in best_forms(tags, every) if c.fit is not None and not c.settled]
+        work = {f"{self.name}-afar-{_word(c.effect)}": (afar, (c, g.optimum, g.data, g.floor, g.train)) for c in far}
+        every = _latest(*every, *self._all(work, "from afar", 0.85, 0.91))
+        ranked = sorted((c for c in every if not c.note), key=lambda c: c.cost)
+        near = [c for c in ranked if c.cost < NEAR * ranked[0].cost and c.cost < WORTH * g.optimum.cost][:LEADERS]
+        return _latest(*every, *self._settle([c for c in near if not c.settled], "afar settle", 0.91, SWEPT))
 
     def rivals(self, named: Candidate, every: Sequence[Candidate]) -> list[Candidate]:
         """Everything that was fitted, after what is about to be named, and what that may be taken for, got what the

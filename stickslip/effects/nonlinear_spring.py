@@ -8,7 +8,7 @@ from ..params import parameter, variant
 from .base import Spring
 from .catalogue import register
 
-STROKE = 1e-3  # m; the elongation at which both forms have the same relative deviation
+STROKE = 1e-4  # m; the elongation at which both forms have the same relative deviation
 
 
 @register
@@ -19,7 +19,7 @@ class NonlinearSpring(Spring):
     summary = "force of the driving spring is not proportional to its elongation"
     equation = (
         r"F_{\mathrm{spring}} \to F_{\mathrm{spring}}\,[1 + \beta\,(x_0 - x)] \quad\mathrm{or}\quad"
-        r" F_{\mathrm{spring}}\,[1 + \beta\,(x_0 - x)^2/(1\,\mathrm{mm})]"
+        r" F_{\mathrm{spring}}\,[1 + \beta\,(x_0 - x)^2/(0.1\,\mathrm{mm})]"
     )
     signature = "relation of recurrence and slip size; recurrence of the first event, which loads the spring from zero"
     confused_with = {
@@ -38,12 +38,12 @@ class NonlinearSpring(Spring):
         upper=800.0,
         null=0.0,
         symbol=r"\beta",
-        doc="relative change of the secant stiffness per metre of elongation (at 1 mm in the cubic form)",
+        doc="relative change of the secant stiffness per metre of elongation (at 0.1 mm in the cubic form)",
     )
     form: str = variant("quadratic", ("quadratic", "cubic"), "one-sided (beam) or symmetric (wire)")
 
     def formula(self) -> str:
-        lever = "(x_0 - x)" if self.form == "quadratic" else r"(x_0 - x)^2/(1\,\mathrm{mm})"
+        lever = "(x_0 - x)" if self.form == "quadratic" else r"(x_0 - x)^2/(0.1\,\mathrm{mm})"
         return rf"F_{{\mathrm{{spring}}}} \to F_{{\mathrm{{spring}}}}\,[1 + \beta\,{lever}]"
 
     def pull(self, stretch: Array, pull: Array) -> Array:

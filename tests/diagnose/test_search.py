@@ -284,6 +284,57 @@ def test_a_leader_is_tried_at_twice_its_amplitude_as_long_as_that_leads_on(best,
     assert found.settled
 
 
+def strangers(monkeypatch, costs):
+    """A candidate of tilt, and fits that stay where they begin, at costs by the sign of the amplitude."""
+    data, columns, line, optimum, _ = made(2)
+    effect = catalogue.make("tilt")
+    (free,) = effect_parameters(effect)
+    optimum = replace(optimum, events=np.ones_like(optimum.events), columns=columns)
+    at = replace(optimum, z=np.append(optimum.z, free.inward(1e-5)), free=(*optimum.free, free), cost=1000.0)
+    problem = Invented(data, line * 1e-3)
+    problem.coarser = lambda: problem
+    problem.seeing = lambda use: problem
+    taken = []
+
+    def step(problem, floor, *, z, events, stages, **_):
+        taken.append((float(z[-1]), stages))
+        assert not np.any(events)
+        return replace(at, z=z, events=events, cost=costs[np.sign(z[-1])])
+
+    for module in (refit, search):
+        monkeypatch.setattr(module, "Problem", lambda *a, **k: problem)
+    monkeypatch.setattr(refit, "fit", step)
+    monkeypatch.setattr(refit, "with_fit", lambda c, found, *a: replace(c, fit=found))
+    small = Candidate("tilt", {}, effect, 0.1, 0.1, composition="invented", fit=at)
+    return small, (optimum, data, 1e-4 * np.ones_like(data.values), data.valid[..., 0]), taken
+
+
+@pytest.mark.parametrize(("costs", "expected"), [({1: 900.0, -1: 400.0}, 400.0), ({1: 1200.0, -1: 1100.0}, 1000.0)])
+def test_from_afar_either_sign_is_begun_at_a_plausible_amplitude_and_the_best_is_kept(costs, expected, monkeypatch):
+    small, ground, taken = strangers(monkeypatch, costs)
+    found = refit.afar(small, *ground)
+    assert found.cost == expected
+    assert found.fit is small.fit or found.fit.z[-1] == taken[1][0] < 0.0
+    assert [stages for _, stages in taken] == [refit.FAR] * 2
+    optimum, data, floor, _ = ground
+    moved = abs(taken[0][0]) * np.sqrt(np.mean(np.square(1e-3 * made(2)[2] / floor)[data.valid]))
+    assert 0.6 * search.PLAUSIBLE < moved < 1.6 * search.PLAUSIBLE
+
+
+def test_from_afar_what_was_not_refitted_yet_counts_for_nothing(monkeypatch):
+    small, ground, _ = strangers(monkeypatch, {1: 1200.0, -1: 1100.0})
+    found = refit.afar(replace(small, note="not refitted"), *ground)
+    assert found.cost == 1100.0
+    assert not found.note
+
+
+def test_a_periodic_effect_is_not_begun_afar(monkeypatch):
+    small, ground, taken = strangers(monkeypatch, {1: 1.0, -1: 1.0})
+    wave = replace(small, tag="drive-ripple", effect=catalogue.make("drive-ripple"))
+    assert refit.afar(wave, *ground) is wave
+    assert not taken
+
+
 def test_derivatives_of_a_periodic_effect_are_carried_on_where_the_last_run_is_held_out(monkeypatch):
     """Its last parameter is the phase of that run, in which nothing is known of any slope."""
     data, columns, _, fit, _ = made(4)

@@ -14,8 +14,12 @@ from stickslip.diagnose.refit import FEW, MORE
 from stickslip.diagnose.sweep import EXPLAINING, FOLLOWED, FORMS, LIKE, PROMISING, SWEPT, Ground, Sweep, best_forms
 from stickslip.effects import catalogue
 from stickslip.fit.inertial import Fit
+from stickslip.residual import Misfit
 
 FINAL = {"contact-ageing": 100.0, "wear": 110.0}  # where a fit to the end arrives; elsewhere it stays
+AFAR = {"sensor-gain": 50.0, "tilt": 60.0, "adhesion": 990.0}  # where a fit begun at a plausible amplitude arrives
+LITTLE, MUCH = 0.5, 5.0  # floors
+REST = [LITTLE]  # error of what is fitted to the end
 
 
 def invented(effect, cost: float, promise: float, note: str = "") -> Candidate:
@@ -24,6 +28,10 @@ def invented(effect, cost: float, promise: float, note: str = "") -> Candidate:
               np.zeros((*shape, 1)), np.ones((1, 1), bool), 1, 1)  # fmt: skip
     form = {k: str(v) for k, v in vars(effect).items() if isinstance(v, str)}
     return Candidate(effect.tag, form, effect, promise / 2, promise, fit=fit, note=note)
+
+
+def described(error: float = LITTLE) -> Misfit:
+    return Misfit(error, {"slip": error}, {})
 
 
 @pytest.fixture
@@ -44,11 +52,19 @@ def calls(monkeypatch):
     def settle(candidate, data, floor, train, worth):
         assert worth == FOLLOWED * 1000.0
         done.append(("settle", candidate.tag))
-        return invented(candidate.effect, FINAL.get(candidate.tag, candidate.cost), candidate.promise)
+        found = invented(candidate.effect, FINAL.get(candidate.tag, candidate.cost), candidate.promise)
+        return replace(found, train=described(REST[0]), settled=True)
 
+    def afar(candidate, optimum, data, floor, train):
+        done.append(("afar", candidate.tag))
+        better = candidate.tag in AFAR
+        return invented(candidate.effect, AFAR[candidate.tag], candidate.promise) if better else candidate
+
+    REST[0] = LITTLE
     monkeypatch.setattr(module, "score", score)
     monkeypatch.setattr(module, "refine", refine)
     monkeypatch.setattr(module, "settle", settle)
+    monkeypatch.setattr(module, "afar", afar)
     monkeypatch.setattr(module, "candidate_from", lambda kept, *rest: kept)
     monkeypatch.setattr(module, "candidate_arrays", lambda candidate: candidate)
     return done
@@ -93,6 +109,27 @@ def test_every_tag_comes_back_and_the_leaders_are_followed_to_the_end(calls):
     assert told == sorted(told)
     assert told[-1] == pytest.approx(SWEPT)  # the comparison of what may get a name is still to come
     assert len({(c.tag, *c.form.values()) for c in every}) == len(every)
+
+
+def test_where_nothing_describes_the_data_everything_is_begun_far_from_an_amplitude_of_zero(calls):
+    REST[0] = MUCH
+    best, every, told = run()
+    begun = [tag for what, tag in calls if what == "afar"]
+    settled = [tag for what, tag in calls if what == "settle"]
+    assert sorted(begun) == sorted(set(catalogue.tags()) - set(settled[: settled.index("sensor-gain")]))
+    # what leads then is followed to the end, and only that
+    assert set(settled[settled.index("sensor-gain") :]) == {"sensor-gain", "tilt"}
+    costs = {c.tag: c.cost for c in best if not c.note}
+    assert costs["sensor-gain"] == 50.0
+    assert costs["adhesion"] == 990.0
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(SWEPT)
+    assert len({(c.tag, *c.form.values()) for c in every}) == len(every)
+
+
+def test_where_something_describes_the_data_nothing_is_begun_afar(calls):
+    run()
+    assert "afar" not in {what for what, _ in calls}
 
 
 def test_other_forms_are_tried_for_those_that_lead(calls):
@@ -196,7 +233,7 @@ def test_where_nothing_promised_leads_all_others_get_a_few_steps(calls, monkeypa
         return replace(invented(candidate.effect, cost, candidate.promise), score=candidate.score)
 
     monkeypatch.setattr(module, "refine", refine)
-    monkeypatch.setattr(module, "settle", lambda candidate, *rest: candidate)
+    monkeypatch.setattr(module, "settle", lambda candidate, *rest: replace(candidate, train=described()))
     best, _, told = run()
     assert {tag for what, tag in calls if what == f"refine {FEW}"} == set(catalogue.tags())
     assert min(best, key=lambda c: c.cost).tag == hidden

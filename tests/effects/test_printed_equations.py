@@ -47,7 +47,7 @@ TOLD: dict[tuple[str, ...], tuple[str, ...]] = {
         "¬y",
     ),
     ("nonlinear-spring", "quadratic"): ("F_spring [1 + β (x_0 - x)]",),
-    ("nonlinear-spring", "cubic"): ("F_spring [1 + β (x_0 - x)^2/(1 mm)]",),
+    ("nonlinear-spring", "cubic"): ("F_spring [1 + β (x_0 - x)^2/(0.1 mm)]",),
     ("plasticity",): ("[1 + (h u_i/max_j u_j)^n]^(-1/n)", "Σ_i c_i = F_s"),
     ("position-dependent-friction", "wave"): ("ε sin(2π x/λ + φ)", "¬e^"),
     ("position-dependent-friction", "trend"): ("μ e^(ε x/λ)", "¬sin"),
