@@ -316,7 +316,7 @@ def test_from_afar_either_sign_is_begun_at_a_plausible_amplitude_and_the_best_is
     assert found.cost == expected
     assert found.fit is small.fit or found.fit.z[-1] == taken[1][0] < 0.0
     assert [stages for _, stages in taken] == [refit.FAR] * 2
-    optimum, data, floor, _ = ground
+    _, data, floor, _ = ground
     moved = abs(taken[0][0]) * np.sqrt(np.mean(np.square(1e-3 * made(2)[2] / floor)[data.valid]))
     assert 0.6 * search.PLAUSIBLE < moved < 1.6 * search.PLAUSIBLE
 
