@@ -22,7 +22,8 @@ HOPEFUL = 0.2  # share of the misfit gone at the start from which a search that 
 FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
-AGAIN, SETTLED = 8, 0.97  # a leader is refined again until that takes less than 3 % off its cost
+LARGER = 2.0, 1.5  # times its amplitude: where a leader is begun again, each as long as it leads on
+AGAIN, SETTLED = 10, 0.97  # a leader is refined again until that takes less than 3 % off its cost
 WIDELY = ((7.0, 8), (2.5, 8), (1.0, 14))  # by way of wide floors: a search that stands still in a bent valley goes on
 FAR = ((30.0, 8), *WIDELY)  # the same from another amplitude
 
@@ -105,8 +106,8 @@ def settle(
     """The same candidate refined to the end, from where it is and from its other starts; the best of them.
 
     It is followed by way of wide floors only where its cost is below ``worth`` by then: from twice its amplitude again
-    and again, until that leads no further, and then from where it is, until it stands still. Its standard deviations
-    are those of :func:`stickslip.fit.inertial.certain`.
+    and again, until that leads no further, from half as much more, and then from where it is, until it stands still.
+    Its standard deviations are those of :func:`stickslip.fit.inertial.certain`.
     """
 
     def go(candidate: Candidate, most: int, stages: tuple[tuple[float, int], ...] = ()) -> Candidate:
@@ -123,15 +124,15 @@ def settle(
     if best.fit is None or best.composition is None:
         return best
     problem = Problem(best.composition, measurement, threads=threads)
-    grows = _amplitude(best) is not None
+    steps = list(LARGER) if _amplitude(best) is not None else []
     for _ in range(AGAIN if best.cost < worth else 0):
         before = best.cost
-        begins, stages = (_larger(best, problem, train), FAR) if grows else (best, WIDELY)
+        begins, stages = (_larger(best, steps[0], problem, train), FAR) if steps else (best, WIDELY)
         best = min(best, go(begins, MOST, stages), key=lambda c: c.cost)
         if best.cost > SETTLED * before:
-            if not grows:
+            if not steps:
                 break
-            grows = False
+            steps.pop(0)
     assert best.fit is not None
     sure = certain(problem, floor, best.fit)
     # its errors were taken with the derivatives it has
@@ -148,7 +149,7 @@ def afar(
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Candidate:
-    """The candidate refitted from plausible amplitudes, everything else as in the ``optimum`` of the model without it.
+    """The candidate refitted from the best of its plausible amplitudes, and all else as in the ``optimum`` without it.
 
     It is the way of :func:`stickslip.diagnose.search.score` with derivatives of its own, and with events that begin at
     their prior's mean: where an effect is strong, those of the optimum lead nowhere. A periodic effect has a phase,
@@ -158,16 +159,17 @@ def afar(
         return candidate
     problem = Problem(candidate.composition, measurement, threads=threads)
     events = np.zeros_like(optimum.events)
-    best = candidate
     try:
-        for z in plausible(candidate, optimum, measurement, floor, train, threads):
-            new = fit(problem, floor, z=z, events=events, stages=FAR, use=train)
-            (progress or silent)(f"{candidate.tag}: cost {best.cost:.0f}, from afar {new.cost:.0f}")
-            if best.note or new.cost < best.cost:
-                best = with_fit(replace(candidate, note="", settled=False), new, problem, floor, train)
+        far = plausible(candidate, optimum, measurement, floor, train, threads)
+        tried = [fit(problem, floor, z=z, events=events, stages=FAR[:2], use=train) for z in far]
+        first = min(tried, key=lambda f: f.cost)
+        new = fit(problem, floor, z=first.z, events=first.events, stages=FAR[2:], use=train, columns=first.columns)
     except StickslipError as error:
-        return best if not best.note else replace(best, note=str(error))
-    return best
+        return replace(candidate, note=str(error)) if candidate.note else candidate
+    (progress or silent)(f"{candidate.tag}: cost {candidate.cost:.0f}, from afar {new.cost:.0f}")
+    if new.cost >= candidate.cost and not candidate.note:
+        return candidate
+    return with_fit(replace(candidate, note="", settled=False), new, problem, floor, train)
 
 
 def _amplitude(candidate: Candidate) -> int | None:
@@ -177,8 +179,8 @@ def _amplitude(candidate: Candidate) -> int | None:
     return next(own, None)
 
 
-def _larger(candidate: Candidate, problem: Problem, train: np.ndarray) -> Candidate:
-    """The candidate at twice its amplitude, to be refitted: a small one may be a bend of the valley that leads on.
+def _larger(candidate: Candidate, times: float, problem: Problem, train: np.ndarray) -> Candidate:
+    """The candidate at a larger amplitude, to be refitted: a small one may be a bend of the valley that leads on.
 
     Its events begin anew at their prior's mean: they have bent themselves to what the smaller amplitude leaves.
     """
@@ -189,9 +191,9 @@ def _larger(candidate: Candidate, problem: Problem, train: np.ndarray) -> Candid
     free, spec = old.free[i], specs(candidate.effect)[old.free[i].name.split(".", 1)[1]]
     null = free.inward(spec.null or 0.0)
     z = old.z.copy()
-    z[i] = np.clip(null + 2.0 * (z[i] - null), *np.array(free.bounds) + np.array([1e-6, -1e-6]))
+    z[i] = np.clip(null + times * (z[i] - null), *np.array(free.bounds) + np.array([1e-6, -1e-6]))
     events = np.zeros_like(old.events)
-    z, _ = begun(problem.seeing(use), z, events, old.columns, old.free, old.features - old.offsets, use)
+    z, _ = begun(problem.seeing(use), z, events, old.columns, old.free, problem.measurement.values, use)
     # the derivatives are those of another place, and its cost is not this one's
     far = replace(old, z=z, events=events, cost=np.inf, columns=np.zeros_like(old.columns))
     return replace(candidate, fit=far, note="not refitted")

@@ -27,6 +27,7 @@ START = 0.02  # of the amplitude's range; scaled until its effect on the feature
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
 MOST_STARTS = 6
 PLAUSIBLE = 60.0  # floors, rms: by how much an amplitude moves the features at which everything else is refitted
+LARGER = 2.5  # times such an amplitude: what is tried besides where nothing describes the data
 CARRIED = ((30.0, 6), (7.0, 6), (2.5, 7))  # stages of that refit, with the base's derivatives carried on
 OTHERS = 2  # further starts that a leader is fitted from
 SHARES = (1.0, 0.4)  # of a linear step that are tried
@@ -101,8 +102,8 @@ def _spread(lengths: list[int], number: int) -> list[int]:
 def plausible(
     candidate: Candidate, optimum: Fit, measurement: Measurement, floor: np.ndarray, train: np.ndarray, threads: int
 ) -> list[np.ndarray]:
-    """Free parameters with the candidate's effect at plausible amplitudes, of either sign where it may have both, and
-    everything else as the model without it has it."""
+    """Free parameters with the candidate's effect at plausible amplitudes and at larger ones, of either sign where it
+    may have both, from every start of its inner parameters; everything else as the model without it has it."""
     assert candidate.composition is not None
     assert candidate.fit is not None
     use = train & np.asarray(measurement.cycles.used)
@@ -111,9 +112,9 @@ def plausible(
     free = candidate.fit.free[k:]
     valid = measurement.valid & use[..., None]
     search = Search(problem, optimum, floor, valid, candidate.wide, free, k, candidate.effect)
-    inner = {f.name.split(".", 1)[1]: candidate.fit.values[f.name] for f in free}
-    found = [search.far(inner, sign, PLAUSIBLE, use) for sign in (1.0, -1.0)]
-    return [far[0] for far in found if far is not None]
+    found = [search.far(inner, sign, PLAUSIBLE, use) for inner in starts(candidate.effect) for sign in (1.0, -1.0)]
+    near = [far[0] for far in found if far is not None]
+    return [z for at in near for z in (at, search.scaled(at, LARGER, use))]
 
 
 def _score(effect, form, base, optimum, measurement, floor, train, threads, tell) -> Candidate:
@@ -320,6 +321,13 @@ class Search:
                 break
             share = float(np.clip(share * np.clip(rms / max(now, 1e-6), 0.02, 10.0), 1e-6, 0.5))
         return z, features
+
+    def scaled(self, z: np.ndarray, times: float, use: np.ndarray) -> np.ndarray:
+        """Free parameters with the amplitude so many times as large, as far as its bounds let it."""
+        out, at, o = z.copy(), self.k + self.amplitude, self.optimum
+        low, high = self.free[self.amplitude].bounds
+        out[at] = float(np.clip(self.null + times * (z[at] - self.null), low + 1e-6, high - 1e-6))
+        return begun(self.problem, out, o.events, o.columns, o.free, self.bare, use)[0]
 
     def settle(self, use: np.ndarray) -> None:
         """Refit everything from the best place seen: where an effect is periodic, its phase tells how large it is."""

@@ -129,7 +129,7 @@ class Sweep:
         work = {f"{self.name}-afar-{_word(c.effect)}": (afar, (c, g.optimum, g.data, g.floor, g.train)) for c in far}
         every = _latest(*every, *self._all(work, "from afar", 0.85, 0.91))
         ranked = sorted((c for c in every if not c.note), key=lambda c: c.cost)
-        near = [c for c in ranked if c.cost < NEAR * ranked[0].cost and c.cost < WORTH * g.optimum.cost][:LEADERS]
+        near = [c for c in ranked if c.cost < NEAR * ranked[0].cost and c.cost < FOLLOWED * g.optimum.cost][:LEADERS]
         return _latest(*every, *self._settle([c for c in near if not c.settled], "afar settle", 0.91, SWEPT))
 
     def rivals(self, named: Candidate, every: Sequence[Candidate]) -> list[Candidate]:
