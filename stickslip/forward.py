@@ -180,12 +180,12 @@ def _share(new: Array, old: Array) -> Array:
 def _in_stick(model: Model, pull: Array) -> Array:
     """Forces (N) of the elements of a contact that rests under a ``pull`` (N) at full strength, some time after an
     arrest: there each was at its weakened cap; since then all were moved alike."""
-    bank = model.bank
+    bank = model.shaped()
     left = bank.strength * model.weakening.ratio
     load = pull - jnp.sum(left)
     further = loading_displacement(bank.stiffness, bank.strength - left, load)
-    back = jnp.minimum(load, 0.0) / jnp.sum(bank.stiffness)
-    return jnp.clip(left + bank.stiffness * (further + back), -bank.strength, bank.strength)
+    back = loading_displacement(bank.stiffness, bank.strength + left, -load)
+    return jnp.clip(left + bank.stiffness * (further - back), -bank.strength, bank.strength)
 
 
 def run_cycles(
@@ -235,7 +235,8 @@ def run_cycles(
         return (end, late, end.x - track.reading[-1] + back, model.bank.strength), track
 
     zero = jnp.zeros(())
-    ahead = start.x - _reading(first, cycles.start[0], start)  # of the reading, as at every later arrest
+    # of the reading, as at every later arrest; a virgin contact's spring is as long as it is, whatever the sensor shows
+    ahead = jnp.where(cycles.virgin, 0.0, start.x - _reading(first, cycles.start[0], start))
     items = (events, cycles.start, cycles.position, cycles.limit, cycles.least_slip, cycles.used)
     tracks: Track
     _, tracks = jax.lax.scan(cycle, (start, zero, ahead, first.bank.strength), items)

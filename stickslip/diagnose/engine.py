@@ -20,6 +20,7 @@ from ..floors import floors
 from ..residual import misfit
 from ..segment import Segmentation, segment
 from ..trace import Trace
+from .begin import with_starts
 from .candidate import Candidate
 from .heldout import HeldOut
 from .holdout import training_cycles
@@ -308,6 +309,7 @@ def _round(
         every = sweep.rivals(best.candidate, every)
         candidates = best_forms(tags, every)
         if all(c.tag != tag for c in begins):
+            tell(f"{name}: the model without {tag} fitted again", 1.0)
             nearer = _from(rung, [best.candidate], material, f"{name}-{tag}")
             rung = rung if nearer is rung else _widely(nearer, material, f"{name}-{tag}")
         judged = _judged(candidates, rung, limits)
@@ -326,8 +328,14 @@ def _from(rung: Rung, begins: Sequence[Candidate], material: Material, name: str
     """The rung fitted again from where candidates arrived, if that is better."""
     assert rung.composition is not None
     assert rung.fit is not None
-    k = len(rung.composition.free)
-    places = [replace(rung.fit, z=c.fit.z[:k], events=c.fit.events) for c in begins if c.fit is not None]
+    data, _, train, _ = material
+    old, use = rung.fit, train & np.asarray(data.cycles.used)
+    problem = Problem(rung.composition, data).seeing(use)
+    places = []
+    for c in begins:
+        assert c.fit is not None
+        z = with_starts(problem, c.fit.z[: old.z.size], c.fit.events, old.columns, old.free, data.values, use)
+        places.append(replace(old, z=z, events=c.fit.events))
     for i, (begin, stages) in enumerate((place, stages) for place in places for stages in BASE_AGAIN):
         rung = _further(rung, begin, stages, material, f"{name}-again{i + 1}")
     return rung

@@ -14,7 +14,7 @@ from ..fit.composition import Composition
 from ..fit.inertial import Fit, certain, fit
 from ..fit.problem import Problem
 from ..params import specs
-from .begin import begun
+from .begin import with_starts
 from .candidate import Candidate, ease, with_fit
 from .search import plausible, score, silent
 
@@ -23,7 +23,7 @@ FEW = 9  # evaluations for those that promise something
 MORE = 12  # more for the better half of them
 MOST = 30  # for the leaders
 LARGER = 2.0, 1.5  # times its amplitude: where a leader is begun again, each as long as it leads on
-AGAIN, SETTLED = 10, 0.97  # a leader is refined again until that takes less than 3 % off its cost
+AGAIN, SETTLED = 10, 0.97  # a leader is begun or refined again until that takes less than 3 % off its cost
 WIDELY = ((7.0, 8), (2.5, 8), (1.0, 14))  # by way of wide floors: a search that stands still in a bent valley goes on
 FAR = ((30.0, 8), *WIDELY)  # the same from another amplitude
 
@@ -117,8 +117,8 @@ def settle(
     if best.fit is None:
         return best
     for z, events in candidate.others:
-        begun = replace(candidate, fit=replace(best.fit, z=z, events=events), note="not refitted")
-        other = go(begun, FEW + MORE)
+        start = replace(candidate, fit=replace(best.fit, z=z, events=events), note="not refitted")
+        other = go(start, FEW + MORE)
         if other.cost < best.cost:
             best = other
     if best.fit is None or best.composition is None:
@@ -169,7 +169,8 @@ def afar(
     (progress or silent)(f"{candidate.tag}: cost {candidate.cost:.0f}, from afar {new.cost:.0f}")
     if new.cost >= candidate.cost and not candidate.note:
         return candidate
-    return with_fit(replace(candidate, note="", settled=False), new, problem, floor, train)
+    # its other starts are from where this one is not
+    return with_fit(replace(candidate, note="", settled=False, others=()), new, problem, floor, train)
 
 
 def _amplitude(candidate: Candidate) -> int | None:
@@ -193,7 +194,7 @@ def _larger(candidate: Candidate, times: float, problem: Problem, train: np.ndar
     z = old.z.copy()
     z[i] = np.clip(null + times * (z[i] - null), *np.array(free.bounds) + np.array([1e-6, -1e-6]))
     events = np.zeros_like(old.events)
-    z, _ = begun(problem.seeing(use), z, events, old.columns, old.free, problem.measurement.values, use)
+    z = with_starts(problem.seeing(use), z, events, old.columns, old.free, problem.measurement.values, use)
     # the derivatives are those of another place, and its cost is not this one's
     far = replace(old, z=z, events=events, cost=np.inf, columns=np.zeros_like(old.columns))
     return replace(candidate, fit=far, note="not refitted")

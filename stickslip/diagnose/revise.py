@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..fit.composition import Composition
 from ..fit.inertial import fit
 from ..fit.problem import Problem
+from .begin import with_starts
 from .candidate import Candidate
 from .refit import MOST
 from .rungs import Material, Rung, kept, make_rung
@@ -99,13 +101,27 @@ def _less(top: Rung, tag: str, left: Sequence[str], material: Material) -> Rung:
     assert top.fit is not None
     data, floor, train, store = material
     smaller, old = top.composition.without(tag), top.fit
-    z = old.z[[i for i, f in enumerate(old.free) if not f.name.startswith(f"{tag}.")]]
+    z = _without(top, tag, smaller, material)
     found = kept(
         store,
         f"left-{'-'.join(left)}",  # of what is in it: with other settings a piece may have come from other effects
         lambda: fit(Problem(smaller, data), floor, z=z, events=old.events, stages=((1.0, MOST),), use=train),
     )
     return make_rung(("static", "inertia", *left), " + ".join(left), smaller, found, material)
+
+
+def _without(
+    top: Rung, tag: str, composition: Composition, material: Material, instead: np.ndarray | None = None
+) -> np.ndarray:
+    """Free parameters of the last model without an effect, and with those of another ``instead``: its runs begin so
+    that the slips come when they do in the data."""
+    assert top.fit is not None
+    old, use = top.fit, material.train & np.asarray(material.data.cycles.used)
+    left = [i for i, f in enumerate(old.free) if not f.name.startswith(f"{tag}.")]
+    known, columns = [old.free[i] for i in left], old.columns[..., left]
+    z = np.concatenate([old.z[left], () if instead is None else instead])
+    problem = Problem(composition, material.data).seeing(use)
+    return with_starts(problem, z, old.events, columns, known, material.data.values, use)
 
 
 def _instead(top: Rung, tag: str, rival: Candidate, material: Material) -> tuple[Candidate, Rung]:
@@ -117,8 +133,7 @@ def _instead(top: Rung, tag: str, rival: Candidate, material: Material) -> tuple
     old = top.fit
     own = [i for i, f in enumerate(rival.fit.free) if f.name.startswith(f"{rival.tag}.")]
     composition = top.composition.without(tag).with_effect(rival.effect, [rival.fit.free[i] for i in own])
-    rest = old.z[[i for i, f in enumerate(old.free) if not f.name.startswith(f"{tag}.")]]
-    z = np.concatenate([rest, rival.fit.z[own]])
+    z = _without(top, tag, composition, material, rival.fit.z[own])
     model = tuple(rival.tag if t == tag else t for t in top.model)
     found = kept(
         store,

@@ -13,12 +13,13 @@ from ..errors import StickslipError
 from ..features.measurement import Measurement
 from ..fit.common import Common
 from ..fit.composition import PHASE, Composition, run_of
+from ..fit.composition import START as START_OF_RUN
 from ..fit.inertial import Fit, fit, robust
 from ..fit.parameters import effect_parameters
 from ..fit.problem import Problem
 from ..floors import event_widths
 from ..params import specs
-from .begin import begun
+from .begin import begun, with_starts
 from .candidate import Candidate, ease
 from .linear import Linear, Step
 from .periods import periods, phasor, within_record
@@ -162,9 +163,9 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
     off = search.off(features)
     offsets, r = -common.offsets(off), robust(common(off[valid]))
     unknown = np.zeros((z.size, z.size))
-    begun = Fit(z, events, r, r, features + offsets, offsets, unknown, composition.free, columns, use, 0, 0)
+    start = Fit(z, events, r, r, features + offsets, offsets, unknown, composition.free, columns, use, 0, 0)
     return Candidate(
-        effect.tag, form, effect, explained, promise, factor, composition, begun, note="not refitted", others=others
+        effect.tag, form, effect, explained, promise, factor, composition, start, note="not refitted", others=others
     )
 
 
@@ -314,12 +315,14 @@ class Search:
         for _ in range(5):
             z = self.point(values, self.null + share * reach)
             o = self.optimum
-            z, features = begun(self.problem, z, o.events, o.columns, o.free, self.bare, use)
+            z, features = begun(self.problem, z, o.events, o.columns, o.free, self.bare, use, steps=1)
             moved = np.abs(np.nan_to_num((features - self.bare) / self.floor, nan=1e3))[self.valid]
             now = float(np.sqrt(np.mean(np.minimum(moved, 1e3) ** 2)))
             if 0.6 * rms < now < 1.6 * rms or (now < rms and share >= 0.5):
                 break
             share = float(np.clip(share * np.clip(rms / max(now, 1e-6), 0.02, 10.0), 1e-6, 0.5))
+        if any(f.name.startswith(START_OF_RUN) for f in o.free):
+            z, features = begun(self.problem, z, o.events, o.columns, o.free, self.bare, use)
         return z, features
 
     def scaled(self, z: np.ndarray, times: float, use: np.ndarray) -> np.ndarray:
@@ -327,7 +330,7 @@ class Search:
         out, at, o = z.copy(), self.k + self.amplitude, self.optimum
         low, high = self.free[self.amplitude].bounds
         out[at] = float(np.clip(self.null + times * (z[at] - self.null), low + 1e-6, high - 1e-6))
-        return begun(self.problem, out, o.events, o.columns, o.free, self.bare, use)[0]
+        return with_starts(self.problem, out, o.events, o.columns, o.free, self.bare, use)
 
     def settle(self, use: np.ndarray) -> None:
         """Refit everything from the best place seen: where an effect is periodic, its phase tells how large it is."""

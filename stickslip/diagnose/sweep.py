@@ -125,11 +125,12 @@ class Sweep:
     def _afar(self, tags: Sequence[str], every: Sequence[Candidate]) -> list[Candidate]:
         """Everything fitted, after what leads nowhere from near an amplitude of zero was begun far from there."""
         g = self.ground
-        far = [c for c in best_forms(tags, every) if c.fit is not None and not c.settled]
+        followed = FOLLOWED * g.optimum.cost
+        far = [c for c in best_forms(tags, every) if c.fit is not None and not (c.settled and c.cost < followed)]
         work = {f"{self.name}-afar-{_word(c.effect)}": (afar, (c, g.optimum, g.data, g.floor, g.train)) for c in far}
         every = _latest(*every, *self._all(work, "from afar", 0.85, 0.91))
         ranked = sorted((c for c in every if not c.note), key=lambda c: c.cost)
-        near = [c for c in ranked if c.cost < NEAR * ranked[0].cost and c.cost < FOLLOWED * g.optimum.cost][:LEADERS]
+        near = [c for c in ranked if c.cost < NEAR * ranked[0].cost and c.cost < followed][:LEADERS]
         return _latest(*every, *self._settle([c for c in near if not c.settled], "afar settle", 0.91, SWEPT))
 
     def rivals(self, named: Candidate, every: Sequence[Candidate]) -> list[Candidate]:

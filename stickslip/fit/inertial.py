@@ -383,8 +383,7 @@ def fit(
     res.solve(problem)
     offsets = -res.common(1.0).offsets(res.misfit(x))
     data, prior = res.data(x, 1.0), res.priors(x)
-    x = _begun_alike(res, x)
-    raw, columns = _with_unseen(whole, res, x)
+    x, raw, columns = _with_unseen(whole, res, x)
     return Fit(
         x[: res.k],
         res.events(x),
@@ -402,8 +401,8 @@ def fit(
 
 
 def _begun_alike(res: _Residuals, x: np.ndarray) -> np.ndarray:
-    """The parameters with runs that the fit has not seen begun as far from full strength as those it has, which an
-    effect may have moved by far: only from near there their first slip tells how far it is."""
+    """The parameters with runs that the fit has not seen begun as far from full strength as those it has (the median),
+    which an effect may have moved by far: only from near there their own slips tell how far it is."""
     runs = {i: run_of(free.name) for i, free in enumerate(res.free) if free.name.startswith(START)}
     seen = [x[i] for i, run in runs.items() if res.used[run].any()]
     unseen = [i for i, run in runs.items() if not res.used[run].any()]
@@ -413,13 +412,15 @@ def _begun_alike(res: _Residuals, x: np.ndarray) -> np.ndarray:
     return x
 
 
-def _with_unseen(whole: Problem, res: _Residuals, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _with_unseen(whole: Problem, res: _Residuals, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Features and derivatives at ``x``, those of cycles that the fit has not seen added: there only what every event,
-    or a run, has of its own is derived by, for that is set anew where a fit is judged on them."""
+    or a run, has of its own is derived by, for that is set anew where a fit is judged on them. Before them ``x``, with
+    runs that the fit has not seen begun like the others."""
     features, columns = res.evaluate(x), res.columns(x)
     unseen = np.asarray(whole.measurement.cycles.used) & whole.seen & ~res.used
     if not unseen.any():
-        return features, columns
+        return x, features, columns
+    x = _begun_alike(res, x)
     z, events = x[: res.k], res.events(x)
     rest = whole.seeing(unseen)
     features = np.where(unseen[..., None], rest.features(z, events), features)
@@ -433,7 +434,7 @@ def _with_unseen(whole: Problem, res: _Residuals, x: np.ndarray) -> tuple[np.nda
     which = [*own, *begins]
     slopes = rest.columns(z, events, which, features, np.array(steps))
     columns[..., which] += np.where(unseen[..., None, None], slopes, 0.0)
-    return features, columns
+    return x, features, columns
 
 
 def certain(problem: Problem, floor: np.ndarray, found: Fit) -> Fit:

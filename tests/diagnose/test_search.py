@@ -244,7 +244,6 @@ def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_st
     monkeypatch.setattr(refit, "certain", lambda problem, floor, found: found)
     monkeypatch.setattr(refit, "ease", lambda *a: 1.0)
     monkeypatch.setattr(refit, "with_fit", lambda c, found, *a: replace(c, fit=found))
-    monkeypatch.setattr(refit, "_larger", lambda candidate, *a: candidate)
     begun = Candidate("tilt", {}, catalogue.make("tilt"), 0.1, 0.1, composition="invented", fit=fit)
     hopeless = refit.settle(begun, data, np.ones_like(data.values), data.valid, 900.0)
     assert hopeless.cost == 1000.0
@@ -270,7 +269,7 @@ def test_a_leader_is_tried_at_larger_amplitudes_as_long_as_they_lead_on(best, ex
 
     monkeypatch.setattr(refit, "fit", step)
     monkeypatch.setattr(refit, "Problem", lambda *a, **k: SimpleNamespace(measurement=data, seeing=lambda use: None))
-    monkeypatch.setattr(refit, "begun", lambda problem, z, *a: (z, None))
+    monkeypatch.setattr(refit, "with_starts", lambda problem, z, *a: z)
     monkeypatch.setattr(refit, "certain", lambda problem, floor, found: found)
     monkeypatch.setattr(refit, "ease", lambda *a: 1.0)
     monkeypatch.setattr(refit, "with_fit", lambda c, found, *a: replace(c, fit=found))

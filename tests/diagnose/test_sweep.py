@@ -127,6 +127,22 @@ def test_where_nothing_describes_the_data_everything_is_begun_far_from_an_amplit
     assert len({(c.tag, *c.form.values()) for c in every}) == len(every)
 
 
+def test_what_was_fitted_to_the_end_but_not_followed_is_begun_afar_too(calls, monkeypatch):
+    """Where no effect takes 5 % off, those nearest to it are not followed; the right one may be among them."""
+    REST[0] = MUCH
+
+    def refine(candidate, data, floor, train, evaluations):
+        cost = 955.0 + catalogue.tags().index(candidate.tag) if candidate.tag not in AFAR else 951.0
+        return replace(invented(candidate.effect, cost, candidate.promise), score=candidate.score)
+
+    monkeypatch.setattr(module, "refine", refine)
+    monkeypatch.setitem(FINAL, "contact-ageing", 960.0)
+    monkeypatch.setitem(FINAL, "wear", 961.0)
+    best, _, _ = run()
+    assert ("settle", "sensor-gain") in calls[: calls.index(("afar", "sensor-gain"))]
+    assert next(c.cost for c in best if c.tag == "sensor-gain") == AFAR["sensor-gain"]
+
+
 def test_where_something_describes_the_data_nothing_is_begun_afar(calls):
     run()
     assert "afar" not in {what for what, _ in calls}
