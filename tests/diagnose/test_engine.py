@@ -11,13 +11,16 @@ import pytest
 from stickslip.diagnose import engine, revise, rungs
 from stickslip.diagnose.candidate import Candidate
 from stickslip.diagnose.heldout import HeldOut
+from stickslip.diagnose.thresholds import THRESHOLDS
 from stickslip.diagnose.verdict import judge
 from stickslip.effects import catalogue
 from stickslip.fit.inertial import Fit
 from stickslip.fit.parameters import effect_parameters
 from stickslip.residual import Misfit
 
-DATA = SimpleNamespace(names=("a",), dropped=(), cycles=SimpleNamespace(used=np.ones((1, 1), bool)))
+DATA = SimpleNamespace(
+    values=np.zeros((1, 1, 3)), names=("a",), dropped=(), cycles=SimpleNamespace(used=np.ones((1, 1), bool))
+)
 CAMPAIGN = SimpleNamespace(rig=SimpleNamespace(contacts=4))
 TRACES = [SimpleNamespace(displacement=1, drive=1, name="a", role="")]
 
@@ -90,7 +93,8 @@ def diagnose(monkeypatch):
         world.base_from = base_from or {}
 
         class Sweep:
-            def __init__(self, ground, jobs, store, name, tell):
+            def __init__(self, ground, jobs, store, name, tell, limits):
+                assert limits is THRESHOLDS
                 self.ground = ground
 
             def run(self, tags):
@@ -109,7 +113,9 @@ def diagnose(monkeypatch):
                 return [replace(c, note="") if c.tag in catalogue.alike(named.tag) else c for c in every]
 
         for module in (engine, revise):
-            monkeypatch.setattr(module, "Problem", lambda composition, data: SimpleNamespace(composition=composition))
+            monkeypatch.setattr(
+                module, "Problem", lambda c, data: SimpleNamespace(composition=c, seeing=lambda use: None)
+            )
             monkeypatch.setattr(module, "fit", world.fit)
             monkeypatch.setattr(module, "make_rung", world.rung)
         for name, value in {
