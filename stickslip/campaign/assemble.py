@@ -21,6 +21,7 @@ from ..readers.repair import (
     drop_nan,
     find_gaps,
     join_resets,
+    set_zero,
     unwrap,
 )
 from ..trace import SIGNALS, Drive, Provenance, Repair, Trace
@@ -91,6 +92,12 @@ class _Assembly:
         check_size(time, data)
         resolution, noise = self._mend(time, data, channels)
         drive = self._drive(time, data, resolution, noise)
+        if entry.virgin and drive is not None and "displacement" in data:
+            begins = float(drive.position(time[0]))
+            data["displacement"], done = set_zero(
+                data["displacement"], begins, noise["displacement"], resolution["displacement"]
+            )
+            self.repairs += done
         leading = next(name for name in SIGNALS if name in data)
         rig = self.campaign.rig_of(entry.label)
         stiffness = rig.spring_stiffness if isinstance(rig.spring_stiffness, float) else None

@@ -223,3 +223,26 @@ def correct_clock(time: Array, error: float) -> tuple[Array, list[Repair]]:
         raise InputError("a clock error beyond one per cent", value=error, allowed="-1e4 ppm to 1e4 ppm")
     reason = f"the recorder's clock runs {'fast' if error > 0 else 'slow'} by {abs(error) * 1e6:.4g} ppm, as stated"
     return time[0] + (time - time[0]) / (1.0 + error), [Repair("clock", time.size, "time", reason)]
+
+
+def set_zero(
+    displacement: Array, load_point: float, noise: float, resolution: float | None
+) -> tuple[Array, list[Repair]]:
+    """The displacement of a freshly set down block, counted from where the load point is as the record begins.
+
+    Its spring is not stretched then, so what the first sample is off the load point is the sensor's own zero. Within
+    noise and counts nothing is changed.
+
+    Args:
+        displacement: m, shape (n,).
+        load_point: m, at the first sample.
+        noise, resolution: of one sample of the displacement, m.
+    """
+    off = float(displacement[0]) - load_point
+    if abs(off) <= max(5.0 * noise, 2.0 * (resolution or 0.0), 1e-12 * float(np.ptp(displacement))):
+        return displacement, []
+    reason = (
+        f"it begins {shown(off, 'm')} off the load point, and a freshly set down block (virgin = true) has a "
+        "spring that is not stretched: taken as the sensor's zero"
+    )
+    return displacement - off, [Repair("zero", displacement.size, "displacement", reason)]

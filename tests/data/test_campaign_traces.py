@@ -49,6 +49,20 @@ def test_units_resolution_noise_and_provenance(campaign, run):
         trace.provenance.columns["time"] = "other"
 
 
+def test_a_virgin_record_is_counted_from_its_load_point(campaign, run):
+    """A vibrometer's zero is anywhere; taken as it is, the spring would seem stretched and the first slip late."""
+    t, x = run
+    there = only(campaign(TIME + X + DRIVE + "virgin = true\n", rows=np.column_stack([t, x])))
+    assert there.repairs == ()
+    shifted = only(campaign(TIME + X + DRIVE + "virgin = true\n", rows=np.column_stack([t, x + 100.0])))
+    assert shifted.displacement == pytest.approx((x - x[0]) * 1e-6, abs=1e-15)
+    assert [r.kind for r in shifted.repairs] == ["zero"]
+    # how far the spring of another record is stretched as it begins is not known
+    other = only(campaign(TIME + X + DRIVE, rows=np.column_stack([t, x + 100.0])))
+    assert other.displacement == pytest.approx((x + 100.0) * 1e-6, abs=1e-15)
+    assert other.repairs == ()
+
+
 def test_units_of_the_header_and_a_conflict(campaign, run, refuses):
     rows = np.column_stack(run)[:5000]
     both = 'time = { column = "time" }\ndisplacement = { column = "x" }\n' + DRIVE

@@ -12,6 +12,7 @@ from stickslip.readers.repair import (
     drop_nan,
     find_gaps,
     join_resets,
+    set_zero,
     unwrap,
 )
 
@@ -181,6 +182,17 @@ def test_clock_error():
     assert "fast by 40 ppm" in repairs[0].reason
     with pytest.raises(InputError, match="beyond one per cent"):
         correct_clock(read, 0.5)
+
+
+def test_a_freshly_set_down_block_begins_where_its_load_point_is():
+    x = 3e-4 + np.linspace(0.0, 1e-6, 50)
+    result, (repair,) = set_zero(x, 1e-4, 5e-9, 8e-9)
+    assert result == pytest.approx(x - 2e-4, abs=1e-18)
+    assert (repair.kind, repair.count) == ("zero", 50)
+    assert "200 µm off the load point" in repair.reason
+    near = 1e-4 + np.linspace(1.5e-8, 1e-6, 50)  # within noise and counts: bit for bit as it was
+    assert set_zero(near, 1e-4, 5e-9, 8e-9) == (near, [])
+    assert set_zero(near, 1e-4, 1e-9, None)[1]
 
 
 @pytest.mark.parametrize("sigma", [5e-9, 50e-9])
