@@ -80,30 +80,30 @@ class Sweep:
 
     def run(self, tags: Sequence[str]) -> tuple[list[Candidate], list[Candidate]]:
         """Every tag's candidate in its best form, in the order of ``tags``; and everything that was fitted."""
-        scored = self._score([form for tag in tags for form in forms_of(tag)], 0.0, 0.55)
+        scored = self._score([form for tag in tags for form in forms_of(tag)], 0.0, 0.38)
         firsts = _firsts(sorted(scored, key=lambda c: -c.promise))  # each tag in the form that promises most
         promising = firsts[:PROMISING]
         explaining = _firsts(sorted(scored, key=lambda c: -c.score))[:EXPLAINING]
         promising += [c for c in explaining if c.tag not in {p.tag for p in promising}]
-        begun = self._refine(promising, FEW, "few", 0.55, 0.62)
+        begun = self._refine(promising, FEW, "few", 0.38, 0.43)
         few = sorted(begun, key=lambda c: c.cost)
         if not any(c.cost < WORTH * self.ground.optimum.cost for c in few):
             # then promises told nothing: few steps for all others, of which the best take the places of the worst
             others = [c for c in firsts if c.tag not in {p.tag for p in promising}]
-            begun += self._refine(others, FEW, "few", 0.62, 0.67)
+            begun += self._refine(others, FEW, "few", 0.43, 0.46)
             few = sorted(begun, key=lambda c: c.cost)[: len(few)]
         half = few[: max(LEAST, len(few) // 2)]
         half += [c for c in few[len(half) :] if c.cost < NEAR * few[0].cost]
         leading = {c.tag for c in half[:LEAST]}
         followed = {_word(c.effect) for c in half}
         forms = [c for c in scored if c.tag in leading and _word(c.effect) not in followed]
-        more = self._refine([*half, *forms], MORE, "more", 0.67, 0.71)
+        more = self._refine([*half, *forms], MORE, "more", 0.46, 0.49)
         leader = min(more, key=lambda c: c.cost, default=None)
         if leader is not None and leader.cost < WORTH * self.ground.optimum.cost:
             # what it may be taken for deserves the same, whatever its own score promised
             known = {_word(c.effect) for c in more}
             like = [c for c in _taken_for(leader, scored) if _word(c.effect) not in known]
-            more += self._refine(self._refine(like, FEW, "like", 0.71, 0.74), MORE, "like more", 0.74, 0.77)
+            more += self._refine(self._refine(like, FEW, "like", 0.49, 0.51), MORE, "like more", 0.51, 0.53)
         best = min((c.cost for c in more), default=np.inf)
         ranked = sorted(more, key=lambda c: c.cost)
         near = [c for c in ranked if c.cost < NEAR * best][:LEADERS]
@@ -111,7 +111,7 @@ class Sweep:
             taken_for = _like(near[0].effect) - {c.tag for c in near}
             for first in _firsts([c for c in ranked if c.tag in taken_for])[:LIKE]:
                 near += [c for c in ranked if c.tag == first.tag and c.cost < NEAR * first.cost][:FORMS]
-        most = self._settle(near, "settle", 0.77, 0.85)
+        most = self._settle(near, "settle", 0.53, 0.6)
         every = _latest(*scored, *begun, *more, *most)
         if not any(self._described(c) for c in most):
             every = self._afar(tags, every)
@@ -128,10 +128,10 @@ class Sweep:
         followed = FOLLOWED * g.optimum.cost
         far = [c for c in best_forms(tags, every) if c.fit is not None and not (c.settled and c.cost < followed)]
         work = {f"{self.name}-afar-{_word(c.effect)}": (afar, (c, g.optimum, g.data, g.floor, g.train)) for c in far}
-        every = _latest(*every, *self._all(work, "from afar", 0.85, 0.91))
+        every = _latest(*every, *self._all(work, "from afar", 0.6, 0.88))
         ranked = sorted((c for c in every if not c.note), key=lambda c: c.cost)
         near = [c for c in ranked if c.cost < NEAR * ranked[0].cost and c.cost < followed][:LEADERS]
-        return _latest(*every, *self._settle([c for c in near if not c.settled], "afar settle", 0.91, SWEPT))
+        return _latest(*every, *self._settle([c for c in near if not c.settled], "afar settle", 0.88, SWEPT))
 
     def rivals(self, named: Candidate, every: Sequence[Candidate]) -> list[Candidate]:
         """Everything that was fitted, after what is about to be named, and what that may be taken for, got what the
