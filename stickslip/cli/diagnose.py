@@ -20,7 +20,7 @@ UNRESOLVED = 3
 def diagnose(
     campaign: str,
     *,
-    out: Path,
+    out: Path | None = None,
     candidates: str | None = None,
     max_effects: int = 4,
     holdout: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
@@ -38,6 +38,7 @@ def diagnose(
         TOML file that describes the rig and its measured runs.
     out:
         Folder for report.html, result.json and the finished pieces; an interrupted diagnosis goes on from them.
+        Default: NAME-diagnosis in this folder, after the campaign's file or, where that is campaign.toml, its folder.
     candidates:
         Try these effects only: contact-ageing,drive-ripple.
     max_effects:
@@ -58,6 +59,7 @@ def diagnose(
         Replace an existing run folder.
     """
     chosen = None if candidates is None else [c.strip() for c in candidates.split(",") if c.strip()]
+    out = _named_after(Path(campaign)) if out is None else out
     result = diagnose_campaign(
         campaign,
         out,
@@ -75,6 +77,12 @@ def diagnose(
     else:
         _print(result, out)
     return 0 if result["verdict"]["kind"] in ("complete", "missing") else UNRESOLVED
+
+
+def _named_after(campaign: Path) -> Path:
+    """Where the results go if nothing is said."""
+    name = campaign.stem if campaign.name != "campaign.toml" else campaign.resolve().parent.name
+    return Path(f"{name or 'campaign'}-diagnosis")
 
 
 def _teller(clock: Callable[[], float] = time.perf_counter) -> Callable[[str, float], None]:

@@ -178,18 +178,21 @@ def diagnose(
             verdict = Verdict("missing")  # to be said below: of a set, nothing is added to
             break
     sets: tuple[tuple[Candidate, ...], ...] = ()
+    added = len(named)
+    ladder, named = done_without(ladder, named, material, limits, tell)
+    if verdict.kind == "unknown" and len(named) < added:
+        found = _stop(ladder[-1], named, len(named), limits) if len(rounds) == added else None
+        tags = [n.tag for n in named]
+        verdict = found or nothing(tags, rounds[-1].judged, ladder[-1], limits, _forms(named))
     if verdict.kind == "missing":
-        if len(named) > 1 or any(n.rivals for n in named):
-            tell("trying to do without each effect, and with its rivals", 1.0)
-        ladder, named = done_without(ladder, named, material, limits)
-        ladder[-1], named = told_apart(ladder[-1], named, material, limits)
+        ladder[-1], named = told_apart(ladder[-1], named, material, limits, tell)
         verdict = _said(ladder[-1], named, verdict, limits)
         sets = tuple((n.candidate, *n.rivals) for n in named if n.rivals)
     elif any(n.rivals for n in named):
         every = tuple(dict.fromkeys(c.tag for n in named for c in (n.candidate, *n.rivals)))
         verdict = replace(verdict, set=every)
     if not any(ladder[-1].fit is f for f in (optimum, *(c.fit for r in rounds for c in r.candidates))):
-        tell("standard deviations", 1.0)
+        tell("standard deviations", 0.0)
         ladder[-1] = _certain(ladder[-1], material)
     return Diagnosis(
         verdict,
@@ -225,7 +228,7 @@ def _arrived(rung: Rung, named: Sequence[Named], material: Material, limits: Thr
     for again in range(FURTHER_FITS if named else 0):
         if rung.fit is None or is_complete(rung.train, rung.held, limits):
             break
-        tell("the last model once more", 1.0)
+        tell(f"the last model once more ({again + 1})", again / FURTHER_FITS)
         before = rung.fit.cost
         rung = _further(rung, rung.fit, FURTHER, material, f"named{len(named)}-{again + 1}")
         if rung.fit is None or rung.fit.cost > ARRIVED * before:
@@ -309,7 +312,7 @@ def _round(
         every = sweep.rivals(best.candidate, every)
         candidates = best_forms(tags, every)
         if all(c.tag != tag for c in begins):
-            tell(f"{name}: the model without {tag} fitted again", 1.0)
+            tell(f"{name}: the model without {tag} fitted again", 0.0)
             nearer = _from(rung, [best.candidate], material, f"{name}-{tag}")
             rung = rung if nearer is rung else _widely(nearer, material, f"{name}-{tag}")
         judged = _judged(candidates, rung, limits)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from .rungs import Material, Rung, kept, make_rung
 from .thresholds import Thresholds
 from .verdict import Judged, at_border, confidence, grade, worse
 
+Tell = Callable[[str, float], None]
 INSTEAD = ((2.5, 6), (1.0, MOST))  # stages of a fit with one effect in another's place
 
 
@@ -48,16 +49,18 @@ class Named:
 
 
 def done_without(
-    ladder: list[Rung], named: list[Named], material: Material, limits: Thresholds
+    ladder: list[Rung], named: list[Named], material: Material, limits: Thresholds, tell: Tell
 ) -> tuple[list[Rung], list[Named]]:
     """The ladder without effects that are no longer needed once the others are in.
 
     One goes where the rest, fitted again, costs less than ``limits.rival`` times as much and meets the same limits.
+    ``tell`` is told the work and the share of it done.
     """
     gone = True
     while gone and len(named) > 1:
         gone = False
-        for one in named:
+        for i, one in enumerate(named):
+            tell(f"trying to do without {one.tag}", i / len(named))
             left = [n for n in named if n is not one]
             rung = _less(ladder[-1], one.tag, [n.tag for n in left], material)
             if _cost(rung) < limits.rival * _cost(ladder[-1]) and _grade(rung, limits) <= _grade(ladder[-1], limits):
@@ -66,7 +69,9 @@ def done_without(
     return ladder, named
 
 
-def told_apart(top: Rung, named: Sequence[Named], material: Material, limits: Thresholds) -> tuple[Rung, list[Named]]:
+def told_apart(
+    top: Rung, named: Sequence[Named], material: Material, limits: Thresholds, tell: Tell
+) -> tuple[Rung, list[Named]]:
     """The last model, and its effects with the rivals that are left now that everything is in.
 
     Every rival is put in its effect's place and all is fitted again. It stays one where the costs are within
@@ -77,6 +82,7 @@ def told_apart(top: Rung, named: Sequence[Named], material: Material, limits: Th
     for i, one in enumerate(named):
         if not one.rivals or one.fresh:
             continue
+        tell(f"trying others in the place of {one.tag}", i / len(named))
         inside = {n.tag for n in named}
         others = [_instead(top, one.tag, r, material) for r in one.rivals if r.tag not in inside]
         offers = [(one.candidate, top), *((c, rung) for c, rung in others if not at_border(c, limits))]

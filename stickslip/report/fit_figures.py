@@ -152,7 +152,7 @@ def ramp_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: int
 
 @styled
 def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
-    """Errors of every model: by phase, and on fitted and unseen runs together."""
+    """Errors of every model, on fitted (solid) and on unseen runs (dashed): over all phases, and by phase."""
     made, axes = figure(1, 2, width=10.0, height=3.8)
     labels, before = [], 0
     for i, step in enumerate(ladder):
@@ -168,10 +168,14 @@ def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
     phases = list(dict.fromkeys(p for step in ladder for p in (step.get("by_phase") or {})))
     for phase in phases:
         mark, colour = _MARKS.get(phase, ("x", DARK))
-        y = np.array(
-            [np.nan if (v := (step.get("by_phase") or {}).get(phase)) is None else v for step in ladder], float
-        )
-        axes[0, 1].plot(x, y, marker=mark, color=colour, label=plain(phase, 30))
+        for key, style in (("by_phase", "-"), ("heldout_by_phase", "--")):
+            found = [(step.get(key) or {}).get(phase) for step in ladder]
+            y = np.array([np.nan if v is None else v for v in found], float)
+            if np.isfinite(y).any():
+                label = plain(phase, 30) if style == "-" else "_unseen"
+                axes[0, 1].plot(x, y, style, marker=mark, color=colour, label=label)
+    axes[0, 0].set_title("all phases", fontsize=9, loc="left")
+    axes[0, 1].set_title("by phase (dashed: unseen runs)", fontsize=9, loc="left")
     for ax in axes.flat:
         ax.axhline(1.0, color=LIGHT, ls=":", lw=1.0)
         if ax.get_lines()[:-1]:

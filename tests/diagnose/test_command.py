@@ -80,10 +80,34 @@ def test_a_stage_begins_even_where_its_first_line_is_left_out(capsys):
 
 
 def test_what_a_command_needs_is_named(capsys):
-    assert run(["diagnose", str(CAMPAIGN)]) == 2
-    assert "diagnose needs --out" in capsys.readouterr().err
+    assert run(["diagnose"]) == 2
+    assert "diagnose needs CAMPAIGN" in capsys.readouterr().err
     assert run(["simulate"]) == 2
     assert "simulate needs SCENARIO" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("file", "folder"), [("hidden-effect/campaign.toml", "hidden-effect"), ("x/rig.toml", "rig")])
+def test_without_a_folder_it_is_named_after_the_campaign(tmp_path, monkeypatch, capsys, file, folder):
+    monkeypatch.chdir(tmp_path)
+    asked = []
+
+    def stopped(campaign, out, **kwargs):
+        asked.append(out)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("stickslip.cli.diagnose.diagnose_campaign", stopped)
+    assert run(["diagnose", file, "--candidates", "tilt", "--max-effects", "1", "--holdout", "v400.csv"]) == 130
+    assert [str(path) for path in asked] == [f"{folder}-diagnosis"]
+
+
+def test_the_shipped_campaign_is_what_a_diagnosis_asks_for():
+    from stickslip.campaign import load_campaign, load_traces
+
+    assert sum(file.stat().st_size for file in CAMPAIGN.parent.iterdir()) <= 5e6
+    traces = load_traces(load_campaign(CAMPAIGN))
+    assert len(traces) == 5
+    assert len({round(t.drive_velocity, 7) for t in traces}) >= 3
+    assert any(t.drive.holds(float(t.time[0]), float(t.time[-1])) for t in traces)
 
 
 def test_a_piece_is_kept_and_only_for_the_same_inputs(tmp_path):

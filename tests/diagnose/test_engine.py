@@ -246,6 +246,16 @@ def test_and_so_does_the_next(diagnose):
     assert found.verdict.effects == ("viscous-drag",)
 
 
+@pytest.mark.parametrize("most", [3, 4])
+def test_what_is_no_longer_needed_goes_also_where_something_is_left(diagnose, most):
+    much = {tags: (cost, error + 3.0 if error < 8.0 else error) for tags, (cost, error) in CHAIN.items()}
+    found, _ = diagnose(much, max_effects=most)
+    assert (found.verdict.kind, found.verdict.effects) == ("unknown", ("tilt", "viscous-drag"))
+    assert found.ladder[-1].model == ("static", "inertia", "tilt", "viscous-drag")
+    said = "2 effects were added" if most == 3 else "viscous-drag help, but something is missing"
+    assert said in found.verdict.text
+
+
 def test_what_only_leaves_a_small_misfit_may_go_where_the_whole_leaves_one(diagnose):
     small = {tags: (cost, 1.8 if error == SMALL else error) for tags, (cost, error) in CHAIN.items()}
     found, _ = diagnose(small)

@@ -9,9 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from stickslip.conformance import check_effect
 from stickslip.diagnose.candidate import forms_of
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
+from stickslip.scenario import make_scenario, simulate
+from stickslip.scenario.demonstration import RIG
 from stickslip.workflow import code_digest
 
 MODULE = """
@@ -75,6 +78,18 @@ def test_it_is_known_by_its_tag(installed, name):
         assert name not in catalogue.all()
         with pytest.raises(InputError, match="there is no effect 'my-effect'"):
             catalogue.get(name)
+
+
+def test_it_keeps_the_rules_and_is_simulated(installed):
+    installed("humming = humming_friction:Humming")
+    assert check_effect(catalogue.get("humming"), full_metadata=False) == []
+    drive = {"velocity": 2e-4, "events": 2}
+    plain, humming = (
+        simulate(make_scenario({**RIG, "drive": drive, "effect": effects}))
+        for effects in ([], [{"type": "humming", "size": 0.05, "key": "major"}])
+    )
+    ratio = float(humming["spring_force"].max() / plain["spring_force"].max())
+    assert ratio == pytest.approx(1.05, abs=0.005)
 
 
 @pytest.mark.parametrize(

@@ -136,6 +136,18 @@ def test_steps_of_a_ladder_are_named_by_what_they_add():
     assert [text.get_text() for text in axes.get_xticklabels()] == ["static", "+ inertia", "+ tilt"]
 
 
+def test_a_ladder_shows_every_phase_on_fitted_and_on_unseen_runs():
+    steps = [
+        {"model": ["static"], "by_phase": {"slip": 9.0, "creep": 3.0}, "heldout_by_phase": {"slip": 8.0}},
+        {"model": ["static", "inertia"], "by_phase": {"slip": 2.0, "creep": 1.0}, "heldout_by_phase": {"slip": 4.0}},
+    ]
+    lines = ladder_picture(steps).axes[1].get_lines()[:-1]  # the last is the line at 1
+    drawn = {(line.get_linestyle(), line.get_color()): list(line.get_ydata()) for line in lines}
+    assert sorted(drawn.values()) == [[3.0, 1.0], [8.0, 4.0], [9.0, 2.0]]
+    (unseen,) = (colour for style, colour in drawn if style == "--")
+    assert drawn["-", unseen] == [9.0, 2.0]
+
+
 def test_what_follows_a_slip_is_drawn_in_its_own_scale():
     trace = sawtooth(4)
     found = segment(trace)
