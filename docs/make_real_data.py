@@ -245,7 +245,7 @@ The base model costs {found["ranking_base"]["cost"]:.0f}; what came nearest (who
 {chr(10).join(rest)}
 """
     )
-    return f"""### All records that slip, diagnosed together
+    return f"""### The records of two springs that slip, diagnosed together
 
 `stickslip diagnose` on five records: k = 168 N/m at 42 (260 to 300 s), 1100 and 4300 um/s and k = 1002 N/m at 1100 and 4300 um/s;
 {len(found["ranking"] or [])} effects were tried. It says:

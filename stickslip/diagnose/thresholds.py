@@ -1,8 +1,9 @@
 """The numbers a verdict rests on: one place, the same for every campaign.
 
 Set on simulated development campaigns (see docs/diagnosis); not to be changed for a single case. Frozen on 22 November
-2026 together with the rules that use them (all code as of commit 31d6964), before the first case of the sealed run
-with seed 20261127 (docs/challenge.md); ``border`` and ``fewest`` had the same values then, in ``verdict``.
+2026 (all code as of commit 31d6964), before the first case of the sealed run with seed 20261127 (docs/challenge.md);
+``border`` and ``fewest`` had the same values then, in ``verdict``. Of the rules that use them one was added since: what
+is about to be named must stand beside what it may be taken for, and a base fitted again from where it arrived.
 """
 
 from __future__ import annotations

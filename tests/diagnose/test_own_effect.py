@@ -59,6 +59,19 @@ def test_it_is_fitted(files, tmp_path):
 
 
 @pytest.mark.slow
+def test_it_is_fitted_beside_another(files, tmp_path):
+    path, campaign = files
+    out = tmp_path / "fit"
+    added = ["--add", "surface-finish", "--add", "contact-ageing"]
+    assert run(["fit", campaign, "--effect", path, *added, "--starts", "1", "--out", str(out)]) == 0
+    result = read_result(out)
+    assert result["ladder"][-1]["model"] == ["static", "inertia", "surface-finish", "contact-ageing"]
+    size, rate = (result["parameters"][name] for name in ("surface-finish.size", "contact-ageing.rate"))
+    assert abs(size["value"] - SIZE) < 4 * size["std"]
+    assert abs(rate["value"]) < 4 * rate["std"]  # which is not in the data
+
+
+@pytest.mark.slow
 def test_it_is_diagnosed_by_other_processes(files, tmp_path):
     path, campaign = files
     out = tmp_path / "diagnosis"

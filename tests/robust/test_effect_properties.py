@@ -1,4 +1,4 @@
-"""Up to three effects at once, anywhere in their ranges: numbers, caps and energy hold as they do without."""
+"""Several effects at once, up to all, anywhere in their ranges: numbers, caps and energy hold as they do without."""
 
 from __future__ import annotations
 
@@ -78,3 +78,24 @@ def test_several_effects_anywhere_in_their_ranges():
     laws()
     assert len(used) == len(EFFECTS)
     assert ends["at the end"] > 10 * ends["out of steps"], ends
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_all_effects_at_once():
+    """Each at a fiftieth of its range: a model may hold any set, so also the whole catalogue."""
+    rig = Rig(EFFECTS)
+    p = rig.defaults.copy()
+    for index, effect in enumerate(EFFECTS):
+        spec = specs(effect)[effect.amplitude]
+        null = spec.null or 0.0
+        end = spec.upper if spec.upper - null >= null - spec.lower else spec.lower
+        p[rig.at(index)[effect.amplitude]] = null + 0.02 * (end - null)
+    outcome = rig.run(p, DRIVE, TIGHT)
+    alone = rig.run(rig.defaults, DRIVE, TIGHT)
+    n = int(outcome.accepted)
+    s = jax.tree.map(lambda a: np.asarray(a[:n]), outcome.steps)
+    assert s.t[-1] >= 0.55 - 1e-12
+    assert all(np.isfinite(part).all() for part in s)
+    without = np.asarray(alone.steps.x)[: int(alone.accepted)]
+    assert abs(s.x[-1] - without[-1]) > 1e-9
