@@ -23,11 +23,13 @@ from .begin import begun, with_starts
 from .candidate import Candidate, ease
 from .linear import Linear, Step
 from .periods import periods, phasor, within_record
+from .recurrences import told
 
 START = 0.02  # of the amplitude's range; scaled until its effect on the features is moderate
 MODERATE = (2.0, 12.0)  # floors, rms: large against the solver's noise, small against what bends
 MOST_STARTS = 6
 PLAUSIBLE = 60.0  # floors, rms: by how much an amplitude moves the features at which everything else is refitted
+TOLD = 0.5  # share of what makes recurrences differ within runs: an amplitude that explains as much is begun at
 LARGER = 2.5  # times such an amplitude: what is tried besides where nothing describes the data
 CARRIED = ((30.0, 6), (7.0, 6), (2.5, 7))  # stages of that refit, with the base's derivatives carried on
 OTHERS = 2  # further starts that a leader is fitted from
@@ -148,6 +150,7 @@ def _score(effect, form, base, optimum, measurement, floor, train, threads, tell
         if effect.periodic is None:
             for sign in (1.0, -1.0):
                 search.push(likely, sign, PLAUSIBLE, use)
+            search.by_recurrences(use)
         else:
             search.settle(use)
         tell(f"{effect.tag}: everything else refitted around a plausible amplitude")
@@ -184,6 +187,7 @@ class Search:
         self.columns: dict[bytes, np.ndarray] = {}  # derivatives where everything was refitted
         self.each: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []  # the best from every start
         self.plausible: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []  # from plausible amplitudes
+        self.rates: list[tuple[dict[str, float], np.ndarray]] = []  # inner values, change for a unit of the amplitude
         self.bare = problem.features(self.point({}, self.null), optimum.events)  # the base at this tolerance
 
     def point(self, values: dict[str, float], amplitude: float, base: np.ndarray | None = None) -> np.ndarray:
@@ -230,6 +234,7 @@ class Search:
             step, size, phases = self._each_run([f[0] for f in known], linear)
             values = {**values, **phases}
         else:
+            self.rates.append((values, known[0][0]))
             step = linear.step([known[0][0]])
             size = float(step.sizes[0])
         bounds = np.array([f.bounds for f in self.optimum.free])
@@ -298,6 +303,23 @@ class Search:
         far = self.far(values, sign, rms, use)
         if far is not None:
             self._refit(far[0], self.optimum.events, far[1], use)
+
+    def by_recurrences(self, use: np.ndarray) -> None:
+        """Refit everything from the amplitude that the recurrences tell, if one explains how they differ within runs.
+
+        Runs that do not begin virgin begin so that their slips come when the measured ones do.
+        """
+        m, at = self.problem.measurement, self.problem.measurement.layout.slices()["recurrence"].start
+        floor, valid = self.floor[..., at], self.valid[..., at]
+        off = (m.values - self.bare)[..., at] / floor
+        best = max(((*told(off, rate[..., at] / floor, valid)[::-1], i) for i, (_, rate) in enumerate(self.rates)),
+                   default=(0.0, 0.0, 0))  # fmt: skip
+        share, size, i = best
+        if share < TOLD:
+            return
+        o, z = self.optimum, self.point(self.rates[i][0], self.null + size)
+        z, features = begun(self.problem, z, o.events, o.columns, o.free, m.values, use)
+        self._refit(z, o.events, features, use)
 
     def far(
         self, values: dict[str, float], sign: float, rms: float, use: np.ndarray

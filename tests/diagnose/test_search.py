@@ -13,6 +13,7 @@ from stickslip.diagnose import refit, search
 from stickslip.diagnose.candidate import Candidate
 from stickslip.diagnose.linear import Linear
 from stickslip.diagnose.periods import periods, phasor, within_record
+from stickslip.diagnose.recurrences import told
 from stickslip.diagnose.search import Search, starts
 from stickslip.effects import catalogue
 from stickslip.fit.inertial import Fit
@@ -224,6 +225,47 @@ def test_an_amplitude_that_may_have_two_signs_is_tried_with_both(tag, signs, mon
     begun.each = [(0.0, fit.z, fit.events, data.values)] * 3
     assert begun.others()[: len(pushed) - 1] == [o for o in begun.plausible if o is not begun.best]
     assert len(begun.others()) == search.OTHERS
+
+
+def test_recurrences_tell_the_amplitude_whatever_runs_and_single_slips_are_off_by():
+    rng = np.random.default_rng(5)
+    rate = np.cumsum(rng.uniform(0.5, 1.5, (3, 9)), axis=1)
+    off = 7.0 * rate + rng.standard_normal((3, 1)) * 200.0 + 0.5 * rng.standard_normal((3, 9))
+    off[1, 4] = 3e3  # a slip that went astray
+    valid = np.ones((3, 9), bool)
+    valid[2, 3:] = False
+    off[2, 3:] = np.nan
+    size, _ = told(off, rate, valid)
+    assert size == pytest.approx(7.0, rel=0.03)
+    valid[1, 4] = False
+    assert told(off, rate, valid)[1] > 0.9
+    # noise, and what is the same in all cycles, tell nothing
+    assert told(rng.standard_normal((3, 9)), rate, np.ones((3, 9), bool))[1] < 0.3
+    assert told(off, np.ones((3, 9)), valid) == (0.0, 0.0)
+    valid[0] = False
+    valid[1, 2:] = False
+    assert told(off, rate, valid) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("other", [0.0, 400.0])
+def test_what_the_recurrences_tell_is_begun_at(other, monkeypatch):
+    """Beside what else recurrences do, and only where it is most of what makes them differ."""
+    data, _, line, fit, _ = made(6)
+    monkeypatch.setattr(search, "fit", lambda problem, floor, *, z, events, **_: replace(fit, z=z, events=events))
+    monkeypatch.setattr(search, "begun", lambda problem, z, *_: (z, problem.features(z, None)))
+    effect = catalogue.make("sensor-gain")
+    at = data.layout.slices()["recurrence"].start
+    floor = 1e-4 * np.ones_like(data.values)
+    problem = Invented(data, 1e-4 * line)
+    begun = Search(problem, fit, floor, data.valid, 1.0, effect_parameters(effect), 2, effect)
+    begun.best = (np.inf, fit.z, fit.events, data.values)
+    begun.rates = [({}, 1e-4 * line)]
+    values = data.values + 30.0 * 1e-4 * line
+    values[..., at] += 1e-4 * other * np.random.default_rng(7).standard_normal(values.shape[:2])
+    problem.measurement = replace(data, values=values)
+    begun.bare = data.values
+    begun.by_recurrences(np.ones(data.values.shape[:2], bool))
+    assert [z[-1] for _, z, *_ in begun.plausible] == ([] if other else [pytest.approx(30.0)])
 
 
 def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_stands(monkeypatch):
