@@ -9,6 +9,7 @@ import numpy as np
 
 from .campaign import Campaign
 from .errors import InputError
+from .readers.repair import from_load_point
 from .report.describe import gain_is_wrong, stick_gain
 from .report.pace import pace
 from .report.slip_time import at_odds, slip_time
@@ -87,5 +88,6 @@ def with_displacements(traces: Sequence[Trace], found: Sequence[Segmentation]) -
         notes.append(f"{trace.name}: the displacement is {'drive - F/c_s' if gain else 'the integral of the velocity'}")
         count = None if trace.resolution is None or gain is None else trace.resolution / gain
         noise = events.settings.noise
-        out.append(trace.replace(displacement=np.array(position), noise=noise, resolution=count, drive=drive))
+        given = trace.replace(displacement=np.array(position), noise=noise, resolution=count, drive=drive)
+        out.append(from_load_point(given))
     return out, notes

@@ -20,8 +20,8 @@ from ..readers.repair import (
     drop_duplicates,
     drop_nan,
     find_gaps,
+    from_load_point,
     join_resets,
-    set_zero,
     unwrap,
 )
 from ..trace import SIGNALS, Drive, Provenance, Repair, Trace
@@ -92,12 +92,6 @@ class _Assembly:
         check_size(time, data)
         resolution, noise = self._mend(time, data, channels)
         drive = self._drive(time, data, resolution, noise)
-        if entry.virgin and drive is not None and "displacement" in data:
-            begins = float(drive.position(time[0]))
-            data["displacement"], done = set_zero(
-                data["displacement"], begins, noise["displacement"], resolution["displacement"]
-            )
-            self.repairs += done
         leading = next(name for name in SIGNALS if name in data)
         rig = self.campaign.rig_of(entry.label)
         stiffness = rig.spring_stiffness if isinstance(rig.spring_stiffness, float) else None
@@ -122,6 +116,9 @@ class _Assembly:
             provenance=Provenance(entry.file, file_sha256(path), reader, self.used, tuple(self.notes)),
         )
         self.warnings += check_travel(trace, rig, getattr(entry, leading).unit, f"{self.place}.{leading}")
+        cut = any(r.kind == "cut" for r in self.repairs)
+        if not (cut and trace.drive_position is not None):  # it may have been loaded before the part asked for
+            trace = from_load_point(trace)
         return trace.replace(warnings=tuple(self.warnings))
 
     def _time(self, columns: Columns, path: Path) -> Array:

@@ -25,7 +25,7 @@ from .candidate import Candidate
 from .heldout import HeldOut
 from .holdout import training_cycles
 from .refit import AGAIN, MORE, SETTLED, WIDELY
-from .revise import Named, done_without, told_apart
+from .revise import Named, Tell, done_without, told_apart
 from .rungs import Material, Rung, kept, make_rung
 from .static_rung import static_features
 from .sweep import SWEPT, Ground, Store, Sweep, best_forms
@@ -45,7 +45,6 @@ from .verdict import (
     worst_phase,
 )
 
-Tell = Callable[[str, float], None]
 MOST_CYCLES = 14
 BASE_AGAIN = ((3.0, 4), (1.0, MORE)), ((1.0, MORE),)  # stages: by way of wide floors, and straight on
 BEGINS = 2  # cheapest candidates, from where each of which the base is fitted again
@@ -181,7 +180,7 @@ def diagnose(
     added = len(named)
     ladder, named = done_without(ladder, named, material, limits, tell)
     if verdict.kind == "unknown" and len(named) < added:
-        found = _stop(ladder[-1], named, len(named), limits) if len(rounds) == added else None
+        found = _stop(ladder[-1], named, added, limits, added) if len(rounds) == added else None
         tags = [n.tag for n in named]
         verdict = found or nothing(tags, rounds[-1].judged, ladder[-1], limits, _forms(named))
     if verdict.kind == "missing":
@@ -236,8 +235,10 @@ def _arrived(rung: Rung, named: Sequence[Named], material: Material, limits: Thr
     return rung
 
 
-def _stop(rung: Rung, named: Sequence[Named], max_effects: int, limits: Thresholds) -> Verdict | None:
-    """The verdict where no further effect is looked for, or None."""
+def _stop(
+    rung: Rung, named: Sequence[Named], max_effects: int, limits: Thresholds, added: int | None = None
+) -> Verdict | None:
+    """The verdict where no further effect is looked for, or None; ``added`` were, if not all of them are left."""
     tags, forms = [n.tag for n in named], _forms(named)
     left = grade(rung.train, rung.held, limits)
     phase, worst = worst_phase(rung.train, rung.held, limits)
@@ -250,12 +251,14 @@ def _stop(rung: Rung, named: Sequence[Named], max_effects: int, limits: Threshol
             "unknown", text=f"The base model could not be fitted ({phase} is off by {worst:.0f} floors), so no "
             "effect was ranked. Look at `stickslip inspect` for units, missed events and the rig's values.",
         )  # fmt: skip
-    if len(named) < max_effects:
+    added = len(named) if added is None else added
+    if added < max_effects:
         return None
     if named and left == 2:
         return nearly(tags, phase, worst, tried=False, forms=forms)
-    many = "1 effect was" if len(named) == 1 else f"{len(named)} effects were"
-    text = f"{many} added and {phase} is still off by {worst:.1f} floors."
+    many = "1 effect was added" if added == 1 else f"{added} effects were added"
+    many += f" ({added - len(named)} taken out again)" if added > len(named) else ""
+    text = f"{many} and {phase} is still off by {worst:.1f} floors."
     return Verdict("unknown", tuple(tags), tuple(tags), text, forms=forms)
 
 

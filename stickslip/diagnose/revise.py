@@ -15,9 +15,9 @@ from .candidate import Candidate
 from .refit import MOST
 from .rungs import Material, Rung, kept, make_rung
 from .thresholds import Thresholds
-from .verdict import Judged, at_border, confidence, grade, worse
+from .verdict import NONE_MET, Judged, at_border, confidence, grade, worse
 
-Tell = Callable[[str, float], None]
+Tell = Callable[[str, float], None]  # told what is done, and the share of it
 INSTEAD = ((2.5, 6), (1.0, MOST))  # stages of a fit with one effect in another's place
 
 
@@ -53,7 +53,8 @@ def done_without(
 ) -> tuple[list[Rung], list[Named]]:
     """The ladder without effects that are no longer needed once the others are in.
 
-    One goes where the rest, fitted again, costs less than ``limits.rival`` times as much and meets the same limits.
+    One goes where the rest, fitted again, costs less than ``limits.rival`` times as much and meets the same limits, and
+    where none are met, if the unseen cycles are not described worse.
     ``tell`` is told the work and the share of it done.
     """
     gone = True
@@ -63,7 +64,11 @@ def done_without(
             tell(f"trying to do without {one.tag}", i / len(named))
             left = [n for n in named if n is not one]
             rung = _less(ladder[-1], one.tag, [n.tag for n in left], material)
-            if _cost(rung) < limits.rival * _cost(ladder[-1]) and _grade(rung, limits) <= _grade(ladder[-1], limits):
+            top = ladder[-1]
+            poorer = _grade(rung, limits) > _grade(top, limits) or (
+                _grade(top, limits) == NONE_MET and worse(rung.held, top.held, limits)
+            )
+            if _cost(rung) < limits.rival * _cost(top) and not poorer:
                 ladder, named, gone = [*ladder[:2], rung], [replace(n, fresh=False) for n in left], True
                 break
     return ladder, named
@@ -110,7 +115,8 @@ def _less(top: Rung, tag: str, left: Sequence[str], material: Material) -> Rung:
     z = _without(top, tag, smaller, material)
     found = kept(
         store,
-        f"left-{'-'.join(left)}",  # of what is in it: with other settings a piece may have come from other effects
+        # of what is in it, and what it was taken from: with other settings a piece may have come from other effects
+        f"left-{'-'.join(left)}-of-{'-'.join(top.model[2:])}",
         lambda: fit(Problem(smaller, data), floor, z=z, events=old.events, stages=((1.0, MOST),), use=train),
     )
     return make_rung(("static", "inertia", *left), " + ".join(left), smaller, found, material)

@@ -310,14 +310,14 @@ class Search:
         Runs that do not begin virgin begin so that their slips come when the measured ones do.
         """
         m, at = self.problem.measurement, self.problem.measurement.layout.slices()["recurrence"].start
-        floor, valid = self.floor[..., at], self.valid[..., at]
-        off = (m.values - self.bare)[..., at] / floor
-        best = max(((*told(off, rate[..., at] / floor, valid)[::-1], i) for i, (_, rate) in enumerate(self.rates)),
-                   default=(0.0, 0.0, 0))  # fmt: skip
-        share, size, i = best
-        if share < TOLD:
+        off, floor, valid = (a[..., at] for a in (m.values - self.bare, self.floor, self.valid))
+        low, high = self.free[self.amplitude].bounds
+        found = [(values, *told(off, rate[..., at], floor, valid)) for values, rate in self.rates]
+        found = [f for f in found if f[2] >= TOLD and low < self.null + f[1] < high]
+        if not found:
             return
-        o, z = self.optimum, self.point(self.rates[i][0], self.null + size)
+        values, size, _ = max(found, key=lambda f: f[2])
+        o, z = self.optimum, self.point(values, self.null + size)
         z, features = begun(self.problem, z, o.events, o.columns, o.free, m.values, use)
         self._refit(z, o.events, features, use)
 

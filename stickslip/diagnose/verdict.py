@@ -29,6 +29,9 @@ class _Errors(Protocol):
         """On the others."""
 
 
+NONE_MET = 3  # the grade of a model that is beyond all limits
+
+
 @dataclass(frozen=True)
 class Verdict:
     """What the data say.
@@ -90,7 +93,7 @@ def grade(train: Misfit, held: HeldOut | None, limits: Thresholds = THRESHOLDS) 
     if is_complete(train, held, limits):
         return 0
     factors = (limits.remainder, limits.adequate)
-    return next((i for i, f in enumerate(factors, start=1) if is_adequate(train, held, limits, f)), 3)
+    return next((i for i, f in enumerate(factors, start=1) if is_adequate(train, held, limits, f)), NONE_MET)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..trace import SIGNALS, Repair
+from ..trace import SIGNALS, Drive, Repair, Trace
 from ..units import shown
 
 Array = NDArray[np.float64]
@@ -16,6 +16,7 @@ Mask = NDArray[np.bool_]
 
 _UNITS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
 MOST_COUNTS = 2.0**53  # beyond which whole counts cannot be told from others
+FIRST_SAMPLES = 5  # of a record, which tell where it begins
 
 
 def unwrap(values: Array, period: float, channel: str, resolution: float | None = None) -> tuple[Array, list[Repair]]:
@@ -225,24 +226,34 @@ def correct_clock(time: Array, error: float) -> tuple[Array, list[Repair]]:
     return time[0] + (time - time[0]) / (1.0 + error), [Repair("clock", time.size, "time", reason)]
 
 
-def set_zero(
-    displacement: Array, load_point: float, noise: float, resolution: float | None
-) -> tuple[Array, list[Repair]]:
-    """The displacement of a freshly set down block, counted from where the load point is as the record begins.
+def from_load_point(trace: Trace) -> Trace:
+    """A virgin run with load point and displacement counted from where the load point is as the record begins.
 
-    Its spring is not stretched then, so what the first sample is off the load point is the sensor's own zero. Within
-    noise and counts nothing is changed.
-
-    Args:
-        displacement: m, shape (n,).
-        load_point: m, at the first sample.
-        noise, resolution: of one sample of the displacement, m.
+    The spring of a freshly set down block is not stretched then, so what the displacement is off the load point is the
+    sensor's own zero. Within noise and counts nothing is changed, nor is any run that does not begin virgin.
     """
-    off = float(displacement[0]) - load_point
-    if abs(off) <= max(5.0 * noise, 2.0 * (resolution or 0.0), 1e-12 * float(np.ptp(displacement))):
-        return displacement, []
-    reason = (
-        f"it begins {shown(off, 'm')} off the load point, and a freshly set down block (virgin = true) has a "
-        "spring that is not stretched: taken as the sensor's zero"
+    if not trace.virgin or trace.displacement is None or trace.drive is None:
+        return trace
+    begins = float(trace.drive.position(trace.time[0]))
+    first = trace.displacement[:FIRST_SAMPLES]
+    off = float(np.median(first)) - begins
+    apart = 3.0 * float(np.median(np.abs(first - np.median(first))))
+    least = max(5.0 * (trace.noise or 0.0), 2.0 * (trace.resolution or 0.0), 2.0 * trace.hum, apart, 1e-15)
+    off, begins = (v if abs(v) > least else 0.0 for v in (off, begins))
+    said = []
+    if begins:
+        said.append(f"the load point begins at {shown(begins, 'm')}, from where both are counted")
+    if off:
+        said.append(
+            f"the displacement begins {shown(off, 'm')} off the load point, which is taken as its sensor's zero: the "
+            "spring of a freshly set down block (virgin = true) is not stretched"
+        )
+    if not said:
+        return trace
+    position = trace.drive_position
+    return trace.replace(
+        displacement=trace.displacement - (off + begins),
+        drive=Drive(trace.drive.times, trace.drive.positions - begins),
+        drive_position=None if position is None else position - begins,
+        repairs=(*trace.repairs, Repair("zero", trace.time.size, "displacement", "; ".join(said))),
     )
-    return displacement - off, [Repair("zero", displacement.size, "displacement", reason)]

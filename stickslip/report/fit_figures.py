@@ -165,15 +165,17 @@ def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
         y = np.array([np.nan if step.get(name) is None else step[name] for step in ladder], float)
         if np.isfinite(y).any():
             axes[0, 0].plot(x, y, style, marker="o", color=DARK if style == "-" else MIDDLE, label=text)
-    phases = list(dict.fromkeys(p for step in ladder for p in (step.get("by_phase") or {})))
+    kinds = ("by_phase", "heldout_by_phase")
+    phases = list(dict.fromkeys(p for step in ladder for key in kinds for p in (step.get(key) or {})))
     for phase in phases:
         mark, colour = _MARKS.get(phase, ("x", DARK))
-        for key, style in (("by_phase", "-"), ("heldout_by_phase", "--")):
+        label = plain(phase, 30)
+        for key, style in zip(kinds, ("-", "--"), strict=True):
             found = [(step.get(key) or {}).get(phase) for step in ladder]
             y = np.array([np.nan if v is None else v for v in found], float)
             if np.isfinite(y).any():
-                label = plain(phase, 30) if style == "-" else "_unseen"
                 axes[0, 1].plot(x, y, style, marker=mark, color=colour, label=label)
+                label = "_unseen"  # once in the legend
     axes[0, 0].set_title("all phases", fontsize=9, loc="left")
     axes[0, 1].set_title("by phase (dashed: unseen runs)", fontsize=9, loc="left")
     for ax in axes.flat:

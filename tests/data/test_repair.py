@@ -11,10 +11,11 @@ from stickslip.readers.repair import (
     drop_duplicates,
     drop_nan,
     find_gaps,
+    from_load_point,
     join_resets,
-    set_zero,
     unwrap,
 )
+from stickslip.trace import Drive, Trace
 
 LSB = 7.91e-9
 RATE = 10_000
@@ -184,15 +185,23 @@ def test_clock_error():
         correct_clock(read, 0.5)
 
 
-def test_a_freshly_set_down_block_begins_where_its_load_point_is():
-    x = 3e-4 + np.linspace(0.0, 1e-6, 50)
-    result, (repair,) = set_zero(x, 1e-4, 5e-9, 8e-9)
-    assert result == pytest.approx(x - 2e-4, abs=1e-18)
-    assert (repair.kind, repair.count) == ("zero", 50)
-    assert "200 µm off the load point" in repair.reason
-    near = 1e-4 + np.linspace(1.5e-8, 1e-6, 50)  # within noise and counts: bit for bit as it was
-    assert set_zero(near, 1e-4, 5e-9, 8e-9) == (near, [])
-    assert set_zero(near, 1e-4, 1e-9, None)[1]
+@pytest.mark.parametrize("zero", [0.0, 12e-3])
+def test_a_freshly_set_down_block_begins_where_its_load_point_is(zero):
+    t = np.arange(50) * 1e-3
+    x = np.linspace(0.0, 1e-8, 50)
+    drive = Drive(np.array([0.0, 1.0]), zero + np.array([0.0, 1e-4]))
+    run = Trace("a", t, displacement=3e-4 + x, drive=drive, noise=5e-9, resolution=8e-9, virgin=True)
+    found = from_load_point(run)
+    assert found.displacement == pytest.approx(x - np.median(x[:5]), abs=1e-16)
+    assert found.drive.position(t) == pytest.approx(1e-4 * t, abs=1e-16)
+    assert [r.kind for r in found.repairs] == ["zero"]
+    assert "off the load point" in found.repairs[0].reason
+    assert from_load_point(run.replace(virgin=False)).displacement is run.displacement
+    near = run.replace(displacement=zero + 1.5e-8 + x)  # within noise and counts
+    seen = from_load_point(near)
+    assert seen is near if zero == 0.0 else seen.displacement == pytest.approx(1.5e-8 + x, abs=1e-16)
+    assert from_load_point(near.replace(noise=1e-9, resolution=None)).repairs
+    assert bool(from_load_point(near.replace(noise=1e-9, resolution=None, hum=1e-7)).repairs) is (zero != 0.0)
 
 
 @pytest.mark.parametrize("sigma", [5e-9, 50e-9])

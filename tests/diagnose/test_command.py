@@ -92,12 +92,12 @@ def test_without_a_folder_it_is_named_after_the_campaign(tmp_path, monkeypatch, 
     asked = []
 
     def stopped(campaign, out, **kwargs):
-        asked.append(out)
+        asked.append((str(out), kwargs["candidates"], kwargs["max_effects"], kwargs["holdout"]))
         raise KeyboardInterrupt
 
     monkeypatch.setattr("stickslip.cli.diagnose.diagnose_campaign", stopped)
     assert run(["diagnose", file, "--candidates", "tilt", "--max-effects", "1", "--holdout", "v400.csv"]) == 130
-    assert [str(path) for path in asked] == [f"{folder}-diagnosis"]
+    assert asked == [(f"{folder}-diagnosis", ["tilt"], 1, ("v400.csv",))]
 
 
 def test_the_shipped_campaign_is_what_a_diagnosis_asks_for():

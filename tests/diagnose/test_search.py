@@ -229,43 +229,62 @@ def test_an_amplitude_that_may_have_two_signs_is_tried_with_both(tag, signs, mon
 
 def test_recurrences_tell_the_amplitude_whatever_runs_and_single_slips_are_off_by():
     rng = np.random.default_rng(5)
-    rate = np.cumsum(rng.uniform(0.5, 1.5, (3, 9)), axis=1)
-    off = 7.0 * rate + rng.standard_normal((3, 1)) * 200.0 + 0.5 * rng.standard_normal((3, 9))
-    off[1, 4] = 3e3  # a slip that went astray
+    rate = 1e-3 * np.cumsum(rng.uniform(0.5, 1.5, (3, 9)), axis=1)  # s
+    floor = np.full((3, 9), 1e-3)
+    floor[:, 0] *= 26.0  # a virgin cycle is hardly known
+    off = 7.0 * rate + rng.standard_normal((3, 1)) * 0.2 + 0.5 * floor * rng.standard_normal((3, 9))
+    off[1, 4] = 3.0  # a slip that went astray
     valid = np.ones((3, 9), bool)
     valid[2, 3:] = False
     off[2, 3:] = np.nan
-    size, _ = told(off, rate, valid)
+    size, _ = told(off, rate, floor, valid)
     assert size == pytest.approx(7.0, rel=0.03)
     valid[1, 4] = False
-    assert told(off, rate, valid)[1] > 0.9
-    # noise, and what is the same in all cycles, tell nothing
-    assert told(rng.standard_normal((3, 9)), rate, np.ones((3, 9), bool))[1] < 0.3
-    assert told(off, np.ones((3, 9)), valid) == (0.0, 0.0)
+    assert told(off, rate, floor, valid)[1] > 0.85
+    # noise, and what is the same in all cycles of a run, tell nothing
+    every = np.ones((3, 9), bool)
+    assert told(floor * rng.standard_normal((3, 9)), rate, floor, every)[1] < 0.3
+    assert told(off, np.ones((3, 9)), floor, valid) == (0.0, 0.0)
+    assert told(np.full((3, 9), 50.0) + floor, rate, floor, every)[1] < 0.3
     valid[0] = False
     valid[1, 2:] = False
-    assert told(off, rate, valid) == (0.0, 0.0)
+    assert told(off, rate, floor, valid) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("other", [0.0, 400.0])
-def test_what_the_recurrences_tell_is_begun_at(other, monkeypatch):
-    """Beside what else recurrences do, and only where it is most of what makes them differ."""
+@pytest.mark.parametrize(("other", "size", "tag"), [
+    (0.0, 30.0, "sensor-gain"),
+    (400.0, 30.0, "sensor-gain"),
+    (0.0, 80.0, "sensor-gain"),  # beyond its range
+    (0.0, -30.0, "machine-compliance"),  # which has one sign
+])  # fmt: skip
+def test_what_the_recurrences_tell_is_begun_at(other, size, tag, monkeypatch):
+    """Only where it is most of what makes them differ, and possible; with what the data say of when runs begin."""
     data, _, line, fit, _ = made(6)
+    aims = []
+
+    def set_begins(problem, z, events, columns, known, aim, use):
+        aims.append(aim)
+        return z, problem.features(z, None)
+
     monkeypatch.setattr(search, "fit", lambda problem, floor, *, z, events, **_: replace(fit, z=z, events=events))
-    monkeypatch.setattr(search, "begun", lambda problem, z, *_: (z, problem.features(z, None)))
-    effect = catalogue.make("sensor-gain")
+    monkeypatch.setattr(search, "begun", set_begins)
+    effect = catalogue.make(tag)
     at = data.layout.slices()["recurrence"].start
     floor = 1e-4 * np.ones_like(data.values)
     problem = Invented(data, 1e-4 * line)
-    begun = Search(problem, fit, floor, data.valid, 1.0, effect_parameters(effect), 2, effect)
-    begun.best = (np.inf, fit.z, fit.events, data.values)
-    begun.rates = [({}, 1e-4 * line)]
-    values = data.values + 30.0 * 1e-4 * line
+    start = Search(problem, fit, floor, data.valid, 1.0, effect_parameters(effect), 2, effect)
+    start.best = (np.inf, fit.z, fit.events, data.values)
+    # inner values that tell nothing come first and last
+    start.rates = [({"a": 1.0}, 0.0 * line), ({}, 1e-4 * line), ({"b": 1.0}, 0.0 * line)]
+    values = data.values + size * 1e-4 * line
     values[..., at] += 1e-4 * other * np.random.default_rng(7).standard_normal(values.shape[:2])
     problem.measurement = replace(data, values=values)
-    begun.bare = data.values
-    begun.by_recurrences(np.ones(data.values.shape[:2], bool))
-    assert [z[-1] for _, z, *_ in begun.plausible] == ([] if other else [pytest.approx(30.0)])
+    start.bare = data.values
+    start.by_recurrences(np.ones(data.values.shape[:2], bool))
+    possible = other == 0.0 and size == 30.0
+    assert [z[-1] for _, z, *_ in start.plausible] == ([pytest.approx(30.0)] if possible else [])
+    assert all(aim is values for aim in aims)
+    assert len(aims) == possible
 
 
 def test_a_leader_in_a_bent_valley_is_followed_by_way_of_wide_floors_until_it_stands(monkeypatch):

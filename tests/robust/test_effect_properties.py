@@ -97,5 +97,20 @@ def test_all_effects_at_once():
     s = jax.tree.map(lambda a: np.asarray(a[:n]), outcome.steps)
     assert s.t[-1] >= 0.55 - 1e-12
     assert all(np.isfinite(part).all() for part in s)
+
+    @jax.jit
+    def elements(p):
+        model = rig.model(p)
+        bank = model.shaped()
+
+        def increment(state, motion):
+            state, seen = march_step(model, bank, state, motion)
+            return state, (state.force, state.cap, seen)
+
+        return jax.lax.scan(increment, model.rest(), prescribed())[1]
+
+    force, cap, seen = elements(p)
+    assert all(np.isfinite(part).all() for part in (force, cap, *seen))
+    assert np.all(np.abs(force) <= np.asarray(cap) * (1 + 1e-9) + 1e-15)
     without = np.asarray(alone.steps.x)[: int(alone.accepted)]
     assert abs(s.x[-1] - without[-1]) > 1e-9
