@@ -116,10 +116,7 @@ class _Assembly:
             provenance=Provenance(entry.file, file_sha256(path), reader, self.used, tuple(self.notes)),
         )
         self.warnings += check_travel(trace, rig, getattr(entry, leading).unit, f"{self.place}.{leading}")
-        cut = any(r.kind == "cut" for r in self.repairs)
-        if not (cut and trace.drive_position is not None):  # it may have been loaded before the part asked for
-            trace = from_load_point(trace)
-        return trace.replace(warnings=tuple(self.warnings))
+        return from_load_point(trace).replace(warnings=tuple(self.warnings))
 
     def _time(self, columns: Columns, path: Path) -> Array:
         entry = self.entry

@@ -230,9 +230,12 @@ def from_load_point(trace: Trace) -> Trace:
     """A virgin run with load point and displacement counted from where the load point is as the record begins.
 
     The spring of a freshly set down block is not stretched then, so what the displacement is off the load point is the
-    sensor's own zero. Within noise and counts nothing is changed, nor is any run that does not begin virgin.
+    sensor's own zero. Within noise and counts nothing is changed, nor is any run that does not begin virgin, nor one
+    that was cut where the load point was read: it may have been loaded before the part asked for.
     """
     if not trace.virgin or trace.displacement is None or trace.drive is None:
+        return trace
+    if trace.drive_position is not None and any(r.kind == "cut" for r in trace.repairs):
         return trace
     begins = float(trace.drive.position(trace.time[0]))
     first = trace.displacement[:FIRST_SAMPLES]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 
 import jax
 import numpy as np
@@ -34,13 +35,9 @@ def several(draw) -> dict[int, dict[str, float]]:
     return values
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(1800)
-def test_several_effects_anywhere_in_their_ranges():
-    rig = Rig(EFFECTS)
+def marched(rig: Rig) -> Callable:
+    """Forces, caps and what is seen of the elements through a prescribed motion, of the vector of parameters."""
     motions = prescribed()
-    used: Counter[str] = Counter()
-    ends: Counter[str] = Counter()
 
     @jax.jit
     def elements(p):
@@ -52,6 +49,17 @@ def test_several_effects_anywhere_in_their_ranges():
             return state, (state.force, state.cap, seen)
 
         return jax.lax.scan(increment, model.rest(), motions)[1]
+
+    return elements
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_several_effects_anywhere_in_their_ranges():
+    rig = Rig(EFFECTS)
+    elements = marched(rig)
+    used: Counter[str] = Counter()
+    ends: Counter[str] = Counter()
 
     @settings(max_examples=200, deadline=None, derandomize=True, database=None)
     @given(several())
@@ -98,18 +106,7 @@ def test_all_effects_at_once():
     assert s.t[-1] >= 0.55 - 1e-12
     assert all(np.isfinite(part).all() for part in s)
 
-    @jax.jit
-    def elements(p):
-        model = rig.model(p)
-        bank = model.shaped()
-
-        def increment(state, motion):
-            state, seen = march_step(model, bank, state, motion)
-            return state, (state.force, state.cap, seen)
-
-        return jax.lax.scan(increment, model.rest(), prescribed())[1]
-
-    force, cap, seen = elements(p)
+    force, cap, seen = marched(rig)(p)
     assert all(np.isfinite(part).all() for part in (force, cap, *seen))
     assert np.all(np.abs(force) <= np.asarray(cap) * (1 + 1e-9) + 1e-15)
     without = np.asarray(alone.steps.x)[: int(alone.accepted)]
