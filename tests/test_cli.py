@@ -254,6 +254,16 @@ except KeyboardInterrupt:
     assert found.stderr == ""
 
 
+def test_the_exit_does_not_wait_for_a_timer_that_an_interrupted_library_left():
+    code = (
+        "import sys, threading; from stickslip.cli import main; threading.Timer(60.0, print).start()\n"
+        "sys.argv = ['stickslip', '--version']; main()"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30)
+    assert found.returncode == 0
+    assert found.stderr == ""
+
+
 def test_a_signal_ends_the_program_cleanly(scenario, tmp_path):
     command = [
         sys.executable,

@@ -62,6 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         sys.unraisablehook = sys.__unraisablehook__
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the exit itself is not interrupted
+        for thread in threading.enumerate():
+            if isinstance(thread, threading.Timer):  # JAX's of a minute, where its start was interrupted: Python waits
+                thread.cancel()
         sys.exit(code)
     return code
 
