@@ -469,6 +469,21 @@ def test_a_picture_of_an_effect(tmp_path, capsys):
     assert capsys.readouterr().out == ""
 
 
+def test_a_terminal_shows_both_traces_beside_the_explanation(capsys, monkeypatch):
+    assert run(["effects", "residual-load"]) == 0
+    piped = capsys.readouterr().out.splitlines()
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    assert run(["effects", "residual-load"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert [line for line in shown if line in piped and line] == [line for line in piped if line]
+    number = shown.index("without:")
+    assert shown[number - 1].startswith("spring force from ")
+    without, with_it = shown[number + 1 : number + 6], shown[number + 7 : number + 12]
+    assert shown[number + 6].startswith("with ")
+    assert any(line.strip() for line in without)
+    assert with_it != without  # the effect is seen
+
+
 def test_compiled_code_is_kept_and_can_be_switched_off(scenario, tmp_path_factory):
     home = tmp_path_factory.mktemp("cache")
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("JAX_", "STICKSLIP_"))}

@@ -9,13 +9,22 @@ import numpy as np
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # of a braille character, by row and column
 
 
-def sketch(t: np.ndarray, y: np.ndarray, *, columns: int = 60, rows: int = 4, encoding: str | None = None) -> list[str]:
-    """Lines of text that show y over t from its least to its greatest value.
+def sketch(
+    t: np.ndarray,
+    y: np.ndarray,
+    *,
+    columns: int = 60,
+    rows: int = 4,
+    limits: tuple[float, float] | None = None,
+    encoding: str | None = None,
+) -> list[str]:
+    """Lines of text that show y over t, from its least to its greatest value or between other ``limits``.
 
     Braille characters (two by four dots) where the encoding has them (default: that of standard output), else ``:``.
     """
     wide, high = 2 * columns, 4 * rows
-    low, span = float(np.min(y)), float(np.ptp(y)) or 1.0
+    low, top = limits or (float(np.min(y)), float(np.max(y)))
+    span = top - low or 1.0
     column = np.clip(((t - t[0]) / ((t[-1] - t[0]) or 1.0) * wide).astype(int), 0, wide - 1)
     level = np.clip(((y - low) / span * high).astype(int), 0, high - 1)
     raster = np.zeros((high, wide), bool)

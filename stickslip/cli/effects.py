@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,10 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import InputError, RunFolderError
+from ..errors import InputError, RunFolderError, StickslipError
 from . import show
 
 if TYPE_CHECKING:
+    import numpy as np
+    import xarray
+
     from ..effects.base import Effect
 
 
@@ -63,12 +67,15 @@ def effects(
         print(_catalogue(catalogue.all()))
         return 0
     cls = catalogue.get(tag)
-    print(_explained(cls))
+    print(_explained(cls), flush=True)
     if picture is not None:
         _draw(cls, picture)
         print(f"\nwritten to {picture}")
-    elif cls.__module__.startswith("stickslip."):
-        print(f"picture of a trace with and without it: stickslip effects {cls.tag} --picture {cls.tag}.png")
+        return 0
+    if sys.stdout.isatty():  # it takes some seconds, which a pipe need not wait for
+        print("\n".join(["", *_sketched(cls)]))
+    if cls.__module__.startswith("stickslip."):
+        print(f"picture with a stick and a slip close up: stickslip effects {cls.tag} --picture {cls.tag}.png")
     return 0
 
 
@@ -153,12 +160,46 @@ def _check_picture(path: Path, force: bool) -> None:
         raise RunFolderError("the picture exists already", file=path, hint="choose another name, or use --force")
 
 
-def _draw(cls: type[Effect], path: Path) -> None:
-    from ..plots import effect_figure, save
+def _traces(cls: type[Effect]) -> tuple[xarray.Dataset, xarray.Dataset, dict[str, float]]:
+    """Traces without and with an effect, and the amplitude it was given."""
     from ..scenario.demonstration import with_and_without
 
     with show.progress_bar("both traces") as watch:
-        without, with_it, values = with_and_without(cls, watch)
+        return with_and_without(cls, watch)
+
+
+def _sketched(cls: type[Effect]) -> list[str]:
+    """Lines that show the spring's force without and with an effect, from just before the first slip, on one scale.
+
+    It is the one that the sensor's reading tells, so that an error of the sensor shows as well.
+    """
+    from ..scenario.demonstration import RIG
+    from ._sketch import sketch
+
+    def told(data: xarray.Dataset) -> np.ndarray:
+        off = data["displacement"] - data["reading"]
+        return (data["spring_force"] + RIG["block"]["spring_stiffness"] * off).values
+
+    try:
+        *both, values = _traces(cls)
+    except StickslipError as error:
+        return [f"no picture of it: {error}"]
+    begin = 0.95 * min((float(d["onset"][0]) for d in both if d["onset"].size), default=0.0)
+    parts = [d.sel(time=slice(begin, None)) for d in both]
+    curves = [(d["time"].values, told(d)) for d in parts]
+    low, top = min(float(y.min()) for _, y in curves), max(float(y.max()) for _, y in curves)
+    text = ", ".join(f"{name} = {value}" for name, value in values.items())
+    span = f"from {show.quantity(begin, 's')} to {show.quantity(float(curves[0][0][-1]), 's')}"
+    lines = [f"spring force {span}, between {show.quantity(low, 'N')} and {show.quantity(top, 'N')}"]
+    for name, (t, y) in zip(("without", f"with {text}"), curves, strict=True):
+        lines += [f"{name}:", *(f"  {line}" for line in sketch(t, y, columns=72, rows=5, limits=(low, top)))]
+    return lines
+
+
+def _draw(cls: type[Effect], path: Path) -> None:
+    from ..plots import effect_figure, save
+
+    without, with_it, values = _traces(cls)
     text = ", ".join(f"{name} = {value}" for name, value in values.items())
     try:
         save(effect_figure(without, with_it, cls.tag, text), path)
