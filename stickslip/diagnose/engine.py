@@ -307,20 +307,24 @@ def _round(
         tell(f"{name}: the model without them fitted again", SWEPT)
         rung = _widely(_from(rung, begins, material, name), material, name)
     judged = _judged(candidates, rung, limits)
-    best, _ = decide(judged, limits)
     compared: set[str] = set()
-    while best is not None and best.candidate.tag not in compared:
-        tag = best.candidate.tag
+    while (named := _not_compared(judged, compared, limits)) is not None:
+        tag = named.tag
         compared.add(tag)
-        every = sweep.rivals(best.candidate, every)
+        every = sweep.rivals(named, every)
         candidates = best_forms(tags, every)
         if all(c.tag != tag for c in begins):
             tell(f"{name}: the model without {tag} fitted again", 0.0)
-            nearer = _from(rung, [best.candidate], material, f"{name}-{tag}")
+            nearer = _from(rung, [named], material, f"{name}-{tag}")
             rung = rung if nearer is rung else _widely(nearer, material, f"{name}-{tag}")
         judged = _judged(candidates, rung, limits)
-        best, _ = decide(judged, limits)
     return rung, Round(tuple(candidates), tuple(every), tuple(judged), rung)
+
+
+def _not_compared(judged: Sequence[Judged], compared: set[str], limits: Thresholds) -> Candidate | None:
+    """What may get a name, alone or in a set, and was not compared yet with what it may be taken for."""
+    _, close = decide(judged, limits)
+    return next((j.candidate for j in close if j.passed and j.candidate.tag not in compared), None)
 
 
 def _judged(candidates: Sequence[Candidate], rung: Rung, limits: Thresholds) -> list[Judged]:

@@ -152,9 +152,12 @@ def afar(
     """The candidate refitted from the best of its plausible amplitudes, and all else as in the ``optimum`` without it.
 
     It is the way of :func:`stickslip.diagnose.search.score` with derivatives of its own, and with events that begin at
-    their prior's mean: where an effect is strong, those of the optimum lead nowhere. A periodic effect has a phase,
-    and no such start.
+    their prior's mean: where an effect is strong, those of the optimum lead nowhere. One that was not refitted yet is
+    from where its search began as well, and the better of both is taken: from afar a weak one is overshot. A periodic
+    effect has a phase, and no start afar.
     """
+    if candidate.note:
+        candidate = refine(candidate, measurement, floor, train, FEW + MORE, threads=threads, progress=progress)
     if candidate.fit is None or candidate.composition is None or candidate.effect.periodic is not None:
         return candidate
     problem = Problem(candidate.composition, measurement, threads=threads)

@@ -3,8 +3,9 @@
 Set on simulated development campaigns (see docs/diagnosis); not to be changed for a single case. Frozen on 22 November
 2026 (all code as of commit 31d6964), before the first case of the sealed run with seed 20261127 (docs/challenge.md);
 ``border`` and ``fewest`` had the same values then, in ``verdict``. Rules that use them were added since: what is about
-to be named must stand beside what it may be taken for and a base fitted again from where it arrived, a model that
-describes all once it is fitted again is complete, and effects are taken out again from an ``unknown`` as well.
+to be named, alone or in a set, must stand beside what it may be taken for and a base fitted again from where it
+arrived, a model that describes all once it is fitted again is complete, and effects are taken out again from an
+``unknown`` as well.
 """
 
 from __future__ import annotations

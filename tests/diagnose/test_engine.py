@@ -158,6 +158,13 @@ def test_what_is_named_was_compared_with_all_that_it_may_be_taken_for(diagnose):
     assert candidates["residual-load"].note == ""
 
 
+def test_all_of_a_set_are_compared_with_what_each_may_be_taken_for(diagnose):
+    sets = {("curvature",): (300.0, LITTLE), ("sensor-low-pass",): (305.0, LITTLE), ("residual-load",): (100.0, SMALL)}
+    found, _ = diagnose({k: v for k, v in sets.items() if k != ("residual-load",)})
+    assert (found.verdict.kind, found.verdict.set) == ("ambiguous", ("curvature", "sensor-low-pass"))
+    assert diagnose(sets, passed_by={"residual-load"})[0].verdict.effects == ("residual-load",)
+
+
 def test_a_name_is_not_given_for_what_the_base_does_from_the_same_place(diagnose):
     sets = {("wear",): (690.0, 8.8), ("tilt",): (695.0, 8.9), ("viscous-drag",): (700.0, LITTLE)}
     assert diagnose(sets)[0].verdict.effects == ("viscous-drag",)

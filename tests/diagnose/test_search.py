@@ -384,10 +384,17 @@ def test_from_afar_either_sign_is_begun_at_a_plausible_amplitude_and_the_best_is
     assert 0.6 * search.PLAUSIBLE < moved < 1.6 * search.PLAUSIBLE
 
 
-def test_from_afar_what_was_not_refitted_yet_counts_for_nothing(monkeypatch):
+@pytest.mark.parametrize(("near", "expected"), [(1300.0, 1100.0), (1050.0, 1050.0)])
+def test_what_was_not_refitted_yet_is_from_near_as_well_as_from_afar(near, expected, monkeypatch):
     small, ground, _ = strangers(monkeypatch, {1: 1200.0, -1: 1100.0})
+
+    def from_near(candidate, data, floor, train, most, **_):
+        assert most == refit.FEW + refit.MORE
+        return replace(candidate, note="", fit=replace(candidate.fit, cost=near))
+
+    monkeypatch.setattr(refit, "refine", from_near)
     found = refit.afar(replace(small, note="not refitted"), *ground)
-    assert found.cost == 1100.0
+    assert found.cost == expected
     assert not found.note
 
 
