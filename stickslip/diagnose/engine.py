@@ -293,8 +293,8 @@ def _round(
 ) -> tuple[Rung, Round]:
     """All candidates on a rung, and the rung fitted again from where the best two of them arrived, and what is named.
 
-    A base less converged than its rivals would make a gain of nothing. An effect gets a name only after what it may be
-    taken for was refitted, and the rung from where it arrived.
+    A base less converged than its rivals would make a gain of nothing. An effect is named, alone or in a set, only
+    after what it may be taken for was refitted, and the rung from where it arrived.
     """
     assert rung.composition is not None
     assert rung.fit is not None
@@ -313,9 +313,10 @@ def _round(
         compared.add(tag)
         every = sweep.rivals(named, every)
         candidates = best_forms(tags, every)
-        if all(c.tag != tag for c in begins):
-            tell(f"{name}: the model without {tag} fitted again", 0.0)
-            nearer = _from(rung, [named], material, f"{name}-{tag}")
+        arrived = next(c for c in candidates if c.tag == tag)
+        if all(c is not arrived for c in begins):
+            tell(f"{name}: the model without {tag} fitted again", SWEPT)
+            nearer = _from(rung, [arrived], material, f"{name}-{tag}")
             rung = rung if nearer is rung else _widely(nearer, material, f"{name}-{tag}")
         judged = _judged(candidates, rung, limits)
     return rung, Round(tuple(candidates), tuple(every), tuple(judged), rung)

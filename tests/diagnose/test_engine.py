@@ -66,12 +66,16 @@ class World(dict):
         cost = self.left(problem.composition)[0]
         if events is not None and not problem.composition.tags:
             cost = self.base_from.get(catalogue.tags()[int(events[0, 0, 0])], (cost, 0.0))[0]
+            cost = self.base_from.get("arrived", (cost, 0.0))[0] if events[0, 0, 1] == ARRIVED else cost
         return Fit(at, np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.zeros(shape), np.eye(len(at)), free,
                    np.zeros((*shape, len(at))), np.ones((1, 1), bool), 1, 1)  # fmt: skip
 
     def rung(self, model, added, composition, fit, material):
         error = next((e for c, e in self.base_from.values() if fit and fit.cost == c), self.left(composition)[1])
         return rungs.Rung(model, added, Misfit(error, {"creep": error}, {}), held(error), composition, fit, np.zeros(1))
+
+
+ARRIVED = -1.0  # second event of a candidate that was followed to the end beside its rivals
 
 
 def held(error: float) -> HeldOut:
@@ -88,7 +92,9 @@ class Memory(dict):
 
 @pytest.fixture
 def diagnose(monkeypatch):
-    def run(sets, *, max_effects=4, store=None, campaign=CAMPAIGN, candidates=None, passed_by=(), base_from=None):
+    def run(
+        sets, *, max_effects=4, store=None, campaign=CAMPAIGN, candidates=None, passed_by=(), base_from=None, arrives=()
+    ):
         world = World({(): (1000.0, 9.0), **sets})
         world.base_from = base_from or {}
 
@@ -110,7 +116,12 @@ def diagnose(monkeypatch):
                 return found, found
 
             def rivals(self, named, every):
-                return [replace(c, note="") if c.tag in catalogue.alike(named.tag) else c for c in every]
+                alike = [replace(c, note="") if c.tag in catalogue.alike(named.tag) else c for c in every]
+                return [arrived(c) if c.tag in arrives and c.tag == named.tag else c for c in alike]
+
+        def arrived(c):
+            events = np.array([[[c.fit.events[0, 0, 0], ARRIVED]]])
+            return replace(c, fit=replace(c.fit, cost=c.fit.cost - 1.0, events=events))
 
         for module in (engine, revise):
             monkeypatch.setattr(
@@ -176,6 +187,16 @@ def test_a_name_is_not_given_for_what_the_base_does_from_the_same_place(diagnose
     again = {key for key in store if "again" in key}
     assert {f"round1-viscous-drag-again{i}" for i in (1, 2)} < again
     assert any(key.startswith("round1-viscous-drag-wide") for key in store)
+
+
+@pytest.mark.parametrize("other", ["wear", "viscous-drag"])
+def test_the_base_begins_where_what_is_named_arrived_beside_its_rivals(diagnose, other):
+    """Whether it was among the cheapest two of the sweep, from where the base was begun before, or not."""
+    sets = {("tilt",): (695.0, 8.9), (other,): (690.0, 8.8), ("viscous-drag",): (700.0, LITTLE)}
+    base_from = {"arrived": (710.0, LITTLE)}
+    assert diagnose(sets, base_from=base_from)[0].verdict.effects == ("viscous-drag",)
+    found, _ = diagnose(sets, base_from=base_from, arrives={"viscous-drag"})
+    assert (found.verdict.kind, found.ladder[-1].fit.cost) == ("unknown", 710.0)
 
 
 @pytest.mark.parametrize("most", [1, 4])
