@@ -68,7 +68,7 @@ def parse(result: Mapping[str, Any]) -> Answer:
     if verdict["kind"] not in KINDS:
         raise ValueError(f"unknown kind of verdict '{verdict['kind']}'")
     ladder = result["ladder"]
-    dynamic = [rung for rung in ladder if rung["added"] is not None] or ladder
+    dynamic = [rung for rung in ladder if rung["model"] != ["static"]] or ladder
     return Answer(
         verdict["kind"],
         tuple(verdict["effects"]),

@@ -123,6 +123,7 @@ def _print(result: dict[str, Any], out: Path) -> None:
         table.add_column(name, justify="right", no_wrap=True)
     for rung in result["ladder"]:
         label = "static" if rung["added"] is None else f"+ {rung['added']}"
+        label = f"without {rung['removed']}" if rung["removed"] else label
         for which, total, parts in (
             ("fitted", rung["train_error"], rung["by_phase"]),
             ("unseen", rung["heldout_error"], rung["heldout_by_phase"]),

@@ -370,7 +370,9 @@ def _further(rung: Rung, begin: Fit, stages: tuple[tuple[float, int], ...], mate
     data, floor, train, store = material
     problem = Problem(rung.composition, data)
     more = kept(store, name, lambda: fit(problem, floor, z=begin.z, events=begin.events, stages=stages, use=train))
-    return rung if more.cost >= rung.fit.cost else make_rung(rung.model, rung.added, rung.composition, more, material)
+    if more.cost >= rung.fit.cost:
+        return rung
+    return make_rung(rung.model, rung.added, rung.composition, more, material, rung.removed)
 
 
 def _certain(rung: Rung, material: Material) -> Rung:

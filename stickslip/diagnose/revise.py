@@ -51,7 +51,7 @@ class Named:
 def done_without(
     ladder: list[Rung], named: list[Named], material: Material, limits: Thresholds, tell: Tell
 ) -> tuple[list[Rung], list[Named]]:
-    """The ladder without effects that are no longer needed once the others are in.
+    """The ladder with a further rung for each effect that is no longer needed once the others are in, and what is left.
 
     One goes where the rest, fitted again, costs less than ``limits.rival`` times as much and meets the same limits, and
     where none are met, if the unseen cycles are not described worse.
@@ -69,7 +69,7 @@ def done_without(
                 _grade(top, limits) == NONE_MET and worse(rung.held, top.held, limits)
             )
             if _cost(rung) < limits.rival * _cost(top) and not poorer:
-                ladder, named, gone = [*ladder[:2], rung], [replace(n, fresh=False) for n in left], True
+                ladder, named, gone = [*ladder, rung], [replace(n, fresh=False) for n in left], True
                 break
     return ladder, named
 
@@ -119,7 +119,7 @@ def _less(top: Rung, tag: str, left: Sequence[str], material: Material) -> Rung:
         f"left-{'-'.join(left)}-of-{'-'.join(top.model[2:])}",
         lambda: fit(Problem(smaller, data), floor, z=z, events=old.events, stages=((1.0, MOST),), use=train),
     )
-    return make_rung(("static", "inertia", *left), " + ".join(left), smaller, found, material)
+    return make_rung(("static", "inertia", *left), None, smaller, found, material, removed=tag)
 
 
 def _without(
@@ -153,7 +153,7 @@ def _instead(top: Rung, tag: str, rival: Candidate, material: Material) -> tuple
         lambda: fit(Problem(composition, data), floor, z=z, events=old.events, stages=INSTEAD, use=train),
     )
     added = rival.tag if top.added == tag else top.added
-    rung = make_rung(model, added, composition, found, material)
+    rung = make_rung(model, added, composition, found, material, top.removed)
     return _fitted(rival, rung), rung
 
 

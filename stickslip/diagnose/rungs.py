@@ -24,7 +24,8 @@ class Rung:
 
     Attributes:
         model: tags of what is in it.
-        added: what this rung added.
+        added: what this rung added to the one before, or None.
+        removed: the effect it does without, which the one before had, or None.
         train, held: errors on the cycles fitted and on the others.
         fit, composition: None for the static model.
         features: of the model (R, n, F).
@@ -37,6 +38,7 @@ class Rung:
     composition: Composition | None
     fit: Fit | None
     features: np.ndarray
+    removed: str | None = None
 
 
 class Material(NamedTuple):
@@ -50,13 +52,18 @@ class Material(NamedTuple):
 
 
 def make_rung(
-    model: tuple[str, ...], added: str | None, composition: Composition, optimum: Fit, material: Material
+    model: tuple[str, ...],
+    added: str | None,
+    composition: Composition,
+    optimum: Fit,
+    material: Material,
+    removed: str | None = None,
 ) -> Rung:
     """The step of a fitted model, with its errors on fitted and on unseen cycles."""
     data, floor, train, _ = material
     unseen = np.asarray(data.cycles.used) & ~train
     held = held_out(Problem(composition, data), optimum, floor, unseen, optimum.features)
-    return Rung(model, added, errors(data, optimum, floor), held, composition, optimum, optimum.features)
+    return Rung(model, added, errors(data, optimum, floor), held, composition, optimum, optimum.features, removed)
 
 
 def kept(store: Store | None, name: str, make: Callable[[], Fit]) -> Fit:

@@ -76,6 +76,7 @@ def _rung(rung: Rung) -> dict[str, Any]:
     return {
         "model": list(rung.model),
         "added": rung.added,
+        "removed": rung.removed,
         "train_error": rung.train.total,
         "heldout_error": None if rung.held is None else rung.held.error,
         "by_phase": rung.train.by_phase,

@@ -158,7 +158,8 @@ def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
     for i, step in enumerate(ladder):
         parts = step.get("model") or ["model"]
         name = str(step.get("added") or " + ".join(parts[before:] or parts[-1:]))
-        labels.append(plain(("+ " if i else "") + name, 28))
+        removed = step.get("removed")
+        labels.append(plain(f"without {removed}" if removed else ("+ " if i else "") + name, 28))
         before = len(parts)
     x = np.arange(len(ladder))
     for name, text, style in (("train_error", "fitted runs", "-"), ("heldout_error", "unseen runs", "--")):

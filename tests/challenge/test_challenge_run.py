@@ -57,7 +57,7 @@ def invented_diagnosis(log: Path, slow: float = 0.0, failing: str = "", dying: s
             folder.json(
                 {
                     "verdict": {"kind": "missing", "effects": ["wear"], "set": ["wear"], "text": ""},
-                    "ladder": [{"added": "inertia", "heldout_error": 2.0}, {"added": "wear", "heldout_error": 1.0}],
+                    "ladder": [{"model": ["inertia"], "heldout_error": 2.0}, {"model": ["wear"], "heldout_error": 1.0}],
                     "parameters": {}, "inputs": [file_record(path) for path in sorted(campaign.parent.iterdir())],
                     "seconds": slow, "pieces": pieces,
                 }

@@ -70,9 +70,10 @@ class World(dict):
         return Fit(at, np.zeros((1, 1, 2)), cost, cost, np.zeros(shape), np.zeros(shape), np.eye(len(at)), free,
                    np.zeros((*shape, len(at))), np.ones((1, 1), bool), 1, 1)  # fmt: skip
 
-    def rung(self, model, added, composition, fit, material):
+    def rung(self, model, added, composition, fit, material, removed=None):
         error = next((e for c, e in self.base_from.values() if fit and fit.cost == c), self.left(composition)[1])
-        return rungs.Rung(model, added, Misfit(error, {"creep": error}, {}), held(error), composition, fit, np.zeros(1))
+        told = Misfit(error, {"creep": error}, {})
+        return rungs.Rung(model, added, told, held(error), composition, fit, np.zeros(1), removed)
 
 
 ARRIVED = -1.0  # second event of a candidate that was followed to the end beside its rivals
@@ -266,7 +267,8 @@ def test_what_is_no_longer_needed_goes(diagnose):
     found, _ = diagnose(CHAIN)
     assert (found.verdict.kind, found.verdict.effects) == ("missing", ("tilt", "viscous-drag"))
     assert found.ladder[-1].model == ("static", "inertia", "tilt", "viscous-drag")
-    assert len(found.ladder) == 3
+    steps = [(r.added, r.removed) for r in found.ladder[2:]]  # the way there is told
+    assert steps == [("wear", None), ("tilt", None), ("viscous-drag", None), (None, "wear")]
 
 
 def test_and_so_does_the_next(diagnose):

@@ -131,9 +131,17 @@ def test_steps_of_a_ladder_are_named_by_what_they_add():
         {"model": ["static"], "added": None, "train_error": 900.0, "by_phase": {"slip": 900.0}},
         {"model": ["static", "inertia"], "added": None, "train_error": 9.0, "by_phase": {"slip": 9.0}},
         {"model": ["static", "inertia", "tilt"], "added": "tilt", "train_error": 1.0, "by_phase": {"slip": 1.0}},
+        {
+            "model": ["static", "inertia", "tilt", "wear"],
+            "added": "wear",
+            "train_error": 0.9,
+            "by_phase": {"slip": 0.9},
+        },
+        {"model": ["static", "inertia", "wear"], "added": None, "removed": "tilt", "train_error": 0.9, "by_phase": {}},
     ]
     axes = ladder_picture(steps).axes[0]
-    assert [text.get_text() for text in axes.get_xticklabels()] == ["static", "+ inertia", "+ tilt"]
+    labels = [text.get_text() for text in axes.get_xticklabels()]
+    assert labels == ["static", "+ inertia", "+ tilt", "+ wear", "without tilt"]
 
 
 def test_a_ladder_shows_every_phase_on_fitted_and_on_unseen_runs():
