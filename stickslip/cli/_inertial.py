@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..campaign import Campaign
+from ..conformance import try_laws
 from ..diagnose.candidate import forms_of
 from ..diagnose.heldout import held_out
 from ..diagnose.holdout import training_cycles
@@ -66,6 +67,7 @@ def fit_inertial(
     for path in options.files:
         catalogue.load_file(path)
     effects = chosen(options.add)
+    try_laws(type(effect) for effect in effects)
     traces, notes = with_displacements(traces, found)
     usable = [(t, s) for t, s in zip(traces, found, strict=True) if t.displacement is not None and t.drive is not None]
     if not usable:

@@ -88,10 +88,9 @@ def _load(path: str, changes: list[str], trace: str | None, files: tuple[Path, .
     if trace is not None:
         raise InputError("--trace names a run of a fit or a diagnosis", key="--trace", hint="give a run folder")
     if files:
-        from ..effects import catalogue
+        from ..conformance import load_effects
 
-        for file in files:
-            catalogue.load_file(file)
+        load_effects(files)
     from ..scenario import load_scenario
 
     return load_scenario(path, changes)

@@ -10,6 +10,7 @@ from ..effects.catalogue import accept, forms
 from ..errors import StickslipError
 from . import dynamics, gradients, statics
 from .rig import Rig
+from .trial import first_line
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def _together(effects: tuple[Effect, ...]) -> list[Finding]:
         except Exception as error:  # whatever a foreign law raises when it is traced
             if len(effects) > 1:
                 return alone()
-            return [Finding(effects[0].tag, "compilation", f"the law cannot be compiled: {_first_line(error)}")]
+            return [Finding(effects[0].tag, "compilation", f"the law cannot be compiled: {first_line(error)}")]
         if name == "finite" and findings and len(effects) > 1:
             return alone()  # a number that is not finite spoils the others' runs and derivatives
         if name == "finite" and findings:
@@ -116,7 +117,3 @@ def describe(effect: Effect) -> str:
     """The form of an effect that has several, as a prefix of a message."""
     own = [f for f in forms(type(effect)) if f and all(getattr(effect, k) == v for k, v in f.items())]
     return f"({', '.join(f'{k} = {v}' for k, v in own[0].items())}) " if own else ""
-
-
-def _first_line(error: Exception) -> str:
-    return f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else ''}"

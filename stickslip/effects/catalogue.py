@@ -8,7 +8,7 @@ import inspect
 import re
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -197,10 +197,14 @@ def roles(cls: type[Effect]) -> list[str]:
     return [r.__name__ for r in _roles() if issubclass(cls, r)]
 
 
-def load_file(path: str | Path) -> list[type[Effect]]:
+def load_file(path: str | Path, trial: Callable[[Sequence[type[Effect]]], None] | None = None) -> list[type[Effect]]:
     """Execute a user's Python file and put its effects into the catalogue. Loading it again replaces them.
 
     Every class in it that inherits a role and has a ``tag`` is taken; ``@register`` is not needed.
+
+    Args:
+        path: of the file.
+        trial: is called with its effects; where it raises an `InputError` the catalogue stays as it was.
 
     Raises:
         InputError: no such file, an error in it (with its line), no effect in it, or an effect that lacks something.
@@ -227,6 +231,8 @@ def load_file(path: str | Path) -> list[type[Effect]]:
             register(cls)
         if not found:
             raise InputError("the file defines no effect (a class with a tag)", hint=_roles_hint())
+        if trial is not None:
+            trial(found)
     except InputError as error:
         for tag in [tag for tag, cls in _user.items() if cls.__module__ == name]:
             del _user[tag]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..effects import catalogue
+from ..conformance import load_effects
 from ..effects.equations import Equations
 from ..errors import InputError, RunFolderError, nearest
 from ..fit.record import KEY, Driven, Fitted, constant_drive, from_record, pieces_drive, shared
@@ -137,8 +137,7 @@ def load_run(folder: str | Path, effects: Sequence[str | Path] = (), *, learned:
     """
     folder = Path(folder)
     result = read_result(folder)
-    for path in effects:
-        catalogue.load_file(path)
+    load_effects(effects)
     section = (result.get("learned_residual") or {}).get(KEY) if learned else result.get(KEY)
     if section is None and learned:
         raise RunFolderError(
