@@ -149,12 +149,13 @@ def diagnose_campaign(
     import xarray
 
     from .campaign import load_campaign, load_traces
+    from .conformance import try_laws
     from .diagnose.engine import diagnose
     from .diagnose.summary import summary
     from .effects import catalogue
     from .fit.problem import Problem
     from .motion import check_pace, slip_times, true_gains, with_displacements
-    from .report import write_report
+    from .report import abilities, write_report
     from .report.describe import left_out
     from .report.inertial_result import fit_sections
     from .report.missing_force import missing_sections
@@ -166,10 +167,12 @@ def diagnose_campaign(
     traces = load_traces(loaded)
     if candidates is not None:
         _check_candidates(candidates)
+    try_laws(catalogue.get(tag) for tag in (catalogue.tags() if candidates is None else candidates))
     inputs = input_records(loaded)
     events = [segment(t) for t in traces]
     try:
         notes = [*check_pace(traces, events), *slip_times(loaded, traces, events)]
+        able = abilities(traces, events)
     except InputError as error:
         raise error.at(file=loaded.path) from None
     with open_run(out, force=force, resume=True) as run:
@@ -187,9 +190,10 @@ def diagnose_campaign(
         pieces = Pieces(run, key)
         ready = pieces.ready()
         # before minutes of fitting, in which a wrong unit may be mended
-        first = [*notes, *([f"going on from {ready} finished pieces"] if ready else [])]
+        cannot = [line for line in able.cannot if line not in notes]
+        first = [*notes, *cannot, *([f"going on from {ready} finished pieces"] if ready else [])]
         if progress is not None and first:
-            progress(" ".join(first), 0.0)
+            progress("\n         ".join(["before anything is fitted:", *first]), 0.0)
         try:
             found = diagnose(
                 loaded,
@@ -213,6 +217,7 @@ def diagnose_campaign(
             "versions": versions(),
         }
         result["notes"] = [*notes, *mended, *implied]
+        result |= {"can": list(able.can), "cannot": cannot}
         result["dropped"] = [*left_out(traces, segmentations), *result["dropped"]]
         top = next((r for r in reversed(found.ladder) if r.fit is not None), None)
         if top is not None and top.fit is not None and top.composition is not None:

@@ -469,6 +469,13 @@ def test_a_picture_of_an_effect(tmp_path, capsys):
     assert capsys.readouterr().out == ""
 
 
+def test_values_of_an_effect_have_their_unit():
+    from stickslip.cli.effects import _given
+    from stickslip.effects import catalogue
+
+    assert _given(catalogue.get("viscous-drag"), {"drag": 0.012, "exponent": 2.0}) == "drag = 12 mN, exponent = 2"
+
+
 def test_a_terminal_shows_both_traces_beside_the_explanation(capsys, monkeypatch):
     assert run(["effects", "residual-load"]) == 0
     piped = capsys.readouterr().out.splitlines()
@@ -477,9 +484,9 @@ def test_a_terminal_shows_both_traces_beside_the_explanation(capsys, monkeypatch
     shown = capsys.readouterr().out.splitlines()
     assert [line for line in shown if line in piped and line] == [line for line in piped if line]
     number = shown.index("without:")
-    assert shown[number - 1].startswith("spring force from ")
+    assert shown[number - 1].startswith("the spring's force as the reading tells it, from ")
     without, with_it = shown[number + 1 : number + 6], shown[number + 7 : number + 12]
-    assert shown[number + 6].startswith("with ")
+    assert shown[number + 6] == "with lost = 0.196:"
     assert any(line.strip() for line in without)
     assert with_it != without  # the effect is seen
 

@@ -144,6 +144,9 @@ def test_inspect_draws_the_trace_with_characters(capsys):
     assert all(0x2800 < ord(c) < 0x2900 for line in up for c in line.strip())
     assert set("".join(sketch(t, t, columns=20, rows=4, encoding="ascii"))) == {":", " "}
     assert sketch(t, 0 * t, columns=20, rows=4, encoding="utf-8")[3]
+    low, high = (sketch(t, y + 0 * t, columns=20, rows=4, limits=(0.0, 1.0), encoding="utf-8") for y in (0.4, 0.9))
+    assert [bool(line) for line in low] == [False, False, True, False]  # two curves on one scale
+    assert [bool(line) for line in high] == [True, False, False, False]
     assert run(["inspect", write()]) == 0
     assert "load point less position" in capsys.readouterr().out
 

@@ -58,15 +58,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         keep_interrupts()
         if isinstance(sys.stdout, io.TextIOWrapper):
             sys.stdout.reconfigure(errors="replace")  # a terminal that knows no µ
-    code = run(sys.argv[1:] if arguments is None else arguments)
-    if arguments is None:
+    if arguments is not None:
+        return run(arguments)
+    try:
+        sys.exit(run(sys.argv[1:]))
+    finally:
         sys.unraisablehook = sys.__unraisablehook__
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the exit itself is not interrupted
         for thread in threading.enumerate():
             if isinstance(thread, threading.Timer):  # JAX's of a minute, where its start was interrupted: Python waits
                 thread.cancel()
-        sys.exit(code)
-    return code
 
 
 def keep_interrupts() -> None:

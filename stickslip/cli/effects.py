@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,10 +56,10 @@ def effects(
         raise InputError("--latex belongs to --model", key="--latex", hint=hint)
     if picture is not None:
         _check_picture(picture, force)
+    from ..conformance import load_effects
     from ..effects import catalogue
 
-    for path in effect:
-        catalogue.load_file(path)
+    load_effects(effect)
     if model is not None:
         print(_equations(model.split(","), latex), end="")
         return 0
@@ -188,20 +188,27 @@ def _sketched(cls: type[Effect]) -> list[str]:
     parts = [d.sel(time=slice(begin, None)) for d in both]
     curves = [(d["time"].values, told(d)) for d in parts]
     low, top = min(float(y.min()) for _, y in curves), max(float(y.max()) for _, y in curves)
-    text = ", ".join(f"{name} = {value}" for name, value in values.items())
-    span = f"from {show.quantity(begin, 's')} to {show.quantity(float(curves[0][0][-1]), 's')}"
-    lines = [f"spring force {span}, between {show.quantity(low, 'N')} and {show.quantity(top, 'N')}"]
-    for name, (t, y) in zip(("without", f"with {text}"), curves, strict=True):
+    span = f"from {show.quantity(begin, 's')} to {show.quantity(float(curves[0][0][-1]), 's')}, "
+    span += f"between {show.quantity(low, 'N')} and {show.quantity(top, 'N')}"
+    lines = [f"the spring's force as the reading tells it, {span}"]
+    for name, (t, y) in zip(("without", f"with {_given(cls, values)}"), curves, strict=True):
         lines += [f"{name}:", *(f"  {line}" for line in sketch(t, y, columns=72, rows=5, limits=(low, top)))]
     return lines
+
+
+def _given(cls: type[Effect], values: Mapping[str, float]) -> str:
+    """Values of an effect's parameters in words."""
+    from ..params import specs
+
+    known = specs(cls)
+    return ", ".join(f"{name} = {show.quantity(value, known[name].unit)}" for name, value in values.items())
 
 
 def _draw(cls: type[Effect], path: Path) -> None:
     from ..plots import effect_figure, save
 
     without, with_it, values = _traces(cls)
-    text = ", ".join(f"{name} = {value}" for name, value in values.items())
     try:
-        save(effect_figure(without, with_it, cls.tag, text), path)
+        save(effect_figure(without, with_it, cls.tag, _given(cls, values)), path)
     except OSError as error:
         raise RunFolderError(f"the picture cannot be written ({error.strerror})", file=path) from None

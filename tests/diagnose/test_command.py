@@ -9,10 +9,23 @@ import pytest
 
 from stickslip.cli import run
 from stickslip.cli.diagnose import _teller
+from stickslip.effects import catalogue
 from stickslip.errors import InputError
 from stickslip.runstore import open_run
 from stickslip.workflow import Pieces, diagnose_campaign
 
+OWN = """from stickslip.effects import Threshold
+from stickslip.params import parameter
+
+class Mine(Threshold):
+    tag = "mine"
+    summary, equation, amplitude = "friction falls", "f", "size"
+    size: object = parameter(0.0, unit="1", lower=0.0, upper=0.1, null=0.0, doc="relative change of friction")
+
+    def strength(self, state, motion, contact):
+        # may be replaced
+        return 1.0 - self.size
+"""
 CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 
 
@@ -37,6 +50,19 @@ def test_bad_input_is_one_message(tmp_path, capsys, extra, words):
     assert code == 2
     assert words in error
     assert "Traceback" not in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_law_that_cannot_be_compiled_is_refused_before_anything_is_fitted(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(catalogue, "_user", {})
+    path = tmp_path / "mine.py"
+    path.write_text(OWN.replace("return", "if motion.v > 0.0:\n            return 2.0\n        return"))
+    for tried in ([], ["--candidates", "mine"]):
+        command = ["diagnose", str(CAMPAIGN), "--effect", str(path), "--out", str(tmp_path / "out"), *tried]
+        assert run(command) == 2
+        said = capsys.readouterr().err
+        assert said.startswith(f"stickslip: {path}: line 11: the law of 'mine' cannot be compiled: TracerBool")
+        assert "jnp.where" in said
     assert not (tmp_path / "out").exists()
 
 
@@ -152,4 +178,6 @@ def test_an_interrupted_diagnosis_says_what_is_kept_and_goes_on_from_it(tmp_path
         assert run(["diagnose", str(CAMPAIGN), "--out", str(tmp_path / "run")]) == 130
         said = capsys.readouterr().err
         assert "interrupted; 2 finished pieces are kept, and the same command goes on from them" in said
+        assert "before anything is fitted:" in said
+        assert "Slow noise of the sensor is not stated in v050" in said  # what these data cannot tell
     assert "going on from 2 finished pieces" in said

@@ -1,6 +1,10 @@
-"""An effect in a user's own file is fitted and diagnosed like those of the catalogue, also by other processes."""
+"""An effect in a user's own file, or of an installed package, is fitted and diagnosed like those of the catalogue, also
+by other processes."""
 
 from __future__ import annotations
+
+import importlib
+import sys
 
 import pytest
 
@@ -29,25 +33,36 @@ class Finish(Threshold):
 """
 
 
-@pytest.fixture
-def files(tmp_path, monkeypatch) -> tuple[str, str]:
-    """The effect's file, and a campaign of two short runs that were simulated with it."""
+@pytest.fixture(params=["file", "package"])
+def files(tmp_path, monkeypatch, request):
+    """Arguments that name the effect's file, none where a package offers it, and a campaign of two short runs that were
+    simulated with it."""
     monkeypatch.setattr(catalogue, "_user", {})
-    path = tmp_path / "my_effect.py"
+    path = tmp_path / "surface_finish.py"
     path.write_text(EFFECT, encoding="utf-8")
-    catalogue.load_file(path)
+    if request.param == "package":
+        info = tmp_path / "surface_finish-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: surface-finish\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text("[stickslip.effects]\nsurface-finish = surface_finish:Finish\n")
+        monkeypatch.syspath_prepend(str(tmp_path))
+        monkeypatch.setattr(catalogue.EFFECTS, "_plugged", None)
+        importlib.invalidate_caches()
+    else:
+        catalogue.load_file(path)
     hidden = {"effect": [{"type": "surface-finish", "size": SIZE}], "sensor": {"white": 1e-11}}
     runs = [make_scenario({**RIG, **hidden, "drive": {"velocity": v, "events": 6}}) for v in (2e-4, 4e-4)]
     campaign = write_campaign(tmp_path, runs, [simulate(scenario) for scenario in runs])
     catalogue._user.clear()  # the commands are to load it themselves
-    return str(path), str(campaign)
+    yield ["--effect", str(path)] if request.param == "file" else [], str(campaign)
+    sys.modules.pop("surface_finish", None)
 
 
 @pytest.mark.slow
 def test_it_is_fitted(files, tmp_path):
-    path, campaign = files
+    own, campaign = files
     out = tmp_path / "fit"
-    command = ["fit", campaign, "--effect", path, "--add", "surface-finish", "--starts", "1", "--out", str(out)]
+    command = ["fit", campaign, *own, "--add", "surface-finish", "--starts", "1", "--out", str(out)]
     assert run(command) == 0
     result = read_result(out)
     without, with_it = result["ladder"][-2:]
@@ -60,10 +75,10 @@ def test_it_is_fitted(files, tmp_path):
 
 @pytest.mark.slow
 def test_it_is_fitted_beside_another(files, tmp_path):
-    path, campaign = files
+    own, campaign = files
     out = tmp_path / "fit"
     added = ["--add", "surface-finish", "--add", "contact-ageing"]
-    assert run(["fit", campaign, "--effect", path, *added, "--starts", "1", "--out", str(out)]) == 0
+    assert run(["fit", campaign, *own, *added, "--starts", "1", "--out", str(out)]) == 0
     result = read_result(out)
     assert result["ladder"][-1]["model"] == ["static", "inertia", "surface-finish", "contact-ageing"]
     size, rate = (result["parameters"][name] for name in ("surface-finish.size", "contact-ageing.rate"))
@@ -73,10 +88,10 @@ def test_it_is_fitted_beside_another(files, tmp_path):
 
 @pytest.mark.slow
 def test_it_is_diagnosed_by_other_processes(files, tmp_path):
-    path, campaign = files
+    own, campaign = files
     out = tmp_path / "diagnosis"
     command = [
-        "diagnose", campaign, "--effect", path, "--candidates", "surface-finish,contact-ageing", "--jobs", "2",
+        "diagnose", campaign, *own, "--candidates", "surface-finish,contact-ageing", "--jobs", "2",
         "--max-effects", "1", "--out", str(out),
     ]  # fmt: skip
     assert run(command) == 0
