@@ -30,6 +30,8 @@ def check_metadata(cls: type[Effect], full: bool) -> Iterator[str]:
             yield f"confused with '{tag}', which is no other effect"
         if not experiment:
             yield f"no experiment separates it from '{tag}'"
+    for name in set(cls.exponents) - specs(cls).keys():
+        yield f"the exponent '{name}' is no parameter"
     for name, spec in specs(cls).items():
         if not spec.doc or (full and not spec.symbol):
             yield f"parameter {name} lacks {'a symbol' if spec.doc else 'words'}"

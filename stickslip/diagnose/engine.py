@@ -278,8 +278,19 @@ def _said(rung: Rung, named: Sequence[Named], verdict: Verdict, limits: Threshol
 
 
 def _forms(named: Sequence[Named]) -> dict[str, dict[str, str]]:
-    """tag -> form of its law, where it has several."""
-    return {c.tag: c.form for n in named for c in (n.candidate, *n.rivals) if c.form}
+    """tag -> form of its law, where it has several, and the exponents that say as much."""
+    found = {c.tag: {**c.form, **_exponents(c)} for n in named for c in (n.candidate, *n.rivals)}
+    return {tag: form for tag, form in found.items() if form}
+
+
+def _exponents(candidate: Candidate) -> dict[str, str]:
+    names = candidate.effect.exponents if candidate.fit is not None else ()
+    if not names:
+        return {}
+    assert candidate.fit is not None
+    values, std = candidate.fit.values, candidate.fit.std()
+    keys = {name: f"{candidate.tag}.{name}" for name in names}
+    return {name: f"{values[key]:.2g} +- {std[key]:.1g}" for name, key in keys.items()}
 
 
 def _round(

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from ..effects import catalogue
+from ..fit import multistart
 from ..fit.record import KEY, fitted, record
 from ..fit.solved import solved
 from ..floors import scatter_factor
+from . import experiment
 from .candidate import Candidate
 from .caution import cautions
 from .engine import Diagnosis, Round
@@ -55,6 +57,7 @@ def summary(
         "later_rounds": [{"base": _ranking_base(r), "ranking": _ranking(r)} for r in d.rounds[1:]],
         "parameters": {} if last is None else _parameters(last),
         "next_experiment": next_experiment(d, progress),
+        "seeds": {"starts": multistart.SEED, "draws": experiment.SEED},
         "held_out": {
             n: [int(k) for k in (~d.train[r] & used[r]).nonzero()[0]] for r, n in enumerate(d.measurement.names)
         },
@@ -108,6 +111,8 @@ def _ranked(c: Candidate, done: Round) -> dict[str, Any]:
         "promise": c.promise,
         "refit": c.fit is not None and not c.note,
         "note": c.note,
+        "heldout_gain": None,
+        "amplitude": None,
     }
     if c.fit is None or c.held is None or c.train is None or c.note:
         return out

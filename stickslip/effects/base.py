@@ -101,6 +101,8 @@ class Effect(eqx.Module):
         amplitude: name of the parameter whose null value makes the effect vanish.
         generalises: tags of effects that this law contains as special cases; where both describe the data, the special
             case is named.
+        exponents: names of inner parameters that make of one formula what the literature has as several forms (linear
+            drag, drag by inertia); a verdict says their values beside the name.
         family: under which it is listed: contact, friction, block, geometry, drive or sensor. A drive or a sensor may
             put energy in; all others are held to be passive by the conformance suite.
         periodic: of a wave: the parameter that is its period (or "frequency"), and over what it is periodic: "time",
@@ -115,6 +117,7 @@ class Effect(eqx.Module):
     source: ClassVar[str] = ""
     amplitude: ClassVar[str] = ""
     generalises: ClassVar[tuple[str, ...]] = ()
+    exponents: ClassVar[tuple[str, ...]] = ()
     periodic: ClassVar[tuple[str, Literal["time", "load point", "displacement"]] | None] = None
     family: ClassVar[str] = "contact"
     symbols: ClassVar[dict[str, str]] = {}

@@ -35,6 +35,7 @@ class VelocityWeakening(Threshold):
     }
     source = "Stribeck (1902); Bo & Pavelescu, Wear 82 (1982) 277; Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
     amplitude = "drop"
+    exponents = ("exponent",)
     family = "friction"
 
     drop: Array = parameter(

@@ -38,6 +38,7 @@ class ViscousDrag(BodyForce):
     }
     source = "Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994) 1083"
     amplitude = "drag"
+    exponents = ("exponent",)
     family = "block"
 
     drag: Array = parameter(

@@ -161,6 +161,7 @@ def test_the_shipped_campaign_is_diagnosed(tmp_path):
     assert code == 0
     assert result["verdict"]["kind"] == "missing"
     assert result["verdict"]["effects"] == ["contact-ageing"]
+    assert result["seeds"] == {"starts": 0, "draws": 0}
     errors = [rung["heldout_error"] for rung in result["ladder"]]
     assert errors[0] > errors[1] > 1.5 > errors[2]
 

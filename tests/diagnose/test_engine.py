@@ -190,6 +190,12 @@ def test_a_name_is_not_given_for_what_the_base_does_from_the_same_place(diagnose
     assert any(key.startswith("round1-viscous-drag-wide") for key in store)
 
 
+def test_a_name_says_the_exponent_of_its_law(diagnose):
+    found, _ = diagnose({("viscous-drag",): (100.0, SMALL)})
+    assert "lacks viscous-drag (exponent: 1 +- " in found.verdict.text
+    assert list(found.verdict.forms["viscous-drag"]) == ["exponent"]
+
+
 @pytest.mark.parametrize("other", ["wear", "viscous-drag"])
 def test_the_base_begins_where_what_is_named_arrived_beside_its_rivals(diagnose, other):
     """Whether it was among the cheapest two of the sweep, from where the base was begun before, or not."""
@@ -282,7 +288,7 @@ def test_what_is_no_longer_needed_goes_also_where_something_is_left(diagnose, mo
     found, _ = diagnose(much, max_effects=most)
     assert (found.verdict.kind, found.verdict.effects) == ("unknown", ("tilt", "viscous-drag"))
     assert found.ladder[-1].model == ("static", "inertia", "tilt", "viscous-drag")
-    said = "3 effects were added (1 taken out again)" if most == 3 else "viscous-drag help, but something is missing"
+    said = "3 effects were added (1 taken out again)" if most == 3 else "help, but something is missing"
     assert said in found.verdict.text
 
 

@@ -154,6 +154,11 @@ def test_forms_that_share_an_equation_are_found() -> None:
     assert not any("same equation" in text for text in check_metadata(Offset, True))
 
 
+def test_an_exponent_that_is_no_parameter_is_found(monkeypatch) -> None:
+    monkeypatch.setattr(Offset, "exponents", ("power",))
+    assert any("'power' is no parameter" in f.text for f in check_effects([Offset]))
+
+
 def test_missing_metadata_is_found() -> None:
     texts = [f.text for f in check_effects([Offset]) if f.check == "metadata"]
     assert any("source" in t for t in texts) and any("signature" in t for t in texts)
