@@ -402,6 +402,10 @@ def test_a_periodic_effect_is_not_begun_afar(monkeypatch):
     small, ground, taken = strangers(monkeypatch, {1: 1.0, -1: 1.0})
     wave = replace(small, tag="drive-ripple", effect=catalogue.make("drive-ripple"))
     assert refit.afar(wave, *ground) is wave
+    monkeypatch.setattr(refit, "refine", lambda c, *a, **k: replace(c, note=""))
+    near = refit.afar(replace(wave, note="not refitted"), *ground)  # what was not refitted yet is so from near alone
+    assert not near.note
+    assert near.fit is wave.fit
     assert not taken
 
 
