@@ -251,7 +251,9 @@ def _creep(pairs: Pairs, slipping: Pairs) -> Verdict:
             short = re.sub(r" \([^)]*\)", "", d.reason).split(":")[0]  # numbers differ from one to the next
             reasons[short] = reasons.get(short, 0) + d.count
         text = "; ".join(f"{n} because {reason}" for reason, n in sorted(reasons.items(), key=lambda r: -r[1]))
-        bad.append(f"{_count(sum(d.count for d in lost), 'creep process')} cannot: {text}.")
+        bad.append(
+            f"{_count(sum(d.count for d in lost), 'creep process')} cannot be compared with the static model: {text}."
+        )
     return good, bad
 
 
