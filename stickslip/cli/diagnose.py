@@ -135,8 +135,10 @@ def _print(result: dict[str, Any], out: Path) -> None:
     verdict = result["verdict"]
     sure = "" if verdict["confidence"] is None else f" ({100 * verdict['confidence']:.0f} % if it is in the catalogue)"
     console.print(f"[bold]{verdict['kind']}[/bold]: {escape(verdict['text'])}{sure}", highlight=False)
-    if result["next_experiment"]:
-        console.print(f"next experiment: {escape(result['next_experiment']['text'])}", highlight=False)
+    proposed = result["next_experiment"]
+    for found in [proposed, *proposed.get("others", ())] if proposed else ():
+        between = f" ({' or '.join(found['separates'])})" if proposed.get("others") else ""
+        console.print(f"next experiment{between}: {escape(found['text'])}", highlight=False)
     for text in [*result["notes"], *result["caution"]]:
         console.print(escape(text), highlight=False)
     mended = told(result)

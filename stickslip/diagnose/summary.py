@@ -150,11 +150,18 @@ def _parameters(rung: Rung) -> dict[str, Any]:
 def next_experiment(d: Diagnosis, progress: Callable[[str, float], None] | None = None) -> dict[str, Any] | None:
     """For effects these data cannot tell apart: the experiment in which their fitted models differ most.
 
-    Where none of the menu tells them apart, what the catalogue knows of the two comes first.
+    With several sets it is that of the first, and in ``others`` those of the others.
     """
     if d.verdict.kind != "ambiguous" or not d.sets:
         return None
-    rivals = d.sets[0]
+    first, *others = (_separating(rivals, d, progress) for rivals in d.sets)
+    return {**first, "others": others} if others else first
+
+
+def _separating(
+    rivals: Sequence[Candidate], d: Diagnosis, progress: Callable[[str, float], None] | None
+) -> dict[str, Any]:
+    """Where none of the menu tells them apart, what the catalogue knows of the first two comes first."""
     a, b = (catalogue.get(c.tag) for c in rivals[:2])
     known = catalogue.alike(a.tag).get(b.tag)
     fitted = [c for c in rivals if c.fit is not None and c.composition is not None]

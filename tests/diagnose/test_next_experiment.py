@@ -48,6 +48,15 @@ def test_all_of_the_set_are_simulated(asked, tags):
     assert found["text"] == "hold the drive"
 
 
+def test_every_set_has_its_own(asked):
+    one = diagnosis()
+    two = SimpleNamespace(**{**vars(one), "sets": (one.sets[0], diagnosis(tags=("tilt", "nonlinear-spring")).sets[0])})
+    found = summary.next_experiment(two)
+    assert found["separates"] == list(PAIR)
+    assert [other["separates"] for other in found["others"]] == [["tilt", "nonlinear-spring"]]
+    assert "others" not in summary.next_experiment(one)
+
+
 def test_those_that_were_not_fitted_are_left_out(asked):
     summary.next_experiment(diagnosis(tags=(*PAIR, "tilt"), fits=(True, False, True)))
     assert asked[0] == [("contact-ageing", "tilt", 1.7, None)]

@@ -188,6 +188,14 @@ def test_everything_a_diagnosis_holds_is_shown(tmp_path):
         assert part in words, part
 
 
+def test_with_several_sets_every_experiment_is_shown(tmp_path):
+    other = {"text": "hold the drive", "separates": ["wear", "thermal-creep"]}
+    result = {**DIAGNOSIS, "next_experiment": {**DIAGNOSIS["next_experiment"], "others": [other]}}
+    words = " ".join(Reader(write_report(folder(tmp_path, result)).read_text()).text.split())
+    assert "start in reverse (separates tilt, nonlinear-spring)" in words
+    assert "hold the drive (separates wear, thermal-creep)" in words
+
+
 def test_results_with_little_in_them(tmp_path):
     where = folder(tmp_path, {"schema": 1, "kind": "simulate", "verdict": "stick-slip", "title": "t"}, arrays=False)
     assert "stick-slip" in Reader(write_report(where).read_text()).text
