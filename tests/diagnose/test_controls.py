@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from stickslip.challenge.generator.campaigns import Run, make_campaign
 from stickslip.errors import InputError
 from stickslip.workflow import diagnose_campaign
 
@@ -16,9 +17,14 @@ CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect"
 ORDERS = {"reversed": [3, 2, 1, 0], "slowest-two": [1, 0, 2, 3], "random": random.Random(1).sample(range(4), 4)}
 
 
-def shuffled(folder: Path, order: list[int]) -> Path:
-    """The shipped campaign with the velocities of its steady runs, the slowest first, in another order."""
-    shutil.copytree(CAMPAIGN, folder)
+HOLDS = ((4.3, 1e-4), (5.3, 0.0), (7.6, 1e-4), (12.6, 0.0), (15.2, 1e-4))
+CLOSE = (*(Run(f"v{v}", v * 1e-6) for v in (199, 200, 201, 202)), Run("holds", 1e-4, pieces=HOLDS))
+
+
+def shuffled(folder: Path, order: list[int], campaign: Path = CAMPAIGN) -> Path:
+    """A campaign, by default the shipped one, with the velocities of its steady runs, the slowest first, in another
+    order."""
+    shutil.copytree(campaign, folder)
     path = folder / "campaign.toml"
     text = path.read_text(encoding="utf-8")
     speeds = re.findall(r'^drive_velocity = "(.*)"$', text, re.MULTILINE)
@@ -46,3 +52,16 @@ def test_velocities_shuffled_between_traces_give_no_name(tmp_path, order):
     assert verdict["kind"] == "unknown"
     assert verdict["effects"] == []
     assert verdict["set"] == []
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_nor_do_velocities_so_close_that_the_base_can_be_fitted_and_effects_are_ranked(tmp_path):
+    """Half a per cent from run to run, the slowest now the fastest: 1.5 %."""
+    make_campaign(tmp_path / "right", 3, runs=CLOSE, spring_known=True)
+    path = shuffled(tmp_path / "campaign", [1, 2, 3, 0], tmp_path / "right")
+    result = diagnose_campaign(path, tmp_path / "out", jobs=2, missing_force=False)
+    assert result["verdict"]["kind"] == "unknown"
+    assert result["verdict"]["effects"] == []
+    assert result["verdict"]["set"] == []
+    assert sum(c["refit"] for c in result["ranking"]) > 20
