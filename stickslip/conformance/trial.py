@@ -87,6 +87,7 @@ def _refusal(cls: type[Effect], what: str, key: str | None = None) -> InputError
         f"the law of '{cls.tag}' cannot be compiled: {what}",
         file=_file(cls),
         key=key,
-        hint="a law is written with jax.numpy and has no branch that depends on a value: jnp.where(v > 0, a, b); what "
-        "it returns has the shape that its role asks for (documentation, 'Writing an effect')",
+        hint="a law is written with jax.numpy and without 'if' on a value (jnp.tanh(v / v_r) for a sign, "
+        "jnp.maximum(x, 0.0) for a part); what it returns has the shape that its role asks for (documentation, "
+        "'Writing an effect')",
     )

@@ -85,7 +85,8 @@ class FittedRun:
         """The model as a scenario.
 
         Args:
-            changes: such as ``"drive.velocity=100um/s"``, as after ``--set``.
+            changes: such as ``"drive.velocity=100um/s"``, as after ``--set``; parameters also by the name that the fit
+                gives them (``"rig.mass=0.1"``, ``"contact-ageing.rate=0"``).
             trace: drive as this measured run was; default at the first run's velocity, for so many ``events``.
             events: slips to simulate where the drive has one velocity.
 
@@ -98,7 +99,9 @@ class FittedRun:
             drive = {"piece": [{"velocity": v, "duration": dt} for v, dt in run.pieces]}
         spring = self._spring() if trace is None else run.stiffness
         content = scenario_content(self.fitted, f"{self.title}: {' + '.join(self.parts)}", drive, spring)
-        made = make_scenario(content, self.folder).with_changes([parse_assignment(text) for text in changes])
+        given = [parse_assignment(text) for text in changes]
+        given = [(_key(name, [effect.tag for effect in self.fitted.effects()]), value) for name, value in given]
+        made = make_scenario(content, self.folder).with_changes(given)
         return replace(made, path=self.folder / RESULT)
 
     def _first(self) -> Driven:
@@ -121,6 +124,21 @@ class FittedRun:
         """Of the first run where every run has a spring of its own, else None: the rig's."""
         own = [run.stiffness for run in self.runs]
         return own[0] if own and None not in own else None
+
+
+OTHERWISE = {
+    "weakening.drop": "set weakening.ratio, which is 1 - drop",
+    "contact.strength": "set contact.friction_coefficient: strength = contacts x normal_force x friction_coefficient",
+}
+
+
+def _key(name: str, tags: Sequence[str]) -> str:
+    """What a scenario calls a parameter of a fit."""
+    if name in OTHERWISE:
+        raise InputError("a scenario has this parameter of a fit in another way", file="--set", key=name,
+                         hint=OTHERWISE[name])  # fmt: skip
+    table, _, rest = name.partition(".")
+    return f"block.{rest}" if table == "rig" else f"effect.{name}" if table in tags else name
 
 
 def load_run(folder: str | Path, effects: Sequence[str | Path] = (), *, learned: bool = False) -> FittedRun:

@@ -96,6 +96,17 @@ def test_the_scenario_is_the_same_model(folder):
     assert heavier.contact.strength == pytest.approx(2 * 0.26)
 
 
+def test_a_parameter_is_set_by_the_name_that_the_fit_gives_it(folder):
+    back = ss.load_run(folder)
+    model = build(back.scenario(["rig.mass=0.1", "contact-ageing.rate=0.02", "contact.u_max=1um"])).model
+    assert float(model.block.mass) == 0.1
+    assert float(model.effects[0].rate) == 0.02
+    assert float(model.effects[1].drag) == pytest.approx(0.001)
+    for name, hint in (("weakening.drop", "weakening.ratio"), ("contact.strength", "contact.friction_coefficient")):
+        with pytest.raises(InputError, match=hint):
+            back.scenario([f"{name}=0.2"])
+
+
 def test_without_a_known_load_the_strength_is_kept(tmp_path):
     back = ss.load_run(folder_of(tmp_path / "fit", found(normal_force=None, friction=None)))
     assert build(back.scenario()).contact.strength == pytest.approx(0.26)
