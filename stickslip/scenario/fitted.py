@@ -20,6 +20,10 @@ from .overrides import parse_assignment
 
 EVENTS = 5  # slips that are simulated unless told otherwise
 FRICTION = 0.2  # where neither load nor friction of a contact is known; only their product acts
+_OTHERWISE = {  # parameters of a fit that a scenario has in another way -> what to set
+    "weakening.drop": "set weakening.ratio, which is 1 - drop",
+    "contact.strength": "set contact.friction_coefficient: strength = contacts x normal_force x friction_coefficient",
+}
 
 
 @dataclass(frozen=True)
@@ -126,17 +130,11 @@ class FittedRun:
         return own[0] if own and None not in own else None
 
 
-OTHERWISE = {
-    "weakening.drop": "set weakening.ratio, which is 1 - drop",
-    "contact.strength": "set contact.friction_coefficient: strength = contacts x normal_force x friction_coefficient",
-}
-
-
 def _key(name: str, tags: Sequence[str]) -> str:
     """What a scenario calls a parameter of a fit."""
-    if name in OTHERWISE:
-        raise InputError("a scenario has this parameter of a fit in another way", file="--set", key=name,
-                         hint=OTHERWISE[name])  # fmt: skip
+    if name in _OTHERWISE:
+        what = "a scenario has this parameter of a fit in another way"
+        raise InputError(what, file="--set", key=name, hint=_OTHERWISE[name])
     table, _, rest = name.partition(".")
     return f"block.{rest}" if table == "rig" else f"effect.{name}" if table in tags else name
 

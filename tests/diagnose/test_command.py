@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import run
-from stickslip.cli.diagnose import _teller
+from stickslip.cli.diagnose import _print, _teller
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
 from stickslip.runstore import open_run
@@ -148,6 +148,27 @@ def test_a_piece_is_kept_and_only_for_the_same_inputs(tmp_path):
         assert Pieces(folder, "inputs 1").load("other") is None
         (folder.folder / "pieces" / "base.npz").write_bytes(b"half written")
         assert Pieces(folder, "inputs 1").load("base") is None
+
+
+def test_the_terminal_says_every_step_of_the_ladder_and_every_experiment(tmp_path, capsys):
+    error = {"train_error": 2.0, "by_phase": {"slip": 2.0}, "heldout_error": 3.0, "heldout_by_phase": {"slip": 3.0}}
+    steps = [(None, None), ("inertia", None), ("tilt", None), ("wear", None), (None, "tilt")]
+    experiment = {"text": "start in reverse", "separates": ["tilt", "nonlinear-spring"]}
+    other = {"text": "hold the drive", "separates": ["wear", "thermal-creep"]}
+    result = {
+        "ladder": [{"added": added, "removed": removed, **error} for added, removed in steps],
+        "verdict": {"kind": "ambiguous", "text": "one of two", "confidence": None},
+        "next_experiment": experiment, "notes": [], "caution": [], "dropped": [],
+    }  # fmt: skip
+    _print(result, tmp_path)
+    said = capsys.readouterr().out
+    labels = [line.split("│")[1].strip() for line in said.splitlines() if "│ fitted │" in line]
+    assert labels == ["static", "+ inertia", "+ tilt", "+ wear", "without tilt"]
+    assert "next experiment: start in reverse\n" in said
+    _print({**result, "next_experiment": {**experiment, "others": [other]}}, tmp_path)
+    said = capsys.readouterr().out
+    assert "next experiment (tilt or nonlinear-spring): start in reverse\n" in said
+    assert "next experiment (wear or thermal-creep): hold the drive\n" in said
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from stickslip.conformance import load_effects, try_laws
+from stickslip.conformance import load_effects, trial, try_laws
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
 
@@ -76,6 +76,16 @@ def test_the_state_stays_what_it_is(load, state):
         load(("return state + motion.path", f"return {state}"), ("jnp.tanh(state)", "1.0"))
 
 
-def test_the_programs_own_are_not_tried(monkeypatch):
-    monkeypatch.setattr(catalogue.get("wear"), "strength", None)
-    try_laws([catalogue.get("wear")])
+def test_the_programs_own_are_not_tried(load, monkeypatch):
+    tried = []
+
+    def base_model(effects):
+        tried.extend(effect.tag for effect in effects)
+        return made(effects)
+
+    made = trial.base_model
+    monkeypatch.setattr(trial, "base_model", base_model)
+    _, (mine,) = load()
+    assert tried == ["mine", "mine"]  # in both forms of its law
+    try_laws([catalogue.get("wear"), mine])
+    assert tried == ["mine"] * 4
