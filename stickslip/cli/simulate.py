@@ -61,11 +61,7 @@ def simulate(
     if out is not None:
         refuse_existing(out, force)
     began = time.perf_counter()
-    from ..scenario.overrides import parse_sweep
-
-    loaded = _load(path, changes, trace, effect)
-    if sweep is not None:
-        loaded = loaded.with_changes([("sweep", parse_sweep(sweep))])
+    loaded = _load(path, changes, trace, effect, sweep)
     series = loaded.file.sweep
     with open_run(out, force=force) if out is not None else nullcontext() as run:
         work = _single(loaded, run) if series is None else _series(loaded, series, run)
@@ -79,12 +75,19 @@ def simulate(
     return 130 if result.get("interrupted") else 0
 
 
-def _load(path: str, changes: list[str], trace: str | None, files: tuple[Path, ...]) -> Scenario:
-    """A scenario from its file, or the model of a run folder."""
+def _load(
+    path: str, changes: list[str], trace: str | None, files: tuple[Path, ...], sweep: str | None = None
+) -> Scenario:
+    """A scenario from its file, or the model of a run folder; with a series over it."""
+    from ..scenario.overrides import parse_sweep
+
+    table = None if sweep is None else parse_sweep(sweep)
     if Path(path).is_dir():
         from ..scenario.fitted import load_run
 
-        return load_run(path, files).scenario(changes, trace)
+        found = load_run(path, files)
+        loaded = found.scenario(changes, trace)
+        return loaded if table is None else loaded.with_changes([("sweep", {**table, "key": found.key(table["key"])})])
     if trace is not None:
         raise InputError("--trace names a run of a fit or a diagnosis", key="--trace", hint="give a run folder")
     if files:
@@ -93,7 +96,8 @@ def _load(path: str, changes: list[str], trace: str | None, files: tuple[Path, .
         load_effects(files)
     from ..scenario import load_scenario
 
-    return load_scenario(path, changes)
+    loaded = load_scenario(path, changes)
+    return loaded if table is None else loaded.with_changes([("sweep", table)])
 
 
 def scenario_arguments(scenario: str, more: tuple[str, ...], changes: tuple[str, ...]) -> tuple[str, list[str]]:

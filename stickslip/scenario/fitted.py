@@ -103,10 +103,21 @@ class FittedRun:
             drive = {"piece": [{"velocity": v, "duration": dt} for v, dt in run.pieces]}
         spring = self._spring() if trace is None else run.stiffness
         content = scenario_content(self.fitted, f"{self.title}: {' + '.join(self.parts)}", drive, spring)
-        given = [parse_assignment(text) for text in changes]
-        given = [(_key(name, [effect.tag for effect in self.fitted.effects()]), value) for name, value in given]
+        given = [(self.key(name), value) for name, value in map(parse_assignment, changes)]
         made = make_scenario(content, self.folder).with_changes(given)
         return replace(made, path=self.folder / RESULT)
+
+    def key(self, name: str) -> str:
+        """What a scenario calls a parameter of the fit; other names as they are.
+
+        Raises:
+            InputError: a scenario has it in another way.
+        """
+        if name in _OTHERWISE:
+            raise InputError("a scenario has this parameter of a fit in another way", key=name, hint=_OTHERWISE[name])
+        table, _, rest = name.partition(".")
+        tags = [effect.tag for effect in self.fitted.effects()]
+        return f"block.{rest}" if table == "rig" else f"effect.{name}" if table in tags else name
 
     def _first(self) -> Driven:
         if not self.runs:
@@ -128,15 +139,6 @@ class FittedRun:
         """Of the first run where every run has a spring of its own, else None: the rig's."""
         own = [run.stiffness for run in self.runs]
         return own[0] if own and None not in own else None
-
-
-def _key(name: str, tags: Sequence[str]) -> str:
-    """What a scenario calls a parameter of a fit."""
-    if name in _OTHERWISE:
-        what = "a scenario has this parameter of a fit in another way"
-        raise InputError(what, file="--set", key=name, hint=_OTHERWISE[name])
-    table, _, rest = name.partition(".")
-    return f"block.{rest}" if table == "rig" else f"effect.{name}" if table in tags else name
 
 
 def load_run(folder: str | Path, effects: Sequence[str | Path] = (), *, learned: bool = False) -> FittedRun:

@@ -107,6 +107,14 @@ def test_a_parameter_is_set_by_the_name_that_the_fit_gives_it(folder):
             back.scenario([f"{name}=0.2"])
 
 
+def test_and_so_in_a_series(folder, capsys):
+    assert run(["simulate", str(folder), "--sweep", "rig.mass=0.08,0.1", "--set", "drive.events=2", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["key"] == "block.mass"
+    assert run(["simulate", str(folder), "--sweep", "weakening.drop=0.1,0.2"]) == 2
+    assert "weakening.drop: a scenario has this parameter" in capsys.readouterr().err
+
+
 def test_without_a_known_load_the_strength_is_kept(tmp_path):
     back = ss.load_run(folder_of(tmp_path / "fit", found(normal_force=None, friction=None)))
     assert build(back.scenario()).contact.strength == pytest.approx(0.26)
