@@ -81,13 +81,15 @@ def _load(
     """A scenario from its file, or the model of a run folder; with a series over it."""
     from ..scenario.overrides import parse_sweep
 
-    table = None if sweep is None else parse_sweep(sweep)
     if Path(path).is_dir():
         from ..scenario.fitted import load_run
 
         found = load_run(path, files)
         loaded = found.scenario(changes, trace)
-        return loaded if table is None else loaded.with_changes([("sweep", {**table, "key": found.key(table["key"])})])
+        if sweep is None:
+            return loaded
+        table = parse_sweep(sweep)
+        return loaded.with_changes([("sweep", {**table, "key": found.key(table["key"])})])
     if trace is not None:
         raise InputError("--trace names a run of a fit or a diagnosis", key="--trace", hint="give a run folder")
     if files:
@@ -97,7 +99,7 @@ def _load(
     from ..scenario import load_scenario
 
     loaded = load_scenario(path, changes)
-    return loaded if table is None else loaded.with_changes([("sweep", table)])
+    return loaded if sweep is None else loaded.with_changes([("sweep", parse_sweep(sweep))])
 
 
 def scenario_arguments(scenario: str, more: tuple[str, ...], changes: tuple[str, ...]) -> tuple[str, list[str]]:
