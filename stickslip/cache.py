@@ -19,19 +19,19 @@ _SETTINGS = {
     "JAX_COMPILATION_CACHE_DIR": "",
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
     "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
-    # a checked error inside compiled code calls back into Python, and such code cannot be kept; as nan it is found by
-    # the integrator's own check of every piece
-    "EQX_ON_ERROR": "nan",
 }
 
 
 def enable() -> Path | None:
-    """Keep compiled code in the user's cache folder.
+    """Keep compiled code in the user's cache folder, and compile the same code where nothing can be kept.
 
     Returns:
         The folder, or None where it is switched off (``STICKSLIP_NO_CACHE=1``), cannot be written, or JAX has its own
         setting already.
     """
+    # a checked error inside compiled code calls back into Python, and such code cannot be kept and gives other last
+    # digits; as nan it is found by the integrator's own check of every piece
+    os.environ.setdefault("EQX_ON_ERROR", "nan")
     if _off() or "JAX_COMPILATION_CACHE_DIR" in os.environ:
         return None
     folder = _folder()

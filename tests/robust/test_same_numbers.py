@@ -59,9 +59,10 @@ def test_fit_static_twice(tmp_path):
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_fit_inertial_twice(tmp_path):
+    """Once with what the compilation cache keeps and once compiled anew."""
     small_campaign(tmp_path)
     for n in (1, 2):
-        call("fit", tmp_path / "campaign.toml", "--model", "inertial", "--out", tmp_path / f"out{n}")
+        call("fit", tmp_path / "campaign.toml", "--model", "inertial", "--out", tmp_path / f"out{n}", cached=n == 1)
     same(tmp_path / "out1", tmp_path / "out2")
 
 
