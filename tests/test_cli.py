@@ -493,7 +493,8 @@ def test_a_terminal_shows_both_traces_beside_the_explanation(capsys, monkeypatch
 
 def test_compiled_code_is_kept_and_can_be_switched_off(scenario, tmp_path_factory):
     home = tmp_path_factory.mktemp("cache")
-    environment = {key: value for key, value in os.environ.items() if not key.startswith(("JAX_", "STICKSLIP_", "EQX_"))}
+    set_here = ("JAX_", "STICKSLIP_", "EQX_")
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(set_here)}
     environment["XDG_CACHE_HOME"] = str(home)
     found = shell("simulate", scenario, env=environment)
     assert found.returncode == 0, found.stderr

@@ -77,7 +77,8 @@ class Diagnosis:
         verdict, ladder, rounds: what was found, and how.
         measurement, floor, train: the data, its floors, the cycles fitted (R, n).
         dropped: what was left out, and why.
-        sets: of an ambiguous verdict: the effects of which one is missing, each as fitted in the last model.
+        sets: effects that these data cannot tell apart: of an ambiguous verdict each as fitted in the last model, of an
+            unknown one as fitted where the first of them was added.
     """
 
     verdict: Verdict
@@ -176,7 +177,6 @@ def diagnose(
         if stays:
             verdict = Verdict("missing")  # to be said below: of a set, nothing is added to
             break
-    sets: tuple[tuple[Candidate, ...], ...] = ()
     added = len(named)
     ladder, named = done_without(ladder, named, material, limits, tell)
     if verdict.kind == "unknown" and len(named) < added:
@@ -186,10 +186,11 @@ def diagnose(
     if verdict.kind == "missing":
         ladder[-1], named = told_apart(ladder[-1], named, material, limits, tell)
         verdict = _said(ladder[-1], named, verdict, limits)
-        sets = tuple((n.candidate, *n.rivals) for n in named if n.rivals)
-    elif any(n.rivals for n in named):
+    sets = tuple((n.candidate, *others) for n in named if (others := _others(n, named)))
+    if sets and verdict.kind == "unknown":
         every = tuple(dict.fromkeys(c.tag for n in named for c in (n.candidate, *n.rivals)))
-        verdict = replace(verdict, set=every)
+        apart = undecided((), [[c.tag for c in group] for group in sets], _forms(named))
+        verdict = replace(verdict, set=every, text=f"{verdict.text} {apart.text}")
     if not any(ladder[-1].fit is f for f in (optimum, *(c.fit for r in rounds for c in r.candidates))):
         tell("standard deviations", 0.0)
         ladder[-1] = _certain(ladder[-1], material)
@@ -275,6 +276,11 @@ def _said(rung: Rung, named: Sequence[Named], verdict: Verdict, limits: Threshol
         phase, worst = worst_phase(rung.train, rung.held, limits)
         found = nearly(sure, phase, worst, tried=bool(verdict.reasons), reasons=verdict.reasons, forms=forms)
     return replace(found, confidence=float(np.prod([n.confidence for n in named])))
+
+
+def _others(one: Named, named: Sequence[Named]) -> list[Candidate]:
+    """Rivals of an effect that are not in the model themselves."""
+    return [r for r in one.rivals if all(r.tag != n.tag for n in named)]
 
 
 def _forms(named: Sequence[Named]) -> dict[str, dict[str, str]]:

@@ -152,7 +152,7 @@ def next_experiment(d: Diagnosis, progress: Callable[[str, float], None] | None 
 
     With several sets it is that of the first, and in ``others`` those of the others.
     """
-    if d.verdict.kind != "ambiguous" or not d.sets:
+    if not d.sets:
         return None
     first, *others = (_separating(rivals, d, progress) for rivals in d.sets)
     return {**first, "others": others} if others else first

@@ -261,6 +261,17 @@ def test_an_unknown_that_names_on_the_way_keeps_the_set(diagnose):
     assert found.verdict.kind == "unknown"
     assert found.verdict.effects == ("sensor-drift",)
     assert found.verdict.set == ("sensor-drift", "thermal-creep")
+    assert found.verdict.text.endswith("These data cannot tell sensor-drift and thermal-creep apart.")
+    assert [[c.composition.tags for c in group] for group in found.sets] == [[("sensor-drift",), ("thermal-creep",)]]
+
+
+def test_what_is_in_the_model_is_no_rival_of_what_is_in_it(diagnose):
+    pair = {tags: (cost, 6.0) for tags, (cost, _) in PAIR.items()}
+    found, _ = diagnose(pair | {("sensor-drift", "thermal-creep"): (100.0, MUCH)})
+    assert found.ladder[-1].model[2:] == ("sensor-drift", "thermal-creep")
+    assert (found.verdict.kind, found.verdict.set) == ("unknown", ("sensor-drift", "thermal-creep"))
+    assert found.sets == ()
+    assert "cannot tell" not in found.verdict.text
 
 
 CHAIN = {

@@ -75,8 +75,13 @@ def test_a_rival_that_was_not_fitted_leaves_the_catalogue(asked):
 
 
 @pytest.mark.parametrize("kind", ["complete", "missing", "unknown"])
-def test_only_what_is_ambiguous_needs_one(asked, kind):
-    assert summary.next_experiment(diagnosis(kind)) is None
+def test_only_what_cannot_be_told_apart_needs_one(asked, kind):
+    assert summary.next_experiment(SimpleNamespace(**{**vars(diagnosis(kind)), "sets": ()})) is None
+
+
+def test_what_cannot_be_told_apart_needs_one_also_where_more_is_missing(asked):
+    found = summary.next_experiment(diagnosis("unknown"))
+    assert (found["text"], found["separates"]) == ("hold the drive", list(PAIR))
 
 
 def test_conditions_are_those_of_the_measurement():
