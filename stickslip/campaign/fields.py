@@ -58,7 +58,9 @@ def quantity(
             and (below is None or number < below)
         )
         if not inside:
-            raise InputError("out of range", value=value, allowed=_range(unit, above, least, most, below))
+            bare = unit != "1" and not isinstance(value, str)
+            hint = f"a number alone is in {unit}; write the unit with it if it is another" if bare else None
+            raise InputError("out of range", value=value, allowed=_range(unit, above, least, most, below), hint=hint)
         return number
 
     return BeforeValidator(read)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import tomllib
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ from ..errors import InputError, nearest
 Kind = Literal["campaign", "scenario"]
 
 _MOST_BYTES = 10_000_000
+_SHOWN = 8  # files in a hint
+_ALIKE = 0.5  # of two names that one may have been meant by the other
 _COMMANDS = {"campaign": "inspect, fit and diagnose", "scenario": "simulate and creep"}
 
 
@@ -64,6 +67,17 @@ def _kind(content: dict[str, Any]) -> Kind | None:
     return "campaign" if measured else "scenario"
 
 
+def _instead(path: Path, kind: str) -> str:
+    """What was meant by a name that is not there: all such files end alike, so the ending says nothing."""
+    beside = sorted(path.parent.glob("*.toml")) if path.parent.is_dir() else []
+    close = [p.name for p in beside if difflib.SequenceMatcher(None, p.stem, path.stem).ratio() >= _ALIKE]
+    if close:
+        return nearest(path.name, close)
+    new = f"stickslip new {kind} FILE writes one to start from"
+    names = [repr(p.name) for p in beside[:_SHOWN]] + ["..."] * (len(beside) > _SHOWN)
+    return f"there is {', '.join(names)}; {new}" if names else new
+
+
 def _wanted(path: Path, kind: Kind) -> str:
     """How to mend it where something else was named, such as a file of measurements."""
     if kind == "scenario":
@@ -83,9 +97,7 @@ def _bytes(path: Path, kind: Kind) -> bytes:
             raise InputError(f"too large for a {kind} file", file=path, hint=_wanted(path, kind))
         return raw
     except FileNotFoundError:
-        beside = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-        hint = nearest(path.name, beside) if beside else f"stickslip new {kind} FILE writes one to start from"
-        raise InputError(f"the {kind} file is not there", file=path, hint=hint) from None
+        raise InputError(f"the {kind} file is not there", file=path, hint=_instead(path, kind)) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"the {kind} file cannot be opened ({reason})", file=path) from None

@@ -120,6 +120,17 @@ def test_a_missing_file_names_the_nearest_one(tmp_path):
     (tmp_path / "sphere.toml").write_text("")
     with pytest.raises(InputError, match=r"did you mean 'sphere\.toml'"):
         load_scenario(tmp_path / "spere.toml")
+    with pytest.raises(InputError, match="stickslip new scenario FILE"):  # all such files end alike
+        load_scenario(tmp_path / "rig.toml")
+
+
+def test_a_bare_number_out_of_range_is_told_its_unit(tmp_path):
+    path = write(tmp_path, rig())
+    with pytest.raises(InputError, match="at most 10 m/s\\n  to mend: a number alone is in m/s"):
+        load_scenario(path, ["drive.velocity=50"])
+    with pytest.raises(InputError) as told:
+        load_scenario(path, ["drive.velocity=50 m/s"])
+    assert told.value.hint is None
 
 
 def test_a_folder_is_no_scenario(tmp_path):
