@@ -491,6 +491,21 @@ def test_a_terminal_shows_both_traces_beside_the_explanation(capsys, monkeypatch
     assert with_it != without  # the effect is seen
 
 
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="threads are counted as Linux lists them")
+@pytest.mark.parametrize("chosen", ["", "2"])
+def test_linear_algebra_takes_one_thread_unless_told_otherwise(chosen):
+    environment = {key: value for key, value in os.environ.items() if not key.endswith("_THREADS")}
+    environment |= {"OPENBLAS_NUM_THREADS": chosen} if chosen else {}
+    code = (
+        "import os; from stickslip.cli import run; run(['--help'])\n"
+        "import numpy as np; np.linalg.svd(np.ones((300, 300)))\n"
+        "print('threads:', len(os.listdir('/proc/self/task')), file=__import__('sys').stderr)"
+    )
+    found = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=60)
+    cores = len(os.sched_getaffinity(0))
+    assert found.stderr == f"threads: {min(int(chosen or 1), cores)}\n"
+
+
 def test_compiled_code_is_kept_and_can_be_switched_off(scenario, tmp_path_factory):
     home = tmp_path_factory.mktemp("cache")
     set_here = ("JAX_", "STICKSLIP_", "EQX_")

@@ -16,7 +16,7 @@ from types import FrameType
 
 from cyclopts import App, CycloptsError, MissingArgumentError
 
-from .. import __version__, cache
+from .. import __version__, cache, threads
 from ..errors import InputError, StickslipError, nearest
 
 # module and function in it -> what it does, in one line
@@ -103,6 +103,7 @@ def keep_interrupts() -> None:
 def run(arguments: Sequence[str]) -> int:
     """Run a command line and return its exit code; every error is one message on stderr."""
     try:
+        threads.one_for_linear_algebra()
         cache.enable()
         result = make_app()(list(arguments), exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
