@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RunFolderError, StickslipError
+from ..lifeline import end_with
 from ..runstore import Run, json_text, open_run, versions
 from .mix import MIX, Case, case_seed, plan
 from .seal import CASES, TRUTH, make_seal
@@ -93,7 +94,7 @@ def _make_all(
     work = [(number, case) for number, case in enumerate(planned, start=1) if case.name not in made]
     root = str(run.folder)
     results = Parallel(n_jobs=max(1, min(jobs, len(work) or 1)), return_as="generator_unordered")(
-        delayed(make_case)(root, case, seed, number, grouped) for number, case in work
+        delayed(_made)(os.getpid(), root, case, seed, number, grouped) for number, case in work
     )
     for truth in results:
         made[truth["name"]] = truth
@@ -101,6 +102,12 @@ def _make_all(
         if tell is not None:
             tell(truth["name"], len(made) / len(planned))
     return made
+
+
+def _made(parent: int, *case: Any) -> dict[str, Any]:
+    """A case made in a worker."""
+    end_with(parent)
+    return make_case(*case)
 
 
 def _fingerprint(case: Case, grouped: bool) -> str:

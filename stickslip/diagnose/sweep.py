@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from ..effects.base import Effect
 from ..features.measurement import Measurement
 from ..fit.composition import Composition
 from ..fit.inertial import Fit
+from ..lifeline import end_with
 from .candidate import Candidate, forms_of
 from .pieces import candidate_arrays, candidate_from
 from .refit import FEW, MORE, afar, refine, settle
@@ -192,7 +194,7 @@ class Sweep:
             # a worker whose memory grew with what it compiled is replaced by a new one
             warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
             pool = Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1)
-            yield from pool(delayed(_named)(key, dumps(job), files) for key, job in work.items())
+            yield from pool(delayed(_named)(key, dumps(job), files, os.getpid()) for key, job in work.items())
 
 
 def best_forms(tags: Sequence[str], every: Sequence[Candidate]) -> list[Candidate]:
@@ -230,8 +232,9 @@ def _taken_for(leader: Candidate, found: Sequence[Candidate]) -> list[Candidate]
     return [c for tag in sorted(_like(leader.effect)) for c in [c for c in promised if c.tag == tag][:FORMS]]
 
 
-def _named(key: str, job: bytes, files: tuple[str, ...]) -> tuple[str, Candidate]:
+def _named(key: str, job: bytes, files: tuple[str, ...], parent: int) -> tuple[str, Candidate]:
     """Do a job in a worker, which loads the user's files first: a class that were itself pickled would be no pytree."""
+    end_with(parent)
     known = {getattr(module, "__file__", None) for module in catalogue.user_modules()}
     for path in files:
         if path not in known:

@@ -173,7 +173,7 @@ def diagnosis(folder: Path, out: Path, jobs: int) -> list[str]:
 def test_a_diagnosis_killed_at_twenty_random_moments(tmp_path, jobs):
     """`stickslip diagnose` of two runs; it ends between kills where all is done, and is begun anew then.
 
-    With two jobs the processes of the candidates outlive the kill for a while and find out by themselves.
+    With two jobs the processes of the candidates outlive the kill for a moment and find out by themselves.
     """
     small_campaign(tmp_path)
     began = time.monotonic()

@@ -1,0 +1,57 @@
+"""Workers of a process that was killed do not stay."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+# a sweep's jobs: each says which process does it, and takes long
+SWEEP = """
+import os, sys, time
+from pathlib import Path
+from stickslip.diagnose.sweep import Sweep
+def job(folder):
+    Path(folder, str(os.getpid())).touch()
+    time.sleep(60)
+work = {str(n): (job, (sys.argv[1],)) for n in range(4)}
+list(Sweep(None, 2, None, "sweep", print)._results(work))
+"""
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; one that has ended and waits to be collected does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are looked up as Linux lists them")
+def test_workers_of_a_killed_sweep_end(tmp_path):
+    process = subprocess.Popen([sys.executable, "-c", SWEEP, str(tmp_path)])
+    try:
+        until = time.monotonic() + 60.0
+        while len(list(tmp_path.iterdir())) < 2 and time.monotonic() < until:
+            time.sleep(0.1)
+        workers = [int(p.name) for p in tmp_path.iterdir()]
+        assert len(workers) == 2
+        assert all(alive(pid) for pid in workers)
+        process.kill()
+        process.wait()
+        until = time.monotonic() + 20.0
+        while any(alive(pid) for pid in workers) and time.monotonic() < until:
+            time.sleep(0.1)
+        assert not any(alive(pid) for pid in workers)
+    finally:
+        process.kill()
+        process.wait()
+        for path in tmp_path.iterdir():
+            with suppress(OSError):
+                os.kill(int(path.name), signal.SIGKILL)
