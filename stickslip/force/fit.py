@@ -1,0 +1,293 @@
+"""Gauss-Newton with exact derivatives; random effects and misfit within events in the likelihood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from ..errors import FitError
+from ..fit.parameters import Free
+from .problem import PULL, Point, Problem, Slopes
+from .scatter import Blocks, Known, Scatter, covariance, estimate
+
+Array = NDArray[np.float64]
+BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean
+FARTHEST = 1.5  # step of a parameter on the search scale
+ROUNDS = 10  # times that the scatter is estimated anew
+FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
+HALVINGS = 5  # of a step that does not lower the cost
+STEPS = 3  # of Gauss-Newton between
+SETTLED = 0.3  # fall of the cost (in units of chi-square) at which a round ends
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An optimum.
+
+    Attributes:
+        problem, point: what was fitted, and where.
+        slopes: residuals and derivatives there.
+        scatter: sizes of what is random.
+        dropped: points left out, for they lie beyond what else is random (a jump of the sensor), shape (p,).
+        known: what the covariance is made of.
+        blocks: points by event.
+        likelihood: twice the negative logarithm of the marginal likelihood of each event, shape (E,).
+        prior: of the shared parameters (chi-square).
+        covariance: of shared parameters, phases and weights, events marginalised.
+        strength: force of the contact at full strength (N).
+        evaluations: of the model.
+    """
+
+    problem: Problem
+    point: Point
+    slopes: Slopes
+    scatter: Scatter
+    dropped: NDArray[np.bool_]
+    known: Known
+    blocks: Blocks
+    likelihood: Array
+    prior: float
+    covariance: Array
+    strength: float
+    evaluations: int
+
+    @property
+    def cost(self) -> float:
+        """Twice the negative logarithm of likelihood and priors."""
+        return float(self.likelihood.sum()) + self.prior
+
+    @property
+    def residual(self) -> Array:
+        """Residual force with every event at its own best strength, stretch and offset (N), shape (p,)."""
+        return self.slopes.residual
+
+    @property
+    def marginal(self) -> Array:
+        """Residual force with all events alike (N), shape (p,)."""
+        return self.slopes.residual - (self.slopes.local * self.point.events[self.problem.of]).sum(axis=1)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Name -> SI value of what is shared."""
+        return self.problem.values(self.point)
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        """What is shared."""
+        return self.problem.composition.shared
+
+    def std(self) -> dict[str, float]:
+        """Name -> standard deviation (SI)."""
+        sd = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return {f.name: float(s * f.slope(float(z))) for f, s, z in zip(self.free, sd, self.point.z, strict=False)}
+
+
+class _System:
+    """The linear system of one step."""
+
+    def __init__(self, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks):
+        self.problem, self.point, self.slopes = problem, point, slopes
+        # what the noise is carried by stays as it is, or costs would jump; derivatives in the events are those here
+        known = replace(known, local=blocks(slopes.local))
+        self.known, self.blocks, self.scatter = known, blocks, scatter
+        plain, whole = (np.asarray(a) for a in covariance(scatter.sizes, known))
+        self.plain = np.linalg.cholesky(plain)
+        self.whole = np.linalg.cholesky(whole)
+        self.random = np.exp(2.0 * scatter.sizes[:3])
+        prior, target = prior_rows(problem, point)
+        self.prior, self.target = prior, target
+        local = blocks(slopes.local)
+        self.local = local
+        marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", local, point.events)
+        self.marginal = marginal
+        side = np.concatenate([blocks(slopes.shared), marginal[..., None]], axis=2)
+        white = np.linalg.solve(self.whole, side)
+        self.rows, self.rest = white[..., :-1], white[..., -1]
+
+    def objective(self, point: Point, slopes: Slopes) -> float:
+        """Of residual, random effects and priors, with this covariance."""
+        white = np.linalg.solve(self.plain, self.blocks(slopes.residual)[..., None])[..., 0]
+        rows, target = prior_rows(self.problem, point)
+        return float((white**2).sum() + (point.events**2 / self.random).sum() + (target**2).sum())
+
+    def step(self) -> tuple[Array, Array]:
+        """Changes of the shared parameters and the events' own values after it."""
+        rows = self.rows.reshape(-1, self.rows.shape[-1])
+        normal = rows.T @ rows + self.prior.T @ self.prior
+        right = rows.T @ self.rest.ravel() + self.prior.T @ self.target
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        root = np.linalg.cholesky(normal * scale[:, None] * scale + 1e-11 * np.eye(len(normal)))
+        low, high = reach(self.problem, self.point)
+        tall = np.maximum(high - low, 1e-12)
+        found = lsq_linear(
+            root.T, -np.linalg.solve(root, right * scale), (low / scale, (low + tall) / scale), method="bvls"
+        )
+        change = found.x * scale
+        left = self.marginal + np.einsum("eip,p->ei", self.blocks(self.slopes.shared), change)
+        weighted = np.linalg.solve(np.swapaxes(self.whole, 1, 2), np.linalg.solve(self.whole, left[..., None]))[..., 0]
+        events = -self.random * np.einsum("eia,ei->ea", self.local, weighted)
+        return change, events
+
+    def covariance(self) -> Array:
+        """Of the shared parameters; what stands at a bound does not move."""
+        rows = self.rows.reshape(-1, self.rows.shape[-1])
+        normal = rows.T @ rows + self.prior.T @ self.prior
+        low, high = reach(self.problem, self.point)
+        free = np.flatnonzero((low < 0.0) & (high > 0.0))
+        out = np.zeros_like(normal)
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(normal)[free], 1e-300))
+        part = normal[np.ix_(free, free)] * scale[:, None] * scale
+        out[np.ix_(free, free)] = np.linalg.pinv(part, hermitian=True) * scale[:, None] * scale
+        return out
+
+    def likelihood(self) -> Array:
+        logs = np.log(np.diagonal(self.whole, axis1=1, axis2=2))
+        return (self.rest**2).sum(axis=1) + 2.0 * np.where(self.known.there, logs, 0.0).sum(axis=1)
+
+
+def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
+    """Rows of the priors over their standard deviations, and where the parameters stand in them."""
+    shared = problem.composition.shared
+    a, k = len(shared), point.weights.size
+    b = point.phases.size
+    size = a + b + k
+    rows, target = [], []
+    for i, f in enumerate(shared):
+        if np.isfinite(f.width):
+            row = np.zeros(size)
+            row[i] = 1.0 / f.width
+            rows.append(row)
+            target.append((point.z[i] - f.inward(f.prior)) / f.width)
+    for j, f in enumerate(problem.composition.phases):
+        if f.name == PULL:
+            for r, run in enumerate(problem.runs):
+                row = np.zeros(size)
+                row[a + j * len(problem.runs) + r] = 1e6 if run.virgin else 0.1
+                rows.append(row)
+                target.append(row.max() * point.phases[j, r] if run.virgin else 0.0)
+    level, deviation = problem.composition.nominal
+    if np.isfinite(deviation):
+        row = np.zeros(size)
+        row[a + b :] = 1.0 / point.weights.sum() / deviation
+        rows.append(row)
+        target.append((np.log(point.weights.sum()) - np.log(level)) / deviation)
+    unit = point.weights.sum() / k
+    bend = np.zeros((k - 2, size))
+    bend[:, a + b :] = np.diff(np.eye(k), 2, axis=0) / (BEND * unit)
+    return np.vstack([*rows, bend]), np.concatenate([target, bend[:, a + b :] @ point.weights])
+
+
+def moved(problem: Problem, point: Point, change: Array, events: Array) -> Point:
+    """The point after a step, within the bounds."""
+    shared = problem.composition.shared
+    a, b = point.z.size, point.phases.size
+    phases = point.phases + change[a : a + b].reshape(point.phases.shape)
+    return Point(point.z + change[:a], phases, np.maximum(point.weights + change[a + b :], 0.0), events)
+
+
+def reach(problem: Problem, point: Point) -> tuple[Array, Array]:
+    """The least and the largest change of every shared parameter."""
+    shared = problem.composition.shared
+    b = np.full(point.phases.size, np.inf)
+    bounds = np.array([f.bounds for f in shared]).reshape(-1, 2).T
+    low, high = np.maximum(bounds[0] - point.z, -FARTHEST), np.minimum(bounds[1] - point.z, FARTHEST)
+    empty = np.zeros(point.weights.size)
+    return np.concatenate([low, -b, empty - point.weights]), np.concatenate([high, b, empty + np.inf])
+
+
+def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size: int) -> NDArray[np.bool_]:
+    """Points that what else is known of their event would not let expect, shape (p,)."""
+    _, whole = covariance(scatter.sizes, known)
+    inverse = np.linalg.inv(np.asarray(whole))
+    z = np.einsum("eij,ej->ei", inverse, marginal) / np.sqrt(np.diagonal(inverse, axis1=1, axis2=2))
+    out = np.zeros(size, bool)
+    out[blocks.index[blocks.there]] = np.abs(z[blocks.there]) > FAR
+    return out
+
+
+def known_of(
+    problem: Problem, slopes: Slopes, blocks: Blocks, strength: float, values: dict[str, float],
+    dropped: NDArray[np.bool_],
+) -> Known:  # fmt: skip
+    """What the covariance is made of, at a point."""
+    noise = np.hypot(
+        (slopes.tangent + values.get("rig.spring_stiffness", 0.0)) * problem.white, values["rig.mass"] * problem.shaken
+    )
+    noise = np.where(dropped, strength, noise)
+    return Known(
+        blocks(noise), blocks(slopes.local), blocks(problem.phase), blocks(slopes.tangent), blocks(problem.place),
+        blocks.there, strength,
+    )  # fmt: skip
+
+
+def fit(
+    problem: Problem, point: Point, scatter: Scatter | None = None, *, rounds: int = ROUNDS, steps: int = STEPS,
+    estimated: bool = True, dropped: NDArray[np.bool_] | None = None, verbose: bool = False,
+) -> Fit:  # fmt: skip
+    """Find the optimum.
+
+    Args:
+        problem: data and composition.
+        point: where to begin.
+        scatter: sizes of what is random; default what is usually expected, estimated after the first round.
+        rounds, steps: of the search.
+        estimated: whether the sizes are estimated anew.
+        dropped: points left out; default those that are found to lie far off.
+
+    Raises:
+        FitError: the model gives no finite force at the start.
+    """
+    blocks = Blocks.of(problem.of, problem.events)
+    scatter = Scatter.wide() if scatter is None else scatter
+    slopes = problem.evaluate(point)
+    evaluations, drops = 1, dropped is None
+    dropped = np.zeros(problem.of.size, bool) if dropped is None else dropped
+    if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
+        raise FitError("the model gives no finite force along the motion")
+    for turn in range(rounds):
+        strength = float(point.weights.sum())
+        known = known_of(problem, slopes, blocks, strength, problem.values(point), dropped)
+        if estimated and turn:
+            marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", known.local, point.events)
+            scatter = estimate(scatter, marginal, known)
+            if drops:
+                more = beyond(known, scatter, marginal, blocks, dropped.size) & ~dropped
+                if more.any():
+                    dropped = dropped | more
+                    known = known_of(problem, slopes, blocks, strength, problem.values(point), dropped)
+                    scatter = estimate(scatter, marginal, known)
+        total = 0.0
+        for _ in range(steps):
+            system = _System(problem, point, slopes, scatter, known, blocks)
+            now = system.objective(point, slopes)
+            fallen, share = 0.0, 1.0
+            change, events = system.step()
+            for _ in range(HALVINGS):
+                trial = moved(problem, point, share * change, point.events + share * (events - point.events))
+                there = problem.evaluate(trial)
+                evaluations += 1
+                then = system.objective(trial, there) if np.isfinite(there.residual).all() else np.inf
+                if then < now:
+                    point, slopes, fallen = trial, there, now - then
+                    break
+                share *= 0.3
+            if verbose:
+                print(turn, round(now, 1), round(fallen, 2), share, {n: f"{v:.4g}" for n, v in problem.values(point).items()})
+            total += fallen
+            if fallen < SETTLED:
+                break
+        if verbose:
+            print({n: f"{v:.3g}" for n, v in scatter.named().items()})
+        if turn > 2 and total < 1.0:
+            break
+    strength = float(point.weights.sum())
+    known = known_of(problem, slopes, blocks, strength, problem.values(point), dropped)
+    system = _System(problem, point, slopes, scatter, known, blocks)
+    return Fit(
+        problem, point, slopes, scatter, dropped, known, blocks, system.likelihood(),
+        float((system.target**2).sum()), system.covariance(), strength, evaluations,
+    )  # fmt: skip
+
