@@ -14,8 +14,10 @@ import jax.numpy as jnp
 from jax import Array
 
 from ..contact import Bank
-from ..effects.base import Contact, Drive, Effect, Memory, Motion, Sensor
+from ..effects.base import Contact, Drive, Memory, Motion, Sensor
 from ..model import Model, State
+
+PASSES = 4  # of undoing the sensor
 
 
 class Way(NamedTuple):
@@ -69,9 +71,6 @@ def along(model: Model, way: Way) -> Held:
     led = lead(model, way.t, way.drive)
     mass = model.mass()
     start = model.rest(way.t[0], way.x[0], way.v[0])
-    start = State(
-        start.x, start.v, start.force, start.cap, start.stiffness, start.psi, start.memory, start.work
-    )
 
     def step(carry: tuple[State, Array], item: tuple[Array, ...]) -> tuple[tuple[State, Array], tuple[Array, ...]]:
         state, pull = carry
@@ -104,53 +103,52 @@ def along(model: Model, way: Way) -> Held:
 
 
 def undone(model: Model, way: Way, force: Array) -> Way:
-    """The motion of the block from that of the reading: the chain of sensor effects undone, knot by knot.
+    """The motion of the block from that of the reading: the chain of sensor effects undone.
+
+    By van Cittert's iteration ``x <- x + (reading - sensor(x))``, which needs nothing but the sensor itself; it ends
+    for every filter that loses or delays less than it shows, after few passes where it changes little.
 
     Args:
         model: with effects on the sensor.
         way: the reading in place of the displacement.
         force: that the contact holds at the knots (N), for sensors that see it, shape (n,).
     """
-    sensors: list[Effect] = sorted((e for e in model.effects if isinstance(e, Sensor)), key=_place)
-    if not sensors:
+    if not any(isinstance(e, Sensor) for e in model.effects):
         return way
+    seen = way.x
+    for _ in range(PASSES):
+        shift = way.x + (seen - read(model, way, force)) - seen
+        way = way._replace(x=seen + shift, v=way.v + _slope(shift, way.t) - _slope(way.x - seen, way.t))
+    return way
+
+
+def read(model: Model, way: Way, force: Array) -> Array:
+    """What the sensors show of a motion (m), shape (n,); arguments as of :func:`undone`, ``way`` that of the block."""
+    sensors: list[Any] = sorted((e for e in model.effects if isinstance(e, Sensor)), key=lambda e: e.place)
     bank = model.shaped()
     memory = tuple(e.start(bank) if isinstance(e, Memory) else () for e in sensors)
-    zero = jnp.zeros_like(bank.stiffness)
-    mass = model.mass()
+    zero, mass = jnp.zeros_like(bank.stiffness), model.mass()
 
-    def step(carry: tuple[Any, Array, Array, Array], item: tuple[Array, ...]) -> tuple[Any, tuple[Array, Array]]:
-        states, x0, y0, v0 = carry
-        t, dt, y, v, at, f = item
-        contact = Contact(zero, bank.stiffness, bank.strength, at - x0, zero, mass)
+    def step(states: Any, item: tuple[Array, ...]) -> tuple[Any, Array]:
+        t, dt, x, dx, v, at, f = item
+        contact = Contact(zero, bank.stiffness, bank.strength, f, zero, mass)
+        motion = Motion(t, dt, x, v, jnp.zeros(()), dx, at)
+        states = tuple(
+            e.advance(m, motion, contact) if isinstance(e, Memory) else m for e, m in zip(sensors, states, strict=True)
+        )
+        shown = x
+        for e, m in zip(sensors, states, strict=True):
+            shown = e.read(m, shown, motion, f)
+        return states, shown
 
-        def read(shift: Array) -> tuple[Array, Any]:
-            # how much the block moved beyond what the reading did; its velocity changes along
-            dx = y - y0 + shift
-            motion = Motion(t, dt, x0 + dx, v + 2.0 * shift / dt - v0, jnp.zeros(()), dx, at)
-            after = tuple(
-                e.advance(m, motion, contact) if isinstance(e, Memory) else m
-                for e, m in zip(sensors, states, strict=True)
-            )
-            seen = x0 + dx
-            for e, m in zip(sensors, after, strict=True):
-                seen = e.read(m, seen, motion, f)  # type: ignore[attr-defined]
-            return seen, after
-
-        shift = jnp.zeros(())
-        for _ in range(2):  # a chain of linear filters is undone by the first
-            (seen, slope) = jax.jvp(lambda s: read(s)[0], (shift,), (jnp.ones(()),))
-            shift = shift - (seen - y) / slope
-        _, after = read(shift)
-        x = x0 + (y - y0) + shift
-        return (after, x, y, 2.0 * shift / dt - v0), (x, v + 2.0 * shift / dt - v0)
-
-    dt = jnp.diff(way.t)
-    items = (way.t[1:], dt, way.x[1:], way.v[1:], way.drive[1:], force[1:])
-    first = (memory, way.x[0], way.x[0], jnp.zeros(()))
-    _, (x, v) = jax.lax.scan(step, first, items)
-    return way._replace(x=jnp.concatenate([way.x[:1], x]), v=jnp.concatenate([way.v[:1], v]))
+    items = (way.t[1:], jnp.diff(way.t), way.x[1:], jnp.diff(way.x), way.v[1:], way.drive[1:], force[1:])
+    _, shown = jax.lax.scan(step, memory, items)
+    return jnp.concatenate([way.x[:1], shown])
 
 
-def _place(effect: Effect) -> int:
-    return getattr(effect, "place", 0)
+def _slope(y: Array, t: Array) -> Array:
+    """Rate of change at the knots by parabolas through three of them."""
+    dt, dy = jnp.diff(t), jnp.diff(y)
+    rate = dy / dt
+    inner = (rate[:-1] * dt[1:] + rate[1:] * dt[:-1]) / (dt[:-1] + dt[1:])
+    return jnp.concatenate([rate[:1], inner, rate[-1:]])

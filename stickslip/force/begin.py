@@ -105,7 +105,7 @@ def begin(
     composition = Composition(mass, yields, tuple(free), fixed, (), (nominal, width_nominal))
     problem = Problem(composition, runs)
     flat = np.full(elements, strength / elements)
-    point = Point(vector(composition.shared), begun, flat, np.zeros((problem.events, 3)))
+    point = Point(vector(composition.shared), begun, flat, np.zeros((problem.events, 3)), np.zeros(problem.cycles.shape[1]))
     return problem, _weighed(problem, point, strength)
 
 
@@ -119,11 +119,12 @@ def _weighed(problem: Problem, point: Point, strength: float) -> Point:
     """The point with weights by non-negative least squares."""
     slopes = problem.evaluate(point)
     k = point.weights.size
-    share = -slopes.shared[:, -k:]
+    c = point.common.size
+    share = -slopes.shared[:, -k - c : -c]
     sigma = np.hypot(slopes.tangent * 3e-9, 0.01 * strength)
     measured = slopes.residual + slopes.held
     smooth = np.diff(np.eye(k), 2, axis=0) * 10.0 * k / strength / 3.0
     weights, _ = nnls(
         np.vstack([share / sigma[:, None], smooth]), np.concatenate([measured / sigma, np.zeros(k - 2)]), maxiter=50 * k
     )
-    return Point(point.z, point.phases, weights, point.events)
+    return Point(point.z, point.phases, weights, point.events, point.common)

@@ -15,10 +15,12 @@ from .scatter import Blocks, Known, Scatter, covariance, estimate
 
 Array = NDArray[np.float64]
 BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean
+SYSTEMATIC = 1e-9  # m, of the position: what quantisation, filters and hum may leave alike in all cycles
 FARTHEST = 1.5  # step of a parameter on the search scale
 ROUNDS = 10  # times that the scatter is estimated anew
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
 HALVINGS = 5  # of a step that does not lower the cost
+LAST = 15  # steps with the covariance as it was found
 STEPS = 3  # of Gauss-Newton between
 SETTLED = 0.3  # fall of the cost (in units of chi-square) at which a round ends
 
@@ -121,9 +123,9 @@ class _System:
         scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
         root = np.linalg.cholesky(normal * scale[:, None] * scale + 1e-11 * np.eye(len(normal)))
         low, high = reach(self.problem, self.point)
-        tall = np.maximum(high - low, 1e-12)
+        high = np.where(high - low > 1e-12, high, low + 1e-12)
         found = lsq_linear(
-            root.T, -np.linalg.solve(root, right * scale), (low / scale, (low + tall) / scale), method="bvls"
+            root.T, -np.linalg.solve(root, right * scale), (low / scale, high / scale), method="bvls"
         )
         change = found.x * scale
         left = self.marginal + np.einsum("eip,p->ei", self.blocks(self.slopes.shared), change)
@@ -152,8 +154,8 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
     """Rows of the priors over their standard deviations, and where the parameters stand in them."""
     shared = problem.composition.shared
     a, k = len(shared), point.weights.size
-    b = point.phases.size
-    size = a + b + k
+    b, c = point.phases.size, point.common.size
+    size = a + b + k + c
     rows, target = [], []
     for i, f in enumerate(shared):
         if np.isfinite(f.width):
@@ -171,13 +173,18 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
     level, deviation = problem.composition.nominal
     if np.isfinite(deviation):
         row = np.zeros(size)
-        row[a + b :] = 1.0 / point.weights.sum() / deviation
+        row[a + b : a + b + k] = 1.0 / point.weights.sum() / deviation
         rows.append(row)
         target.append((np.log(point.weights.sum()) - np.log(level)) / deviation)
     unit = point.weights.sum() / k
     bend = np.zeros((k - 2, size))
-    bend[:, a + b :] = np.diff(np.eye(k), 2, axis=0) / (BEND * unit)
-    return np.vstack([*rows, bend]), np.concatenate([target, bend[:, a + b :] @ point.weights])
+    bend[:, a + b : a + b + k] = np.diff(np.eye(k), 2, axis=0) / (BEND * unit)
+    alike = np.zeros((c, size))
+    alike[:, a + b + k :] = np.eye(c) / SYSTEMATIC
+    return (
+        np.vstack([*rows, bend, alike]),
+        np.concatenate([target, bend[:, a + b : a + b + k] @ point.weights, point.common / SYSTEMATIC]),
+    )
 
 
 def moved(problem: Problem, point: Point, change: Array, events: Array) -> Point:
@@ -185,7 +192,9 @@ def moved(problem: Problem, point: Point, change: Array, events: Array) -> Point
     shared = problem.composition.shared
     a, b = point.z.size, point.phases.size
     phases = point.phases + change[a : a + b].reshape(point.phases.shape)
-    return Point(point.z + change[:a], phases, np.maximum(point.weights + change[a + b :], 0.0), events)
+    k = point.weights.size
+    weights = np.maximum(point.weights + change[a + b : a + b + k], 0.0)
+    return Point(point.z + change[:a], phases, weights, events, point.common + change[a + b + k :])
 
 
 def reach(problem: Problem, point: Point) -> tuple[Array, Array]:
@@ -194,8 +203,8 @@ def reach(problem: Problem, point: Point) -> tuple[Array, Array]:
     b = np.full(point.phases.size, np.inf)
     bounds = np.array([f.bounds for f in shared]).reshape(-1, 2).T
     low, high = np.maximum(bounds[0] - point.z, -FARTHEST), np.minimum(bounds[1] - point.z, FARTHEST)
-    empty = np.zeros(point.weights.size)
-    return np.concatenate([low, -b, empty - point.weights]), np.concatenate([high, b, empty + np.inf])
+    more, c = np.full(point.weights.size, np.inf), np.full(point.common.size, np.inf)
+    return np.concatenate([low, -b, -point.weights, -c]), np.concatenate([high, b, more, c])
 
 
 def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size: int) -> NDArray[np.bool_]:
@@ -219,13 +228,14 @@ def known_of(
     noise = np.where(dropped, strength, noise)
     return Known(
         blocks(noise), blocks(slopes.local), blocks(problem.phase), blocks(slopes.tangent), blocks(problem.place),
-        blocks.there, strength,
+        blocks(problem.elapsed), blocks.there, strength,
     )  # fmt: skip
 
 
 def fit(
     problem: Problem, point: Point, scatter: Scatter | None = None, *, rounds: int = ROUNDS, steps: int = STEPS,
-    estimated: bool = True, dropped: NDArray[np.bool_] | None = None, verbose: bool = False,
+    estimated: bool = True, dropped: NDArray[np.bool_] | None = None,
+    first: bool = False, known: Known | None = None, verbose: bool = False,
 ) -> Fit:  # fmt: skip
     """Find the optimum.
 
@@ -235,6 +245,8 @@ def fit(
         scatter: sizes of what is random; default what is usually expected, estimated after the first round.
         rounds, steps: of the search.
         estimated: whether the sizes are estimated anew.
+        known: what the covariance is made of, kept as it is: else costs of two models cannot be compared.
+        first: whether the sizes are estimated before the first step too (else after the first round).
         dropped: points left out; default those that are found to lie far off.
 
     Raises:
@@ -247,47 +259,57 @@ def fit(
     dropped = np.zeros(problem.of.size, bool) if dropped is None else dropped
     if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
         raise FitError("the model gives no finite force along the motion")
-    for turn in range(rounds):
-        strength = float(point.weights.sum())
-        known = known_of(problem, slopes, blocks, strength, problem.values(point), dropped)
-        if estimated and turn:
-            marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", known.local, point.events)
-            scatter = estimate(scatter, marginal, known)
-            if drops:
-                more = beyond(known, scatter, marginal, blocks, dropped.size) & ~dropped
-                if more.any():
-                    dropped = dropped | more
-                    known = known_of(problem, slopes, blocks, strength, problem.values(point), dropped)
-                    scatter = estimate(scatter, marginal, known)
-        total = 0.0
-        for _ in range(steps):
-            system = _System(problem, point, slopes, scatter, known, blocks)
+
+    def here() -> Known:
+        if known is not None:
+            return known
+        return known_of(problem, slopes, blocks, float(point.weights.sum()), problem.values(point), dropped)
+
+    def descend(point: Point, slopes: Slopes, made: Known, most: int) -> tuple[Point, Slopes, float, int]:
+        """Gauss-Newton steps with the covariance as it is, until the cost falls no more."""
+        total, count = 0.0, 0
+        for _ in range(most):
+            system = _System(problem, point, slopes, scatter, made, blocks)
             now = system.objective(point, slopes)
             fallen, share = 0.0, 1.0
             change, events = system.step()
             for _ in range(HALVINGS):
                 trial = moved(problem, point, share * change, point.events + share * (events - point.events))
                 there = problem.evaluate(trial)
-                evaluations += 1
+                count += 1
                 then = system.objective(trial, there) if np.isfinite(there.residual).all() else np.inf
                 if then < now:
                     point, slopes, fallen = trial, there, now - then
                     break
                 share *= 0.3
             if verbose:
-                print(turn, round(now, 1), round(fallen, 2), share, {n: f"{v:.4g}" for n, v in problem.values(point).items()})
+                print(round(now, 1), round(fallen, 2), share, problem.values(point))
             total += fallen
             if fallen < SETTLED:
                 break
-        if verbose:
-            print({n: f"{v:.3g}" for n, v in scatter.named().items()})
+        return point, slopes, total, count
+
+    for turn in range(rounds if estimated else 0):
+        made = here()
+        if turn or first:
+            marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
+            scatter = estimate(scatter, marginal, made)
+            if drops:
+                more = beyond(made, scatter, marginal, blocks, dropped.size) & ~dropped
+                if more.any():
+                    dropped = dropped | more
+                    made = here()
+                    scatter = estimate(scatter, marginal, made)
+        point, slopes, total, count = descend(point, slopes, made, steps)
+        evaluations += count
         if turn > 2 and total < 1.0:
             break
-    strength = float(point.weights.sum())
-    known = known_of(problem, slopes, blocks, strength, problem.values(point), dropped)
-    system = _System(problem, point, slopes, scatter, known, blocks)
+    made = here()
+    point, slopes, _, count = descend(point, slopes, made, LAST)
+    evaluations += count
+    system = _System(problem, point, slopes, scatter, made, blocks)
     return Fit(
-        problem, point, slopes, scatter, dropped, known, blocks, system.likelihood(),
-        float((system.target**2).sum()), system.covariance(), strength, evaluations,
+        problem, point, slopes, scatter, dropped, replace(made, local=blocks(slopes.local)), blocks, system.likelihood(),
+        float((system.target**2).sum()), system.covariance(), float(point.weights.sum()), evaluations,
     )  # fmt: skip
 

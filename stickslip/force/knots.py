@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import savgol_filter
 from scipy.sparse import coo_array, csr_array
@@ -28,6 +29,8 @@ TOWARDS, EVEN = 36, 16  # windows of a stick: spaced as the logarithm of the tim
 RINGS = 12.0  # periods after an arrest that are followed sample by sample
 BEFORE = 8.0  # half-widths of the test function before an onset from where every sample is followed
 SHARE = 0.25  # of a stick that the samples of either end may take
+UNSTEADY = 4.0  # levels of slow noise by which two windows must differ
+BACK = 5.0  # noise levels of one sample within which a step back is noise
 HASTE = 5.0  # noise levels that the block moves in a window of the nucleation
 HUM = 50.0  # Hz, the mains
 
@@ -69,6 +72,7 @@ class Knots:
         white: standard deviation of the reading at the points, from the noise of one sample (m).
         shaken: the same of the acceleration (m/s2).
         place: coordinate along which misfits are alike, one unit apart little (1).
+        elapsed: time since the arrest before, or the start (s).
         noise: standard deviation of one sample (m).
         stiffness: of the driving spring, where this run has its own (N/m).
         virgin: whether the contact is force-free at the start.
@@ -91,6 +95,7 @@ class Knots:
     white: Array
     shaken: Array
     place: Array
+    elapsed: Array
     noise: float
     stiffness: float | None
     virgin: bool
@@ -128,13 +133,14 @@ def kernels(half: float, rate: float) -> tuple[Array, Array, Array]:
     return phi, first, second
 
 
-def knots(trace: Trace, found: Segmentation, times: Scales) -> Knots:
+def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None = None) -> Knots:
     """Thin a run.
 
     Args:
         trace: with displacement and drive.
         found: its events, at least one.
         times: of the campaign.
+        extra: added to every sample once it is decided where the knots are (m).
     """
     assert trace.displacement is not None and trace.drive is not None
     t, x = _even(trace.time, trace.displacement)
@@ -144,9 +150,14 @@ def knots(trace: Trace, found: Segmentation, times: Scales) -> Knots:
     x = x - _hum(t, x, found.events, rate, times)
     smoothed, speed = _smooth(x, noise, rate, times)
     breaks = np.searchsorted(t, trace.drive.breakpoints)
+    steady, raw = speed, x
+    step = max(trace.resolution or 0.0, 2.0 * noise, UNSTEADY * _unsteady(x, t, found.events, rate))
+    if extra is not None:
+        x = x + extra[: x.size]
+        smoothed, speed = _smooth(x, noise, rate, times)
     phi, first, second = kernels(times.half, rate)
     h = phi.size // 2
-    pieces = _Pieces()
+    pieces = _Pieces(step)
     pieces.start(t, x, d)
     edge = 1
     n = t.size
@@ -154,17 +165,17 @@ def knots(trace: Trace, found: Segmentation, times: Scales) -> Knots:
     for e, event in enumerate(events):
         begin, end = _fast(events, e, times, rate, n, t, h)
         begin = max(begin, edge + 1)
-        pieces.windows(_edges(edge, begin, event.i_onset, breaks), e, t, x, d)
+        pieces.windows(_apart(_edges(edge, begin, event.i_onset, breaks), raw, step, breaks), e, t, x, d)
         if end <= begin:
             continue
         onset = min(max(event.i_onset, begin), end)
-        pieces.windows(_hasty(begin, onset, speed, noise, rate, h), e, t, x, d, compared=False)
+        pieces.windows(_hasty(begin, onset, steady, noise, rate, h), e, t, x, d, compared=False)
         pieces.samples(_thin(onset, end, event, times, rate, h), t, smoothed, speed, d, events, e)
         pieces.compare(begin + h, end - h, h, t, x, event, e, times, (phi, first, second), noise)
         edge = end
     if n - edge > 4 * h:
         last = len(events)
-        pieces.windows(_edges(edge, n, n, breaks), last, t, x, d, compared=False)
+        pieces.windows(_apart(_edges(edge, n, n, breaks), raw, step, breaks), last, t, x, d, compared=False)
     return pieces.made(trace, t, (phi, first, second), events, noise, times)
 
 
@@ -202,6 +213,20 @@ def _hum(t: Array, x: Array, events: tuple[Event, ...], rate: float, times: Scal
     found, *_ = np.linalg.lstsq(basis[still][keep], rest[keep], rcond=None)
     spread = float(np.std(rest[keep])) * np.sqrt(2.0 / keep.sum()) * np.sqrt(width)
     return basis @ found if np.hypot(*found) > 4.0 * spread else np.zeros_like(x)
+
+
+def _unsteady(x: Array, t: Array, events: tuple[Event, ...], rate: float) -> float:
+    """Slow noise of the reading (m): how far means over a hundredth of a stick stray from a line through two others."""
+    found = []
+    for before, event in zip(events, events[1:], strict=False):
+        a = int(np.searchsorted(t, before.t_arrest + 0.4 * (event.t_onset - before.t_arrest)))
+        b = int(np.searchsorted(t, before.t_arrest + 0.8 * (event.t_onset - before.t_arrest)))
+        width = (b - a) // 40
+        if width < 2:
+            continue
+        mean = x[a : a + 40 * width].reshape(40, width).mean(axis=1)
+        found.append(np.median(np.abs(np.diff(mean, 2))) / 0.6745 / np.sqrt(6.0))
+    return float(np.median(found)) if found else 0.0
 
 
 def _smooth(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, Array]:
@@ -264,6 +289,28 @@ def _edges(low: int, high: int, onset: int, breaks: Index) -> Index:
     return np.array(keep)
 
 
+def _apart(edges: Index, x: Array, step: float, breaks: Index) -> Index:
+    """Windows joined until the block moves by ``step`` (m) from one to the next: less is the sensor's count.
+
+    The mean over a reading that stands still says nothing of where within the count the block is. The drive's
+    breakpoints remain.
+    """
+    if edges.size < 4:
+        return edges
+    total = np.cumsum(np.insert(x[edges[0] : edges[-1]], 0, 0.0))
+    kept = [edges[0]]
+    last: float | None = None
+    for k in range(1, edges.size):
+        a, b = kept[-1] - edges[0], edges[k] - edges[0]
+        mean = (total[b] - total[a]) / (b - a)
+        if last is None or abs(mean - last) >= step or edges[k] in breaks:
+            kept.append(edges[k])
+            last = mean
+    if kept[-1] != edges[-1]:
+        kept[-1] = edges[-1]
+    return np.array(kept)
+
+
 def _hasty(low: int, high: int, speed: Array, noise: float, rate: float, h: int) -> Index:
     """Edges of the windows of the nucleation: so long that the block's way in one stands out of the noise of its mean.
 
@@ -291,19 +338,21 @@ def _thin(begin: int, end: int, event: Event, times: Scales, rate: float, h: int
 class _Pieces:
     """Knots and points as they are made."""
 
-    def __init__(self) -> None:
+    def __init__(self, step: float) -> None:
+        self.step = step
         self.t: list[Array] = []
         self.x: list[Array] = []
         self.v: list[Array] = []
         self.d: list[Array] = []
+        self.weight: list[Array] = []
         self.event: list[Index] = []
         self.slow: list[NDArray[np.bool_]] = []
         self.size = 0
         self.points: list[dict[str, Array]] = []
         self.windowed: list[tuple[Index, Index]] = []
 
-    def _add(self, t: Array, x: Array, v: Array, d: Array, event: Index, slow: bool) -> Index:
-        for into, what in ((self.t, t), (self.x, x), (self.v, v), (self.d, d), (self.event, event)):
+    def _add(self, t: Array, x: Array, v: Array, d: Array, event: Index, slow: bool, weight: Array) -> Index:
+        for into, what in ((self.t, t), (self.x, x), (self.v, v), (self.d, d), (self.event, event), (self.weight, weight)):
             into.append(what)
         self.slow.append(np.full(t.size, slow))
         index = np.arange(self.size, self.size + t.size)
@@ -312,7 +361,7 @@ class _Pieces:
 
     def start(self, t: Array, x: Array, d: Array) -> None:
         """Where the record begins."""
-        self._add(t[:1], x[:1], np.zeros(1), d[:1], np.zeros(1, int), True)
+        self._add(t[:1], x[:1], np.zeros(1), d[:1], np.zeros(1, int), True, np.ones(1))
 
     def windows(self, edges: Index, e: int, t: Array, x: Array, d: Array, compared: bool = True) -> None:
         """Means over the windows between ``edges``."""
@@ -320,7 +369,7 @@ class _Pieces:
         if count.size == 0 or edges[-1] <= edges[0]:
             return
         mean = [np.add.reduceat(y[: edges[-1]], edges[:-1]) / count for y in (t, x, d)]
-        index = self._add(mean[0], mean[1], np.full(count.size, np.nan), mean[2], np.full(count.size, e), True)
+        index = self._add(mean[0], mean[1], np.full(count.size, np.nan), mean[2], np.full(count.size, e), True, count.astype(float))
         if compared:
             self.points.append(
                 {
@@ -334,7 +383,7 @@ class _Pieces:
     ) -> None:
         """Samples as they are."""
         middle = 0.5 * (events[e].t_onset + events[e].t_arrest)
-        self._add(t[index], x[index], v[index], d[index], np.where(t[index] < middle, e, e + 1), False)
+        self._add(t[index], x[index], v[index], d[index], np.where(t[index] < middle, e, e + 1), False, np.ones(index.size))
 
     def compare(
         self, low: int, high: int, h: int, t: Array, x: Array, event: Event, e: int, times: Scales,
@@ -364,7 +413,9 @@ class _Pieces:
         times: Scales,
     ) -> Knots:  # fmt: skip
         knot_t = np.concatenate(self.t)
-        x, d = np.concatenate(self.x), np.concatenate(self.d)
+        d = np.concatenate(self.d)
+        x = _onward(np.concatenate(self.x), np.concatenate(self.weight), np.concatenate(self.slow),
+                    np.concatenate(self.event), max(noise, 0.3 * self.step))  # fmt: skip
         v, slow = np.concatenate(self.v), np.concatenate(self.slow)
         slopes = np.gradient(x, knot_t)
         v = np.where(slow, slopes, v)
@@ -427,9 +478,28 @@ class _Pieces:
         knots_made = Knots(
             trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
             made["at"], phase, of, made["rate"], made["acceleration"], made["white"], made["shaken"],
-            _places(made["at"], phase, of, events, times), noise, trace.spring_stiffness, trace.virgin,
+            _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, events, float(t[0])), noise, trace.spring_stiffness, trace.virgin,
         )  # fmt: skip
         return selected(knots_made, keep)
+
+
+def _onward(x: Array, weight: Array, slow: NDArray[np.bool_], event: Index, noise: float) -> Array:
+    """The windows of every stick without steps back that are the noise's: the block creeps one way.
+
+    A step back by a nanometre would unload every element, and the next one forward would not load them again at once:
+    noise would make the model weaker than the contact. Where the block does go back by more than noise, nothing is
+    changed.
+    """
+    out = x.copy()
+    edges = np.flatnonzero(np.diff(slow.astype(int)) | (np.diff(event) != 0)) + 1
+    for piece in np.split(np.arange(x.size), edges):
+        if piece.size < 3 or not slow[piece[0]]:
+            continue
+        rising = bool(x[piece[-1]] >= x[piece[0]])
+        found = isotonic_regression(x[piece], weights=weight[piece], increasing=rising).x
+        if np.abs(found - x[piece]).max() < BACK * noise:
+            out[piece] = found
+    return out
 
 
 def _joined(pieces: list[Index]) -> Index:
@@ -441,7 +511,7 @@ def selected(k: Knots, keep: NDArray[np.bool_]) -> Knots:
     index = np.flatnonzero(keep)
     return replace(
         k, mean=k.mean[index], smooth=(k.smooth[0][index], k.smooth[1][index]),
-        **{n: getattr(k, n)[index] for n in ("at", "phase", "of", "rate", "acceleration", "white", "shaken", "place")},
+        **{n: getattr(k, n)[index] for n in ("at", "phase", "of", "rate", "acceleration", "white", "shaken", "place", "elapsed")},
     )  # fmt: skip
 
 
@@ -454,6 +524,11 @@ def _arrests(t: Array, events: tuple[Event, ...], times: Scales) -> Index:
         stop = np.inf if e == len(events) else 0.5 * (events[e].t_onset + events[e].t_arrest)
         out[(t >= events[e - 1].t_arrest + later) & (t < stop)] = e
     return out
+
+
+def _elapsed(at: Array, of: Index, events: tuple[Event, ...], start: float) -> Array:
+    begun = np.array([start, *(e.t_arrest for e in events)])
+    return np.maximum(at - begun[np.minimum(of, len(events))], 0.0)
 
 
 def _places(at: Array, phase: Index, of: Index, events: tuple[Event, ...], times: Scales) -> Array:

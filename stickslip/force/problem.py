@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 PHASE = "phase"
 PULL = "start.pull"  # of the spring at the start of a record, where the contact is not virgin (N)
 EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
+NODES = (-8.0, -6.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 6.0)  # of what cycles share, in units of the place
 LOCAL = ("strength", "stretch", "offset")  # of each event: two logarithms, and a length (m)
 
 
@@ -96,12 +97,14 @@ class Point:
         phases: shape (b, R).
         weights: strength of every element (N), not negative, shape (k,).
         events: :data:`LOCAL` of each event, shape (E, 3).
+        common: error of the position that all cycles share, as a function of the place in the cycle (m), shape (c,).
     """
 
     z: Array
     phases: Array
     weights: Array
     events: Array
+    common: Array
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,7 @@ class Slopes:
 
     Attributes:
         residual: measured force less the model's (N), shape (p,).
-        shared: derivatives in z, then phases of all runs, then weights, shape (p, a + b R + k).
+        shared: derivatives in z, phases of all runs, weights and what cycles share, shape (p, a + b R + k + c).
         local: in the event's own, shape (p, 3).
         tangent: stiffness of what sticks (N/m), shape (p,).
         held: force that the model holds (N), shape (p,).
@@ -138,7 +141,11 @@ class Problem:
         self.phase, self.place, self.at, self.white, self.shaken = (
             np.concatenate([getattr(k, name) for k in runs]) for name in ("phase", "place", "at", "white", "shaken")
         )
+        self.elapsed = np.concatenate([k.elapsed for k in runs])
         self._index = _indices(runs, n, first)
+        virgin = np.isin(self.of, [f for f, k in zip(first[:-1], runs, strict=True) if k.virgin])
+        hats = _hats(self.place)
+        self.cycles = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
 
     def with_composition(self, composition: Composition) -> Problem:
         """The same runs under another composition."""
@@ -176,7 +183,8 @@ class Problem:
         a, b, k, runs = len(shared), len(phases), point.weights.size, len(self.runs)
         size = self.at.size
         residual, tangents, held = np.zeros(size), np.zeros(size), np.zeros(size)
-        slopes, local = np.zeros((size, a + b * runs + k)), np.zeros((size, 3))
+        cycles = self.cycles.shape[1]
+        slopes, local = np.zeros((size, a + b * runs + k + cycles)), np.zeros((size, 3))
         sensed = any(isinstance(e, Sensor) for e in c.effects)
         at_damping = next((i for i, f in enumerate(shared) if f.name == "rig.damping"), None)
         weights = np.maximum(point.weights, EMPTY)
@@ -198,10 +206,12 @@ class Problem:
                 slopes[s, a + j * runs + r] = moved[:, a + j]
             local[s] = moved[:, a + b :]
             share = mean @ elements[r, :n]
-            slopes[s, a + b * runs :] = -share
+            slopes[s, a + b * runs : a + b * runs + k] = -share
             held[s] = share @ weights
             tangents[s] = mean @ tangent[r, :n]
             p += run.at.size
+        slopes[:, a + b * runs + k :] = tangents[:, None] * self.cycles
+        residual += slopes[:, a + b * runs + k :] @ point.common
         return Slopes(residual, slopes, local, tangents, held)
 
 
@@ -219,6 +229,11 @@ def _padded(runs: Sequence[Knots], n: int) -> Way:
         ones,
         ones,
     )
+
+
+def _hats(place: Array) -> Array:
+    """Piecewise linear basis over the place in the cycle, shape (p, c)."""
+    return np.stack([np.interp(place, NODES, row) for row in np.eye(len(NODES))], axis=1)
 
 
 def _indices(runs: Sequence[Knots], n: int, first: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -6,7 +6,7 @@ Residuals of one event belong together, those of two events do not. The covarian
 
 with the sensor's noise w carried to a force by the stiffness of what sticks, random effects D (strength, yield
 displacements, position at the arrest), and misfit whose size L depends on the phase of the cycle and, for errors of the
-position, on the stiffness. All sizes are estimated from the campaign itself by maximum likelihood.
+position, on the stiffness, and a random walk of the reading since the arrest. All sizes are estimated from the campaign itself by maximum likelihood.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from .. import jax_settings  # noqa: F401
 from .knots import PHASES
 
 Array = NDArray[np.float64]
-NAMES = ("strength", "stretch", "offset", *PHASES, "position", "white")
+NAMES = ("strength", "stretch", "offset", *PHASES, "position", "walk", "white")
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
-CENTRES = np.log(np.array([1e-3, 2e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1.0]))
-WIDTHS = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 0.1])
+CENTRES = np.log(np.array([1e-3, 2e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1.0]))
+WIDTHS = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 0.1])
 NUMERIC = 1e-4  # share of the strength below which nothing is claimed
 REACH = 1.0  # correlation length along the place
 
@@ -42,7 +42,7 @@ class Scatter:
     @classmethod
     def wide(cls) -> Scatter:
         """What a fit begins with, so that no single kink of the model holds it."""
-        return cls(np.log(np.array([1e-2, 0.1, 5e-9, 0.02, 0.02, 0.02, 0.02, 2e-9, 1.0])))
+        return cls(np.log(np.array([1e-2, 0.1, 5e-9, 0.02, 0.02, 0.02, 0.02, 2e-9, 1e-9, 1.0])))
 
     def named(self) -> dict[str, float]:
         """Name -> size: shares of strength and of yield displacement, metres of position."""
@@ -87,6 +87,7 @@ class Known:
     phase: Array
     tangent: Array
     place: Array
+    elapsed: Array
     there: Array
     strength: float
 
@@ -97,8 +98,11 @@ def covariance(sizes: Any, k: Known) -> tuple[Any, Any]:
     own = jnp.where(k.there, s[3 + k.phase] * k.strength, 0.0)
     by_place = jnp.where(k.there, s[7] * k.tangent, 0.0)
     near = jnp.exp(-jnp.abs(k.place[:, :, None] - k.place[:, None, :]) / REACH)
+    since = jnp.minimum(k.elapsed[:, :, None], k.elapsed[:, None, :])
+    walk = jnp.where(k.there, s[8] * k.tangent, 0.0)
     alike = (own[:, :, None] * own[:, None, :] + by_place[:, :, None] * by_place[:, None, :]) * near
-    diagonal = jnp.where(k.there, (s[8] * k.white) ** 2 + (NUMERIC * k.strength) ** 2, 1.0)
+    alike = alike + walk[:, :, None] * walk[:, None, :] * since
+    diagonal = jnp.where(k.there, (s[9] * k.white) ** 2 + (NUMERIC * k.strength) ** 2, 1.0)
     plain = alike + jnp.eye(own.shape[1]) * diagonal[:, :, None]
     scaled = k.local * s[:3]
     return plain, plain + jnp.einsum("eia,eja->eij", scaled, scaled)

@@ -1,0 +1,193 @@
+"""Every effect in every form: where its inner parameters are best, and the model refitted in full with it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+
+from ..effects import catalogue
+from ..effects.base import Effect, Geometry
+from ..errors import StickslipError
+from ..fit.parameters import Free, effect_parameters
+from ..params import Spec, specs
+from .fit import Array, Fit, fit
+from .problem import Point, is_own
+from .score import Explained, signatures
+
+FREQUENCIES = 240  # of a periodic effect
+LONGEST = 1.5  # of a record: a longer wave is a trend
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One form of an effect on top of a model.
+
+    Attributes:
+        tag, form: which.
+        members: of the grid of inner parameters tried, and the falls of the cost they promise.
+        fit: with the effect in it; None where it could not be fitted.
+        note: why.
+    """
+
+    tag: str
+    form: dict[str, str]
+    promise: float
+    fit: Fit | None
+    note: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name of the amplitude."""
+        return f"{self.tag}.{catalogue.get(self.tag).amplitude}"
+
+
+def shapes_backbone(effect: Effect) -> bool:
+    """Whether all that an effect does is to change the backbone, which the free bank measures anyway."""
+    if not isinstance(effect, Geometry):
+        return False
+    return getattr(effect, "where", "series") == "series"
+
+
+def every_form(tags: Sequence[str]) -> list[tuple[str, dict[str, str]]]:
+    """All forms of the effects that act along the motion."""
+    out = []
+    for tag in tags:
+        cls = catalogue.get(tag)
+        for form in catalogue.forms(cls):
+            if not shapes_backbone(cls(**form)):
+                out.append((tag, form))
+    return out
+
+
+def grid(effect: Effect) -> list[dict[str, float]]:
+    """Coarse grid of the inner parameters that have one."""
+    axes: dict[str, tuple[float, ...]] = {}
+    for name, spec in specs(effect).items():
+        if name == effect.amplitude or is_own(name):
+            continue
+        own = float(getattr(effect, name))
+        axes[name] = _axis(spec, own)
+    return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())] or [{}]
+
+
+def _axis(spec: Spec, own: float) -> tuple[float, ...]:
+    if not spec.grid:
+        return (own,)
+    return tuple(dict.fromkeys((*spec.grid, own))) if len(spec.grid) < 3 else spec.grid
+
+
+def try_effect(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> Candidate:
+    """An effect's best member, refitted in full."""
+    effect = catalogue.get(tag)(**form)
+    try:
+        if effect.periodic is not None and hasattr(effect, "phase"):
+            return _periodic(base, explained, effect, form)
+        return _plain(base, explained, effect, form)
+    except StickslipError as error:
+        return Candidate(tag, form, 0.0, None, str(error).split("\n")[0])
+
+
+def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]) -> Candidate:
+    members = grid(effect)
+    columns = signatures(base, effect, members)
+    usable = np.isfinite(columns).all(axis=1) & (np.abs(columns).max(axis=1) > 0.0)
+    if not usable.any():
+        return Candidate(effect.tag, form, 0.0, None, "it does nothing along this motion")
+    members = [m for m, ok in zip(members, usable, strict=True) if ok]
+    falls, sizes, errors = explained.singly(columns[usable].T)
+    spec = specs(effect)[effect.amplitude]
+    null = spec.null or 0.0
+    sizes = null + sizes
+    inside = np.clip(sizes, spec.lower, spec.upper)
+    # a parabola through the promise: what is left of it where the amplitude may not go all the way
+    share = np.where(sizes != null, (inside - null) / np.where(sizes != null, sizes - null, 1.0), 0.0)
+    falls = falls * (1.0 - (1.0 - share) ** 2)
+    best = int(np.argmax(falls))
+    least = 0.3 * float(errors[best])  # at the null itself inner parameters do nothing
+    amplitude = float(inside[best])
+    if abs(amplitude - null) < least:
+        sign = 1.0 if amplitude >= null and spec.upper > null else -1.0
+        amplitude = null + sign * min(least, 0.5 * abs((spec.upper if sign > 0 else spec.lower) - null))
+    found = _refit(base, effect, {**members[best], effect.amplitude: amplitude})
+    return Candidate(effect.tag, form, float(falls[best]), found)
+
+
+def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
+    """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,)."""
+    for name, value in values.items():
+        effect = eqx.tree_at(lambda e, n=name: getattr(e, n), effect, np.float64(value))  # type: ignore[misc]
+    free = effect_parameters(effect, amplitude=values[effect.amplitude])
+    free = [_kept(f, values) for f in free]
+    composition = base.problem.composition.with_effect(effect, free)
+    problem = base.problem.with_composition(composition)
+    return fit(problem, _start(base, free, turns), base.scatter, dropped=base.dropped, estimated=False, known=base.known)
+
+
+def _kept(f: Free, values: dict[str, float]) -> Free:
+    own = f.name.partition(".")[2]
+    return f.starting(values[own]) if own in values else f
+
+
+def _start(base: Fit, free: Sequence[Free], turns: Array | None) -> Point:
+    own = [f for f in free if not is_own(f.name)]
+    z = np.concatenate([base.point.z, [f.inward(f.start) for f in own]])
+    phases = base.point.phases
+    for f in free:
+        if is_own(f.name):
+            at = np.full(len(base.problem.runs), f.start) if turns is None else turns
+            phases = np.vstack([phases, at / float(f.scale)])
+    return replace(base.point, z=z, phases=phases)
+
+
+def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]) -> Candidate:
+    """An effect with a period and a phase for each run: the period of a periodogram on top of everything."""
+    name, variable = effect.periodic
+    spec = specs(effect)[name]
+    if getattr(effect, "form", None) == "trend":
+        return _plain(base, explained, effect, form)
+    frequencies = _frequencies(base, variable, spec, name)
+    if frequencies.size == 0:
+        return Candidate(effect.tag, form, 0.0, None, "the records are too short for a period")
+    values = frequencies if name == "frequency" else 1.0 / frequencies
+    runs = base.problem.run
+    number = len(base.problem.runs)
+    members = [{name: float(v), "phase": turn} for v in values for turn in (0.0, 0.5 * np.pi)]
+    columns = signatures(base, effect, members)
+    best, top, at = -np.inf, None, 0
+    for i in range(values.size):
+        pair = columns[2 * i : 2 * i + 2]
+        split = np.zeros((runs.size, 2 * number))
+        for r in range(number):
+            split[runs == r, 2 * r : 2 * r + 2] = pair[:, runs == r].T
+        fall, found = explained.gain(split)
+        if fall > best:
+            best, top, at = fall, found, i
+    assert top is not None
+    waves = top.reshape(number, 2)
+    size = np.hypot(waves[:, 0], waves[:, 1])
+    amplitude = float(np.sqrt(np.mean(size**2)))
+    limit = specs(effect)[effect.amplitude]
+    amplitude = float(np.clip(amplitude, 1e-3 * limit.upper, 0.9 * limit.upper))
+    turns = np.arctan2(waves[:, 1], waves[:, 0])
+    found = _refit(base, effect, {name: float(values[at]), effect.amplitude: amplitude}, turns)
+    return Candidate(effect.tag, form, best, found)
+
+
+def _frequencies(base: Fit, variable: str, spec: Spec, name: str) -> Array:
+    """Frequencies that the records resolve, within the bounds of the parameter."""
+    runs = base.problem.runs
+    way = {"time": "t", "load point": "drive", "displacement": "x"}[variable]
+    spans = np.array([np.ptp(getattr(k, way)) for k in runs])
+    low, high = (spec.lower, spec.upper) if name == "frequency" else (1.0 / spec.upper, 1.0 / spec.lower)
+    low = max(low, 1.0 / (LONGEST * spans.max()))
+    events = [k.events / max(np.ptp(getattr(k, way)), 1e-300) for k in runs]
+    # beyond some periods a stick the windows of the creep see nothing of it
+    high = min(high, 60.0 * max(events))
+    if high <= low:
+        return np.zeros(0)
+    return np.geomspace(low, high, FREQUENCIES)
