@@ -49,7 +49,7 @@ def _known(value: Any, default: float, width: float) -> tuple[float, float, floa
     return float(value), 0.0, None, None, True
 
 
-def _shared_rig(campaign: Campaign, names: Sequence[str]) -> Rig:
+def shared_rig(campaign: Campaign, names: Sequence[str]) -> Rig:
     """The rig of all runs. What a trace gives anew counts where all agree; springs may differ from run to run.
 
     Raises:
@@ -96,7 +96,7 @@ def base_composition(
     Raises:
         InputError: the mass is not given; the roughness is given by halves, or without load and friction.
     """
-    rig, m, s = _shared_rig(campaign, measurement.names), measurement, measurement.layout.slices()
+    rig, m, s = shared_rig(campaign, measurement.names), measurement, measurement.layout.slices()
     mass, mass_width, lightest, heaviest, weighed = _known(rig.mass, np.nan, 0.0)
     if not np.isfinite(mass):
         raise InputError(

@@ -29,9 +29,11 @@ class Candidate:
 
     Attributes:
         tag, form: which.
-        members: of the grid of inner parameters tried, and the falls of the cost they promise.
+        promise: fall of the cost that its best member promises for a small amplitude.
         fit: with the effect in it; None where it could not be fitted.
         note: why.
+        members: how many values of the inner parameters were tried.
+        visible: amplitude that would be five standard deviations (SI, distance from the null).
     """
 
     tag: str
@@ -39,6 +41,8 @@ class Candidate:
     promise: float
     fit: Fit | None
     note: str = ""
+    members: int = 1
+    visible: float | None = None
 
     @property
     def name(self) -> str:
@@ -114,7 +118,7 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
         sign = 1.0 if amplitude >= null and spec.upper > null else -1.0
         amplitude = null + sign * min(least, 0.5 * abs((spec.upper if sign > 0 else spec.lower) - null))
     found = _refit(base, effect, {**members[best], effect.amplitude: amplitude})
-    return Candidate(effect.tag, form, float(falls[best]), found)
+    return Candidate(effect.tag, form, float(falls[best]), found, "", len(members), 5.0 * float(errors[best]))
 
 
 def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
@@ -175,7 +179,9 @@ def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]
     amplitude = float(np.clip(amplitude, 1e-3 * limit.upper, 0.9 * limit.upper))
     turns = np.arctan2(waves[:, 1], waves[:, 0])
     found = _refit(base, effect, {name: float(values[at]), effect.amplitude: amplitude}, turns)
-    return Candidate(effect.tag, form, best, found)
+    # in the mean over runs and phases a wave is seen as each of its two parts is
+    seen = explained.singly(columns[2 * at : 2 * at + 2].T)[2]
+    return Candidate(effect.tag, form, best, found, "", int(values.size), 5.0 * float(np.mean(seen)))
 
 
 def _frequencies(base: Fit, variable: str, spec: Spec, name: str) -> Array:

@@ -35,6 +35,13 @@ def folds(fit: Fit) -> list[NDArray[np.intp]]:
     runs = [np.flatnonzero(problem.event_run == r) for r in range(len(problem.runs))]
     if not problem.composition.phases and len(runs) > 2:
         return [r for r in runs if r.size]
+    return halves(fit)
+
+
+def halves(fit: Fit) -> list[NDArray[np.intp]]:
+    """The events of either half of every run."""
+    problem = fit.problem
+    runs = [np.flatnonzero(problem.event_run == r) for r in range(len(problem.runs))]
     return [half for r in runs for half in np.array_split(r, 2) if half.size]
 
 

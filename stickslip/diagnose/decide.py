@@ -1,0 +1,120 @@
+"""From refitted effects to an answer, by few rules.
+
+1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many members
+   of its family, among as many effects; and unseen runs are predicted better, by more than two standard errors over
+   their events.
+2. *Named*: the seen effect that predicts unseen runs best.
+3. *A set*: those seen that predict the unseen runs as well, within two standard errors of the difference event by event.
+   Where a law is in it with a special case of it, the special case stays: it needs less.
+4. *Unknown*: nothing is seen, but the residual force is a function of a variable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..effects import catalogue
+from ..force.candidates import Candidate
+from ..force.fit import Array, Fit
+from ..force.heldout import folds, halves, unseen
+
+CHANCE = 1e-3  # of any effect at all being seen where nothing is missing
+ERRORS = 2.0  # standard errors
+DISPERSION = 2.0  # of the fall of the cost, over that of perfectly known covariances
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A refitted effect beside the model without it.
+
+    Attributes:
+        candidate: what was tried.
+        gain: fall of the cost.
+        chance: of such a fall by chance, corrected for all that was tried.
+        unseen: fall of the predictive cost of every event left out, shape (E,).
+        amplitude, std: in SI.
+    """
+
+    candidate: Candidate
+    gain: float
+    chance: float
+    unseen: Array
+    amplitude: float
+    std: float
+
+    @property
+    def tag(self) -> str:
+        """Of the effect."""
+        return self.candidate.tag
+
+    @property
+    def error(self) -> float:
+        """Standard error of the sum of ``unseen``."""
+        n = self.unseen.size
+        return float(np.sqrt(n) * np.std(self.unseen, ddof=1)) if n > 1 else np.inf
+
+    @property
+    def seen(self) -> bool:
+        """Rule 1."""
+        return self.chance < CHANCE and float(self.unseen.sum()) > ERRORS * self.error
+
+
+class Judge:
+    """The model without, and how it predicts what it has not seen."""
+
+    def __init__(self, base: Fit, tried: int) -> None:
+        self.base, self.tried = base, tried
+        self._runs, self._halves = folds(base), halves(base)
+        self._unseen = {False: unseen(base, self._runs).cost, True: unseen(base, self._halves).cost}
+
+    def __call__(self, candidate: Candidate) -> Judged | None:
+        """The candidate beside it; None where it was not fitted."""
+        fit = candidate.fit
+        if fit is None:
+            return None
+        own = [f for f in fit.problem.composition.phases if f.name.startswith(f"{candidate.tag}.")]
+        free = [f for f in fit.free if f.name.startswith(f"{candidate.tag}.")]
+        number = len(free) + len(own) * len(fit.problem.runs)
+        gain = max(self.base.cost - fit.cost, 0.0)
+        chance = min(1.0, float(chi2.sf(gain / DISPERSION, number)) * candidate.members * self.tried)
+        predicted = unseen(fit, self._halves if own else self._runs).cost
+        name = candidate.name
+        return Judged(
+            candidate, gain, chance, self._unseen[bool(own)] - predicted, fit.values[name], fit.std().get(name, np.inf)
+        )
+
+
+def best_forms(judged: Sequence[Judged]) -> list[Judged]:
+    """Every effect in the form that predicts unseen runs best among those that fit nearly best, the best first."""
+    out: dict[str, Judged] = {}
+    for j in sorted(judged, key=lambda j: -j.gain):
+        other = out.get(j.tag)
+        if other is None or (j.gain > other.gain - 4.0 and j.unseen.sum() > other.unseen.sum()):
+            out[j.tag] = j
+    return sorted(out.values(), key=lambda j: -float(j.unseen.sum()) if j.seen else np.inf)
+
+
+def named(judged: Sequence[Judged]) -> list[Judged]:
+    """The effect to be named, and behind it those that these data cannot tell from it; nothing where none is seen."""
+    seen = [j for j in best_forms(judged) if j.seen]
+    if not seen:
+        return []
+    best = max(seen, key=lambda j: float(j.unseen.sum()))
+    close = [best, *(j for j in seen if j is not best and _as_well(best, j))]
+    tags = {j.tag for j in close}
+    # what contains another of them needs more to say the same
+    simple = [j for j in close if not set(catalogue.get(j.tag).generalises) & (tags - {j.tag})]
+    return simple or close
+
+
+def _as_well(best: Judged, other: Judged) -> bool:
+    difference = best.unseen - other.unseen
+    total, error = float(difference.sum()), float(np.sqrt(difference.size) * np.std(difference, ddof=1))
+    return total < ERRORS * error or total < LEAST
+
+
+LEAST = 6.0  # of the predictive cost: a likelihood ratio of twenty

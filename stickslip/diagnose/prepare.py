@@ -1,0 +1,86 @@
+"""From traces to the problem that a diagnosis solves: which runs can take part, and where the fit of the base begins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..campaign import Campaign
+from ..errors import InputError
+from ..fit.start import ringing, shared_rig
+from ..force.begin import begin
+from ..force.knots import Knots, Scales, knots, scales
+from ..force.problem import Point, Problem
+from ..segment import Segmentation
+from ..trace import Trace
+
+FEWEST = 2  # slips of a run that takes part
+UNHEARD = "no ringing is heard after the slips, so the contact's stiffness is known from the creep alone"
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What a diagnosis works on.
+
+    Attributes:
+        problem, start: the base model along the measured motion, and where its fit begins.
+        traces, segmentations: of the runs that take part, in order.
+        scales: times of the campaign.
+        dropped: what was left out, and why.
+    """
+
+    problem: Problem
+    start: Point
+    traces: tuple[Trace, ...]
+    segmentations: tuple[Segmentation, ...]
+    scales: Scales
+    dropped: tuple[str, ...]
+
+    @property
+    def runs(self) -> tuple[Knots, ...]:
+        """The runs at their knots."""
+        return self.problem.runs
+
+
+def prepare(campaign: Campaign, traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> Prepared:
+    """Thin all runs that can take part, and look where the base begins.
+
+    Raises:
+        InputError: no run has displacement, drive and slips, or the mass is not given.
+    """
+    used, dropped = [], []
+    for trace, found in zip(traces, segmentations, strict=True):
+        why = _why_not(trace, found)
+        if why:
+            dropped.append(f"{trace.name}: {why}")
+        else:
+            used.append((trace, found))
+    if not used:
+        raise InputError(
+            "a diagnosis needs the displacement of the block, the motion of the drive, and slips",
+            file=campaign.path,
+            key="trace.displacement",
+            hint="others can be inspected and fitted with --model static; " + "; ".join(dropped),
+        )
+    kept, found = zip(*used, strict=True)
+    period = ringing(kept, found)
+    if period is None:
+        dropped.append(UNHEARD)
+    times = scales(list(found), period, min(t.sampling_rate for t in kept))
+    runs = [knots(t, s, times) for t, s in used]
+    rig = shared_rig(campaign, [t.name for t in kept])
+    try:
+        problem, start = begin(rig, kept, found, runs, times)
+    except InputError as error:
+        raise error.at(file=campaign.path) from None
+    return Prepared(problem, start, kept, found, times, tuple(dropped))
+
+
+def _why_not(trace: Trace, found: Segmentation) -> str:
+    if trace.displacement is None:
+        return "no displacement in it"
+    if trace.drive is None:
+        return "no drive is given"
+    if len(found.events) < FEWEST:
+        return f"{len(found.events)} slips, of which a diagnosis needs {FEWEST}"
+    return ""

@@ -1,0 +1,126 @@
+"""Stick-slip of a small rig as the solver makes it, and its accepted steps as knots of a motion that is given."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from stickslip.conformance.rig import base_model
+from stickslip.effects import catalogue
+from stickslip.effects.base import Effect
+from stickslip.force.along import Held, Way, along
+from stickslip.model import Model
+from stickslip.params import specs
+from stickslip.solve import Steps, Tolerance, integrate
+
+STRENGTH = 0.2604  # N, of the rig's contact
+TIMES, POSITIONS = np.array([0.0, 0.13, 0.2, 1.0]), np.array([0.0, 0.13e-3, 0.13e-3, 0.93e-3])  # s, m; a short hold
+END = 0.55  # s; three slips
+KNOTS = 1024  # one size for all, so that one program serves all
+COARSE = Tolerance(1e-2, 1e-10, 1e-7)
+
+LAWS = [(tag, form) for tag in catalogue.tags() for form in catalogue.forms(catalogue.get(tag))]
+GROUPS = [LAWS[i : i + 22] for i in range(0, len(LAWS), 22)]  # compiled together
+
+march = jax.jit(along)
+
+
+class Slips(NamedTuple):
+    """A simulation, as knots that need not be its steps.
+
+    Attributes:
+        model: that was simulated.
+        steps: of the solver.
+        way: the motion at the knots, padded.
+        own: places of the solver's steps among the knots, shape (steps,).
+        turned: first step within which the block turns.
+    """
+
+    model: Model
+    steps: Steps
+    way: Way
+    own: np.ndarray
+    turned: int
+
+
+def named(law: tuple[str, dict[str, str]]) -> str:
+    """The law in words."""
+    return " ".join([law[0], *law[1].values()])
+
+
+def tenth(effect: Effect, share: float = 0.1) -> float:
+    """An amplitude a share of the plausible range away from the null."""
+    spec = specs(effect)[effect.amplitude]
+    null = spec.null or 0.0
+    upper = spec.usual[1] if spec.usual else spec.upper
+    return null + share * ((upper if upper > null else spec.lower) - null)
+
+
+@lru_cache(maxsize=8)
+def absent(group: int) -> tuple[Effect, ...]:
+    """All effects of a group at their null, of which one after the other is given its amplitude: one compilation."""
+    return tuple(jax.tree.map(jnp.asarray, catalogue.get(tag)(**form)) for tag, form in GROUPS[group])
+
+
+def effects_with(law: tuple[str, dict[str, str]], share: float = 0.1) -> tuple[Effect, ...]:
+    """The group of a law, in which only this law does anything."""
+    group = next(i for i, laws in enumerate(GROUPS) if law in laws)
+    effects, at = list(absent(group)), GROUPS[group].index(law)
+    effects[at] = valued(effects[at], tenth(effects[at], share))
+    return tuple(effects)
+
+
+def valued(effect: Effect, amplitude: float) -> Effect:
+    """The effect with an amplitude."""
+    return eqx.tree_at(lambda e: getattr(e, e.amplitude), effect, jnp.asarray(amplitude, float))
+
+
+def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE, turns: bool = True) -> Slips:
+    """The rig with effects, from rest to its third slip and on.
+
+    Args:
+        effects: all.
+        tolerance: of the solver.
+        turns: whether the turning point within a step becomes a knot of its own.
+    """
+    model = base_model(effects)
+    model = eqx.tree_at(
+        lambda m: (m.load_point.times, m.load_point.positions), model, (jnp.asarray(TIMES), jnp.asarray(POSITIONS))
+    )
+    trajectory, _ = integrate(model, END, tolerance=tolerance, largest_step=4e-3)
+    s = trajectory.steps
+    i = np.flatnonzero(s.v[1:] * s.v[:-1] < 0.0)
+    turned = int(i[0]) + 1 if i.size else s.t.size
+    if not turns:
+        i = i[:0]
+    v0, v1, dt = s.v[i], s.v[i + 1], np.diff(s.t)[i]
+    t = np.insert(s.t, i + 1, s.t[i] + dt * v0 / (v0 - v1))
+    x = np.insert(s.x, i + 1, s.x[i] + 0.5 * dt * v0**2 / (v0 - v1))
+    v = np.insert(s.v, i + 1, 0.0)
+    own = np.flatnonzero(np.insert(np.ones(s.t.size, bool), i + 1, False))
+    return Slips(model, s, way_of(t, x, v), own, turned)
+
+
+def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> Way:
+    """A motion under the rig's drive, drawn out at rest to the one size."""
+    more = KNOTS - t.size
+    assert more >= 0
+    t = np.concatenate([t, t[-1] + 1e-3 * np.arange(1, more + 1)])
+    x, v = np.concatenate([x, np.full(more, x[-1])]), np.concatenate([v, np.zeros(more)])
+    ones = np.ones(KNOTS)
+    return Way(*(jnp.asarray(a) for a in (t, x, v, np.interp(t, TIMES, POSITIONS), ones, ones)))
+
+
+def held(slips: Slips) -> Held:
+    """What the model holds along it, at the solver's own steps."""
+    return at_steps(march(slips.model, slips.way), slips)
+
+
+def at_steps(values: Any, slips: Slips) -> Any:
+    """Arrays over knots, at the solver's steps."""
+    return jax.tree.map(lambda a: np.asarray(a)[slips.own], values)
