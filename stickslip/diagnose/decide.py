@@ -1,8 +1,8 @@
 """From refitted effects to an answer, by few rules.
 
 1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many members
-   of its family, among as many effects; and unseen runs are predicted better, by more than two standard errors over
-   their events.
+   of its family, among as many effects; and unseen runs are predicted better: their likelihood by more than two standard
+   errors over their events, and their error (root mean square over floor) as well.
 2. *Named*: the seen effect that predicts unseen runs best.
 3. *A set*: those seen that predict the unseen runs as well, within two standard errors of the difference event by event.
    Where a law is in it with a special case of it, the special case stays: it needs less.
@@ -19,7 +19,7 @@ from scipy.stats import chi2
 
 from ..effects import catalogue
 from ..force.candidates import Candidate
-from ..force.fit import Array, Fit
+from ..force.fit import Array, Fit, deviations
 from ..force.heldout import folds, halves, unseen
 
 CHANCE = 1e-3  # of any effect at all being seen where nothing is missing
@@ -36,6 +36,7 @@ class Judged:
         gain: fall of the cost.
         chance: of such a fall by chance, corrected for all that was tried.
         unseen: fall of the predictive cost of every event left out, shape (E,).
+        fall: of the error on unseen runs, as a share of it.
         amplitude, std: in SI.
     """
 
@@ -43,6 +44,7 @@ class Judged:
     gain: float
     chance: float
     unseen: Array
+    fall: float
     amplitude: float
     std: float
 
@@ -60,7 +62,7 @@ class Judged:
     @property
     def seen(self) -> bool:
         """Rule 1."""
-        return self.chance < CHANCE and float(self.unseen.sum()) > ERRORS * self.error
+        return self.chance < CHANCE and float(self.unseen.sum()) > ERRORS * self.error and self.fall > 0.0
 
 
 class Judge:
@@ -69,7 +71,8 @@ class Judge:
     def __init__(self, base: Fit, tried: int) -> None:
         self.base, self.tried = base, tried
         self._runs, self._halves = folds(base), halves(base)
-        self._unseen = {False: unseen(base, self._runs).cost, True: unseen(base, self._halves).cost}
+        self._unseen = {False: unseen(base, self._runs), True: unseen(base, self._halves)}
+        self._floor = deviations(base)
 
     def __call__(self, candidate: Candidate) -> Judged | None:
         """The candidate beside it; None where it was not fitted."""
@@ -81,11 +84,15 @@ class Judge:
         number = len(free) + len(own) * len(fit.problem.runs)
         gain = max(self.base.cost - fit.cost, 0.0)
         chance = min(1.0, float(chi2.sf(gain / DISPERSION, number)) * candidate.members * self.tried)
-        predicted = unseen(fit, self._halves if own else self._runs).cost
+        without, predicted = self._unseen[bool(own)], unseen(fit, self._halves if own else self._runs)
+        fall = 1.0 - self._error(predicted.residual) / self._error(without.residual)
         name = candidate.name
-        return Judged(
-            candidate, gain, chance, self._unseen[bool(own)] - predicted, fit.values[name], fit.std().get(name, np.inf)
-        )
+        std = fit.std().get(name, np.inf)
+        return Judged(candidate, gain, chance, without.cost - predicted.cost, fall, fit.values[name], std)
+
+    def _error(self, residual: Array) -> float:
+        use = ~self.base.dropped
+        return float(np.sqrt(np.mean((residual[use] / self._floor[use]) ** 2)))
 
 
 def best_forms(judged: Sequence[Judged]) -> list[Judged]:

@@ -11,17 +11,14 @@ import numpy as np
 
 from ..campaign import Campaign
 from ..effects import catalogue
-from ..force.begin import begin  # noqa: F401  (the sketch of a problem, for those who build their own)
 from ..force.candidates import Candidate, every_form
-from ..force.fit import Array, Fit, fit
-from ..force.knots import PHASES
+from ..force.fit import Array, Fit, deviations, fit
 from ..force.residual import Structure, structures
 from ..force.score import Explained
 from ..force.heldout import unseen
-from ..force.scatter import covariance
 from ..segment import Segmentation, segment
 from ..trace import Trace
-from .decide import CHANCE, DISPERSION, Judge, Judged, best_forms, named
+from .decide import DISPERSION, Judge, Judged, named
 from .prepare import Prepared, prepare
 from .trials import Tell, trials
 
@@ -161,7 +158,7 @@ def diagnose(
         ladder.append(_rung((*ladder[-1].model, done.close[0].tag), done.close[0].tag, base))
         if len(taken) + 1 >= max_effects:
             verdict = _end([*taken, done.close[0].tag], replace(done, base=base, close=()), rounds)
-    floor = _floor(base)
+    floor = deviations(base)
     return Diagnosis(verdict, tuple(ladder), tuple(rounds), prepared, floor, tuple(dropped), in_time())
 
 
@@ -211,14 +208,3 @@ def static_residual(base: Fit) -> Array:
     point = replace(base.point, z=z, events=np.zeros_like(base.point.events))
     return problem.with_composition(composition).evaluate(point).residual
 
-
-def _floor(found: Fit) -> Array:
-    """Standard deviation of the residual at every point: noise and scatter (N), shape (p,)."""
-    _, whole = covariance(found.scatter.sizes, found.known)
-    sd = np.sqrt(np.diagonal(np.asarray(whole), axis1=1, axis2=2))
-    out = np.zeros(found.problem.of.size)
-    out[found.blocks.index[found.blocks.there]] = sd[found.blocks.there]
-    return out
-
-
-__all__ = ["CHANCE", "PHASES", "Diagnosis", "Round", "Rung", "Verdict", "best_forms", "diagnose"]

@@ -1,175 +1,323 @@
-"""A diagnosis as plain numbers and words: what goes into ``result.json``."""
+"""A diagnosis as plain numbers and words: what goes into ``result.json``, and the arrays behind its pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from ..campaign import Rig
 from ..effects import catalogue
-from ..fit import multistart
-from ..fit.record import KEY, fitted, record
+from ..fit.composition import run_of
+from ..fit.record import KEY, Fitted, record
 from ..fit.solved import solved
-from ..floors import scatter_factor
-from . import experiment
-from .candidate import Candidate
-from .caution import cautions
-from .engine import Diagnosis, Round
-from .experiment import TELLING, recommend_among
-from .menu import Conditions
-from .rungs import Rung
-from .verdict import passed_over
+from ..force.backbone import Backbone, PowerLaw, backbone, power_law
+from ..force.fit import Array, Fit
+from ..force.heldout import unseen
+from ..force.knots import PHASES
+from ..force.problem import PULL
+from ..force.residual import coordinates
+from ..units import shown
+from .decide import CHANCE, Judged, best_forms
+from .engine import Diagnosis, Round, Rung
+from .fitted import fitted_model
+
+Variables = dict[str, Any]
+LISTED = 6  # effects whose smallest visible amplitude is said in the verdict
 
 
-def summary(
-    diagnosis: Diagnosis,
-    rig: Any = None,
-    asked: Sequence[str] = (),
-    progress: Callable[[str, float], None] | None = None,
-) -> dict[str, Any]:
-    """The verdict, the ladder, the ranking, parameters with units, what to measure next, and the last model.
+def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
+    """The result, and the variables of its arrays.
 
     Args:
-        diagnosis: what was found.
-        rig: ``[rig]`` of the campaign, for the load on a contact.
-        asked: tags the user wanted tried.
-        progress: told what is simulated for the next experiment, and the share done.
+        d: what was found.
+        rig: of the campaign.
     """
-    d = diagnosis
-    used = np.asarray(d.measurement.cycles.used)
-    last = next((r for r in reversed(d.ladder) if r.fit is not None), None)
-    return {
+    curve = backbone(d.fit)
+    law = power_law(curve, int(rig.contacts or 1))
+    found = fitted_model(d.fit, law, d.prepared.traces, int(rig.contacts or 1), rig)
+    words = solved(found)
+    first = d.rounds[0]
+    result = {
         "schema": 1,
         "verdict": {
             "kind": d.verdict.kind,
             "effects": list(d.verdict.effects),
             "set": list(d.verdict.set),
-            "text": d.verdict.text,
-            "reasons": list(d.verdict.reasons),
-            "confidence": d.verdict.confidence,
-            "forms": {tag: dict(form) for tag, form in d.verdict.forms.items()},
+            "text": verdict_text(d),
+            "reasons": reasons(d),
+            "confidence": None,
+            "forms": {r.close[0].tag: dict(r.close[0].candidate.form) for r in d.rounds if r.close},
         },
-        "caution": cautions(d, asked),
-        "ladder": [_rung(r) for r in d.ladder],
-        "ranking": _ranking(d.rounds[0]) if d.rounds else [],
-        "ranking_base": _ranking_base(d.rounds[0]) if d.rounds else None,
-        "later_rounds": [{"base": _ranking_base(r), "ranking": _ranking(r)} for r in d.rounds[1:]],
-        "parameters": {} if last is None else _parameters(last),
-        "next_experiment": next_experiment(d, progress),
-        "seeds": {"starts": multistart.SEED, "draws": experiment.SEED},
-        "held_out": {
-            n: [int(k) for k in (~d.train[r] & used[r]).nonzero()[0]] for r, n in enumerate(d.measurement.names)
+        "caution": [] if d.in_time else ["the time limit came before all effects were tried: this is the best so far"],
+        "in_time": d.in_time,
+        "ladder": [_rung(r, d) for r in d.ladder],
+        "ranking": _ranking(first, d),
+        "ranking_base": _ranking_base(first, d.ladder[1], d),
+        "later_rounds": [
+            {"base": _ranking_base(r, rung, d), "ranking": _ranking(r, d)}
+            for r, rung in zip(d.rounds[1:], d.ladder[2:], strict=False)
+        ],
+        "visible": visible(d),
+        "structure": _structure(d),
+        "scatter": d.fit.scatter.named(),
+        "parameters": parameters(d.fit, found),
+        "backbone": {
+            "u_max": law.u_max, "p": law.p, "spread": law.spread, "misfit": law.misfit,
+            "strength": float(curve.force[-1]), "stiffness": float((d.fit.point.weights / _reach(d)).sum()),
         },
+        "next_experiment": next_experiment(d),
+        "seeds": {},
+        "held_out": "every run in turn; by halves where a run has parameters of its own",
         "dropped": list(d.dropped),
-        **({} if last is None else _model(last, d, rig)),
-    }
+        "equations": [{"text": words.text(), "latex": words.latex()}],
+        KEY: record(found),
+    }  # fmt: skip
+    return result, variables(d, curve, law)
 
 
-def _model(rung: Rung, d: Diagnosis, rig: Any) -> dict[str, Any]:
-    """The last model, so that it can be made again, and the equations it solves."""
-    assert rung.composition is not None
-    assert rung.fit is not None
-    found = fitted(rung.composition, rung.fit, d.measurement, rig)
-    words = solved(found)
-    return {"equations": [{"text": words.text(), "latex": words.latex()}], KEY: record(found)}
+def _reach(d: Diagnosis) -> Array:
+    return d.fit.problem.composition.reach
 
 
-def _rung(rung: Rung) -> dict[str, Any]:
+def error(residual: Array, d: Diagnosis, where: Array | None = None) -> float:
+    """Root mean square of a residual force over its floor; what was dropped does not count."""
+    use = ~d.fit.dropped if where is None else where & ~d.fit.dropped
+    return float(np.sqrt(np.mean((residual[use] / d.floor[use]) ** 2))) if use.any() else float("nan")
+
+
+def by_phase(residual: Array, d: Diagnosis) -> dict[str, float]:
+    """The same in each phase of the cycle."""
+    phase = d.fit.problem.phase
+    return {name: error(residual, d, phase == i) for i, name in enumerate(PHASES) if (phase == i).any()}
+
+
+def _rung(rung: Rung, d: Diagnosis) -> dict[str, Any]:
+    run = d.fit.problem.run
     return {
         "model": list(rung.model),
         "added": rung.added,
-        "removed": rung.removed,
-        "train_error": rung.train.total,
-        "heldout_error": None if rung.held is None else rung.held.error,
-        "by_phase": rung.train.by_phase,
-        "heldout_by_phase": {} if rung.held is None else rung.held.by_phase,
-        "by_run": rung.train.by_run,
-        "alike": rung.train.alike,
+        "removed": None,
+        "train_error": error(rung.residual, d),
+        "heldout_error": None if rung.unseen is None else error(rung.unseen, d),
+        "by_phase": by_phase(rung.residual, d),
+        "heldout_by_phase": {} if rung.unseen is None else by_phase(rung.unseen, d),
+        "by_run": {k.name: error(rung.residual, d, run == r) for r, k in enumerate(d.prepared.runs)},
+        "force_error": float(np.sqrt(np.mean(rung.residual[~d.fit.dropped] ** 2)) / d.fit.strength),
+        "cost": None if rung.fit is None else rung.fit.cost,
     }
 
 
-def _ranking(done: Round) -> list[dict[str, Any]]:
-    """Candidates of a round, the best first; those that were not refitted last."""
-    order = sorted(done.candidates, key=lambda c: (bool(c.note), -c.promise if c.note else c.cost))
-    return [_ranked(c, done) for c in order]
+def _ranking_base(done: Round, rung: Rung, d: Diagnosis) -> dict[str, Any]:
+    assert rung.unseen is not None
+    held = error(rung.unseen, d)
+    return {
+        "model": list(rung.model), "cost": done.base.cost, "train_error": error(rung.residual, d), "heldout_error": held,
+    }  # fmt: skip
 
 
-def _ranking_base(done: Round) -> dict[str, Any]:
-    """What the candidates of a round were added to."""
-    base = done.base
-    assert base.fit is not None
-    held = None if base.held is None else base.held.error
-    return {"model": list(base.model), "cost": base.fit.cost, "train_error": base.train.total, "heldout_error": held}
+def _ranking(done: Round, d: Diagnosis) -> list[dict[str, Any]]:
+    """Effects of a round in their best form, the best first; then those that were not fitted."""
+    best = best_forms(done.judged)
+    close = {id(j) for j in done.close}
+    rows = sorted(best, key=lambda j: (id(j) not in close, -float(j.gain)))
+    fitted = {j.tag for j in best}
+    left = {c.tag: c for c in done.candidates if c.tag not in fitted}
+    return [*(_ranked(j, done, d) for j in rows), *(_not_ranked(c.tag, c.form, c.note) for c in left.values())]
 
 
-def _ranked(c: Candidate, done: Round) -> dict[str, Any]:
-    out: dict[str, Any] = {
-        "effect": c.tag,
-        "form": c.form,
-        "score": c.score,
-        "promise": c.promise,
-        "refit": c.fit is not None and not c.note,
-        "note": c.note,
-        "heldout_gain": None,
-        "amplitude": None,
+def _ranked(j: Judged, done: Round, d: Diagnosis) -> dict[str, Any]:
+    fit = j.candidate.fit
+    assert fit is not None
+    spec = catalogue.amplitude(catalogue.get(j.tag))
+    total = float(j.unseen.sum())
+    return {
+        "effect": j.tag,
+        "form": dict(j.candidate.form),
+        "score": None,
+        "promise": j.candidate.promise,
+        "refit": True,
+        "note": "",
+        "cost": fit.cost,
+        "gain": j.gain,
+        "chance": j.chance,
+        "train_error": error(fit.marginal, d),
+        "heldout_error": error(unseen(fit).residual, d),
+        "heldout_gain": total / max(abs(j.gain), 1e-300) if j.gain > 1.0 else 0.0,
+        "heldout_gain_std": j.error / max(abs(j.gain), 1e-300) if j.gain > 1.0 else 0.0,
+        "heldout_cost": total,
+        "heldout_cost_std": j.error,
+        "heldout_cycles": int(j.unseen.size),
+        "failures": failures(j, done),
+        "forms": [
+            {"form": dict(o.candidate.form), "cost": done.base.cost - o.gain} for o in done.judged if o.tag == j.tag
+        ],
+        "amplitude": {"name": j.candidate.name, "value": j.amplitude, "std": j.std, "unit": spec.unit},
+        "visible": j.candidate.visible,
     }
-    if c.fit is None or c.held is None or c.train is None or c.note:
-        return out
-    base = done.base.held
-    gain = np.zeros(0) if base is None else base.per_cycle - c.held.per_cycle
-    gain = gain[np.isfinite(gain)]
-    judged = next((j for j in done.judged if j.candidate is c), None)
-    forms = [e for e in done.every if e.tag == c.tag and e.fit is not None and not e.note]
-    out |= {
-        "cost": c.fit.cost,
-        "train_error": c.train.total,
-        "heldout_error": c.held.error,
-        "heldout_gain": None if base is None else 1.0 - c.held.score / base.score,
-        "heldout_gain_std": None
-        if base is None or gain.size < 2
-        else float(np.std(gain, ddof=1) / np.sqrt(gain.size) / base.score),
-        "heldout_cycles": int(gain.size),
-        "failures": [] if judged is None else list(passed_over(judged, done.judged)),
-        "forms": [{"form": e.form, "cost": e.cost} for e in sorted(forms, key=lambda e: e.cost)],
-    }
-    if c.amplitude is not None:
-        name = c.amplitude.name
-        std = c.fit.std()[name]
-        out["amplitude"] = {"name": name, "value": c.fit.values[name], "std": std, "unit": c.amplitude.unit}
+
+
+def _not_ranked(tag: str, form: dict[str, str], note: str) -> dict[str, Any]:
+    return {
+        "effect": tag, "form": dict(form), "score": None, "refit": False, "note": note or "not tried in time",
+        "heldout_gain": None, "amplitude": None,
+    }  # fmt: skip
+
+
+def failures(j: Judged, done: Round) -> list[str]:
+    """Why an effect is not named, in words; nothing where it is."""
+    if any(j is c for c in done.close):
+        return [] if j is done.close[0] else [f"these data cannot tell it from {done.close[0].tag}"]
+    out = []
+    if j.chance >= CHANCE:
+        out.append(f"chance gives such a gain with probability {j.chance:.2g}")
+    if float(j.unseen.sum()) <= 2.0 * j.error:
+        out.append("unseen runs are not predicted better by more than two standard errors")
+    if not out and done.close:
+        out.append(f"{done.close[0].tag} predicts unseen runs better")
     return out
 
 
-def _parameters(rung: Rung) -> dict[str, Any]:
-    assert rung.fit is not None
-    sd = rung.fit.std()
-    values = rung.fit.values
-    return {f.name: {"value": values[f.name], "std": sd[f.name], "unit": f.unit, "doc": f.doc} for f in rung.fit.free}
+def reasons(d: Diagnosis) -> list[str]:
+    """What the naming of each effect rests on."""
+    out = []
+    for done in d.rounds:
+        if done.close:
+            j = done.close[0]
+            out.append(
+                f"{j.tag}: the cost falls by {j.gain:.0f} (probability by chance {j.chance:.1g}), that of unseen runs by "
+                f"{float(j.unseen.sum()):.0f} +- {j.error:.0f}"
+            )
+    return out
 
 
-def next_experiment(d: Diagnosis, progress: Callable[[str, float], None] | None = None) -> dict[str, Any] | None:
-    """For effects these data cannot tell apart: the experiment in which their fitted models differ most.
+def visible(d: Diagnosis) -> dict[str, dict[str, Any]]:
+    """Tag -> the smallest amplitude of an effect that the last model would have shown (five standard deviations)."""
+    out: dict[str, dict[str, Any]] = {}
+    for c in d.rounds[-1].candidates:
+        if c.visible is None:
+            continue
+        unit = catalogue.amplitude(catalogue.get(c.tag)).unit
+        known = out.get(c.tag)
+        if known is None or c.visible < known["amplitude"]:
+            out[c.tag] = {"amplitude": c.visible, "unit": unit, "form": dict(c.form)}
+    return out
 
-    With several sets it is that of the first, and in ``others`` those of the others.
-    """
-    if not d.sets:
+
+def verdict_text(d: Diagnosis) -> str:
+    """The answer in a few sentences."""
+    v, last, base = d.verdict, d.ladder[-1], d.ladder[1]
+    before, after = (error(r.unseen, d) for r in (base, last) if r.unseen is not None)
+    parts = []
+    if v.effects:
+        amounts = []
+        for tag in v.effects:
+            name = f"{tag}.{catalogue.get(tag).amplitude}"
+            unit = catalogue.amplitude(catalogue.get(tag)).unit
+            value, std = d.fit.values[name], d.fit.std()[name]
+            amounts.append(f"{name} = {shown(value, unit, 3)} +- {shown(std, unit, 2)}")
+        parts.append(
+            f"Adding {' and '.join(v.effects)} takes the error on unseen runs from {before:.3g} to {after:.3g} floors "
+            f"({'; '.join(amounts)})."
+        )
+    if v.kind == "ambiguous":
+        sets = [[j.tag for j in r.close] for r in d.rounds if len(r.close) > 1]
+        parts.append("These data cannot tell " + "; nor ".join(" from ".join(s) for s in sets) + ".")
+    if v.kind == "unknown" and v.structure is not None:
+        parts.append(
+            f"Something is missing that no effect of the catalogue explains: the residual force depends on the "
+            f"{v.structure.variable} (probability by chance {v.structure.chance:.1g})."
+        )
+    if v.kind in ("complete", "missing"):
+        seen = sorted(visible(d).items(), key=lambda item: item[0])
+        some = "; ".join(f"{tag} {shown(a['amplitude'], a['unit'], 2)}" for tag, a in seen[:LISTED])
+        more = f"; and {len(seen) - LISTED} more in the report" if len(seen) > LISTED else ""
+        parts.append(
+            f"Nothing {'else ' if v.effects else ''}is missing above what these data show (five standard deviations: "
+            f"{some}{more})."
+        )
+    return " ".join(parts)
+
+
+def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
+    """For effects that these data cannot tell apart: what the catalogue knows to separate them."""
+    sets = [r.close for r in d.rounds if len(r.close) > 1]
+    if not sets:
         return None
-    first, *others = (_separating(rivals, d, progress) for rivals in d.sets)
-    return {**first, "others": others} if others else first
+    made = []
+    for close in sets:
+        a, b = close[0].tag, close[1].tag
+        known = catalogue.alike(a).get(b)
+        text = known or "add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s"
+        made.append({"text": text, "separates": [j.tag for j in close]})
+    return {**made[0], "others": made[1:]} if len(made) > 1 else made[0]
 
 
-def _separating(
-    rivals: Sequence[Candidate], d: Diagnosis, progress: Callable[[str, float], None] | None
-) -> dict[str, Any]:
-    """Where none of the menu tells them apart, what the catalogue knows of the first two comes first."""
-    a, b = (catalogue.get(c.tag) for c in rivals[:2])
-    known = catalogue.alike(a.tag).get(b.tag)
-    fitted = [c for c in rivals if c.fit is not None and c.composition is not None]
-    if len(fitted) > 1:
-        factor = 1.0 + min(scatter_factor(d.measurement), 1.0)
-        found = recommend_among(fitted, Conditions.of(d.measurement), factor=factor, progress=progress)
-        if found["floors"] < TELLING and known is not None and len(fitted) == 2:
-            found["text"] = f"{known} ({found['text']})"
-        return found
-    text = "add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s, a virgin start"
-    return {"text": known or text, "separates": [c.tag for c in rivals[:2]]}
+def _structure(d: Diagnosis) -> dict[str, Any] | None:
+    s = d.verdict.structure
+    if s is None:
+        return None
+    return {
+        "variable": s.variable, "unit": s.unit, "chance": s.chance, "at": s.at.tolist(), "force": s.force.tolist(),
+    }  # fmt: skip
+
+
+def parameters(fit: Fit, found: Fitted) -> dict[str, dict[str, Any]]:
+    """Value, standard deviation, unit and meaning of every parameter, fixed ones included."""
+    out: dict[str, dict[str, Any]] = {}
+    values, std = found.values, found.std
+    for f, z in zip(found.composition.free, found.z, strict=True):
+        if run_of(f.name) is not None:
+            continue
+        low, high = f.bounds
+        note = ""
+        if np.isfinite([low, high]).all() and min(z - low, high - z) < 1e-3 * (high - low):
+            note = "at its bound"
+        elif f.name.startswith("contact.") and f.name != "contact.strength":
+            note = "of the law fitted to the measured backbone"
+        elif np.isfinite(f.width) and std[f.name] > 0.8 * f.width * abs(f.slope(float(z))):
+            note = "not determined by the data: this is its prior"
+        note = "; ".join(filter(None, [note, f.unusual(values[f.name], std[f.name])]))
+        out[f.name] = {"value": values[f.name], "std": std[f.name], "unit": f.unit, "doc": f.doc, "note": note}
+    for name, value in found.composition.fixed.items():
+        unit = "N/m" if name.endswith("stiffness") else "1"
+        out[name] = {"value": value, "std": 0.0, "unit": unit, "doc": "", "note": "given"}
+    mass = {"value": found.composition.mass, "std": 0.0, "unit": "kg", "doc": "mass of the block", "note": "given"}
+    out.setdefault("rig.mass", mass)
+    assert PULL not in out
+    return out
+
+
+def variables(d: Diagnosis, curve: Backbone, law: PowerLaw) -> Variables:
+    """Arrays of the pictures: measured and model force at the points of every run, the backbone."""
+    out: Variables = {}
+    problem = d.fit.problem
+    base = d.ladder[1].fit
+    assert base is not None
+    where = coordinates(d.fit)
+    for r, run in enumerate(d.prepared.runs):
+        own = problem.run == r
+        dim = f"force{r}_point"
+        held = d.fit.slopes.held[own]
+        for name, values, unit in (
+            ("time", problem.at[own], "s"),
+            ("model", held, "N"),
+            ("measured", held + d.fit.residual[own], "N"),
+            ("residual", d.fit.marginal[own], "N"),
+            ("base_residual", base.marginal[own], "N"),
+            ("floor", d.floor[own], "N"),
+            ("phase", problem.phase[own], "1"),
+            ("event", run.of, "1"),
+            ("displacement", where["displacement"][own], "m"),
+            ("velocity", where["velocity"][own], "m/s"),
+            ("spring_force", where["spring force"][own], "N"),
+            ("time_in_contact", where["time in contact"][own], "s"),
+        ):
+            out[f"force{r}_{name}"] = (dim, np.asarray(values), {"units": unit})
+    for name, values, unit in (
+        ("displacement", curve.displacement, "m"), ("force", curve.force, "N"), ("std", curve.std, "N"),
+        ("law", law.force, "N"),
+    ):  # fmt: skip
+        out[f"backbone_{name}"] = ("backbone_point", values, {"units": unit})
+    return out
+

@@ -313,3 +313,11 @@ def fit(
         float((system.target**2).sum()), system.covariance(), float(point.weights.sum()), evaluations,
     )  # fmt: skip
 
+
+def deviations(found: Fit) -> Array:
+    """Standard deviation of the residual at every point: noise and scatter (N), shape (p,)."""
+    _, whole = covariance(found.scatter.sizes, found.known)
+    sd = np.sqrt(np.diagonal(np.asarray(whole), axis1=1, axis2=2))
+    out = np.zeros(found.problem.of.size)
+    out[found.blocks.index[found.blocks.there]] = sd[found.blocks.there]
+    return out

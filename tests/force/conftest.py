@@ -1,0 +1,69 @@
+"""Small campaigns of the challenge's generator, an independent simulator: made once, loaded once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from stickslip.campaign import load_campaign, load_traces
+from stickslip.challenge.detection import detection
+from stickslip.challenge.generator import Run, make_campaign
+from stickslip.challenge.generator.forms import EFFECTS
+from stickslip.fit.resonance import ringing
+from stickslip.force.begin import begin
+from stickslip.force.knots import Knots, Scales, knots, scales
+from stickslip.force.problem import Point, Problem
+from stickslip.segment import Segmentation, segment
+from stickslip.trace import Trace
+
+SMALL = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A campaign as a fit begins with it.
+
+    Attributes:
+        truth: of the generator.
+        traces, found, knots, times: data, events, runs at their knots, and the times they were thinned by.
+        problem, point: the base and where its fit begins.
+    """
+
+    truth: dict[str, Any]
+    traces: list[Trace]
+    found: list[Segmentation]
+    knots: list[Knots]
+    times: Scales
+    problem: Problem
+    point: Point
+
+
+def made(folder: Any, seed: int, effects: Any = (), runs: tuple[Run, ...] = SMALL, **options: Any) -> Case:
+    """A campaign made and loaded."""
+    truth = make_campaign(folder, seed, effects, runs=runs, **options)
+    campaign = load_campaign(folder / "campaign.toml")
+    traces = load_traces(campaign)
+    found = [segment(t) for t in traces]
+    times = scales(found, ringing(traces, found), traces[0].sampling_rate)
+    thinned = [knots(t, s, times) for t, s in zip(traces, found, strict=True)]
+    problem, point = begin(campaign.rig, traces, found, thinned, times)
+    return Case(truth, traces, found, thinned, times, problem, point)
+
+
+def seen(tag: str, form: str, multiple: float) -> tuple[str, float, str]:
+    """An effect to be hidden, at a multiple of the amplitude from which it can be seen."""
+    return tag, multiple * detection(EFFECTS[tag], form), form
+
+
+@pytest.fixture(scope="session")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """Two runs of four events with nothing hidden, the contact virgin and the spring known."""
+    return made(tmp_path_factory.mktemp("small") / "case", 11, spring_known=True)
+
+
+@pytest.fixture(scope="session")
+def begun(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """The same from a record that begins with the spring stretched, its stiffness unknown."""
+    return made(tmp_path_factory.mktemp("begun") / "case", 11, spring_known=False, virgin=False)
