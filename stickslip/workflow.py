@@ -59,6 +59,18 @@ def check_counts(max_effects: int, jobs: int | None = None) -> None:
             raise InputError("out of range", key=key, value=value, allowed="1 or more", hint=hint)
 
 
+def check_time(limit: float | None) -> None:
+    """Refuse a time limit that is none.
+
+    Raises:
+        InputError: it is not positive.
+    """
+    if limit is not None and not limit > 0.0:
+        raise InputError(
+            "out of range", key="--time-limit", value=limit, allowed="more than 0 s", hint="leave it out for no limit"
+        )
+
+
 def code_digest(effect_files: Sequence[str | Path] = ()) -> str:
     """Digest of the package's own modules and of effects from elsewhere: pieces made by other code are not taken up.
 
@@ -118,8 +130,7 @@ def diagnose_campaign(
     holdout: Sequence[str] = (),
     effect_files: Sequence[str | Path] = (),
     jobs: int | None = None,
-    learn_residual: bool = False,
-    missing_force: bool = True,
+    time_limit: float | None = None,
     force: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> dict[str, Any]:
@@ -129,10 +140,8 @@ def diagnose_campaign(
 
     Args:
         campaign: the TOML file. out: the run folder.
-        candidates, max_effects, holdout, jobs, progress: see ``stickslip.diagnose.engine.diagnose``.
+        candidates, max_effects, holdout, jobs, time_limit, progress: see ``stickslip.diagnose.engine.diagnose``.
         effect_files: Python files with effects of one's own, which are run.
-        learn_residual: fit a smooth force to what is left over, for prediction; it takes no part in the verdict.
-        missing_force: estimate and draw what force is missing (a minute of a processor), also without part in it.
         force: replace an existing run folder.
 
     Returns:
@@ -143,6 +152,7 @@ def diagnose_campaign(
         RunFolderError: the folder cannot be written.
     """
     check_counts(max_effects, jobs)
+    check_time(time_limit)
     out = Path(out)
     refuse_existing(out, force)
     began = time.perf_counter()
@@ -153,12 +163,10 @@ def diagnose_campaign(
     from .diagnose.engine import diagnose
     from .diagnose.summary import summary
     from .effects import catalogue
-    from .fit.problem import Problem
     from .motion import check_pace, slip_times, true_gains, with_displacements
     from .report import abilities, write_report
     from .report.describe import left_out
-    from .report.inertial_result import fit_sections
-    from .report.missing_force import missing_sections
+    from .report.diagnosis_result import trace_sections
     from .segment import segment
 
     for path in effect_files:
@@ -180,7 +188,6 @@ def diagnose_campaign(
             {
                 "inputs": inputs,
                 "holdout": list(holdout),
-                "candidates": candidates,
                 "versions": versions(),
                 "code": code_digest(effect_files),
             }
@@ -194,6 +201,7 @@ def diagnose_campaign(
         first = [*notes, *cannot, *([f"going on from {ready} finished pieces"] if ready else [])]
         if progress is not None and first:
             progress("\n         ".join(["before anything is fitted:", *first]), 0.0)
+        left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), 0.0)
         try:
             found = diagnose(
                 loaded,
@@ -204,36 +212,26 @@ def diagnose_campaign(
                 holdout=holdout,
                 jobs=jobs,
                 store=pieces,
+                time_limit=left,
                 progress=progress,
             )
         except KeyboardInterrupt:
             text = f"{pieces.ready()} finished pieces are kept, and the same command goes on from them"
             raise KeyboardInterrupt(text) from None
+        except InputError as error:
+            raise error.at(file=loaded.path) from None
+        sections, variables = summary(found, loaded.rig)
         result: dict[str, Any] = {
-            "kind": "diagnose",
-            "title": loaded.title,
-            **summary(found, loaded.rig, candidates or (), progress=progress),
-            "inputs": inputs,
-            "versions": versions(),
-        }
+            "kind": "diagnose", "title": loaded.title, **sections, "inputs": inputs, "versions": versions()
+        }  # fmt: skip
         result["notes"] = [*notes, *mended, *implied]
         result |= {"can": list(able.can), "cannot": cannot}
         result["dropped"] = [*left_out(traces, segmentations), *result["dropped"]]
-        top = next((r for r in reversed(found.ladder) if r.fit is not None), None)
-        if top is not None and top.fit is not None and top.composition is not None:
-            problem = Problem(top.composition, found.measurement)
-            sections, variables = fit_sections(
-                problem, top.fit, traces, segmentations, found.floor, found.train, loaded.rig
-            )
-            result |= sections
-            if missing_force:
-                sections, more = missing_sections(
-                    found, pieces, learn_residual=learn_residual, rig=loaded.rig, progress=progress
-                )
-                result |= sections
-                variables |= more
-            coordinates = variables.pop("coordinates")
-            run.arrays(xarray.Dataset(variables, coords=coordinates, attrs={"title": loaded.title}))
+        described, pictured = trace_sections(traces, segmentations)
+        result |= described
+        variables |= pictured
+        coordinates = variables.pop("coordinates", {})
+        run.arrays(xarray.Dataset(variables, coords=coordinates, attrs={"title": loaded.title}))
         result["seconds"] = round(time.perf_counter() - began, 1)
         run.json(result)
         write_report(run.folder)

@@ -8,7 +8,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -85,7 +85,7 @@ def run_challenge(
     runs = folder / RUNS
     tags = None if candidates is None else list(candidates)
     if diagnosis is None:
-        diagnosis = partial(diagnose_campaign, jobs=1, candidates=tags, max_effects=max_effects, missing_force=False)
+        diagnosis = partial(diagnose_campaign, jobs=1, candidates=tags, max_effects=max_effects)
     with alone(runs):
         runs.mkdir(exist_ok=True)
         _protocol(runs, digest(folder), {"candidates": tags, "max_effects": max_effects})
@@ -120,9 +120,9 @@ def _workers(number: int) -> str:
 
 def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
     """Write down under what settings this challenge is run, and refuse others later."""
-    from ..diagnose.thresholds import THRESHOLDS
+    from ..diagnose import decide
 
-    now = {"seal": seal, **options, "thresholds": asdict(THRESHOLDS), "versions": versions()}
+    now = {"seal": seal, **options, "thresholds": {"chance": decide.CHANCE, "errors": decide.ERRORS, "dispersion": decide.DISPERSION}, "versions": versions()}
     now |= {"code": code_digest(), "codes": {}}
     path = runs / PROTOCOL
     if not path.is_file():

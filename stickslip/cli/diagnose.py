@@ -26,7 +26,7 @@ def diagnose(
     holdout: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
     jobs: int | None = None,
-    learn_residual: Annotated[bool, Parameter(negative="")] = False,
+    time_limit: float | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -44,15 +44,14 @@ def diagnose(
     max_effects:
         Add at most so many, one after the other.
     holdout:
-        A run no fit may see; may be given several times. Default: runs whose role in the campaign is "held-out", or the
-        middle one of three or more velocities and the later part of runs with holds, or the last third of every run.
+        A run to keep aside; may be given several times. Default: runs whose role in the campaign is "held-out". Every
+        other run is predicted from the others in turn.
     effect:
         A Python file with an effect of your own, which is run and then tried with the others.
     jobs:
         Parallel processes; default one a core.
-    learn_residual:
-        Also fit a smooth force of displacement, velocity and time in contact to what the last model leaves over. It is
-        for prediction and no explanation, and the verdict does not use it.
+    time_limit:
+        Seconds after which the best answer so far is given; it says so.
     json:
         Print result.json.
     force:
@@ -68,7 +67,7 @@ def diagnose(
         holdout=holdout,
         effect_files=effect,
         jobs=jobs,
-        learn_residual=learn_residual,
+        time_limit=time_limit,
         force=force,
         progress=_teller(),
     )
@@ -145,6 +144,4 @@ def _print(result: dict[str, Any], out: Path) -> None:
     lost = [f"left out: {text}" for text in result["dropped"]]
     for text in [*mended, *lost[:8], *([f"... and {len(lost) - 8} more"] if len(lost) > 8 else [])]:
         console.print(escape(text), highlight=False)
-    if result.get("learned_residual"):
-        console.print(f"learned residual: {result['learned_residual']['text']}", highlight=False)
     console.print(f"report in {escape(str(out / 'report.html'))}", highlight=False)

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from ..force.heldout import unseen
 from ..segment import Segmentation, segment
 from ..trace import Trace
 from .decide import DISPERSION, Judge, Judged, named
+from .pieces import Store, kept, name_of
 from .prepare import Prepared, prepare
 from .trials import Tell, trials
 
@@ -106,7 +108,9 @@ def diagnose(
     *,
     candidates: Sequence[str] | None = None,
     max_effects: int = 4,
+    holdout: Sequence[str] = (),
     jobs: int | None = None,
+    store: Store | None = None,
     time_limit: float | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Diagnosis:
@@ -116,7 +120,9 @@ def diagnose(
         campaign, traces, segmentations: the measurement.
         candidates: tags to try; default the whole catalogue.
         max_effects: at most so many are added one after the other.
+        holdout: runs to keep aside, besides those whose role in the campaign is "held-out".
         jobs: processes; default the number of cores.
+        store: keeps finished pieces.
         time_limit: seconds after which the best answer so far is given.
         progress: told the stage and the share of it done.
 
@@ -132,7 +138,7 @@ def diagnose(
     tell: Tell = progress or (lambda text, share: None)
     segmentations = [segment(t) for t in traces] if segmentations is None else segmentations
     tell("the measured force", 0.0)
-    prepared = prepare(campaign, traces, segmentations)
+    prepared = prepare(campaign, traces, segmentations, holdout)
     dropped = list(prepared.dropped)
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]
     if campaign.rig.contacts == 1 and SEVERAL in tags:
@@ -140,7 +146,7 @@ def diagnose(
         dropped.append(f"{SEVERAL}: not tried, for the rig has one contact")
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
     tell("fitting the base model", 0.5)
-    base = fit(prepared.problem, prepared.start)
+    base = kept(store, "base", prepared.problem, lambda: fit(prepared.problem, prepared.start))
     ladder = [Rung(("static",), None, static_residual(base), None, None), _rung(("static", "inertia"), "inertia", base)]
     rounds: list[Round] = []
     verdict: Verdict | None = None
@@ -148,13 +154,14 @@ def diagnose(
         taken = [r.close[0].tag for r in rounds if r.close]
         left = [t for t in tags if t not in taken]
         name = f"round {len(rounds) + 1}"
-        done = one_round(base, left, jobs, lambda text, share, n=name: tell(f"{n}: {text}", share), in_time)
+        key = name.replace(" ", "")
+        done = one_round(base, left, jobs, partial(_told, tell, name), in_time, store, key)
         rounds.append(done)
         if not done.close or not in_time():
             verdict = _end(taken, done, rounds)
             break
         tell(f"{name}: the model with {done.close[0].tag}", 1.0)
-        base = settled(base, done.close[0].candidate)
+        base = settled(base, done.close[0].candidate, store, key)
         ladder.append(_rung((*ladder[-1].model, done.close[0].tag), done.close[0].tag, base))
         if len(taken) + 1 >= max_effects:
             verdict = _end([*taken, done.close[0].tag], replace(done, base=base, close=()), rounds)
@@ -162,19 +169,35 @@ def diagnose(
     return Diagnosis(verdict, tuple(ladder), tuple(rounds), prepared, floor, tuple(dropped), in_time())
 
 
-def one_round(base: Fit, tags: Sequence[str], jobs: int, tell: Tell, in_time: Callable[[], bool]) -> Round:
+def _told(tell: Tell, name: str, text: str, share: float) -> None:
+    tell(f"{name}: {text}", share)
+
+
+def one_round(
+    base: Fit,
+    tags: Sequence[str],
+    jobs: int,
+    tell: Tell,
+    in_time: Callable[[], bool],
+    store: Store | None = None,
+    name: str = "round",
+) -> Round:
     """Every effect on top of one model, and which of them is to be named."""
-    tried = trials(base, tags, jobs, tell, in_time)
+    tried = trials(base, tags, jobs, tell, in_time, store, name)
     judge = Judge(base, max(len(every_form(tags)), 1))
     judged = tuple(j for j in map(judge, tried) if j is not None)
     return Round(base, judged, tuple(tried), tuple(named(judged)))
 
 
-def settled(base: Fit, candidate: Candidate) -> Fit:
+def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: str = "round") -> Fit:
     """The model with an effect, what is random estimated anew."""
-    assert candidate.fit is not None
     found = candidate.fit
-    return fit(found.problem, found.point, found.scatter, dropped=base.dropped, first=True)
+    assert found is not None
+    key = f"{name}-settled-{name_of(candidate.tag, candidate.form)}"
+    return kept(
+        store, key, found.problem,
+        lambda: fit(found.problem, found.point, found.scatter, dropped=base.dropped, first=True),
+    )  # fmt: skip
 
 
 def _end(taken: Sequence[str], last: Round, rounds: Sequence[Round]) -> Verdict:

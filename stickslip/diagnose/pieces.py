@@ -1,80 +1,72 @@
-"""Finished pieces of a diagnosis as plain arrays, so that they can be kept in a file that holds data only."""
+"""Finished pieces of a diagnosis as plain arrays, so that an interrupted one goes on from files that hold data only."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, replace
+from collections.abc import Callable, Mapping
+from typing import Protocol
 
 import numpy as np
 
 from ..effects import catalogue
-from ..features.measurement import Measurement
-from ..fit.composition import Composition
-from ..fit.inertial import Fit
-from ..fit.parameters import Free, effect_parameters
-from ..fit.problem import Problem
-from .candidate import Candidate, with_fit
-from .periods import within_record
+from ..force.candidates import Candidate, with_start
+from ..force.fit import Fit, at
+from ..force.problem import Point, Problem
+from ..force.scatter import Scatter
 
-_ARRAYS = ("z", "events", "features", "offsets", "covariance", "columns", "use")
+_POINT = ("z", "phases", "weights", "events", "common")
+_FACTS = ("tag", "form", "promise", "note", "members", "visible", "start")
 
 
-def fit_arrays(fit: Fit) -> dict[str, np.ndarray]:
-    """A fit as named arrays; the free parameters as one JSON text."""
-    free = json.dumps([asdict(f) for f in fit.free])
-    numbers = np.array([fit.cost, fit.data_cost, fit.evaluations, fit.jacobians])
-    return {name: getattr(fit, name) for name in _ARRAYS} | {"numbers": numbers, "free": np.array(free)}
+class Store(Protocol):
+    """Where finished pieces are kept."""
+
+    def load(self, key: str) -> Mapping[str, np.ndarray] | None:
+        """A finished piece, or None."""
+
+    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
+        """Keep a finished piece."""
 
 
-def fit_from(arrays: Mapping[str, np.ndarray]) -> Fit:
-    """The inverse of :func:`fit_arrays`."""
-    cost, data_cost, evaluations, jacobians = arrays["numbers"].tolist()
-    free = tuple(
-        Free(**{**f, "usual": None if f["usual"] is None else tuple(f["usual"])})  # JSON has no tuples
-        for f in json.loads(str(arrays["free"]))
-    )
-    z, events, features, offsets, covariance, columns, use = (np.asarray(arrays[name]) for name in _ARRAYS)
-    return Fit(
-        z,
-        events,
-        cost,
-        data_cost,
-        features,
-        offsets,
-        covariance,
-        free,
-        columns,
-        use.astype(bool),
-        int(evaluations),
-        int(jacobians),
-    )
+def kept(store: Store | None, key: str, problem: Problem, make: Callable[[], Fit]) -> Fit:
+    """A fit of the problem from the store, or made and kept there."""
+    found = store.load(key) if store is not None else None
+    if found is not None:
+        return at(problem, _point(found), Scatter(found["sizes"]), found["dropped"].astype(bool))
+    fit = make()
+    if store is not None:
+        store.save(key, {**_arrays(fit.point), "sizes": fit.scatter.sizes, "dropped": fit.dropped})
+    return fit
 
 
-def candidate_arrays(candidate: Candidate) -> dict[str, np.ndarray]:
-    """A candidate as named arrays."""
-    facts = ("tag", "form", "score", "promise", "wide", "note", "settled")
-    head = json.dumps({name: getattr(candidate, name) for name in facts})
-    others = {name: np.array([o[i] for o in candidate.others]) for i, name in enumerate(("others_z", "others_events"))}
-    return {"head": np.array(head)} | others | (fit_arrays(candidate.fit) if candidate.fit is not None else {})
+def name_of(tag: str, form: Mapping[str, str]) -> str:
+    """Name of a candidate among the pieces of a round."""
+    return "-".join([tag, *form.values()]).replace(" ", "_")
 
 
-def candidate_from(
-    arrays: Mapping[str, np.ndarray],
-    base: Composition,
-    measurement: Measurement,
-    floor: np.ndarray,
-    train: np.ndarray,
-) -> Candidate:
-    """The inverse of :func:`candidate_arrays`; errors are computed again from the features kept."""
-    head = json.loads(str(arrays["head"]))
+def save_candidate(store: Store, key: str, candidate: Candidate) -> None:
+    """Keep a candidate."""
+    head = json.dumps({name: getattr(candidate, name) for name in _FACTS})
+    point = {} if candidate.fit is None else _arrays(candidate.fit.point)
+    store.save(key, {"head": np.array(head), **point})
+
+
+def load_candidate(store: Store, key: str, base: Fit) -> Candidate | None:
+    """A kept candidate on top of its base, or None."""
+    found = store.load(key)
+    if found is None:
+        return None
+    head = json.loads(str(found["head"]))
+    if "z" not in found:
+        return Candidate(**head, fit=None)
     effect = catalogue.get(head["tag"])(**head["form"])
-    composition = base.with_effect(effect, within_record(effect, effect_parameters(effect), measurement))
-    others = tuple(zip(arrays["others_z"], arrays["others_events"], strict=True))
-    candidate = Candidate(**head, effect=effect, composition=composition, others=others)
-    if "z" not in arrays:
-        return candidate
-    fit = fit_from(arrays)
-    if candidate.note:
-        return replace(candidate, fit=fit)
-    return with_fit(candidate, fit, Problem(composition, measurement), floor, train)
+    problem, _ = with_start(base.problem, effect, head["start"])
+    return Candidate(**head, fit=at(problem, _point(found), base.scatter, base.dropped, base.known))
+
+
+def _arrays(point: Point) -> dict[str, np.ndarray]:
+    return {name: np.asarray(getattr(point, name)) for name in _POINT}
+
+
+def _point(found: Mapping[str, np.ndarray]) -> Point:
+    return Point(*(np.asarray(found[name], float) for name in _POINT))

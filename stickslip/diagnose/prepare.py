@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..campaign import Campaign
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..fit.start import ringing, shared_rig
 from ..force.begin import begin
 from ..force.knots import Knots, Scales, knots, scales
@@ -42,15 +42,28 @@ class Prepared:
         return self.problem.runs
 
 
-def prepare(campaign: Campaign, traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> Prepared:
+def prepare(
+    campaign: Campaign, traces: Sequence[Trace], segmentations: Sequence[Segmentation], holdout: Sequence[str] = ()
+) -> Prepared:
     """Thin all runs that can take part, and look where the base begins.
 
+    Args:
+        campaign, traces, segmentations: the measurement.
+        holdout: runs to keep aside.
+
     Raises:
-        InputError: no run has displacement, drive and slips, or the mass is not given.
+        InputError: no run of that name; no run has displacement, drive and slips, or the mass is not given.
     """
+    names = [t.name for t in traces]
+    for name in holdout:
+        if name not in names:
+            raise InputError(
+                "no run of this name to hold out", key="--holdout", value=name, hint=nearest(name, names)
+            )
     used, dropped = [], []
     for trace, found in zip(traces, segmentations, strict=True):
-        why = _why_not(trace, found)
+        aside = trace.name in holdout or (not holdout and trace.role == "held-out")
+        why = "kept aside: no fit sees it" if aside else _why_not(trace, found)
         if why:
             dropped.append(f"{trace.name}: {why}")
         else:

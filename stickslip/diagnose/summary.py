@@ -18,7 +18,7 @@ from ..force.knots import PHASES
 from ..force.problem import PULL
 from ..force.residual import coordinates
 from ..units import shown
-from .decide import CHANCE, Judged, best_forms
+from .decide import CHANCE, ERRORS, Judged, best_forms
 from .engine import Diagnosis, Round, Rung
 from .fitted import fitted_model
 
@@ -171,8 +171,10 @@ def failures(j: Judged, done: Round) -> list[str]:
     out = []
     if j.chance >= CHANCE:
         out.append(f"chance gives such a gain with probability {j.chance:.2g}")
-    if float(j.unseen.sum()) <= 2.0 * j.error:
-        out.append("unseen runs are not predicted better by more than two standard errors")
+    if float(j.unseen.sum()) <= ERRORS * j.error:
+        out.append(f"unseen runs are not predicted better by more than {ERRORS:g} standard errors")
+    if j.fall <= 0.0:
+        out.append("the error on unseen runs does not fall")
     if not out and done.close:
         out.append(f"{done.close[0].tag} predicts unseen runs better")
     return out

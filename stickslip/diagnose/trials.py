@@ -14,11 +14,20 @@ from ..effects import catalogue
 from ..force.candidates import Candidate, every_form, try_effect
 from ..force.fit import Fit
 from ..force.score import Explained
+from .pieces import Store, load_candidate, name_of, save_candidate
 
 Tell = Callable[[str, float], None]
 
 
-def trials(base: Fit, tags: Sequence[str], jobs: int, tell: Tell, until: Callable[[], bool]) -> list[Candidate]:
+def trials(
+    base: Fit,
+    tags: Sequence[str],
+    jobs: int,
+    tell: Tell,
+    until: Callable[[], bool],
+    store: Store | None = None,
+    name: str = "round",
+) -> list[Candidate]:
     """Every form of every effect, refitted with the base.
 
     Args:
@@ -27,11 +36,21 @@ def trials(base: Fit, tags: Sequence[str], jobs: int, tell: Tell, until: Callabl
         jobs: processes.
         tell: told what was tried and the share done.
         until: whether there is time for more; what is not tried then is missing from the answer.
+        store, name: keeps what is finished, under this name.
     """
     work = every_form(tags)
     out: list[Candidate] = []
-    for candidate in _made(base, work, jobs):
+    left = []
+    for tag, form in work:
+        known = None if store is None else load_candidate(store, f"{name}-{name_of(tag, form)}", base)
+        if known is None:
+            left.append((tag, form))
+        else:
+            out.append(known)
+    for candidate in _made(base, left, jobs):
         out.append(candidate)
+        if store is not None:
+            save_candidate(store, f"{name}-{name_of(candidate.tag, candidate.form)}", candidate)
         tell(candidate.tag, len(out) / len(work))
         if not until():
             break

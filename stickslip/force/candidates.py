@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import equinox as eqx
@@ -16,7 +16,7 @@ from ..errors import StickslipError
 from ..fit.parameters import Free, effect_parameters
 from ..params import Spec, specs
 from .fit import Array, Fit, fit
-from .problem import Point, is_own
+from .problem import Point, Problem, is_own
 from .score import Explained, signatures
 
 FREQUENCIES = 240  # of a periodic effect
@@ -34,6 +34,7 @@ class Candidate:
         note: why.
         members: how many values of the inner parameters were tried.
         visible: amplitude that would be five standard deviations (SI, distance from the null).
+        start: values of the effect that its fit began with (SI).
     """
 
     tag: str
@@ -43,6 +44,7 @@ class Candidate:
     note: str = ""
     members: int = 1
     visible: float | None = None
+    start: dict[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -117,19 +119,23 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     if abs(amplitude - null) < least:
         sign = 1.0 if amplitude >= null and spec.upper > null else -1.0
         amplitude = null + sign * min(least, 0.5 * abs((spec.upper if sign > 0 else spec.lower) - null))
-    found = _refit(base, effect, {**members[best], effect.amplitude: amplitude})
-    return Candidate(effect.tag, form, float(falls[best]), found, "", len(members), 5.0 * float(errors[best]))
+    start = {**members[best], effect.amplitude: amplitude}
+    found = _refit(base, effect, start)
+    return Candidate(effect.tag, form, float(falls[best]), found, "", len(members), 5.0 * float(errors[best]), start)
 
 
 def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
     """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,)."""
+    problem, free = with_start(base.problem, effect, values)
+    return fit(problem, _start(base, free, turns), base.scatter, dropped=base.dropped, estimated=False, known=base.known)
+
+
+def with_start(problem: Problem, effect: Effect, values: dict[str, float]) -> tuple[Problem, list[Free]]:
+    """The problem with an effect more, whose search starts at these values (SI), and its free parameters."""
     for name, value in values.items():
         effect = eqx.tree_at(lambda e, n=name: getattr(e, n), effect, np.float64(value))  # type: ignore[misc]
-    free = effect_parameters(effect, amplitude=values[effect.amplitude])
-    free = [_kept(f, values) for f in free]
-    composition = base.problem.composition.with_effect(effect, free)
-    problem = base.problem.with_composition(composition)
-    return fit(problem, _start(base, free, turns), base.scatter, dropped=base.dropped, estimated=False, known=base.known)
+    free = [_kept(f, values) for f in effect_parameters(effect, amplitude=values[effect.amplitude])]
+    return problem.with_composition(problem.composition.with_effect(effect, free)), free
 
 
 def _kept(f: Free, values: dict[str, float]) -> Free:
@@ -178,10 +184,11 @@ def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]
     limit = specs(effect)[effect.amplitude]
     amplitude = float(np.clip(amplitude, 1e-3 * limit.upper, 0.9 * limit.upper))
     turns = np.arctan2(waves[:, 1], waves[:, 0])
-    found = _refit(base, effect, {name: float(values[at]), effect.amplitude: amplitude}, turns)
+    start = {name: float(values[at]), effect.amplitude: amplitude}
+    found = _refit(base, effect, start, turns)
     # in the mean over runs and phases a wave is seen as each of its two parts is
     seen = explained.singly(columns[2 * at : 2 * at + 2].T)[2]
-    return Candidate(effect.tag, form, best, found, "", int(values.size), 5.0 * float(np.mean(seen)))
+    return Candidate(effect.tag, form, best, found, "", int(values.size), 5.0 * float(np.mean(seen)), start)
 
 
 def _frequencies(base: Fit, variable: str, spec: Spec, name: str) -> Array:

@@ -15,7 +15,6 @@ from .scatter import Blocks, Known, Scatter, covariance, estimate
 
 Array = NDArray[np.float64]
 BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean
-SYSTEMATIC = 1e-9  # m, of the position: what quantisation, filters and hum may leave alike in all cycles
 FARTHEST = 1.5  # step of a parameter on the search scale
 ROUNDS = 10  # times that the scatter is estimated anew
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
@@ -180,10 +179,10 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
     bend = np.zeros((k - 2, size))
     bend[:, a + b : a + b + k] = np.diff(np.eye(k), 2, axis=0) / (BEND * unit)
     alike = np.zeros((c, size))
-    alike[:, a + b + k :] = np.eye(c) / SYSTEMATIC
+    alike[:, a + b + k :] = np.eye(c) / problem.systematic
     return (
         np.vstack([*rows, bend, alike]),
-        np.concatenate([target, bend[:, a + b : a + b + k] @ point.weights, point.common / SYSTEMATIC]),
+        np.concatenate([target, bend[:, a + b : a + b + k] @ point.weights, point.common / problem.systematic]),
     )
 
 
@@ -306,11 +305,30 @@ def fit(
             break
     made = here()
     point, slopes, _, count = descend(point, slopes, made, LAST)
-    evaluations += count
-    system = _System(problem, point, slopes, scatter, made, blocks)
+    return _found(problem, point, slopes, scatter, dropped, made, evaluations + count)
+
+
+def at(
+    problem: Problem, point: Point, scatter: Scatter, dropped: NDArray[np.bool_], known: Known | None = None
+) -> Fit:
+    """A fit that was made before, from where it ended; arguments as of :func:`fit`."""
+    blocks = Blocks.of(problem.of, problem.events)
+    slopes = problem.evaluate(point)
+    strength = float(point.weights.sum())
+    made = known or known_of(problem, slopes, blocks, strength, problem.values(point), dropped)
+    return _found(problem, point, slopes, scatter, dropped, made, 1)
+
+
+def _found(
+    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, dropped: NDArray[np.bool_], known: Known,
+    evaluations: int,
+) -> Fit:  # fmt: skip
+    blocks = Blocks.of(problem.of, problem.events)
+    system = _System(problem, point, slopes, scatter, known, blocks)
     return Fit(
-        problem, point, slopes, scatter, dropped, replace(made, local=blocks(slopes.local)), blocks, system.likelihood(),
-        float((system.target**2).sum()), system.covariance(), float(point.weights.sum()), evaluations,
+        problem, point, slopes, scatter, dropped, replace(known, local=blocks(slopes.local)), blocks,
+        system.likelihood(), float((system.target**2).sum()), system.covariance(), float(point.weights.sum()),
+        evaluations,
     )  # fmt: skip
 
 

@@ -145,6 +145,8 @@ class Problem:
         self._index = _indices(runs, n, first)
         virgin = np.isin(self.of, [f for f, k in zip(first[:-1], runs, strict=True) if k.virgin])
         hats = _hats(self.place)
+        # quantisation, filters and hum leave about as much alike in all cycles as the noise of one sample is
+        self.systematic = max(float(np.median([k.noise for k in runs])), 1e-12)
         self.cycles = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
 
     def with_composition(self, composition: Composition) -> Problem:

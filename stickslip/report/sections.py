@@ -14,7 +14,7 @@ from .fit_figures import (
     ramp_grid,
     residual_plots,
 )
-from .missing_figure import missing_picture
+from .force_figures import backbone_picture, cycle_picture, residual_picture, runs_of
 
 if TYPE_CHECKING:
     import xarray
@@ -34,13 +34,14 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
         yield "misfit", "Error by phase of the cycle and drive velocity.", heat_map(misfit["table"])
     if "residual" in data:
         yield "misfit", "Error of every cycle against what might explain it.", residual_plots(data)
-    shown = (result.get("missing_force") or {}).get("shown") or []
-    if shown and "missing0_velocity_at" in data:
-        yield (
-            "missing_force",
-            "Bands: two standard deviations, everything else in the model free. Marks: where the data are.",
-            missing_picture(data, shown),
-        )
+    if runs_of(data):
+        names = list((result.get("ladder") or [{}])[-1].get("by_run") or [])
+        yield "force", "One cycle of every run: force that the contact held, and the model's.", cycle_picture(data, names)
+        caption = "Residual force of the base model against what it may depend on; lines: running medians."
+        yield "force", caption, residual_picture(data, names)
+    if "backbone_force" in data and result.get("backbone"):
+        caption = "Backbone of the contact as the motion shows it, and the law of a rough contact."
+        yield "force", caption, backbone_picture(data, result["backbone"])
     if result.get("static") and "creep0_time" in data:
         yield (
             "static",

@@ -12,8 +12,8 @@ _KNOWN: dict[str, Any] = {
     "verdict": {}, "ladder": [], "ranking": [], "parameters": {}, "equations": [], "identifiability": [], "traces": [],
     "dropped": [], "inputs": [], "versions": {}, "static": None, "misfit": None, "next_experiment": None, "can": [],
     "cannot": [], "effective": None, "profiles": [], "ramps": None, "notes": [], "title": "", "kind": "run",
-    "seconds": None, "summary": "", "caution": [], "ranking_base": None, "missing_force": None,
-    "learned_residual": None, "later_rounds": [],
+    "seconds": None, "summary": "", "caution": [], "ranking_base": None, "later_rounds": [],
+    "visible": {}, "structure": None, "backbone": None,
 }  # fmt: skip
 
 
@@ -21,8 +21,6 @@ def tables(result: Mapping[str, Any]) -> dict[str, Any]:
     """Variables of the template: every key it knows, with an empty value where the result has none."""
     found = {key: _or(result.get(key), empty) for key, empty in _KNOWN.items()}
     found["misfit_rows"] = _misfit_rows(found["misfit"])
-    steps = _or((found["learned_residual"] or {}).get("ladder"), [])
-    found["learned_phases"] = list(dict.fromkeys(p for s in steps for p in _or(s.get("heldout_by_phase"), {})))
     found["ladder_phases"] = list(dict.fromkeys(p for step in found["ladder"] for p in _or(step.get("by_phase"), {})))
     return found
 

@@ -19,10 +19,11 @@ from stickslip.params import specs
 from stickslip.solve import Steps, Tolerance, integrate
 
 STRENGTH = 0.2604  # N, of the rig's contact
-TIMES, POSITIONS = np.array([0.0, 0.13, 0.2, 1.0]), np.array([0.0, 0.13e-3, 0.13e-3, 0.93e-3])  # s, m; a short hold
-END = 0.55  # s; three slips
-KNOTS = 1024  # one size for all, so that one program serves all
-COARSE = Tolerance(1e-2, 1e-10, 1e-7)
+TIMES, POSITIONS = np.array([0.0, 0.13, 0.2, 2.2]), np.array([0.0, 0.13e-3, 0.13e-3, 0.53e-3])  # s, m; a short hold
+END = 1.7  # s; three slips
+KNOTS = 2048  # one size for all, so that one program serves all
+DAMPING, HEALING = 15.0, 0.02  # N s/m, s; so that it sticks again after every slip
+COARSE = Tolerance(5e-3, 5e-11, 5e-8)
 
 LAWS = [(tag, form) for tag in catalogue.tags() for form in catalogue.forms(catalogue.get(tag))]
 GROUPS = [LAWS[i : i + 22] for i in range(0, len(LAWS), 22)]  # compiled together
@@ -90,7 +91,9 @@ def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE, turns:
     """
     model = base_model(effects)
     model = eqx.tree_at(
-        lambda m: (m.load_point.times, m.load_point.positions), model, (jnp.asarray(TIMES), jnp.asarray(POSITIONS))
+        lambda m: (m.load_point.times, m.load_point.positions, m.block.damping, m.weakening.healing_time),
+        model,
+        tuple(jnp.asarray(a) for a in (TIMES, POSITIONS, DAMPING, HEALING)),
     )
     trajectory, _ = integrate(model, END, tolerance=tolerance, largest_step=4e-3)
     s = trajectory.steps

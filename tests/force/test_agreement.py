@@ -46,7 +46,8 @@ def base() -> driven.Slips:
 
 def test_the_base_model_holds_what_the_solver_found(base):
     v = base.steps.v
-    assert np.count_nonzero((v[1:] > 1e-3) & (v[:-1] <= 1e-3)) == 3  # slips
+    assert np.count_nonzero((v[1:] > 1e-3) & (v[:-1] <= 1e-3)) >= 3  # slips
+    assert np.abs(v[-1]) < 1e-4  # and sticks
     assert base.steps.x[base.turned] > 50e-6  # all of the first slip comes before the first turn
     assert wrong(base, base.turned) < EXACT
     assert wrong(base) < AT_TURNS
@@ -102,7 +103,7 @@ def test_the_tangent_is_that_of_what_sticks(base):
     upto = int(np.argmax(held.contact > 0.9 * driven.STRENGTH))
     slope = np.diff(held.contact[:upto]) / np.diff(x[:upto])
     before, after = held.tangent[: upto - 1], held.tangent[1:upto]
-    creep = 5e-3 * held.tangent[0]  # weakening sets in
+    creep = 0.02 * held.tangent[0]  # weakening sets in, by less than one element
     assert np.all(slope <= before + creep)
     assert np.all(slope >= after - creep)
     assert held.tangent[upto - 1] < 0.3 * held.tangent[0]
