@@ -122,7 +122,12 @@ def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
     """Write down under what settings this challenge is run, and refuse others later."""
     from ..diagnose import decide
 
-    now = {"seal": seal, **options, "thresholds": {"chance": decide.CHANCE, "errors": decide.ERRORS, "dispersion": decide.DISPERSION}, "versions": versions()}
+    now = {
+        "seal": seal,
+        **options,
+        "thresholds": {"chance": decide.CHANCE, "errors": decide.ERRORS, "dispersion": decide.DISPERSION},
+        "versions": versions(),
+    }
     now |= {"code": code_digest(), "codes": {}}
     path = runs / PROTOCOL
     if not path.is_file():

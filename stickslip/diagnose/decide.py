@@ -1,11 +1,11 @@
 """From refitted effects to an answer, by few rules.
 
-1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many members
-   of its family, among as many effects; and unseen runs are predicted better: their likelihood by more than 2.5 standard
-   errors over their events, and their error (root mean square over floor) as well.
+1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many
+   members of its family, among as many effects; and unseen runs are predicted better: their likelihood by more than
+   2.5 standard errors over their events, and their error (root mean square over floor) as well.
 2. *Named*: the seen effect that predicts unseen runs best.
-3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference event by event.
-   Where a law is in it with a special case of it, the special case stays: it needs less.
+3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference event by
+   event. Where a law is in it with a special case of it, the special case stays: it needs less.
 4. *Unknown*: nothing is seen, but the residual force is a function of a variable.
 """
 

@@ -14,9 +14,9 @@ from ..campaign import Campaign
 from ..effects import catalogue
 from ..force.candidates import Candidate, every_form
 from ..force.fit import Array, Fit, deviations, fit
+from ..force.heldout import unseen
 from ..force.residual import Structure, structures
 from ..force.score import Explained
-from ..force.heldout import unseen
 from ..segment import Segmentation, segment
 from ..trace import Trace
 from .decide import DISPERSION, Judge, Judged, named
@@ -230,4 +230,3 @@ def static_residual(base: Fit) -> Array:
         z[names.index(name)] = free.inward(free.lower)
     point = replace(base.point, z=z, events=np.zeros_like(base.point.events))
     return problem.with_composition(composition).evaluate(point).residual
-

@@ -1,4 +1,4 @@
-"""From traces to the problem that a diagnosis solves: which runs can take part, and where the fit of the base begins."""
+"""From traces to the problem that a diagnosis solves: which runs take part, and where the fit of the base begins."""
 
 from __future__ import annotations
 
@@ -57,9 +57,7 @@ def prepare(
     names = [t.name for t in traces]
     for name in holdout:
         if name not in names:
-            raise InputError(
-                "no run of this name to hold out", key="--holdout", value=name, hint=nearest(name, names)
-            )
+            raise InputError("no run of this name to hold out", key="--holdout", value=name, hint=nearest(name, names))
     used, dropped = [], []
     for trace, found in zip(traces, segmentations, strict=True):
         aside = trace.name in holdout or (not holdout and trace.role == "held-out")
@@ -75,18 +73,18 @@ def prepare(
             key="trace.displacement",
             hint="others can be inspected and fitted with --model static; " + "; ".join(dropped),
         )
-    kept, found = zip(*used, strict=True)
-    period = ringing(kept, found)
+    kept, segments = tuple(t for t, _ in used), tuple(s for _, s in used)
+    period = ringing(kept, segments)
     if period is None:
         dropped.append(UNHEARD)
-    times = scales(list(found), period, min(t.sampling_rate for t in kept))
+    times = scales(list(segments), period, min(t.sampling_rate for t in kept))
     runs = [knots(t, s, times) for t, s in used]
     rig = shared_rig(campaign, [t.name for t in kept])
     try:
-        problem, start = begin(rig, kept, found, runs, times)
+        problem, start = begin(rig, kept, segments, runs, times)
     except InputError as error:
         raise error.at(file=campaign.path) from None
-    return Prepared(problem, start, kept, found, times, tuple(dropped))
+    return Prepared(problem, start, kept, segments, times, tuple(dropped))
 
 
 def _why_not(trace: Trace, found: Segmentation) -> str:

@@ -80,7 +80,7 @@ def _reach(d: Diagnosis) -> Array:
     return d.fit.problem.composition.reach
 
 
-def error(residual: Array, d: Diagnosis, where: Array | None = None) -> float:
+def error(residual: Array, d: Diagnosis, where: np.ndarray | None = None) -> float:
     """Root mean square of a residual force over its floor; what was dropped does not count."""
     use = ~d.fit.dropped if where is None else where & ~d.fit.dropped
     return float(np.sqrt(np.mean((residual[use] / d.floor[use]) ** 2))) if use.any() else float("nan")
@@ -112,7 +112,8 @@ def _ranking_base(done: Round, rung: Rung, d: Diagnosis) -> dict[str, Any]:
     assert rung.unseen is not None
     held = error(rung.unseen, d)
     return {
-        "model": list(rung.model), "cost": done.base.cost, "train_error": error(rung.residual, d), "heldout_error": held,
+        "model": list(rung.model), "cost": done.base.cost, "train_error": error(rung.residual, d),
+        "heldout_error": held,
     }  # fmt: skip
 
 
@@ -187,7 +188,7 @@ def reasons(d: Diagnosis) -> list[str]:
         if done.close:
             j = done.close[0]
             out.append(
-                f"{j.tag}: the cost falls by {j.gain:.0f} (probability by chance {j.chance:.1g}), that of unseen runs by "
+                f"{j.tag}: the cost falls by {j.gain:.0f} (probability by chance {j.chance:.1g}), on unseen runs by "
                 f"{float(j.unseen.sum()):.0f} +- {j.error:.0f}"
             )
     return out
@@ -322,4 +323,3 @@ def variables(d: Diagnosis, curve: Backbone, law: PowerLaw) -> Variables:
     ):  # fmt: skip
         out[f"backbone_{name}"] = ("backbone_point", values, {"units": unit})
     return out
-

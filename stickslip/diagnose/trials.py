@@ -69,7 +69,9 @@ def _made(base: Fit, work: Sequence[tuple[str, dict[str, str]]], jobs: int) -> I
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="A worker stopped")
         pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
-        yield from (loads(a) for a in pool(delayed(_in_worker)(job, tag, form, files, os.getpid()) for tag, form in work))
+        yield from (
+            loads(a) for a in pool(delayed(_in_worker)(job, tag, form, files, os.getpid()) for tag, form in work)
+        )
 
 
 _kept: dict[int, tuple[Fit, Explained]] = {}

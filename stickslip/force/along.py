@@ -29,12 +29,12 @@ class Way(NamedTuple):
         strength, stretch: factors on caps and on yield displacements of all elements, which vary from event to event.
     """
 
-    t: Array
-    x: Array
-    v: Array
-    drive: Array
-    strength: Array
-    stretch: Array
+    t: Any
+    x: Any
+    v: Any
+    drive: Any
+    strength: Any
+    stretch: Any
 
 
 class Held(NamedTuple):

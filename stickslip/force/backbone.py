@@ -81,5 +81,5 @@ def power_law(curve: Backbone, contacts: int) -> PowerLaw:
     found = least_squares(residual, prior, bounds=(prior - 4.0 * widths, prior + 4.0 * widths), diff_step=1e-4)
     covariance = np.linalg.pinv(found.jac.T @ found.jac, hermitian=True)
     misfit = float(np.sqrt(np.mean(found.fun[: curve.force.size] ** 2)))
-    u_max, p, spread = np.exp(found.x) + [0.0, 1.0, 0.0]
-    return PowerLaw(float(u_max), float(p), float(spread), covariance, misfit, law(found.x))
+    u_max, above, spread = np.exp(found.x)
+    return PowerLaw(float(u_max), 1.0 + float(above), float(spread), covariance, misfit, law(found.x))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,9 @@ def begin(
     mass, mass_width, lightest, heaviest, weighed = known(rig.mass, np.nan, 0.0)
     if not np.isfinite(mass):
         raise InputError(
-            "the dynamic model needs the mass of the block", key="rig.mass", hint='write mass = "0.0894 kg", or weigh it'
+            "the dynamic model needs the mass of the block",
+            key="rig.mass",
+            hint='write mass = "0.0894 kg", or weigh it',
         )
     own = np.array([np.nan if k.stiffness is None else k.stiffness for k in runs])
     stated = own[np.isfinite(own)]
@@ -105,13 +108,15 @@ def begin(
     composition = Composition(mass, yields, tuple(free), fixed, (), (nominal, width_nominal))
     problem = Problem(composition, runs)
     flat = np.full(elements, strength / elements)
-    point = Point(vector(composition.shared), begun, flat, np.zeros((problem.events, 3)), np.zeros(problem.cycles.shape[1]))
+    point = Point(
+        vector(composition.shared), begun, flat, np.zeros((problem.events, 3)), np.zeros(problem.cycles.shape[1])
+    )
     return problem, _weighed(problem, point, strength)
 
 
 def _creep(runs: Sequence[Knots], found: Sequence[Segmentation]) -> float:
     crept = [e.x_onset - float(np.interp(p.t_arrest, k.t, k.x))
-             for k, s in zip(runs, found, strict=True) for p, e in zip(s.events, s.events[1:], strict=False)]  # fmt: skip
+             for k, s in zip(runs, found, strict=True) for p, e in pairwise(s.events)]  # fmt: skip
     return max(float(np.median(np.abs(crept))) if crept else 1e-6, 1e-9)
 
 

@@ -127,7 +127,9 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
 def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
     """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,)."""
     problem, free = with_start(base.problem, effect, values)
-    return fit(problem, _start(base, free, turns), base.scatter, dropped=base.dropped, estimated=False, known=base.known)
+    return fit(
+        problem, _start(base, free, turns), base.scatter, dropped=base.dropped, estimated=False, known=base.known
+    )
 
 
 def with_start(problem: Problem, effect: Effect, values: dict[str, float]) -> tuple[Problem, list[Free]]:
@@ -168,16 +170,15 @@ def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]
     number = len(base.problem.runs)
     members = [{name: float(v), "phase": turn} for v in values for turn in (0.0, 0.5 * np.pi)]
     columns = signatures(base, effect, members)
-    best, top, at = -np.inf, None, 0
+    best, top, at = -np.inf, np.zeros(0), 0
     for i in range(values.size):
         pair = columns[2 * i : 2 * i + 2]
         split = np.zeros((runs.size, 2 * number))
         for r in range(number):
             split[runs == r, 2 * r : 2 * r + 2] = pair[:, runs == r].T
-        fall, found = explained.gain(split)
+        fall, sizes = explained.gain(split)
         if fall > best:
-            best, top, at = fall, found, i
-    assert top is not None
+            best, top, at = fall, sizes, i
     waves = top.reshape(number, 2)
     size = np.hypot(waves[:, 0], waves[:, 1])
     amplitude = float(np.sqrt(np.mean(size**2)))

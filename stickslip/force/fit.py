@@ -111,7 +111,7 @@ class _System:
     def objective(self, point: Point, slopes: Slopes) -> float:
         """Of residual, random effects and priors, with this covariance."""
         white = np.linalg.solve(self.plain, self.blocks(slopes.residual)[..., None])[..., 0]
-        rows, target = prior_rows(self.problem, point)
+        _, target = prior_rows(self.problem, point)
         return float((white**2).sum() + (point.events**2 / self.random).sum() + (target**2).sum())
 
     def step(self) -> tuple[Array, Array]:
@@ -123,9 +123,7 @@ class _System:
         root = np.linalg.cholesky(normal * scale[:, None] * scale + 1e-11 * np.eye(len(normal)))
         low, high = reach(self.problem, self.point)
         high = np.where(high - low > 1e-12, high, low + 1e-12)
-        found = lsq_linear(
-            root.T, -np.linalg.solve(root, right * scale), (low / scale, high / scale), method="bvls"
-        )
+        found = lsq_linear(root.T, -np.linalg.solve(root, right * scale), (low / scale, high / scale), method="bvls")
         change = found.x * scale
         left = self.marginal + np.einsum("eip,p->ei", self.blocks(self.slopes.shared), change)
         weighted = np.linalg.solve(np.swapaxes(self.whole, 1, 2), np.linalg.solve(self.whole, left[..., None]))[..., 0]
@@ -186,9 +184,8 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
     )
 
 
-def moved(problem: Problem, point: Point, change: Array, events: Array) -> Point:
+def moved(point: Point, change: Array, events: Array) -> Point:
     """The point after a step, within the bounds."""
-    shared = problem.composition.shared
     a, b = point.z.size, point.phases.size
     phases = point.phases + change[a : a + b].reshape(point.phases.shape)
     k = point.weights.size
@@ -216,11 +213,9 @@ def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size
     return out
 
 
-def known_of(
-    problem: Problem, slopes: Slopes, blocks: Blocks, strength: float, values: dict[str, float],
-    dropped: NDArray[np.bool_],
-) -> Known:  # fmt: skip
+def known_of(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks, dropped: NDArray[np.bool_]) -> Known:
     """What the covariance is made of, at a point."""
+    strength, values = float(point.weights.sum()), problem.values(point)
     noise = np.hypot(
         (slopes.tangent + values.get("rig.spring_stiffness", 0.0)) * problem.white, values["rig.mass"] * problem.shaken
     )
@@ -234,7 +229,7 @@ def known_of(
 def fit(
     problem: Problem, point: Point, scatter: Scatter | None = None, *, rounds: int = ROUNDS, steps: int = STEPS,
     estimated: bool = True, dropped: NDArray[np.bool_] | None = None,
-    first: bool = False, known: Known | None = None, verbose: bool = False,
+    first: bool = False, known: Known | None = None,
 ) -> Fit:  # fmt: skip
     """Find the optimum.
 
@@ -252,70 +247,65 @@ def fit(
         FitError: the model gives no finite force at the start.
     """
     blocks = Blocks.of(problem.of, problem.events)
-    scatter = Scatter.wide() if scatter is None else scatter
+    sizes = Scatter.wide() if scatter is None else scatter
+    out = np.zeros(problem.of.size, bool) if dropped is None else dropped
     slopes = problem.evaluate(point)
-    evaluations, drops = 1, dropped is None
-    dropped = np.zeros(problem.of.size, bool) if dropped is None else dropped
+    evaluations = 1
     if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
         raise FitError("the model gives no finite force along the motion")
-
-    def here() -> Known:
-        if known is not None:
-            return known
-        return known_of(problem, slopes, blocks, float(point.weights.sum()), problem.values(point), dropped)
-
-    def descend(point: Point, slopes: Slopes, made: Known, most: int) -> tuple[Point, Slopes, float, int]:
-        """Gauss-Newton steps with the covariance as it is, until the cost falls no more."""
-        total, count = 0.0, 0
-        for _ in range(most):
-            system = _System(problem, point, slopes, scatter, made, blocks)
-            now = system.objective(point, slopes)
-            fallen, share = 0.0, 1.0
-            change, events = system.step()
-            for _ in range(HALVINGS):
-                trial = moved(problem, point, share * change, point.events + share * (events - point.events))
-                there = problem.evaluate(trial)
-                count += 1
-                then = system.objective(trial, there) if np.isfinite(there.residual).all() else np.inf
-                if then < now:
-                    point, slopes, fallen = trial, there, now - then
-                    break
-                share *= 0.3
-            if verbose:
-                print(round(now, 1), round(fallen, 2), share, problem.values(point))
-            total += fallen
-            if fallen < SETTLED:
-                break
-        return point, slopes, total, count
-
     for turn in range(rounds if estimated else 0):
-        made = here()
+        made = known or known_of(problem, point, slopes, blocks, out)
         if turn or first:
             marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
-            scatter = estimate(scatter, marginal, made)
-            if drops:
-                more = beyond(made, scatter, marginal, blocks, dropped.size) & ~dropped
-                if more.any():
-                    dropped = dropped | more
-                    made = here()
-                    scatter = estimate(scatter, marginal, made)
-        point, slopes, total, count = descend(point, slopes, made, steps)
+            sizes = estimate(sizes, marginal, made)
+            more = beyond(made, sizes, marginal, blocks, out.size) & ~out
+            if dropped is None and more.any():
+                out = out | more
+                made = known or known_of(problem, point, slopes, blocks, out)
+                sizes = estimate(sizes, marginal, made)
+        point, slopes, total, count = descend(problem, point, slopes, sizes, made, blocks, steps)
         evaluations += count
         if turn > 2 and total < 1.0:
             break
-    made = here()
-    point, slopes, _, count = descend(point, slopes, made, LAST)
-    return _found(problem, point, slopes, scatter, dropped, made, evaluations + count)
+    made = known or known_of(problem, point, slopes, blocks, out)
+    point, slopes, _, count = descend(problem, point, slopes, sizes, made, blocks, LAST)
+    return _found(problem, point, slopes, sizes, out, made, evaluations + count)
 
 
-def at(
-    problem: Problem, point: Point, scatter: Scatter, dropped: NDArray[np.bool_], known: Known | None = None
-) -> Fit:
+def descend(
+    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks, most: int
+) -> tuple[Point, Slopes, float, int]:
+    """Gauss-Newton steps with the covariance as it is, until the cost falls no more.
+
+    Returns:
+        The point and the slopes there, by how much the cost fell, and how often the model was evaluated.
+    """
+    total, count = 0.0, 0
+    for _ in range(most):
+        system = _System(problem, point, slopes, scatter, known, blocks)
+        now = system.objective(point, slopes)
+        change, events = system.step()
+        fallen, share = 0.0, 1.0
+        for _ in range(HALVINGS):
+            trial = moved(point, share * change, point.events + share * (events - point.events))
+            there = problem.evaluate(trial)
+            count += 1
+            then = system.objective(trial, there) if np.isfinite(there.residual).all() else np.inf
+            if then < now:
+                point, slopes, fallen = trial, there, now - then
+                break
+            share *= 0.3
+        total += fallen
+        if fallen < SETTLED:
+            break
+    return point, slopes, total, count
+
+
+def at(problem: Problem, point: Point, scatter: Scatter, dropped: NDArray[np.bool_], known: Known | None = None) -> Fit:
     """A fit that was made before, from where it ended; arguments as of :func:`fit`."""
     blocks = Blocks.of(problem.of, problem.events)
     slopes = problem.evaluate(point)
-    strength = float(point.weights.sum())
-    made = known or known_of(problem, slopes, blocks, strength, problem.values(point), dropped)
+    made = known or known_of(problem, point, slopes, blocks, dropped)
     return _found(problem, point, slopes, scatter, dropped, made, 1)
 
 

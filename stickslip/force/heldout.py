@@ -1,8 +1,8 @@
 """How well events are predicted that a fit has not seen: leave one run out, without fitting again.
 
 At the optimum the model is linear enough in its parameters that what a fit without some events would give is one
-Gauss-Newton step away (the infinitesimal jackknife made exact for a linear model). A run that has parameters of its own,
-a phase or the pull at its start, is left out by halves: they are told by its other half.
+Gauss-Newton step away (the infinitesimal jackknife made exact for a linear model). A run that has parameters of its
+own, a phase or the pull at its start, is left out by halves: they are told by its other half.
 """
 
 from __future__ import annotations

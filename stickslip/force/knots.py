@@ -9,11 +9,12 @@ kinks of onset and arrest are no trouble.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import isotonic_regression
 from scipy.ndimage import uniform_filter1d
+from scipy.optimize import isotonic_regression
 from scipy.signal import savgol_filter
 from scipy.sparse import coo_array, csr_array
 
@@ -25,6 +26,7 @@ Index = NDArray[np.intp]
 
 CREEP, NUCLEATION, SLIP, RING = range(4)
 PHASES = ("creep", "nucleation", "slip", "ring-down")
+POINTS = ("at", "phase", "of", "rate", "acceleration", "white", "shaken", "place", "elapsed")
 TOWARDS, EVEN = 36, 16  # windows of a stick: spaced as the logarithm of the time to the onset, and evenly
 RINGS = 12.0  # periods after an arrest that are followed sample by sample
 BEFORE = 8.0  # half-widths of the test function before an onset from where every sample is followed
@@ -119,7 +121,7 @@ def kernels(half: float, rate: float) -> tuple[Array, Array, Array]:
     Exact in what they are for: the first gives a constant, the second the slope of a parabola, the third its second
     derivative (1/s, 1/s2).
     """
-    h = max(int(round(half * rate)), 3)
+    h = max(round(half * rate), 3)
     u = np.arange(-h, h + 1) / (h + 1.0)
     phi = (1.0 - u * u) ** 5
     s = np.arange(-h, h + 1) / rate
@@ -190,7 +192,7 @@ def _even(t: Array, x: Array) -> tuple[Array, Array]:
 
 def _hum(t: Array, x: Array, events: tuple[Event, ...], rate: float, times: Scales) -> Array:
     """The sine at the mains frequency in the sticks, which is the sensor's (m)."""
-    width = int(round(rate / HUM))
+    width = round(rate / HUM)
     if width < 8:
         return np.zeros_like(x)
     still = np.ones(x.size, bool)
@@ -218,7 +220,7 @@ def _hum(t: Array, x: Array, events: tuple[Event, ...], rate: float, times: Scal
 def _unsteady(x: Array, t: Array, events: tuple[Event, ...], rate: float) -> float:
     """Slow noise of the reading (m): how far means over a hundredth of a stick stray from a line through two others."""
     found = []
-    for before, event in zip(events, events[1:], strict=False):
+    for before, event in pairwise(events):
         a = int(np.searchsorted(t, before.t_arrest + 0.4 * (event.t_onset - before.t_arrest)))
         b = int(np.searchsorted(t, before.t_arrest + 0.8 * (event.t_onset - before.t_arrest)))
         width = (b - a) // 40
@@ -237,7 +239,7 @@ def _smooth(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, 
     contact and makes it young.
     """
     period = times.ring or times.half
-    wide, narrow = (max(int(round(width * rate)) // 2 * 2 + 1, 3) for width in (period, period / 3.0))
+    wide, narrow = (max(round(width * rate) // 2 * 2 + 1, 3) for width in (period, period / 3.0))
     if wide < 5:
         return x, np.gradient(x) * rate
 
@@ -258,9 +260,7 @@ def _smooth(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, 
     return slow + gain * fast, parabola(wide, 1) + gain * (parabola(narrow, 1) - parabola(wide, 1))
 
 
-def _fast(
-    events: tuple[Event, ...], e: int, times: Scales, rate: float, n: int, t: Array, h: int
-) -> tuple[int, int]:
+def _fast(events: tuple[Event, ...], e: int, times: Scales, rate: float, n: int, t: Array, h: int) -> tuple[int, int]:
     """First and last sample around an event that are followed one by one."""
     event = events[e]
     before = event.t_onset - (events[e - 1].t_arrest if e else t[0])
@@ -327,7 +327,7 @@ def _hasty(low: int, high: int, speed: Array, noise: float, rate: float, h: int)
 
 def _thin(begin: int, end: int, event: Event, times: Scales, rate: float, h: int) -> Index:
     """Samples that become knots: all where it rings, some of the slip."""
-    fine = max(1, int(round(times.ring * rate / 24.0))) if times.ring else 1
+    fine = max(1, round(times.ring * rate / 24.0)) if times.ring else 1
     coarse = max(fine, h // 6, 1)
     a, b = event.i_onset + 2 * h, event.i_arrest - 2 * h
     if b - a < 4 * coarse:
@@ -349,11 +349,11 @@ class _Pieces:
         self.slow: list[NDArray[np.bool_]] = []
         self.size = 0
         self.points: list[dict[str, Array]] = []
-        self.windowed: list[tuple[Index, Index]] = []
 
     def _add(self, t: Array, x: Array, v: Array, d: Array, event: Index, slow: bool, weight: Array) -> Index:
-        for into, what in ((self.t, t), (self.x, x), (self.v, v), (self.d, d), (self.event, event), (self.weight, weight)):
+        for into, what in ((self.t, t), (self.x, x), (self.v, v), (self.d, d), (self.weight, weight)):
             into.append(what)
+        self.event.append(event)
         self.slow.append(np.full(t.size, slow))
         index = np.arange(self.size, self.size + t.size)
         self.size += t.size
@@ -369,7 +369,9 @@ class _Pieces:
         if count.size == 0 or edges[-1] <= edges[0]:
             return
         mean = [np.add.reduceat(y[: edges[-1]], edges[:-1]) / count for y in (t, x, d)]
-        index = self._add(mean[0], mean[1], np.full(count.size, np.nan), mean[2], np.full(count.size, e), True, count.astype(float))
+        index = self._add(
+            mean[0], mean[1], np.full(count.size, np.nan), mean[2], np.full(count.size, e), True, count.astype(float)
+        )
         if compared:
             self.points.append(
                 {
@@ -378,19 +380,19 @@ class _Pieces:
                 }
             )  # fmt: skip
 
-    def samples(
-        self, index: Index, t: Array, x: Array, v: Array, d: Array, events: tuple[Event, ...], e: int
-    ) -> None:
+    def samples(self, index: Index, t: Array, x: Array, v: Array, d: Array, events: tuple[Event, ...], e: int) -> None:
         """Samples as they are."""
         middle = 0.5 * (events[e].t_onset + events[e].t_arrest)
-        self._add(t[index], x[index], v[index], d[index], np.where(t[index] < middle, e, e + 1), False, np.ones(index.size))
+        self._add(
+            t[index], x[index], v[index], d[index], np.where(t[index] < middle, e, e + 1), False, np.ones(index.size)
+        )
 
     def compare(
         self, low: int, high: int, h: int, t: Array, x: Array, event: Event, e: int, times: Scales,
         weights: tuple[Array, Array, Array], noise: float,
     ) -> None:  # fmt: skip
         """Points under the test function between two samples."""
-        step = max(1, int(round(0.4 * h)))
+        step = max(1, round(0.4 * h))
         centre = np.arange(low, high, step)
         centre = centre[(centre >= h) & (centre < t.size - h)]
         if centre.size == 0:
@@ -478,7 +480,8 @@ class _Pieces:
         knots_made = Knots(
             trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
             made["at"], phase, of, made["rate"], made["acceleration"], made["white"], made["shaken"],
-            _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, events, float(t[0])), noise, trace.spring_stiffness, trace.virgin,
+            _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, events, float(t[0])),
+            noise, trace.spring_stiffness, trace.virgin,
         )  # fmt: skip
         return selected(knots_made, keep)
 
@@ -511,7 +514,7 @@ def selected(k: Knots, keep: NDArray[np.bool_]) -> Knots:
     index = np.flatnonzero(keep)
     return replace(
         k, mean=k.mean[index], smooth=(k.smooth[0][index], k.smooth[1][index]),
-        **{n: getattr(k, n)[index] for n in ("at", "phase", "of", "rate", "acceleration", "white", "shaken", "place", "elapsed")},
+        **{n: getattr(k, n)[index] for n in POINTS},
     )  # fmt: skip
 
 

@@ -30,7 +30,20 @@ Array = NDArray[np.float64]
 PHASE = "phase"
 PULL = "start.pull"  # of the spring at the start of a record, where the contact is not virgin (N)
 EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
-NODES = (-8.0, -6.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 6.0)  # of what cycles share, in units of the place
+NODES = (
+    -8.0,
+    -6.0,
+    -4.5,
+    -3.0,
+    -2.0,
+    -1.0,
+    0.0,
+    1.0,
+    2.0,
+    3.0,
+    4.5,
+    6.0,
+)  # of what cycles share, in units of the place
 LOCAL = ("strength", "stretch", "offset")  # of each event: two logarithms, and a length (m)
 
 

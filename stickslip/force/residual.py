@@ -1,4 +1,4 @@
-"""Structure that no effect of the catalogue takes: the residual force as a smooth function of one variable at a time."""
+"""Structure that no effect of the catalogue takes: the residual force as a smooth function of one variable."""
 
 from __future__ import annotations
 
@@ -56,7 +56,9 @@ def structures(fit: Fit, explained: Explained, dispersion: float = 1.0) -> list[
     """All variables, the most telling first."""
     out = []
     for (name, values), unit in zip(coordinates(fit).items(), UNITS, strict=True):
-        scaled = np.arcsinh(values / (0.02 * np.abs(values).max())) if name in ("velocity", "time in contact") else values
+        scaled = (
+            np.arcsinh(values / (0.02 * np.abs(values).max())) if name in ("velocity", "time in contact") else values
+        )
         nodes = np.unique(np.quantile(scaled, np.linspace(0.0, 1.0, NODES)))
         if nodes.size < 3:
             continue

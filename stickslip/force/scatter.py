@@ -6,7 +6,8 @@ Residuals of one event belong together, those of two events do not. The covarian
 
 with the sensor's noise w carried to a force by the stiffness of what sticks, random effects D (strength, yield
 displacements, position at the arrest), and misfit whose size L depends on the phase of the cycle and, for errors of the
-position, on the stiffness, and a random walk of the reading since the arrest. All sizes are estimated from the campaign itself by maximum likelihood.
+position, on the stiffness, and a random walk of the reading since the arrest. All sizes are estimated from the campaign
+itself by maximum likelihood.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ class Known:
     tangent: Array
     place: Array
     elapsed: Array
-    there: Array
+    there: NDArray[np.bool_]
     strength: float
 
 

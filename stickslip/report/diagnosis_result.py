@@ -11,9 +11,7 @@ from .describe import describe_trace
 from .pieces import Variables, trace_pieces
 
 
-def trace_sections(
-    traces: Sequence[Trace], segmentations: Sequence[Segmentation]
-) -> tuple[dict[str, Any], Variables]:
+def trace_sections(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> tuple[dict[str, Any], Variables]:
     """Entries of ``result.json`` on the traces, and the variables behind their pictures."""
     pairs = list(zip(traces, segmentations, strict=True))
     variables: Variables = {}

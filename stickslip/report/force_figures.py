@@ -85,7 +85,9 @@ def residual_picture(data: xarray.Dataset, names: list[str]) -> Figure:
         ax.axhline(0.0, color=LIGHT, lw=0.8)
         ax.set(xlabel=f"{text} / ({shown})" if "/" in shown else f"{text} / {shown}", ylim=(-4, 4))
     axes[0, 0].set_ylabel("residual force / floor")
-    made.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=max(len(runs), 1), fontsize=8)
+    made.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=max(len(runs), 1), fontsize=8
+    )
     return made
 
 

@@ -36,7 +36,11 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
         yield "misfit", "Error of every cycle against what might explain it.", residual_plots(data)
     if runs_of(data):
         names = list((result.get("ladder") or [{}])[-1].get("by_run") or [])
-        yield "force", "One cycle of every run: force that the contact held, and the model's.", cycle_picture(data, names)
+        yield (
+            "force",
+            "One cycle of every run: force that the contact held, and the model's.",
+            cycle_picture(data, names),
+        )
         caption = "Residual force of the base model against what it may depend on; lines: running medians."
         yield "force", caption, residual_picture(data, names)
     if "backbone_force" in data and result.get("backbone"):

@@ -11,17 +11,18 @@ import jax.numpy as jnp
 import numpy as np
 
 from stickslip.conformance.rig import base_model
+from stickslip.contact import Bank
 from stickslip.effects import catalogue
-from stickslip.effects.base import Effect
+from stickslip.effects.base import Contact, Effect, Motion
 from stickslip.force.along import Held, Way, along
-from stickslip.model import Model
+from stickslip.model import Forces, Model, State
 from stickslip.params import specs
 from stickslip.solve import Steps, Tolerance, integrate
 
 STRENGTH = 0.2604  # N, of the rig's contact
 TIMES, POSITIONS = np.array([0.0, 0.13, 0.2, 2.2]), np.array([0.0, 0.13e-3, 0.13e-3, 0.53e-3])  # s, m; a short hold
 END = 1.7  # s; three slips
-KNOTS = 2048  # one size for all, so that one program serves all
+KNOTS = 4096  # one size for all, so that one program serves all
 DAMPING, HEALING = 15.0, 0.02  # N s/m, s; so that it sticks again after every slip
 COARSE = Tolerance(5e-3, 5e-11, 5e-8)
 
@@ -31,21 +32,29 @@ GROUPS = [LAWS[i : i + 22] for i in range(0, len(LAWS), 22)]  # compiled togethe
 march = jax.jit(along)
 
 
+class Turning(Model):
+    """A model that puts the turning point into an increment, where the solver's steps have it."""
+
+    def advance(self, state: State, bank: Bank, contact: Contact, motion: Motion) -> tuple[State, Forces]:
+        reverses = state.v * motion.v < 0.0
+        apart = jnp.where(reverses, state.v - motion.v, 1.0)
+        turn = jnp.where(reverses, 0.5 * motion.dt * state.v**2 / apart, 0.0)
+        return super().advance(state, bank, contact, motion._replace(turn=turn))
+
+
 class Slips(NamedTuple):
-    """A simulation, as knots that need not be its steps.
+    """A simulation whose steps are knots.
 
     Attributes:
         model: that was simulated.
         steps: of the solver.
         way: the motion at the knots, padded.
-        own: places of the solver's steps among the knots, shape (steps,).
         turned: first step within which the block turns.
     """
 
     model: Model
     steps: Steps
     way: Way
-    own: np.ndarray
     turned: int
 
 
@@ -81,14 +90,8 @@ def valued(effect: Effect, amplitude: float) -> Effect:
     return eqx.tree_at(lambda e: getattr(e, e.amplitude), effect, jnp.asarray(amplitude, float))
 
 
-def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE, turns: bool = True) -> Slips:
-    """The rig with effects, from rest to its third slip and on.
-
-    Args:
-        effects: all.
-        tolerance: of the solver.
-        turns: whether the turning point within a step becomes a knot of its own.
-    """
+def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE) -> Slips:
+    """The rig with effects, from rest to its third slip and on."""
     model = base_model(effects)
     model = eqx.tree_at(
         lambda m: (m.load_point.times, m.load_point.positions, m.block.damping, m.weakening.healing_time),
@@ -98,15 +101,7 @@ def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE, turns:
     trajectory, _ = integrate(model, END, tolerance=tolerance, largest_step=4e-3)
     s = trajectory.steps
     i = np.flatnonzero(s.v[1:] * s.v[:-1] < 0.0)
-    turned = int(i[0]) + 1 if i.size else s.t.size
-    if not turns:
-        i = i[:0]
-    v0, v1, dt = s.v[i], s.v[i + 1], np.diff(s.t)[i]
-    t = np.insert(s.t, i + 1, s.t[i] + dt * v0 / (v0 - v1))
-    x = np.insert(s.x, i + 1, s.x[i] + 0.5 * dt * v0**2 / (v0 - v1))
-    v = np.insert(s.v, i + 1, 0.0)
-    own = np.flatnonzero(np.insert(np.ones(s.t.size, bool), i + 1, False))
-    return Slips(model, s, way_of(t, x, v), own, turned)
+    return Slips(model, s, way_of(s.t, s.x, s.v), int(i[0]) + 1 if i.size else s.t.size)
 
 
 def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> Way:
@@ -119,11 +114,14 @@ def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> Way:
     return Way(*(jnp.asarray(a) for a in (t, x, v, np.interp(t, TIMES, POSITIONS), ones, ones)))
 
 
-def held(slips: Slips) -> Held:
-    """What the model holds along it, at the solver's own steps."""
-    return at_steps(march(slips.model, slips.way), slips)
+def held(slips: Slips, turning: bool = True) -> Held:
+    """What the model holds along it, at the solver's steps; ``turning`` lets it know where steps turn."""
+    m = slips.model
+    if turning:
+        m = Turning(m.block, m.bank, m.weakening, m.load_point, m.effects)
+    return at_steps(march(m, slips.way), slips)
 
 
 def at_steps(values: Any, slips: Slips) -> Any:
     """Arrays over knots, at the solver's steps."""
-    return jax.tree.map(lambda a: np.asarray(a)[slips.own], values)
+    return jax.tree.map(lambda a: np.asarray(a)[: slips.steps.t.size], values)

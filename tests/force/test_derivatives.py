@@ -1,0 +1,133 @@
+"""Derivatives of the residual force against central differences over a ladder of steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import equinox as eqx
+import numpy as np
+import pytest
+
+from stickslip.effects import catalogue
+from stickslip.fit.parameters import effect_parameters
+from stickslip.force.problem import Point, is_own
+
+LADDER = 10.0 ** np.arange(-3.0, -7.5, -0.5)  # of each direction's own unit
+# residuals have kinks where an element begins to slide: a difference over one of them is no derivative, and the share of
+# points with a kink falls with the step
+AGREE = 2e-6  # of the largest derivative, in the mean over points
+EFFECTS = {
+    "base": (),
+    "effects": (
+        ("contact-ageing", {}, {"rate": 0.003}),
+        ("position-dependent-friction", {"form": "wave"}, {"amplitude": 0.004}),
+    ),
+}
+
+
+def with_effects(case, chosen):
+    """Problem and point with effects in them, events that differ and a common error that is not zero."""
+    composition, z, phases = case.problem.composition, case.point.z, case.point.phases
+    for tag, form, values in chosen:
+        effect = catalogue.get(tag)(**form)
+        amplitude = next(iter(values.values()))
+        effect = eqx.tree_at(lambda e: getattr(e, e.amplitude), effect, np.float64(amplitude))
+        free = effect_parameters(effect, amplitude=amplitude)
+        composition = composition.with_effect(effect, free)
+        z = np.concatenate([z, [f.inward(f.start) for f in free if not is_own(f.name)]])
+        for f in (f for f in free if is_own(f.name)):
+            phases = np.vstack([phases, np.array([0.7, -0.4]) / float(f.scale)])
+    rng = np.random.default_rng(3)
+    problem = case.problem.with_composition(composition)
+    events = rng.standard_normal((problem.events, 3)) * [3e-3, 3e-2, 3e-9]
+    weights = case.point.weights * np.exp(0.1 * rng.standard_normal(case.point.weights.size)) + 1e-4
+    common = np.zeros(case.point.common.size)
+    return problem, Point(z, phases, weights, events, common)
+
+
+@pytest.fixture(scope="module", params=EFFECTS)
+def placed(request, small):
+    problem, point = with_effects(small, EFFECTS[request.param])
+    return problem, point, problem.evaluate(point)
+
+
+def moved(point: Point, part: str, index, step: float) -> Point:
+    """One number of the point moved."""
+    values = np.array(getattr(point, part))
+    values[index] += step
+    return replace(point, **{part: values})
+
+
+def disagreement(problem, point, part, index, unit, exact) -> float:
+    """The least, over the ladder, of the mean difference, over the largest derivative."""
+    best = np.inf
+    size = np.abs(exact).max()
+    assert size > 0.0
+    for step in LADDER * unit:
+        up = problem.evaluate(moved(point, part, index, step)).residual
+        down = problem.evaluate(moved(point, part, index, -step)).residual
+        best = min(best, float(np.mean(np.abs((up - down) / (2.0 * step) - exact))) / size)
+    return best
+
+
+def test_shared_parameters(placed):
+    problem, point, slopes = placed
+    for i, f in enumerate(problem.composition.shared):
+        wrong = disagreement(problem, point, "z", i, 1.0, slopes.shared[:, i])
+        assert wrong < AGREE, f.name
+
+
+def test_phases_act_on_their_own_run(placed):
+    problem, point, slopes = placed
+    a, runs = point.z.size, len(problem.runs)
+    assert point.phases.shape == (len(problem.composition.phases), runs)
+    for j in range(point.phases.shape[0]):
+        for r in range(runs):
+            exact = slopes.shared[:, a + j * runs + r]
+            assert np.all(exact[problem.run != r] == 0.0)
+            assert disagreement(problem, point, "phases", (j, r), 1.0, exact) < AGREE
+
+
+def test_weights(placed):
+    problem, point, slopes = placed
+    first = point.z.size + point.phases.size
+    for k in (2, 11, 20, 29, 38):
+        exact = slopes.shared[:, first + k]
+        assert disagreement(problem, point, "weights", k, point.weights.sum(), exact) < AGREE
+
+
+def test_what_cycles_share(placed):
+    problem, point, slopes = placed
+    first = point.z.size + point.phases.size + point.weights.size
+    cycles = np.flatnonzero(np.abs(slopes.shared[:, first:]).max(axis=0) > 0.0)
+    for c in cycles[[1, cycles.size // 2, -2]]:
+        exact = slopes.shared[:, first + c]
+        assert disagreement(problem, point, "common", c, 1e-6, exact) < AGREE
+
+
+@pytest.mark.parametrize("which", [0, 1, 2], ids=["strength", "stretch", "offset"])
+def test_an_event_moves_its_own_points(placed, which):
+    """The derivative in an event's own number, at its own points."""
+    problem, point, slopes = placed
+    unit = (1.0, 1.0, 1e-6)[which]
+    for e in (0, 2, problem.events - 1):
+        own = problem.of == e
+        size = np.abs(slopes.local[own, which]).max()
+        best, other = np.inf, np.inf
+        for step in LADDER * unit:
+            up = problem.evaluate(moved(point, "events", (e, which), step)).residual
+            down = problem.evaluate(moved(point, "events", (e, which), -step)).residual
+            slope = (up - down) / (2.0 * step)
+            best = min(best, float(np.mean(np.abs(slope - slopes.local[:, which])[own])) / size)
+            other = min(other, float(np.abs(slope[~own]).mean()) / size)
+        if which == 2 and e in problem.first:
+            assert size == 0.0 or best < AGREE
+        assert best < AGREE
+        assert other < 1e-3  # what an event leaves to the next is small
+
+
+def test_the_held_force_is_the_sum_of_its_elements(placed):
+    problem, point, slopes = placed
+    first = point.z.size + point.phases.size
+    shares = -slopes.shared[:, first : first + point.weights.size]
+    np.testing.assert_allclose(shares @ point.weights, slopes.held, rtol=1e-12, atol=1e-14)
