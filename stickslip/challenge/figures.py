@@ -47,7 +47,6 @@ def figures(marked: Sequence[Marked]) -> dict[str, Any]:
         "false_names": rate(m.names for m in of["nothing"] if m.answered),
         "unknown_recall": rate(m.answer.kind == "unknown" for m in of["outside"]),
         "unknown_without_a_name": rate(m.answer.kind == "unknown" and not m.answer.named for m in of["outside"]),
-        "unknown_base_failed": rate(m.base_failed for m in marked if m.answer.kind == "unknown"),
         "amplitude": {
             "all": _sizes(hidden, lambda s: True),
             "textbook_form": _sizes(hidden, lambda s: not s.own_form),

@@ -11,7 +11,6 @@ from .sizes import Size, compared
 
 LEVEL = 0.95
 CIRCUMSTANCES = ("spring_known", "virgin", "new_lines")
-BASE_FAILED = "The base model could not be fitted"  # begins the text of an ``unknown`` that looked for no effect
 
 
 @dataclass(frozen=True)
@@ -67,11 +66,6 @@ class Marked:
         if self.answer.kind == "ambiguous":
             return bool(self.tags) and set(self.tags) <= {*self.answer.named, *self.answer.set}
         return self.right
-
-    @property
-    def base_failed(self) -> bool:
-        """Whether it is ``unknown`` because not even the base model could be fitted."""
-        return self.answer.kind == "unknown" and self.answer.text.startswith(BASE_FAILED)
 
     @property
     def answered(self) -> bool:

@@ -69,7 +69,6 @@ def score_text(score: Mapping[str, Any]) -> str:
             ("effects named where nothing is missing", [share(s["false_names"])]),
             ("unknown recall", [share(s["unknown_recall"])]),
             ("unknown recall, and no effect named", [share(s["unknown_without_a_name"])]),
-            ("of all unknown: the base model could not be fitted", [share(s["unknown_base_failed"])]),
         ]),
         *_block("Held-out error in floors: median (quartiles)", ("base", "last model", "ratio", "within 1.5"), [
             (WORDS.get(name, "right answers"),

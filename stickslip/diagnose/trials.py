@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+import jax
+import jax.numpy as jnp
+import numpy as np
 from cloudpickle import dumps, loads
 from joblib import Parallel, delayed
 
+from ..contact import Bank
 from ..effects import catalogue
+from ..effects.base import Memory
 from ..force.candidates import Candidate, every_form, try_effect
 from ..force.fit import Fit
 from ..force.score import Explained
@@ -47,6 +52,8 @@ def trials(
             left.append((tag, form))
         else:
             out.append(known)
+    # the largest first, so that no process waits for one that was begun last
+    left.sort(key=lambda job: -_size(base, *job))
     for candidate in _made(base, left, jobs):
         out.append(candidate)
         if store is not None:
@@ -72,6 +79,16 @@ def _made(base: Fit, work: Sequence[tuple[str, dict[str, str]]], jobs: int) -> I
         yield from (
             loads(a) for a in pool(delayed(_in_worker)(job, tag, form, files, os.getpid()) for tag, form in work)
         )
+
+
+def _size(base: Fit, tag: str, form: Mapping[str, str]) -> int:
+    """Numbers that an effect remembers."""
+    effect = catalogue.get(tag)(**form)
+    if not isinstance(effect, Memory):
+        return 0
+    reach = base.problem.composition.reach
+    state = effect.start(Bank(jnp.ones(reach.size), jnp.asarray(reach)))
+    return sum(int(np.size(leaf)) for leaf in jax.tree.leaves(state))
 
 
 _kept: dict[int, tuple[Fit, Explained]] = {}

@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 from invented import answer, effect, make, result
 
-import stickslip
 from stickslip.challenge.answers import read_answer
 from stickslip.challenge.figures import VERDICTS, verdict_label
-from stickslip.challenge.marks import BASE_FAILED, mark, rate
+from stickslip.challenge.marks import mark, rate
 from stickslip.challenge.one_case import record_failure
 from stickslip.challenge.pictures import amplitude_figure, confusion_by_amplitude_figure, confusion_figure
 from stickslip.challenge.score import score_challenge
@@ -304,18 +303,6 @@ def test_a_set_claims_to_hold_the_truth_and_no_more(tmp_path: Path) -> None:
     assert of(s["calibration"]["reliability"][2]["holds"]) == (1, 3)
     assert s["calibration"]["brier"] == pytest.approx((0.2**2 + 2 * 0.8**2) / 3)
     assert of(s["calibration"]["by_verdict"]["ambiguous"]) == (0, 3)
-
-
-def test_unknown_for_want_of_a_base_is_counted_apart(tmp_path: Path) -> None:
-    cases = {name: ("outside", [effect("yaw-mode", 6.0)]) for name in ("o1", "o2", "o3")}
-    folder = make(tmp_path / "c", cases)
-    said = f"{BASE_FAILED} (creep is off by 900 floors), so no effect was ranked."
-    answer(folder, {"o1": result("unknown", text=said), "o2": result("unknown"), "o3": result("complete", text=said)})
-    s = score_challenge(folder)
-    assert of(s["unknown_base_failed"]) == (1, 2)
-    assert "of all unknown: the base model could not be fitted 1/2 50 %" in " ".join(score_text(s).split())
-    sources = Path(stickslip.__file__).parent.joinpath("diagnose").glob("*.py")
-    assert any(f'"{BASE_FAILED} (' in path.read_text() for path in sources)
 
 
 def test_what_a_name_brings_on_unseen_cycles(folder: Path) -> None:

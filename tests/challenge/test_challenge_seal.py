@@ -98,7 +98,7 @@ def test_other_settings_or_thresholds_than_at_first_are_refused(folder: Path) ->
         run_challenge(folder, max_effects=1)
     path = folder / RUNS / "protocol.json"
     content = json.loads(path.read_text())
-    content["thresholds"]["gain"] *= 0.5
+    content["thresholds"]["chance"] *= 0.5
     path.write_text(json.dumps(content))
     with pytest.raises(InputError, match="thresholds"):
         run_challenge(folder)

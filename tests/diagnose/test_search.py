@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -16,11 +17,32 @@ from stickslip.diagnose.periods import periods, phasor, within_record
 from stickslip.diagnose.recurrences import told
 from stickslip.diagnose.search import Search, starts
 from stickslip.effects import catalogue
+from stickslip.features.layout import Layout
+from stickslip.features.measurement import Measurement
 from stickslip.fit.inertial import Fit
 from stickslip.fit.parameters import Free, effect_parameters
 from stickslip.floors import EVENT_WIDTHS
+from stickslip.forward import Cycles
 
-from .test_rules import measurement
+
+def measurement(velocities=(5e-5, 1e-4, 2e-4, 4e-4, 1e-4), cycles=6, hold_runs=(4,)) -> Measurement:
+    """Nothing but shapes, velocities and holds (in the fourth and sixth cycle of the hold runs)."""
+    layout = Layout(0.06, 0.004)
+    runs = len(velocities)
+    used = np.ones((runs, cycles), bool)
+    valid = np.ones((runs, cycles, layout.size), bool)
+    valid[..., layout.slices()["hold"]] = False
+    for r in hold_runs:
+        valid[r, [3, 5], layout.slices()["hold"]] = True
+    c = Cycles(*([jnp.zeros((runs, cycles))] * 4), jnp.asarray(used), jnp.asarray(used), *([jnp.zeros((runs, 2))] * 2),
+               jnp.full(runs, jnp.nan), jnp.ones(runs, bool))  # fmt: skip
+    zero = np.zeros((runs, cycles, layout.size))
+    names = tuple(f"run{r}" for r in range(runs))
+    anchors = SimpleNamespace(
+        ring_period=np.full((runs, cycles), 2e-3),
+        creep=np.broadcast_to(np.geomspace(1.0, 4e-3, 16), (runs, cycles, 16)),
+    )
+    return Measurement(layout, c, anchors, zero, valid, zero + 1, names, np.array(velocities))
 
 
 def made(seed: int = 0):

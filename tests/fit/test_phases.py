@@ -55,7 +55,7 @@ def test_every_run_has_its_own_phase_and_all_else_in_common():
 
 
 def test_a_campaign_of_one_run_has_one_phase_and_one_of_three_has_three():
-    from tests.diagnose.test_rules import measurement  # shapes only
+    from tests.diagnose.test_search import measurement  # shapes only
 
     for velocities, names in (((1e-4,), [f"{TAG}.phase"]), ((1e-4, 2e-4), [f"{TAG}.phase.0", f"{TAG}.phase.1"])):
         data = measurement(velocities, 7, ())

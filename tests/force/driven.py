@@ -90,6 +90,11 @@ def valued(effect: Effect, amplitude: float) -> Effect:
     return eqx.tree_at(lambda e: getattr(e, e.amplitude), effect, jnp.asarray(amplitude, float))
 
 
+def with_effects(model: Model, effects: tuple[Effect, ...]) -> Model:
+    """The model with other effects."""
+    return Model(model.block, model.bank, model.weakening, model.load_point, effects)
+
+
 def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE) -> Slips:
     """The rig with effects, from rest to its third slip and on."""
     model = base_model(effects)

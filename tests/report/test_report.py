@@ -42,8 +42,9 @@ DIAGNOSIS = {
             "score": 0.61,
             "refit": True,
             "form": {"by": "contact"},
-            "heldout_gain": 0.8,
-            "heldout_gain_std": 0.07,
+            "gain": 61.5,
+            "heldout_cost": 80.2,
+            "heldout_cost_std": 7.1,
             "amplitude": {"value": 0.01, "std": 0.0004, "unit": "1"},
         }
     ],
@@ -147,7 +148,7 @@ def with_markup(value):
 def test_candidates_of_every_round_are_listed_with_form_and_standard_error(tmp_path):
     text = " ".join(Reader(write_report(folder(tmp_path)).read_text()).text.split())
     assert "tilt (contact)" in text
-    assert "80 ± 7 %" in text
+    assert "80 ± 7" in text
     later = text[text.index("On top of static + inertia + tilt") :]
     assert "321" in later
     assert "sensor-drift" in later
@@ -182,7 +183,7 @@ def test_everything_a_diagnosis_holds_is_shown(tmp_path):
     words = " ".join(Reader(write_report(folder(tmp_path)).read_text()).text.split())
     for part in (
         "ambiguous", "cannot tell apart: tilt, nonlinear-spring", "start in reverse", "static + inertia", "39.5",
-        "0.61", "0.01 ± 0.0004", "920 nm", "89.4 g", "m x'' = F < 0 & more",
+        "61.5", "0.01 ± 0.0004", "920 nm", "89.4 g", "m x'' = F < 0 & more",
         "h_rms, L and F_n act only together", "80 % of the misfit", "143 s", "0" * 64,
     ):  # fmt: skip
         assert part in words, part

@@ -1,0 +1,79 @@
+"""Events left out are predicted as a fit without them would: at a linear problem one step is that fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.force.fit import fit, prior_rows, reach
+from stickslip.force.heldout import folds, unseen
+from stickslip.force.scatter import covariance
+
+from .test_derivatives import EFFECTS, with_effects
+
+
+@pytest.fixture(scope="module")
+def fitted(small):
+    return fit(small.problem, small.point, rounds=4)
+
+
+def refitted(fit, left_out):
+    """Residuals of the events left out, from explicit least squares over the others and the priors."""
+    _, whole = (np.asarray(a) for a in covariance(fit.scatter.sizes, fit.known))
+    low, high = reach(fit.problem, fit.point)
+    free = (low < 0.0) & (high > 0.0)
+    prior, target = prior_rows(fit.problem, fit.point)
+    rows, rest = [prior[:, free]], [target]
+    for e in sorted(set(range(fit.problem.events)) - set(left_out)):
+        own = fit.problem.of == e
+        n = int(own.sum())
+        root = np.linalg.cholesky(whole[e, :n, :n])
+        rows.append(np.linalg.solve(root, fit.slopes.shared[own][:, free]))
+        rest.append(np.linalg.solve(root, fit.marginal[own]))
+    a, b = np.vstack(rows), np.concatenate(rest)
+    scale = np.sqrt((a**2).sum(axis=0))
+    step = -np.linalg.lstsq(a / scale, b, rcond=1e-9)[0] / scale
+    out, cost = {}, {}
+    for e in left_out:
+        own = fit.problem.of == e
+        n = int(own.sum())
+        out[e] = fit.marginal[own] + fit.slopes.shared[own][:, free] @ step
+        part = whole[e, :n, :n]
+        cost[e] = out[e] @ np.linalg.solve(part, out[e]) + np.linalg.slogdet(part)[1]
+    return out, cost
+
+
+def test_a_run_left_out_is_predicted_as_least_squares_without_it(fitted):
+    run = np.flatnonzero(fitted.problem.event_run == 1)
+    other = np.flatnonzero(fitted.problem.event_run == 0)
+    predicted = unseen(fitted, [run, other])
+    for part in (run, other):
+        force, cost = refitted(fitted, part.tolist())
+        for e in part:
+            own = fitted.problem.of == e
+            np.testing.assert_allclose(predicted.residual[own], force[e], atol=2e-5 * fitted.strength)
+            assert predicted.cost[e] == pytest.approx(cost[e], abs=0.05)
+
+
+def test_what_was_not_seen_is_predicted_less_well_than_what_was(fitted):
+    predicted = unseen(fitted)
+    assert predicted.cost.sum() > fitted.likelihood.sum()
+    assert np.all(np.isfinite(predicted.cost))
+    nothing = unseen(fitted, [np.array([], int)])
+    assert not nothing.residual.any()
+
+
+def test_every_event_is_left_out_once(fitted):
+    parts = folds(fitted)
+    assert sorted(np.concatenate(parts).tolist()) == list(range(fitted.problem.events))
+
+
+def test_runs_with_phases_are_left_out_by_halves(small, fitted):
+    problem, point = with_effects(small, EFFECTS["effects"])
+    found = fit(problem, point, fitted.scatter, estimated=False, dropped=fitted.dropped, known=fitted.known, steps=1)
+    parts = folds(found)
+    assert len(parts) == 2 * len(problem.runs)
+    for part in parts:
+        assert np.unique(problem.event_run[part]).size == 1
+        assert part.size < np.count_nonzero(problem.event_run == problem.event_run[part[0]])
+    assert np.all(np.isfinite(unseen(found).cost))

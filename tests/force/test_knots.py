@@ -1,0 +1,169 @@
+"""Knots stand for the record: means where it creeps, its samples where it is fast, all under one test function."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip.force.knots import CREEP, _hum, _onward, kernels, knots
+
+RATE = 1e4
+
+
+@pytest.mark.parametrize("half", [3e-4, 1e-3, 4e-3])
+def test_kernels_are_exact_for_a_parabola(half):
+    phi, first, second = kernels(half, RATE)
+    h = phi.size // 2
+    s = np.arange(-h, h + 1) / RATE
+    parabola = 3.0 - 7.0 * s + 11.0 * s * s
+    assert phi.sum() == pytest.approx(1.0, abs=1e-13)
+    assert phi @ s == pytest.approx(0.0, abs=1e-15)
+    assert first @ parabola == pytest.approx(-7.0, rel=1e-12)
+    assert second @ parabola == pytest.approx(22.0, rel=1e-8)
+    assert np.all(phi >= 0.0)
+
+
+@pytest.mark.parametrize("half", [2e-3, 4e-3])
+def test_the_weak_form_is_the_mean_of_rate_and_acceleration(half):
+    """phi'' on x is phi on x'', also where x'' is no constant over the test function."""
+    phi, first, second = kernels(half, RATE)
+    h = phi.size // 2
+    t = 0.37 + np.arange(-h, h + 1) / RATE
+    w = 2.0 * np.pi / (3.0 * half)
+    x, v, a = np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)
+    assert first @ x == pytest.approx(phi @ v, abs=2e-3 * w)
+    assert second @ x == pytest.approx(phi @ a, abs=5e-3 * w * w)
+
+
+def test_a_force_at_the_knots_is_averaged_as_the_motion_is(small):
+    """The mean of a smooth force between knots is that of its samples."""
+    phi, _, _ = kernels(small.times.half, small.traces[0].sampling_rate)
+    h = phi.size // 2
+    for k, trace in zip(small.knots, small.traces, strict=True):
+        np.testing.assert_allclose(np.asarray(k.mean.sum(axis=1)).ravel(), 1.0, atol=1e-12)
+
+        def force(t):
+            return np.sin(2.0 * np.pi * 3.0 * t) + 5.0 * t
+
+        got = k.mean @ force(k.t)
+        fast = np.flatnonzero(k.phase != CREEP)
+        centre = np.rint((k.at[fast] - trace.time[0]) * trace.sampling_rate).astype(int)
+        assert np.abs(trace.time[centre] - k.at[fast]).max() < 1e-9
+        want = force(trace.time[centre[:, None] + np.arange(-h, h + 1)]) @ phi
+        assert np.abs(got[fast] - want).max() < 2e-3
+        slow = k.phase == CREEP
+        np.testing.assert_allclose(got[slow], force(k.at[slow]), atol=1e-12)
+
+
+def test_points_have_the_motion_under_the_test_function(small):
+    """Rate and acceleration at a point are those of the reading there, which loses energy only in the slip."""
+    k, trace = small.knots[0], small.traces[0]
+    phi, first, second = kernels(small.times.half, trace.sampling_rate)
+    h = phi.size // 2
+    fast = np.flatnonzero(k.phase != CREEP)
+    centre = np.rint((k.at[fast] - trace.time[0]) * trace.sampling_rate).astype(int)
+    x = trace.displacement[centre[:, None] + np.arange(-h, h + 1)]
+    x = x - x[:, h : h + 1]
+    # the mains' hum, nanometres, is taken off beforehand
+    assert np.abs(k.rate[fast] - x @ first).max() < 1e-3 * np.abs(k.rate).max()
+    assert np.abs(k.acceleration[fast] - x @ second).max() < 1e-3 * np.abs(k.acceleration).max()
+
+
+def test_windows_are_means(small):
+    for k, trace in zip(small.knots, small.traces, strict=True):
+        slow = k.phase == CREEP
+        count = np.rint((k.noise / k.white[slow]) ** 2).astype(int)
+        rows = k.mean[np.flatnonzero(slow)]
+        assert np.all(np.diff(rows.indptr) == 1)
+        knot = rows.indices
+        start = np.rint((k.t[knot] - trace.time[0]) * trace.sampling_rate - 0.5 * (count - 1)).astype(int)
+        far = count > 20
+        assert far.sum() > 20
+        for s, n, j in zip(start[far], count[far], knot[far], strict=True):
+            assert k.t[j] == pytest.approx(trace.time[s : s + n].mean(), abs=1e-9)
+            assert k.drive[j] == pytest.approx(trace.drive.position(trace.time[s : s + n]).mean(), abs=1e-13)
+            assert k.x[j] == pytest.approx(trace.displacement[s : s + n].mean(), abs=2e-8)
+
+
+def test_knots_go_forward_in_time(small, begun):
+    for k in (*small.knots, *begun.knots):
+        assert np.all(np.diff(k.t) > 0.0)
+        assert np.all(np.diff(k.event) >= 0)
+
+
+def test_no_point_belongs_to_a_stick_with_an_unknown_past(small, begun):
+    for k in begun.knots:
+        assert not k.virgin
+        assert k.of.min() == 1
+    for k in small.knots:
+        assert k.virgin
+        assert k.of.min() == 0
+    thinned = knots(replace(small.traces[0], virgin=False), small.found[0], small.times)
+    assert thinned.of.min() == 1
+
+
+def flat(x, **options):
+    x = np.asarray(x, float)
+    given = {"weight": np.ones(x.size), "slow": np.ones(x.size, bool), "event": np.zeros(x.size, int), "noise": 1e-9}
+    return _onward(x, **{**given, **options})
+
+
+def test_a_way_that_goes_on_is_left_alone():
+    x = np.cumsum(np.abs(np.random.default_rng(0).standard_normal(50))) * 1e-9
+    np.testing.assert_array_equal(flat(x), x)
+    np.testing.assert_array_equal(flat(-x), -x)
+
+
+def test_steps_back_of_the_size_of_noise_are_taken_out():
+    rng = np.random.default_rng(1)
+    x = np.linspace(0.0, 1e-7, 60) + 1e-9 * rng.standard_normal(60)
+    assert np.any(np.diff(x) < 0.0)
+    found = flat(x)
+    assert np.all(np.diff(found) >= 0.0)
+    assert np.abs(found - x).max() < 5e-9
+    assert found.mean() == pytest.approx(x.mean(), abs=1e-15)
+
+
+def test_a_real_way_back_is_kept():
+    x = np.concatenate([np.linspace(0.0, 1e-7, 30), np.linspace(1e-7, 6e-8, 10)])
+    np.testing.assert_array_equal(flat(x), x)
+
+
+def test_samples_and_other_events_are_not_made_to_go_on():
+    x = np.array([0.0, 1.0, 0.5, 2.0, 3.0, 0.0, 1.0, 0.9, 2.0]) * 1e-9
+    fast = np.zeros(9, bool)
+    np.testing.assert_array_equal(flat(x, slow=fast), x)
+    event = np.array([0, 0, 0, 0, 0, 1, 1, 1, 1])
+    found = flat(x, event=event)
+    assert found[4] == pytest.approx(3e-9)
+    assert found[5] == pytest.approx(0.0, abs=1e-20)
+    assert np.all(np.diff(found[:5]) >= 0.0)
+    assert np.all(np.diff(found[5:]) >= 0.0)
+
+
+def staircase(case):
+    """Smooth creep and slips at the events of a record, without noise."""
+    trace, found = case.traces[0], case.found[0]
+    x = 1e-8 * trace.time
+    for e in found.events:
+        x = x + e.slip * 0.5 * (1.0 + np.tanh((trace.time - 0.5 * (e.t_onset + e.t_arrest)) / (0.1 * e.duration)))
+    return trace.time, x, found.events, trace.sampling_rate
+
+
+def test_the_hum_of_the_mains_is_found_between_slips(small):
+    t, x, events, rate = staircase(small)
+    sine = 4e-9 * np.sin(2.0 * np.pi * 50.0 * t + 0.8)
+    noise = 3e-9 * np.random.default_rng(2).standard_normal(t.size)
+    found = _hum(t, x + sine + noise, events, rate, small.times)
+    assert np.sqrt(np.mean((found - sine) ** 2)) < 0.1 * np.sqrt(np.mean(sine**2))
+
+
+@pytest.mark.parametrize("frequency", [31.0, 43.0, 60.0])
+def test_nothing_but_the_mains_is_taken_off(small, frequency):
+    t, x, events, rate = staircase(small)
+    wave = 4e-9 * np.sin(2.0 * np.pi * frequency * t + 0.8)
+    noise = 3e-9 * np.random.default_rng(2).standard_normal(t.size)
+    assert np.abs(_hum(t, x + noise, events, rate, small.times)).max() == 0.0
+    assert np.abs(_hum(t, x + wave + noise, events, rate, small.times)).max() < 0.05 * 4e-9
