@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ..campaign import Campaign
 from ..errors import InputError, nearest
+from ..features.measurement import doubts
 from ..fit.start import ringing, shared_rig
 from ..force.begin import begin
 from ..force.knots import Knots, Scales, knots, scales
@@ -67,11 +68,16 @@ def prepare(
         else:
             used.append((trace, found))
     if not used:
+        usable = [t for t in traces if t.displacement is not None and t.drive is not None]
+        slips = max((len(s.events) for s in segmentations), default=0)
         raise InputError(
-            "a diagnosis needs the displacement of the block, the motion of the drive, and slips",
+            f"{'one slip' if slips == 1 else 'no slip'} in any run: a diagnosis needs two at least in one of them"
+            if usable and slips < FEWEST
+            else "a diagnosis needs the displacement of the block, the motion of the drive, and slips",
             file=campaign.path,
-            key="trace.displacement",
-            hint="others can be inspected and fitted with --model static; " + "; ".join(dropped),
+            key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in traces[:4]) + ", ..." * (len(traces) > 4),
+            hint="record longer, drive slower or with a softer spring; others can be inspected and fitted with "
+            f"--model static. {'; '.join(dropped)}{doubts(traces)}",
         )
     kept, segments = tuple(t for t, _ in used), tuple(s for _, s in used)
     period = ringing(kept, segments)

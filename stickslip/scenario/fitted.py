@@ -141,13 +141,12 @@ class FittedRun:
         return own[0] if own and None not in own else None
 
 
-def load_run(folder: str | Path, effects: Sequence[str | Path] = (), *, learned: bool = False) -> FittedRun:
+def load_run(folder: str | Path, effects: Sequence[str | Path] = ()) -> FittedRun:
     """Read the model that a fit or a diagnosis left in its run folder.
 
     Args:
         folder: of ``stickslip fit --model inertial --out`` or ``stickslip diagnose --out``.
         effects: Python files with effects of one's own that are in the model; their code is run.
-        learned: the model with the learned residual force of ``stickslip diagnose --learn-residual``, for prediction.
 
     Raises:
         RunFolderError: no run folder, a damaged one, or one that holds no fitted model.
@@ -156,13 +155,7 @@ def load_run(folder: str | Path, effects: Sequence[str | Path] = (), *, learned:
     folder = Path(folder)
     result = read_result(folder)
     load_effects(effects)
-    section = (result.get("learned_residual") or {}).get(KEY) if learned else result.get(KEY)
-    if section is None and learned:
-        raise RunFolderError(
-            "this run holds no learned residual force",
-            file=folder / RESULT,
-            hint="stickslip diagnose CAMPAIGN.toml --out FOLDER --learn-residual leaves one",
-        )
+    section = result.get(KEY)
     if section is None:
         raise RunFolderError(
             "this run holds no fitted model",

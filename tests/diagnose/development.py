@@ -92,7 +92,7 @@ class LeftOut:
 
         tag = self.hidden[campaign.parent.name]
         tried = [t for t, cls in catalogue.all().items() if t != tag and tag not in cls.generalises]
-        return diagnose_campaign(campaign, out, jobs=1, missing_force=False, candidates=tried)
+        return diagnose_campaign(campaign, out, jobs=1, candidates=tried)
 
 
 @dataclass(frozen=True)

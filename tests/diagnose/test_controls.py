@@ -60,7 +60,7 @@ def test_nor_do_velocities_so_close_that_the_base_can_be_fitted_and_effects_are_
     """Half a per cent from run to run, the slowest now the fastest: 1.5 %."""
     make_campaign(tmp_path / "right", 3, runs=CLOSE, spring_known=True)
     path = shuffled(tmp_path / "campaign", [1, 2, 3, 0], tmp_path / "right")
-    result = diagnose_campaign(path, tmp_path / "out", jobs=2, missing_force=False)
+    result = diagnose_campaign(path, tmp_path / "out", jobs=2)
     assert result["verdict"]["kind"] == "unknown"
     assert result["verdict"]["effects"] == []
     assert result["verdict"]["set"] == []

@@ -12,16 +12,17 @@ from pathlib import Path
 
 import pytest
 
-# a sweep's jobs: each says which process does it, and takes long
+# as the trials of a diagnosis do it: each job says which process does it, and takes long
 SWEEP = """
 import os, sys, time
 from pathlib import Path
-from stickslip.diagnose.sweep import Sweep
-def job(folder):
+from joblib import Parallel, delayed
+from stickslip.lifeline import end_with
+def job(parent, folder):
+    end_with(parent)
     Path(folder, str(os.getpid())).touch()
     time.sleep(60)
-work = {str(n): (job, (sys.argv[1],)) for n in range(4)}
-list(Sweep(None, 2, None, "sweep", print)._results(work))
+list(Parallel(n_jobs=2)(delayed(job)(os.getpid(), sys.argv[1]) for _ in range(4)))
 """
 
 
@@ -55,3 +56,19 @@ def test_workers_of_a_killed_sweep_end(tmp_path):
         for path in tmp_path.iterdir():
             with suppress(OSError):
                 os.kill(int(path.name), signal.SIGKILL)
+
+
+def test_a_trial_in_a_worker_ends_with_the_diagnosis(monkeypatch):
+    from cloudpickle import dumps, loads
+
+    from stickslip import cache, lifeline
+    from stickslip.diagnose import trials
+
+    ends = []
+    monkeypatch.setattr(lifeline, "end_with", ends.append)
+    monkeypatch.setattr(cache, "enable", lambda: None)
+    monkeypatch.setattr(trials, "Explained", lambda base: f"explained {base}")
+    monkeypatch.setattr(trials, "try_effect", lambda *arguments: arguments)
+    made = loads(trials._in_worker(dumps("base"), "wear", {"course": "linear"}, (), 4321))
+    assert made == ("base", "explained base", "wear", {"course": "linear"})
+    assert ends == [4321]

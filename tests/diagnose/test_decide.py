@@ -1,0 +1,62 @@
+"""The rules by which a diagnosis names an effect, on made-up outcomes of refits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.diagnose.decide import CHANCE, ERRORS, Judged, best_forms, named
+from stickslip.force.candidates import Candidate
+
+EVENTS = 40
+
+
+def judged(tag: str, gain: float, each: float, *, spread: float = 1.0, chance: float = 1e-9, fall: float = 0.2,
+           form: dict[str, str] | None = None) -> Judged:  # fmt: skip
+    """An effect whose gain on every unseen event is ``each``, give or take ``spread``."""
+    swing = spread * np.where(np.arange(EVENTS) % 2, 1.0, -1.0)
+    return Judged(Candidate(tag, form or {}, gain, None), gain, chance, each + swing, fall, 0.01, 0.001)
+
+
+def test_what_predicts_unseen_runs_best_is_named():
+    close = named([judged("wear", 300.0, 4.0), judged("tilt", 320.0, 8.0), judged("inertia", 50.0, 1.0)])
+    assert [j.tag for j in close] == ["tilt"]
+
+
+@pytest.mark.parametrize(
+    "change", [{"chance": 2.0 * CHANCE}, {"fall": -0.01}, {"spread": 100.0}], ids=["chance", "error", "scatter"]
+)
+def test_each_condition_of_being_seen_is_needed(change):
+    assert judged("wear", 300.0, 4.0).seen
+    assert not judged("wear", 300.0, 4.0, **change).seen
+    assert named([judged("wear", 300.0, 4.0, **change)]) == []
+
+
+def test_so_many_standard_errors_over_the_events():
+    error = judged("wear", 300.0, 1.0).error
+    assert error == pytest.approx(np.sqrt(EVENTS) * np.std(np.tile([1.0, -1.0], EVENTS // 2), ddof=1))
+    just = ERRORS * error / EVENTS
+    assert judged("wear", 300.0, 1.01 * just).seen
+    assert not judged("wear", 300.0, 0.99 * just).seen
+
+
+def test_what_predicts_as_well_event_by_event_is_a_set():
+    close = named([judged("wear", 300.0, 8.0), judged("sensor-gain", 290.0, 7.9), judged("tilt", 100.0, 3.0)])
+    assert [j.tag for j in close] == ["wear", "sensor-gain"]
+
+
+def test_of_a_law_and_its_special_case_the_special_case_stays():
+    both = [judged("rate-and-state", 310.0, 8.05), judged("contact-ageing", 300.0, 8.0)]
+    assert [j.tag for j in named(both)] == ["contact-ageing"]
+    alone = [judged("rate-and-state", 410.0, 12.0), judged("contact-ageing", 300.0, 8.0)]
+    assert [j.tag for j in named(alone)] == ["rate-and-state"]
+
+
+def test_every_effect_stands_once_in_its_best_form():
+    forms = [
+        judged("wear", 300.0, 8.0, form={"course": "linear"}),
+        judged("wear", 303.0, 6.0, form={"course": "logarithmic"}),
+        judged("wear", 200.0, 9.0, form={"course": "saturating"}),
+    ]
+    found = best_forms(forms)
+    assert [j.candidate.form["course"] for j in found] == ["linear"]
