@@ -205,7 +205,7 @@ def ladder(axes: Axes, result: dict[str, Any]) -> None:
             color=DARK,
         )
     axes.set_yscale("log")
-    axes.set_ylim(top=2.5 * max(r["train_error"] for r in rungs))
+    axes.set_ylim(0.55, 2.5 * max(r["train_error"] for r in rungs))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.minorticks_off()
     axes.axhline(1.0, color=LIGHT, ls=":", lw=1.4)

@@ -41,7 +41,8 @@ def coordinates(fit: Fit) -> dict[str, Array]:
     x = np.concatenate([k.mean @ k.x for k in runs])
     drive = np.concatenate([k.mean @ k.drive for k in runs])
     rate = np.concatenate([k.rate for k in runs])
-    stiffness = fit.values["rig.spring_stiffness"]
+    shared = fit.values.get("rig.spring_stiffness", np.nan)
+    stiffness = np.concatenate([np.full(k.at.size, shared if k.stiffness is None else k.stiffness) for k in runs])
     number = problem.of - problem.first[problem.run]
     return dict(
         zip(
