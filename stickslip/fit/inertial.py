@@ -27,7 +27,7 @@ FARTHEST = (0.2, 0.5)  # step on the search scale along a direction that moves l
 LEAST, LARGEST = 1e-3, (0.05, 0.5)  # such a step on the search scale; the largest of a logarithm, of another scale
 DISPERSION = 16.0  # of costs, over that of noise alone: events share what a bank of three parameters cannot describe
 MODEL_ERROR = 2.0  # on standard deviations: a bank of three parameters is no rough line (tests/fit/test_recovery.py)
-PASSES = 2  # over all directions, until derivatives are certain
+PASSES = 3  # over all directions, until derivatives are certain
 WIDE = 2.4  # factor on the floors from which a coarser tolerance of the solver does
 STAGES = ((30.0, 6), (7.0, 8), (2.5, 8), (1.0, 20))  # factor on the floors, most evaluations at it
 
@@ -442,9 +442,10 @@ def certain(problem: Problem, floor: np.ndarray, found: Fit) -> Fit:
 
     Derivatives that a search has carried on, or that were taken by a difference for each parameter, hold the solver's
     noise in the directions that the features hardly tell, and noise looks like knowledge: it makes standard deviations
-    too small, by a factor of three in the worst case seen.
+    too small, by a factor of three in the worst case seen. So the motion is solved strictly here: how much noise there
+    is at the tolerance of a search, and with it the standard deviation, hangs on how a processor rounds.
     """
-    res = _Residuals(problem.seeing(found.use), floor, 1.0, found.use)
+    res = _Residuals(problem.seeing(found.use).strict(), floor, 1.0, found.use)
     x = np.concatenate([found.z, found.events[res.used].ravel()])
     features, columns = res.evaluate(x), found.columns
     for _ in range(PASSES):  # the first on steps that noise has made too short

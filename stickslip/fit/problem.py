@@ -12,6 +12,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -32,6 +33,8 @@ from .program import Program
 
 FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)  # errors below a floor
 COARSE = Tolerance(2e-3, 2e-11, 2e-8, 1.2e-2, 3e-7)  # of one to two: for floors that are widened more than that
+STRICT = Tolerance(5e-5, 1e-13, 1e-10)  # errors that no difference sees: for derivatives that say how certain a fit is
+STRICT_STEPS = 5  # times as many as usual
 STEP = 0.01  # of a difference, on the search scale, until it is known better
 TINY = 0.1  # share of a step that is taken beyond a border where there is no room to either side
 BROKEN = 0.3  # change of a slip's size within such a step that can only be another event
@@ -73,6 +76,15 @@ class Problem:
             return self
         other = copy(self)
         other.tolerance, other._last = COARSE, None
+        return other
+
+    def strict(self) -> Problem:
+        """The same at a tolerance whose noise differences do not see."""
+        if self.tolerance.relative <= STRICT.relative:
+            return self
+        other = copy(self)
+        other.tolerance, other._last = STRICT, None
+        other.composition = replace(self.composition, most_steps=STRICT_STEPS * self.composition.most_steps)
         return other
 
     def seeing(self, cycles: np.ndarray) -> Problem:
