@@ -11,7 +11,9 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
 from ..contact import Bank
 from ..effects.base import Contact, Drive, Memory, Motion, Sensor
@@ -26,6 +28,7 @@ class Way(NamedTuple):
     Attributes:
         t, x, v: time (s), displacement (m) and velocity (m/s) of the block.
         drive: the load point as the drive was told (m).
+        turn: from the knot before to the turning point within the increment (m); zero where there is none.
         strength, stretch: factors on caps and on yield displacements of all elements, which vary from event to event.
     """
 
@@ -33,6 +36,7 @@ class Way(NamedTuple):
     x: Any
     v: Any
     drive: Any
+    turn: Any
     strength: Any
     stretch: Any
 
@@ -74,10 +78,10 @@ def along(model: Model, way: Way) -> Held:
 
     def step(carry: tuple[State, Array], item: tuple[Array, ...]) -> tuple[tuple[State, Array], tuple[Array, ...]]:
         state, pull = carry
-        t, dt, x, dx, v, at, strength, stretch = item
+        t, dt, x, dx, v, at, turn, strength, stretch = item
         own = Bank(bank.stiffness * (strength / stretch), bank.strength * strength)
         contact = Contact(state.force, own.stiffness, own.strength, pull, state.cap, mass)
-        motion = Motion(t, dt, x, v, jnp.zeros(()), dx, at)
+        motion = Motion(t, dt, x, v, turn, dx, at)
         state, forces = model.advance(state, own, contact, motion)
         sticks = jnp.abs(state.force) < state.cap * (1.0 - 1e-6)
         tangent = jnp.sum(jnp.where(sticks, state.stiffness, 0.0))
@@ -85,7 +89,7 @@ def along(model: Model, way: Way) -> Held:
         return (state, forces.spring), out
 
     dt, dx = jnp.diff(way.t), jnp.diff(way.x)
-    items = (way.t[1:], dt, way.x[1:], dx, way.v[1:], led[1:], way.strength[1:], way.stretch[1:])
+    items = (way.t[1:], dt, way.x[1:], dx, way.v[1:], led[1:], way.turn[1:], way.strength[1:], way.stretch[1:])
     pull = model.pull(led[0] - way.x[0])
     _, (pulls, body, contact, elements, tangent) = jax.lax.scan(step, (start, pull), items)
 
@@ -100,6 +104,14 @@ def along(model: Model, way: Way) -> Held:
         begun(jnp.zeros_like(share), elements / jnp.where(share > 0.0, share, 1.0)),
         begun(jnp.sum(bank.stiffness), tangent),
     )
+
+
+def turning(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Way from the knot before to the turning point of each increment (m), by a constant deceleration; else zero."""
+    before, after = v[:-1], v[1:]
+    reverses = before * after < 0.0
+    apart = np.where(reverses, before - after, 1.0)
+    return np.concatenate([[0.0], np.where(reverses, 0.5 * np.diff(t) * before**2 / apart, 0.0)])
 
 
 def undone(model: Model, way: Way, force: Array) -> Way:

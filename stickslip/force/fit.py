@@ -21,6 +21,7 @@ FAR = 5.0  # standard deviations from what the rest of an event lets expect, fro
 HALVINGS = 5  # of a step that does not lower the cost
 LAST = 15  # steps with the covariance as it was found
 STEPS = 3  # of Gauss-Newton between
+NEWTON = 4  # steps of the sizes between
 SETTLED = 0.3  # fall of the cost (in units of chi-square) at which a round ends
 
 
@@ -257,12 +258,12 @@ def fit(
         made = known or known_of(problem, point, slopes, blocks, out)
         if turn or first:
             marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
-            sizes = estimate(sizes, marginal, made)
+            sizes = estimate(sizes, marginal, made, NEWTON)
             more = beyond(made, sizes, marginal, blocks, out.size) & ~out
             if dropped is None and more.any():
                 out = out | more
                 made = known or known_of(problem, point, slopes, blocks, out)
-                sizes = estimate(sizes, marginal, made)
+                sizes = estimate(sizes, marginal, made, NEWTON)
         point, slopes, total, count = descend(problem, point, slopes, sizes, made, blocks, steps)
         evaluations += count
         if turn > 2 and total < 1.0:

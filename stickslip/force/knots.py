@@ -20,6 +20,7 @@ from scipy.sparse import coo_array, csr_array
 
 from ..segment import Event, Segmentation
 from ..trace import Trace
+from .along import turning
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -60,6 +61,7 @@ class Knots:
         name: of the run.
         t, x, v: time (s), reading (m) and its rate (m/s) at the knots.
         drive: load point (m).
+        turn: from the knot before to a turning point in between (m), where every sample counts.
         event: number of the event whose stick and onset a knot belongs to; it changes in the middle of a slip, where
             all elements slide and nothing is remembered.
         arrest: number of the event that a knot's stick leads to, counted from the arrest before; -1 in the later half
@@ -85,6 +87,7 @@ class Knots:
     x: Array
     v: Array
     drive: Array
+    turn: Array
     event: Index
     arrest: Index
     mean: csr_array
@@ -420,6 +423,8 @@ class _Pieces:
                     np.concatenate(self.event), max(noise, 0.3 * self.step))  # fmt: skip
         v, slow = np.concatenate(self.v), np.concatenate(self.slow)
         slopes = np.gradient(x, knot_t)
+        # between windows the velocity is a mean, which tells no turning point
+        turn = np.where(slow | np.insert(slow[:-1], 0, True), 0.0, turning(knot_t, np.where(slow, 0.0, v)))
         v = np.where(slow, slopes, v)
         inner = np.arange(2, v.size - 2)
         bends = np.zeros(v.size)
@@ -478,7 +483,7 @@ class _Pieces:
         # of a contact that was loaded before the record begins nothing is known until all of it slides
         keep = (of < len(events)) & ((of > 0) | trace.virgin)
         knots_made = Knots(
-            trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
+            trace.name, knot_t, x, v, d, turn, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
             made["at"], phase, of, made["rate"], made["acceleration"], made["white"], made["shaken"],
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, events, float(t[0])),
             noise, trace.spring_stiffness, trace.virgin,

@@ -146,7 +146,7 @@ class Problem:
         self.composition, self.runs = composition, tuple(runs)
         first = np.cumsum([0, *(k.events for k in runs)])
         self.first, self.events = first[:-1], int(first[-1])
-        n = max(k.t.size for k in runs)
+        n = _room(max(k.t.size for k in runs))
         self.way = _padded(runs, n)
         self.of = np.concatenate([k.of + f for k, f in zip(runs, first[:-1], strict=True)])
         self.run = np.concatenate([np.full(k.at.size, r) for r, k in enumerate(runs)])
@@ -230,6 +230,14 @@ class Problem:
         return Slopes(residual, slopes, local, tangents, held)
 
 
+def _room(size: int) -> int:
+    """Knots that a compiled program has room for: few different numbers, so that campaigns share programs."""
+    least = 512
+    while least < size:
+        least = -(-least * 5 // 4 // 64) * 64
+    return least
+
+
 def _padded(runs: Sequence[Knots], n: int) -> Way:
     def grown(a: Array, step: float = 0.0) -> Array:
         more = n - a.size
@@ -241,6 +249,7 @@ def _padded(runs: Sequence[Knots], n: int) -> Way:
         np.stack([grown(k.x) for k in runs]),
         np.stack([np.concatenate([k.v, np.zeros(n - k.v.size)]) for k in runs]),
         np.stack([grown(k.drive) for k in runs]),
+        np.stack([np.concatenate([k.turn, np.zeros(n - k.turn.size)]) for k in runs]),
         ones,
         ones,
     )

@@ -14,7 +14,7 @@ from stickslip.conformance.rig import base_model
 from stickslip.contact import Bank
 from stickslip.effects import catalogue
 from stickslip.effects.base import Contact, Effect, Motion
-from stickslip.force.along import Held, Way, along
+from stickslip.force.along import Held, Way, along, turning
 from stickslip.model import Forces, Model, State
 from stickslip.params import specs
 from stickslip.solve import Steps, Tolerance, integrate
@@ -30,16 +30,6 @@ LAWS = [(tag, form) for tag in catalogue.tags() for form in catalogue.forms(cata
 GROUPS = [LAWS[i : i + 22] for i in range(0, len(LAWS), 22)]  # compiled together
 
 march = jax.jit(along)
-
-
-class Turning(Model):
-    """A model that puts the turning point into an increment, where the solver's steps have it."""
-
-    def advance(self, state: State, bank: Bank, contact: Contact, motion: Motion) -> tuple[State, Forces]:
-        reverses = state.v * motion.v < 0.0
-        apart = jnp.where(reverses, state.v - motion.v, 1.0)
-        turn = jnp.where(reverses, 0.5 * motion.dt * state.v**2 / apart, 0.0)
-        return super().advance(state, bank, contact, motion._replace(turn=turn))
 
 
 class Slips(NamedTuple):
@@ -116,15 +106,13 @@ def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> Way:
     t = np.concatenate([t, t[-1] + 1e-3 * np.arange(1, more + 1)])
     x, v = np.concatenate([x, np.full(more, x[-1])]), np.concatenate([v, np.zeros(more)])
     ones = np.ones(KNOTS)
-    return Way(*(jnp.asarray(a) for a in (t, x, v, np.interp(t, TIMES, POSITIONS), ones, ones)))
+    return Way(*(jnp.asarray(a) for a in (t, x, v, np.interp(t, TIMES, POSITIONS), turning(t, v), ones, ones)))
 
 
-def held(slips: Slips, turning: bool = True) -> Held:
-    """What the model holds along it, at the solver's steps; ``turning`` lets it know where steps turn."""
-    m = slips.model
-    if turning:
-        m = Turning(m.block, m.bank, m.weakening, m.load_point, m.effects)
-    return at_steps(march(m, slips.way), slips)
+def held(slips: Slips, turns: bool = True) -> Held:
+    """What the model holds along it, at the solver's steps; ``turns`` lets it know where steps turn."""
+    way = slips.way if turns else slips.way._replace(turn=jnp.zeros(KNOTS))
+    return at_steps(march(slips.model, way), slips)
 
 
 def at_steps(values: Any, slips: Slips) -> Any:

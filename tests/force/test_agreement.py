@@ -28,9 +28,9 @@ def slips(name: str) -> driven.Slips:
     return driven.simulated(driven.effects_with(law, SHARES.get(law[0], 0.1)))
 
 
-def wrong(found: driven.Slips, until: int | None = None, turning: bool = True) -> float:
+def wrong(found: driven.Slips, until: int | None = None, turns: bool = True) -> float:
     """Largest difference of the two forces, over the strength."""
-    apart = driven.held(found, turning).contact - found.steps.contact_force
+    apart = driven.held(found, turns).contact - found.steps.contact_force
     return float(np.abs(apart[:until]).max() / driven.STRENGTH)
 
 
@@ -43,15 +43,15 @@ def test_the_base_model_holds_what_the_solver_found(base):
     v = base.steps.v
     assert np.count_nonzero((v[1:] > 1e-3) & (v[:-1] <= 1e-3)) >= 3  # slips
     assert base.turned > 40  # the first loading
-    assert wrong(base, base.turned, turning=False) < EXACT
+    assert wrong(base, base.turned, turns=False) < EXACT
     assert wrong(base) < EXACT
 
 
 def test_turning_points_within_a_step_are_all_that_is_missing(base):
     """They matter by less than one in a thousand, and less in shorter steps."""
-    assert 1e-6 < wrong(base, turning=False) < UNTOLD
+    assert 1e-6 < wrong(base, turns=False) < UNTOLD
     finer = driven.simulated((), Tolerance(5e-4, 5e-12, 5e-9))
-    assert wrong(finer, turning=False) < 0.3 * wrong(base, turning=False)
+    assert wrong(finer, turns=False) < 0.3 * wrong(base, turns=False)
 
 
 @pytest.mark.parametrize("name", [driven.named(law) for law in driven.LAWS])
@@ -59,7 +59,7 @@ def test_every_law_holds_what_the_solver_found(name):
     found = slips(name)
     assert found.steps.x[-1] > 140e-6  # it slips
     assert found.turned < found.steps.t.size - 50  # and sticks again
-    assert wrong(found, found.turned, turning=False) < EXACT
+    assert wrong(found, found.turned, turns=False) < EXACT
     assert wrong(found) < EXACT
     pull = driven.held(found).pull
     np.testing.assert_allclose(pull, found.steps.spring_force, rtol=1e-12, atol=1e-14)

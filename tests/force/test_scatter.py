@@ -77,7 +77,7 @@ def test_sizes_are_found_in_what_was_drawn_from_them():
     draws = np.random.default_rng(7).standard_normal((EVENTS, POINTS))
     residual = np.einsum("eij,ej->ei", np.linalg.cholesky(whole), draws)
     residual[~known.there] = 0.0
-    found = estimate(Scatter.wide(), residual, known, evaluations=200)
+    found = estimate(Scatter.wide(), residual, known, steps=200)
     off = dict(zip(NAMES, found.sizes - true(), strict=True))
     for name in NAMES:
         assert abs(off[name]) < (0.5 if name in ("walk", "position", "offset") else 0.3), (name, off)
