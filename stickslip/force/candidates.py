@@ -20,6 +20,7 @@ from .problem import Point, Problem, is_own
 from .score import Explained, signatures
 
 FREQUENCIES = 240  # of a periodic effect
+FEW = 12  # members of a family for which no program of their own is compiled
 LONGEST = 1.5  # of a record: a longer wave is a trend
 
 
@@ -100,7 +101,7 @@ def try_effect(base: Fit, explained: Explained, tag: str, form: dict[str, str]) 
 
 def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]) -> Candidate:
     members = grid(effect)
-    columns = signatures(base, effect, members)
+    columns = (_columns if len(members) <= FEW else signatures)(base, effect, members)
     usable = np.isfinite(columns).all(axis=1) & (np.abs(columns).max(axis=1) > 0.0)
     if not usable.any():
         return Candidate(effect.tag, form, 0.0, None, "it does nothing along this motion")
@@ -124,6 +125,19 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     return Candidate(effect.tag, form, float(falls[best]), found, "", len(members), 5.0 * float(errors[best]), start)
 
 
+def _columns(base: Fit, effect: Effect, members: Sequence[dict[str, float]]) -> Array:
+    """Derivative of the residual force in the amplitude at its null, shape (members, p): by the refit's own program."""
+    null = specs(effect)[effect.amplitude].null or 0.0
+    out = []
+    for member in members:
+        problem, free = with_start(base.problem, effect, {**member, effect.amplitude: null}, inside=False)
+        name = f"{effect.tag}.{effect.amplitude}"
+        at, own = next((i, f) for i, f in enumerate(problem.composition.shared) if f.name == name)
+        slopes = problem.evaluate(_start(base, free, None))
+        out.append(slopes.shared[:, at] / own.slope(own.inward(null)))
+    return np.stack(out)
+
+
 def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
     """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,)."""
     problem, free = with_start(base.problem, effect, values)
@@ -132,11 +146,18 @@ def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | N
     )
 
 
-def with_start(problem: Problem, effect: Effect, values: dict[str, float]) -> tuple[Problem, list[Free]]:
-    """The problem with an effect more, whose search starts at these values (SI), and its free parameters."""
+def with_start(
+    problem: Problem, effect: Effect, values: dict[str, float], inside: bool = True
+) -> tuple[Problem, list[Free]]:
+    """The problem with an effect more, whose search starts at these values (SI), and its free parameters.
+
+    ``inside`` keeps the start off the bounds, one of which may be the null.
+    """
     for name, value in values.items():
         effect = eqx.tree_at(lambda e, n=name: getattr(e, n), effect, np.float64(value))  # type: ignore[misc]
-    free = [_kept(f, values) for f in effect_parameters(effect, amplitude=values[effect.amplitude])]
+    free = effect_parameters(effect, amplitude=values[effect.amplitude])
+    if inside:
+        free = [_kept(f, values) for f in free]
     return problem.with_composition(problem.composition.with_effect(effect, free)), free
 
 
