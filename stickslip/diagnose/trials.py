@@ -53,23 +53,28 @@ def trials(
         else:
             out.append(known)
     # the largest first, so that no process waits for one that was begun last
-    left.sort(key=lambda job: -_size(base, *job))
-    for candidate in _made(base, left, jobs):
-        out.append(candidate)
+    groups = [(tag, [form for other, form in left if other == tag]) for tag in dict.fromkeys(t for t, _ in left)]
+    groups.sort(key=lambda job: -_size(base, *job))
+    for made in _made(base, groups, jobs):
+        out += made
         if store is not None:
-            save_candidate(store, f"{name}-{name_of(candidate.tag, candidate.form)}", candidate)
-        tell(candidate.tag, len(out) / len(work))
+            for candidate in made:
+                save_candidate(store, f"{name}-{name_of(candidate.tag, candidate.form)}", candidate)
+        tell(made[-1].tag, len(out) / len(work))
         if not until():
             break
     order = {(tag, tuple(form.items())): i for i, (tag, form) in enumerate(work)}
     return sorted(out, key=lambda c: order[c.tag, tuple(c.form.items())])
 
 
-def _made(base: Fit, work: Sequence[tuple[str, dict[str, str]]], jobs: int) -> Iterator[Candidate]:
+Job = tuple[str, list[dict[str, str]]]  # an effect in some of its forms
+
+
+def _made(base: Fit, work: Sequence[Job], jobs: int) -> Iterator[list[Candidate]]:
     if jobs == 1 or len(work) < 4:
         explained = Explained(base)
-        for tag, form in work:
-            yield try_effect(base, explained, tag, form)
+        for tag, forms in work:
+            yield try_effect(base, explained, tag, forms)
         return
     files = tuple(str(m.__file__) for m in catalogue.user_modules())
     job = dumps(base)
@@ -77,25 +82,27 @@ def _made(base: Fit, work: Sequence[tuple[str, dict[str, str]]], jobs: int) -> I
         warnings.filterwarnings("ignore", message="A worker stopped")
         pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
         yield from (
-            loads(a) for a in pool(delayed(_in_worker)(job, tag, form, files, os.getpid()) for tag, form in work)
+            loads(a) for a in pool(delayed(_in_worker)(job, tag, forms, files, os.getpid()) for tag, forms in work)
         )
 
 
-def _size(base: Fit, tag: str, form: Mapping[str, str]) -> int:
-    """Numbers that an effect remembers."""
-    effect = catalogue.get(tag)(**form)
-    if not isinstance(effect, Memory):
-        return 0
+def _size(base: Fit, tag: str, forms: Sequence[Mapping[str, str]]) -> int:
+    """Numbers that an effect remembers, over its forms."""
     reach = base.problem.composition.reach
-    state = effect.start(Bank(jnp.ones(reach.size), jnp.asarray(reach)))
-    return sum(int(np.size(leaf)) for leaf in jax.tree.leaves(state))
+    total = len(forms)
+    for form in forms:
+        effect = catalogue.get(tag)(**form)
+        if isinstance(effect, Memory):
+            state = effect.start(Bank(jnp.ones(reach.size), jnp.asarray(reach)))
+            total += sum(int(np.size(leaf)) for leaf in jax.tree.leaves(state))
+    return total
 
 
 _kept: dict[int, tuple[Fit, Explained]] = {}
 
 
-def _in_worker(job: bytes, tag: str, form: dict[str, str], files: tuple[str, ...], parent: int) -> Any:
-    """One form in a worker, which loads the user's files first and keeps the base of its last job."""
+def _in_worker(job: bytes, tag: str, forms: list[dict[str, str]], files: tuple[str, ...], parent: int) -> Any:
+    """One effect in a worker, which loads the user's files first and keeps the base of its last job."""
     from .. import cache
     from ..lifeline import end_with
 
@@ -109,4 +116,4 @@ def _in_worker(job: bytes, tag: str, form: dict[str, str], files: tuple[str, ...
         _kept.clear()
         base = loads(job)
         _kept[key] = (base, Explained(base))
-    return dumps(try_effect(*_kept[key], tag, form))
+    return dumps(try_effect(*_kept[key], tag, forms))

@@ -15,12 +15,15 @@ from ..effects.base import Effect, Geometry
 from ..errors import StickslipError
 from ..fit.parameters import Free, effect_parameters
 from ..params import Spec, specs
-from .fit import Array, Fit, fit
+from .fit import LAST, Array, Fit, continued, refit
 from .problem import Point, Problem, is_own
 from .score import Explained, signatures
 
 FREQUENCIES = 240  # of a periodic effect
 FEW = 12  # members of a family for which no program of their own is compiled
+STARTS = 4  # members of a family from which a refit is begun
+SHORT = 4  # steps of each of them, before the best goes on
+ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 LONGEST = 1.5  # of a record: a longer wave is a trend
 
 
@@ -88,8 +91,19 @@ def _axis(spec: Spec, own: float) -> tuple[float, ...]:
     return tuple(dict.fromkeys((*spec.grid, own))) if len(spec.grid) < 3 else spec.grid
 
 
-def try_effect(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> Candidate:
-    """An effect's best member, refitted in full."""
+def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[str, str]]) -> list[Candidate]:
+    """An effect in some of its forms, each refitted in full; then each once more from where the best of them ended."""
+    made = [_tried(base, explained, tag, form) for form in forms]
+    fitted = [c for c in made if c.fit is not None]
+    if len(fitted) < 2:
+        return made
+    best = min(fitted, key=_cost)
+    assert best.fit is not None
+    own = {n.partition(".")[2]: v for n, v in best.fit.values.items() if n.startswith(f"{tag}.")}
+    return [c if c is best or c.fit is None else _better(c, _from(base, c, own)) for c in made]
+
+
+def _tried(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> Candidate:
     effect = catalogue.get(tag)(**form)
     try:
         if effect.periodic is not None and hasattr(effect, "phase"):
@@ -99,6 +113,26 @@ def try_effect(base: Fit, explained: Explained, tag: str, form: dict[str, str]) 
         return Candidate(tag, form, 0.0, None, str(error).split("\n")[0])
 
 
+def _cost(c: Candidate) -> float:
+    return np.inf if c.fit is None else c.fit.cost
+
+
+def _better(one: Candidate, other: Candidate) -> Candidate:
+    return other if _cost(other) < _cost(one) else one
+
+
+def _from(base: Fit, c: Candidate, values: dict[str, float]) -> Candidate:
+    """The candidate refitted from other values of its parameters (SI)."""
+    effect = catalogue.get(c.tag)(**c.form)
+    start = {name: values.get(name, value) for name, value in c.start.items() if not is_own(name)}
+    own = [f for f in base.problem.composition.phases]
+    turns = None if c.fit is None or effect.periodic is None else c.fit.point.phases[len(own) :]
+    try:
+        return replace(c, fit=_refit(base, effect, start, None if turns is None or not len(turns) else turns[0]))
+    except StickslipError:
+        return replace(c, fit=None)
+
+
 def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]) -> Candidate:
     members = grid(effect)
     columns = (_columns if len(members) <= FEW else signatures)(base, effect, members)
@@ -106,23 +140,42 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     if not usable.any():
         return Candidate(effect.tag, form, 0.0, None, "it does nothing along this motion")
     members = [m for m, ok in zip(members, usable, strict=True) if ok]
-    falls, sizes, errors = explained.singly(columns[usable].T)
+    apart = explained.apart(columns[usable].T)
+    falls, sizes, errors = explained.singly(apart)
     spec = specs(effect)[effect.amplitude]
     null = spec.null or 0.0
-    sizes = null + sizes
-    inside = np.clip(sizes, spec.lower, spec.upper)
+    inside = np.clip(sizes, spec.lower - null, spec.upper - null)
     # a parabola through the promise: what is left of it where the amplitude may not go all the way
-    share = np.where(sizes != null, (inside - null) / np.where(sizes != null, sizes - null, 1.0), 0.0)
+    share = np.where(sizes != 0.0, inside / np.where(sizes != 0.0, sizes, 1.0), 0.0)
     falls = falls * (1.0 - (1.0 - share) ** 2)
-    best = int(np.argmax(falls))
-    least = 0.3 * float(errors[best])  # at the null itself inner parameters do nothing
-    amplitude = float(inside[best])
-    if abs(amplitude - null) < least:
-        sign = 1.0 if amplitude >= null and spec.upper > null else -1.0
-        amplitude = null + sign * min(least, 0.5 * abs((spec.upper if sign > 0 else spec.lower) - null))
-    start = {**members[best], effect.amplitude: amplitude}
-    found = _refit(base, effect, start)
-    return Candidate(effect.tag, form, float(falls[best]), found, "", len(members), 5.0 * float(errors[best]), start)
+    starts = []
+    for i in _unlike(apart, falls):
+        size, least = float(inside[i]), 0.3 * float(errors[i])  # at the null itself inner parameters do nothing
+        if share[i] < 1.0:
+            size *= 0.5  # not at the bound either
+        if abs(size) < least:
+            sign = 1.0 if size >= 0.0 and spec.upper > null else -1.0
+            size = sign * min(least, 0.5 * abs((spec.upper if sign > 0 else spec.lower) - null))
+        starts.append((i, {**members[i], effect.amplitude: null + size}))
+    short = [(_refit(base, effect, start, last=SHORT if len(starts) > 1 else LAST), i, start) for i, start in starts]
+    found, i, start = min(short, key=lambda item: item[0].cost)
+    if len(starts) > 1:
+        found = continued(found)
+    return Candidate(
+        effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * float(errors[i]), start
+    )  # fmt: skip
+
+
+def _unlike(apart: Array, falls: Array) -> list[int]:
+    """Members that promise most, each unlike the ones before it in what it does to the residuals."""
+    unit = apart / (np.sqrt((apart**2).sum(axis=0)) + 1e-300)
+    chosen: list[int] = []
+    for i in np.argsort(-falls).tolist():
+        if all(abs(float(unit[:, i] @ unit[:, j])) < ALIKE for j in chosen):
+            chosen.append(i)
+        if len(chosen) == STARTS:
+            break
+    return chosen
 
 
 def _columns(base: Fit, effect: Effect, members: Sequence[dict[str, float]]) -> Array:
@@ -138,12 +191,12 @@ def _columns(base: Fit, effect: Effect, members: Sequence[dict[str, float]]) -> 
     return np.stack(out)
 
 
-def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
+def _refit(
+    base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None, last: int = LAST
+) -> Fit:
     """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,)."""
     problem, free = with_start(base.problem, effect, values)
-    return fit(
-        problem, _start(base, free, turns), base.scatter, dropped=base.dropped, estimated=False, known=base.known
-    )
+    return refit(problem, _start(base, free, turns), base, last)
 
 
 def with_start(
@@ -153,11 +206,10 @@ def with_start(
 
     ``inside`` keeps the start off the bounds, one of which may be the null.
     """
+    free = effect_parameters(effect, amplitude=values[effect.amplitude])
+    free = [f if f.amplitude and not inside else _kept(f, values) for f in free]
     for name, value in values.items():
         effect = eqx.tree_at(lambda e, n=name: getattr(e, n), effect, np.float64(value))  # type: ignore[misc]
-    free = effect_parameters(effect, amplitude=values[effect.amplitude])
-    if inside:
-        free = [_kept(f, values) for f in free]
     return problem.with_composition(problem.composition.with_effect(effect, free)), free
 
 
@@ -209,7 +261,7 @@ def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]
     start = {name: float(values[at]), effect.amplitude: amplitude}
     found = _refit(base, effect, start, turns)
     # in the mean over runs and phases a wave is seen as each of its two parts is
-    seen = explained.singly(columns[2 * at : 2 * at + 2].T)[2]
+    seen = explained.singly(explained.apart(columns[2 * at : 2 * at + 2].T))[2]
     return Candidate(effect.tag, form, best, found, "", int(values.size), 5.0 * float(np.mean(seen)), start)
 
 

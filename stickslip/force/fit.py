@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +93,7 @@ class _System:
     def __init__(self, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks):
         self.problem, self.point, self.slopes = problem, point, slopes
         # what the noise is carried by stays as it is, or costs would jump; derivatives in the events are those here
-        known = replace(known, local=blocks(slopes.local))
+        known = known.with_local(blocks(slopes.local))
         self.known, self.blocks, self.scatter = known, blocks, scatter
         plain, whole = (np.asarray(a) for a in covariance(scatter.sizes, known))
         self.plain = np.linalg.cholesky(plain)
@@ -229,8 +229,7 @@ def known_of(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks, dro
 
 def fit(
     problem: Problem, point: Point, scatter: Scatter | None = None, *, rounds: int = ROUNDS, steps: int = STEPS,
-    estimated: bool = True, dropped: NDArray[np.bool_] | None = None,
-    first: bool = False, known: Known | None = None,
+    dropped: NDArray[np.bool_] | None = None, first: bool = False,
 ) -> Fit:  # fmt: skip
     """Find the optimum.
 
@@ -239,8 +238,6 @@ def fit(
         point: where to begin.
         scatter: sizes of what is random; default what is usually expected, estimated after the first round.
         rounds, steps: of the search.
-        estimated: whether the sizes are estimated anew.
-        known: what the covariance is made of, kept as it is: else costs of two models cannot be compared.
         first: whether the sizes are estimated before the first step too (else after the first round).
         dropped: points left out; default those that are found to lie far off.
 
@@ -254,23 +251,48 @@ def fit(
     evaluations = 1
     if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
         raise FitError("the model gives no finite force along the motion")
-    for turn in range(rounds if estimated else 0):
-        made = known or known_of(problem, point, slopes, blocks, out)
+    for turn in range(rounds):
+        made = known_of(problem, point, slopes, blocks, out)
         if turn or first:
             marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
             sizes = estimate(sizes, marginal, made, NEWTON)
             more = beyond(made, sizes, marginal, blocks, out.size) & ~out
             if dropped is None and more.any():
                 out = out | more
-                made = known or known_of(problem, point, slopes, blocks, out)
+                made = known_of(problem, point, slopes, blocks, out)
                 sizes = estimate(sizes, marginal, made, NEWTON)
         point, slopes, total, count = descend(problem, point, slopes, sizes, made, blocks, steps)
         evaluations += count
         if turn > 2 and total < 1.0:
             break
-    made = known or known_of(problem, point, slopes, blocks, out)
+    made = known_of(problem, point, slopes, blocks, out)
     point, slopes, _, count = descend(problem, point, slopes, sizes, made, blocks, LAST)
     return _found(problem, point, slopes, sizes, out, made, evaluations + count)
+
+
+def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
+    """Another model of the same data from a point, in at most ``last`` steps.
+
+    With the covariance of ``base`` as it is: else the costs of the two could not be compared.
+
+    Raises:
+        FitError: the model gives no finite force at the start.
+    """
+    blocks, slopes = base.blocks, problem.evaluate(point)
+    if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
+        raise FitError("the model gives no finite force along the motion")
+    point, slopes, _, count = descend(problem, point, slopes, base.scatter, base.known, blocks, last)
+    return _found(problem, point, slopes, base.scatter, base.dropped, base.known, count + 1)
+
+
+def continued(found: Fit) -> Fit:
+    """A fit that has not ended yet, to its end."""
+    point, slopes, _, count = descend(
+        found.problem, found.point, found.slopes, found.scatter, found.known, found.blocks, LAST
+    )
+    return _found(
+        found.problem, point, slopes, found.scatter, found.dropped, found.known, found.evaluations + count
+    )  # fmt: skip
 
 
 def descend(
@@ -317,7 +339,7 @@ def _found(
     blocks = Blocks.of(problem.of, problem.events)
     system = _System(problem, point, slopes, scatter, known, blocks)
     return Fit(
-        problem, point, slopes, scatter, dropped, replace(known, local=blocks(slopes.local)), blocks,
+        problem, point, slopes, scatter, dropped, known.with_local(blocks(slopes.local)), blocks,
         system.likelihood(), float((system.target**2).sum()), system.covariance(), float(point.weights.sum()),
         evaluations,
     )  # fmt: skip

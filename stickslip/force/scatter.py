@@ -12,7 +12,7 @@ itself by maximum likelihood.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -89,6 +89,12 @@ class Known:
     elapsed: Array
     there: NDArray[np.bool_]
     strength: float
+
+    def with_local(self, local: Array) -> Known:
+        """The same with other derivatives in the events' own."""
+        other = replace(self, local=local)
+        other.__dict__.update(near=self.near, shifts=self.shifts)  # which do not depend on them
+        return other
 
     @cached_property
     def near(self) -> Array:

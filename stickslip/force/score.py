@@ -159,9 +159,8 @@ class Explained:
         left = self.rest + (apart / scale) @ found
         return float((self.rest**2).sum() - (left**2).sum()), found / scale
 
-    def singly(self, columns: Array) -> tuple[Array, Array, Array]:
-        """The same for each column by itself: falls, coefficients, and their standard deviations, each (m,)."""
-        apart = self.apart(columns)
+    def singly(self, apart: Array) -> tuple[Array, Array, Array]:
+        """The same for each column of :meth:`apart` by itself: falls, coefficients, their deviations, each (m,)."""
         norm = (apart**2).sum(axis=0) + 1e-300
         projected = apart.T @ self.rest
         return projected**2 / norm, -projected / norm, norm**-0.5

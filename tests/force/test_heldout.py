@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.force.fit import fit, prior_rows, reach
+from stickslip.force.fit import fit, prior_rows, reach, refit
 from stickslip.force.heldout import folds, unseen
 from stickslip.force.scatter import covariance
 
@@ -70,7 +70,7 @@ def test_every_event_is_left_out_once(fitted):
 
 def test_runs_with_phases_are_left_out_by_halves(small, fitted):
     problem, point = with_effects(small, EFFECTS["effects"])
-    found = fit(problem, point, fitted.scatter, estimated=False, dropped=fitted.dropped, known=fitted.known, steps=1)
+    found = refit(problem, point, fitted)
     parts = folds(found)
     assert len(parts) == 2 * len(problem.runs)
     for part in parts:

@@ -61,7 +61,7 @@ def test_a_record_that_begins_under_load_finds_what_it_can(begun):
 def gains(case):
     base = fit(case.problem, case.point)
     explained = Explained(base)
-    tried = {tag: try_effect(base, explained, tag, {}) for tag in TRIED}
+    tried = {tag: try_effect(base, explained, tag, [{}])[0] for tag in TRIED}
     return {tag: base.cost - c.fit.cost for tag, c in tried.items() if c.fit is not None}, tried
 
 

@@ -69,6 +69,6 @@ def test_a_trial_in_a_worker_ends_with_the_diagnosis(monkeypatch):
     monkeypatch.setattr(cache, "enable", lambda: None)
     monkeypatch.setattr(trials, "Explained", lambda base: f"explained {base}")
     monkeypatch.setattr(trials, "try_effect", lambda *arguments: arguments)
-    made = loads(trials._in_worker(dumps("base"), "wear", {"course": "linear"}, (), 4321))
-    assert made == ("base", "explained base", "wear", {"course": "linear"})
+    made = loads(trials._in_worker(dumps("base"), "wear", [{"course": "linear"}], (), 4321))
+    assert made == ("base", "explained base", "wear", [{"course": "linear"}])
     assert ends == [4321]
