@@ -15,6 +15,11 @@ from ..workflow import diagnose_campaign
 from .working import EVERY, Stage
 
 UNRESOLVED = 3
+FREE = ("recurrence", "slip", "creep")
+FREELY = (
+    "free: the model run from arrest to arrest through runs that its fit has not seen; error in per cent, and in "
+    "brackets\nin units of what the events of these runs scatter by themselves"
+)
 
 
 def diagnose(
@@ -106,6 +111,19 @@ def _teller(clock: Callable[[], float] = time.perf_counter) -> Callable[[str, fl
     return tell
 
 
+def _free(rung: dict[str, Any]) -> list[str]:
+    """Errors of the free simulation: percent, and in brackets in units of the scatter."""
+    from .show import quantity
+
+    found = rung.get("free") or {}
+    out = []
+    for name in FREE if found else ():
+        part = found[name]
+        share = "-" if part["relative"] is None else f"{quantity(100.0 * part['relative'], '1', 2)} %"
+        out.append(share + ("" if part["scatters"] is None else f" ({quantity(part['scatters'], '1', 2)})"))
+    return out
+
+
 def _print(result: dict[str, Any], out: Path) -> None:
     from rich.console import Console
     from rich.markup import escape
@@ -120,6 +138,9 @@ def _print(result: dict[str, Any], out: Path) -> None:
     table.add_column("cycles")
     for name in ("all", *phases):
         table.add_column(name, justify="right", no_wrap=True)
+    free = any(rung.get("free") for rung in result["ladder"])
+    for name in FREE if free else ():
+        table.add_column(f"free: {name}", justify="right")
     for rung in result["ladder"]:
         label = "static" if rung["added"] is None else f"+ {rung['added']}"
         label = f"without {rung['removed']}" if rung["removed"] else label
@@ -128,9 +149,12 @@ def _print(result: dict[str, Any], out: Path) -> None:
             ("unseen", rung["heldout_error"], rung["heldout_by_phase"]),
         ):
             if total is not None:
-                table.add_row(label, which, quantity(total, "1", 3), *(quantity(parts.get(p), "1", 3) for p in phases))
+                numbers = (quantity(value, "1", 3) for value in (total, *(parts.get(p) for p in phases)))
+                table.add_row(label, which, *numbers, *_free(rung if which == "unseen" and free else {}))
             label = ""
     console.print(table)
+    if free:
+        console.print(FREELY, highlight=False)
     verdict = result["verdict"]
     sure = "" if verdict["confidence"] is None else f" ({100 * verdict['confidence']:.0f} % if it is in the catalogue)"
     console.print(f"[bold]{verdict['kind']}[/bold]: {escape(verdict['text'])}{sure}", highlight=False)

@@ -1,15 +1,16 @@
 """The fitted models run freely through the measured cycles: does what they do agree with what was measured?
 
 Along the measured motion nothing is integrated, so a model may hold the right force there and yet slip at another time.
-Here the leading models, the base and the last of the ladder, are integrated from arrest to arrest, each run with the
-parameters of a fit that has not seen it, and their recurrence, slip and creep are compared with the data's.
+Here the leading models are integrated from arrest to arrest, each run with the parameters of a fit that has not seen
+it. What comes of it is compared with the data in :mod:`.free_errors`.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,13 @@ from ..features.measurement import Measurement, measure
 from ..fit.start import FALLBACK_PERIOD
 from ..force.fit import Fit
 from ..force.heldout import folds, halves, points
-from .free_measures import Array, Measures, measured, measures, scatter, simulated
+from .free_measures import Array, Measures, measured, scatter, simulated
 from .pieces import Store
 from .prepare import Prepared
 from .trials import Tell
 
-ERRORS = 2.0  # standard errors by which a free prediction must be worse to contradict
-COUNTED = ("recurrence", "slip", "creep")  # a cycle's whole length says little beyond its recurrence
-KEPT = ("features", "arrests", "missed", "broken", "times", "readings")
+Parts = tuple[str, ...]  # tags of what is in a model
+MOST_CYCLES = 40  # of a run
 
 
 @dataclass(frozen=True)
@@ -56,67 +56,66 @@ class Confirmation:
     Attributes:
         measurement: features of the data; None where nothing was simulated.
         data: the measures of the data.
-        scatter: what the campaign's own scatter makes of them, under the last model.
-        models: of the rungs that were run, by their number on the ladder.
+        scatter: standard deviation of each that the campaign's own scatter makes, under the last model; None where
+            that was not simulated.
+        models: what was run, by the parts of the model.
         notes: what was not done, and why.
     """
 
     measurement: Measurement | None = None
     data: Measures | None = None
     scatter: Measures | None = None
-    models: dict[int, Freely] = field(default_factory=dict)
+    models: Mapping[Parts, Freely] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
 def confirm(
-    fits: Sequence[Fit | None],
-    names: Sequence[str],
+    fits: Mapping[Parts, Fit],
+    last: Parts,
     prepared: Prepared,
     store: Store | None = None,
     tell: Tell = lambda text, share: None,
     in_time: Callable[[], bool] = lambda: True,
 ) -> Confirmation:
-    """Run the first and the last model of a ladder freely.
+    """Run models freely through the measured cycles (at most the first :data:`MOST_CYCLES` of a run).
 
     Args:
-        fits: of the rungs, in order; None for a rung without a fit.
-        names: of the rungs, for notes and for the store.
+        fits: along the motion, of the models to be run, by their parts.
+        last: parts of the model whose scatter is the unit of errors.
         prepared: the data.
         store: keeps finished pieces.
         tell: told the stage and the share of it done.
         in_time: whether there is time for more.
 
     Returns:
-        What was found; no failure of a simulation raises, it is a note.
+        What was found. A simulation that fails is a note and raises nothing.
     """
-    have = [i for i, fit in enumerate(fits) if fit is not None]
-    chosen = dict.fromkeys([have[0], have[-1]]) if have else {}
-    found: dict[int, Freely] = {}
-    notes: list[str] = []
+    names = [k.name for k in prepared.runs]
+    found: dict[Parts, Freely] = {}
+    unit, notes = None, []
     try:
-        m = measure(prepared.traces, prepared.segmentations, ring_period=prepared.scales.ring or FALLBACK_PERIOD)
-    except Exception as error:
+        ring = prepared.scales.ring or FALLBACK_PERIOD
+        m = measure(prepared.traces, prepared.segmentations, ring_period=ring, most_cycles=MOST_CYCLES)
+    except Exception as error:  # the diagnosis stands without this
         return Confirmation(notes=(f"no free simulation: {_line(error)}",))
-    order = [k.name for k in prepared.runs]
-    runs = [order.index(name) for name in m.names]
-    every = [fits[i] for i in chosen]
-    apart = any(fit is not None and len(folds(fit)) != len(order) for fit in every)
-    unit = None
-    for done, i in enumerate(chosen):
-        fit = fits[i]
-        assert fit is not None
+    runs = [names.index(name) for name in m.names]
+    # two models are compared event by event only if both are left out in the same way
+    apart = any(len(folds(fit)) != len(names) for fit in fits.values())
+    for done, (parts, fit) in enumerate(fits.items()):
         if not in_time():
-            notes.append(f"no free simulation of the model with {names[i]}: the time limit came before")
+            notes.append(f"the time limit came before the model {_named(parts)} was run freely")
             continue
-        tell(f"free simulation: {names[i]}", done / len(chosen))
+        tell(f"free simulation of {_named(parts)}", done / len(fits))
         try:
-            found[i] = _kept(store, f"free-{names[i]}", fit, lambda fit=fit: freely(m, fit, runs, apart))  # type: ignore[misc]
-            if i == have[-1]:
-                unit = _scatter(store, f"free-scatter-{names[i]}", m, fit, runs)
-        except Exception as error:  # an effect of one's own may fail in any way; the diagnosis stands without this
-            notes.append(f"the free simulation of the model with {names[i]} failed: {_line(error)}")
-    ends = [prepared.segmentations[run].events[int(np.sum(m.cycles.used[r])) - 1].t_arrest for r, run in enumerate(runs)]
+            found[parts] = _kept(store, _key("free", parts, fit), Freely, partial(freely, m, fit, runs, apart))
+            if parts == last:
+                key = _key("scatter", parts, fit)
+                unit = _kept(store, key, Measures, partial(scatter, m, fit, runs))
+        except Exception as error:  # an effect of one's own may fail in any way
+            notes.append(f"the free simulation of the model {_named(parts)} failed: {_line(error)}")
     tell("free simulation", 1.0)
+    used = np.asarray(m.cycles.used).sum(axis=1)
+    ends = [prepared.segmentations[k].events[int(n) - 1].t_arrest for k, n in zip(runs, used, strict=True)]
     return Confirmation(m, measured(m, np.array(ends)), unit, found, tuple(notes))
 
 
@@ -151,7 +150,7 @@ def freely(m: Measurement, fit: Fit, runs: Sequence[int], apart: bool) -> Freely
         missed[r, here] = ~track.arrested[here] & ~cut[here]
         for n in here:
             steps = max(int(track.steps[n]), 1)
-            tracks[r, n] = (track.t[n, :steps], track.reading[n, :steps])
+            tracks[r, int(n)] = (np.asarray(track.t[n, :steps]), np.asarray(track.reading[n, :steps]))
     longest = max((t.size for t, _ in tracks.values()), default=1)
     times, readings = np.full((*shape, longest), np.nan), np.full((*shape, longest), np.nan)
     for at, (t, y) in tracks.items():
@@ -159,128 +158,27 @@ def freely(m: Measurement, fit: Fit, runs: Sequence[int], apart: bool) -> Freely
     return Freely(features, arrests, missed, broken, times, readings)
 
 
-def predicted(c: Confirmation, model: Freely) -> Measures:
-    """The model's measures; a slip that is missed counts as none after the time that was waited."""
-    m = c.measurement
-    assert m is not None
-    features, s = np.array(model.features), m.layout.slices()
-    features[model.broken] = np.nan
-    waited = (model.arrests - np.asarray(m.cycles.start))[model.missed]
-    features[model.missed] = np.nan
-    features[model.missed, s["recurrence"].start] = waited
-    features[model.missed, s["times"].start] = 0.0
-    out = measures(m, features, np.where(model.broken, np.nan, model.arrests))
-    return Measures(out.recurrence, out.cycle, np.where(model.missed, 0.0, out.slip), out.creep)
-
-
-def deviations(c: Confirmation, model: Freely) -> dict[str, Array]:
-    """Errors of every event in units of the scatter, by measure, shape (R, n); nan where there is none."""
-    assert c.data is not None and c.scatter is not None
-    made = predicted(c, model)
-    out = {k: np.abs(made[k] - c.data[k]) / np.maximum(c.scatter[k], 1e-300) for k in ("recurrence", "cycle", "slip")}
-    out["creep"] = _rms((made.creep - c.data.creep) / np.maximum(c.scatter.creep, 1e-300), axis=-1)
-    return out
-
-
-def errors(c: Confirmation, model: Freely) -> dict[str, Any]:
-    """The model's errors as plain numbers, for all runs and (``by_run``) for each."""
-    m = c.measurement
-    assert m is not None
-    out = _errors(c, model, np.ones(m.runs, bool))
-    out["by_run"] = {name: _errors(c, model, np.arange(m.runs) == r) for r, name in enumerate(m.names)}
-    return out
-
-
-def _errors(c: Confirmation, model: Freely, runs: NDArray[np.bool_]) -> dict[str, Any]:
-    assert c.measurement is not None and c.data is not None
-    made, data = predicted(c, model), c.data
-    units = None if c.scatter is None else deviations(c, model)
-
-    def scatters(name: str) -> float | None:
-        return None if units is None else _number(_rms(units[name][runs]))
-
-    out: dict[str, Any] = {}
-    for name in ("recurrence", "cycle", "slip"):
-        share = (made[name] - data[name])[runs] / data[name][runs]
-        out[name] = {"relative": _number(_rms(share)), "scatters": scatters(name)}
-    off = (made.creep - data.creep)[runs]
-    whole = data.creep[runs][..., :1]
-    out["creep"] = {
-        "relative": _number(_rms(off / whole)), "metres": _number(_rms(off)), "scatters": scatters("creep")
-    }  # fmt: skip
-    used = np.asarray(c.measurement.cycles.used)[runs]
-    out["missed"] = int(np.sum(model.missed[runs]))
-    out["events"] = int(np.sum(used & ~model.broken[runs]))
-    return out
-
-
-def contradiction(force: tuple[float, float], free: tuple[Array, Array]) -> tuple[float, float] | None:
-    """Whether an effect helps the force and spoils the free prediction.
-
-    Args:
-        force: error of the force on unseen runs without and with it.
-        free: errors of the free prediction in units of the scatter, summed over the measures, of every event without
-            and with it, shape (E,).
-
-    Returns:
-        By how much the sum over events rises and its standard error, paired by event; None where there is no
-        contradiction.
-    """
-    rise = free[1] - free[0]
-    rise = rise[np.isfinite(rise)]
-    if rise.size < 2 or not force[1] < force[0]:
-        return None
-    total, error = float(rise.sum()), float(np.sqrt(rise.size) * np.std(rise, ddof=1))
-    return (total, error) if total > ERRORS * error and total > 0.0 else None
-
-
-def summed(c: Confirmation, model: Freely) -> Array:
-    """Errors of every event in units of the scatter, summed over the measures, shape (R n,); nan where there is none."""
-    each = np.stack([deviations(c, model)[k] for k in COUNTED])
-    with_any = np.isfinite(each).any(axis=0)
-    return np.where(with_any, np.nansum(each, axis=0), np.nan).ravel()
-
-
-def _rms(values: Array, axis: int | None = None) -> Any:
-    """Root mean square of what is finite; nan where nothing is."""
-    there = np.isfinite(values)
-    count = there.sum(axis=axis)
-    total = np.where(there, values, 0.0) ** 2
-    return np.where(count > 0, np.sqrt(total.sum(axis=axis) / np.maximum(count, 1)), np.nan)
-
-
-def _number(value: Any) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def _named(parts: Parts) -> str:
+    return " + ".join(parts)
 
 
 def _line(error: Exception) -> str:
     return f"{type(error).__name__}: {error}".split("\n")[0][:300]
 
 
-def _key(name: str, fit: Fit) -> str:
+def _key(kind: str, parts: Parts, fit: Fit) -> str:
     """Name of a piece that belongs to this fit and to no other of the same effects."""
     p = fit.point
-    content = b"".join(np.ascontiguousarray(a).tobytes() for a in (p.z, p.phases, p.weights))
-    return f"{name}-{hashlib.sha256(content).hexdigest()[:12]}"
+    content = b"".join(np.ascontiguousarray(a).tobytes() for a in (p.z, p.phases, p.weights, fit.scatter.sizes))
+    return f"{kind}-{parts[-1]}-{hashlib.sha256(content).hexdigest()[:12]}"
 
 
-def _kept(store: Store | None, name: str, fit: Fit, make: Callable[[], Freely]) -> Freely:
-    key = _key(name, fit)
+def _kept(store: Store | None, key: str, kind: Any, make: Callable[[], Any]) -> Any:
+    """A data class of arrays from the store, or made and kept there."""
     piece = None if store is None else store.load(key)
     if piece is not None:
-        return Freely(**{k: np.asarray(piece[k]) for k in KEPT})
+        return kind(**{f.name: np.asarray(piece[f.name]) for f in fields(kind)})
     found = make()
     if store is not None:
-        store.save(key, {k: getattr(found, k) for k in KEPT})
-    return found
-
-
-def _scatter(store: Store | None, name: str, m: Measurement, fit: Fit, runs: Sequence[int]) -> Measures:
-    key = _key(name, fit)
-    piece = None if store is None else store.load(key)
-    if piece is not None:
-        return Measures(**{k: np.asarray(piece[k], float) for k in Measures.__dataclass_fields__})
-    found = scatter(m, fit, list(runs))
-    if store is not None:
-        store.save(key, {k: getattr(found, k) for k in Measures.__dataclass_fields__})
+        store.save(key, {f.name: getattr(found, f.name) for f in fields(kind)})
     return found

@@ -81,7 +81,13 @@ def measured(m: Measurement, last: Array) -> Measures:
 
 
 def simulated(
-    m: Measurement, problem: Problem, point: Point, r: int, run: int, events: Array | None = None, offset: Array | None = None
+    m: Measurement,
+    problem: Problem,
+    point: Point,
+    r: int,
+    run: int,
+    events: Array | None = None,
+    offset: Array | None = None,
 ) -> tuple[Track, Array, NDArray[np.bool_]]:
     """One run simulated: its tracks, its features (n, F), and which cycles broke off or follow one that did (n,).
 
@@ -121,9 +127,7 @@ def scatter(m: Measurement, fit: Fit, runs: list[int]) -> Measures:
             change[:, j] = step * own
             moved = _all(m, fit, runs, change)
             # the own event's influence where it was changed, that of the one before elsewhere
-            total = {
-                k: total[k] + (np.nan_to_num(moved[k] - plain[k]) * deviation / step) ** 2 for k in NAMES
-            }
+            total = {k: total[k] + (np.nan_to_num(moved[k] - plain[k]) * deviation / step) ** 2 for k in NAMES}
     return Measures(**{k: np.sqrt(total[k]) for k in NAMES})
 
 

@@ -66,7 +66,7 @@ def _program(names: tuple[str, ...], structure: Any) -> Program:
             begun = jnp.zeros(())
             if PULL in values:
                 begun = jnp.where(cycles.virgin, 0.0, values[PULL] / model.block.spring_stiffness)
-            return eqx.tree_at(lambda m: m.load_point, model, LoadPoint(*nodes, begun))
+            return eqx.tree_at(lambda m: m.load_point, model, LoadPoint(nodes[0], nodes[1], begun))
 
         return run_cycles(build, events, cycles, tolerance, MOST_STEPS)
 
