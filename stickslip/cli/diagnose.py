@@ -15,11 +15,6 @@ from ..workflow import diagnose_campaign
 from .working import EVERY, Stage
 
 UNRESOLVED = 3
-FREE = ("recurrence", "slip", "creep")
-FREELY = (
-    "free: the model run from arrest to arrest through runs that its fit has not seen; error in per cent, and in "
-    "brackets\nin units of what the events of these runs scatter by themselves"
-)
 
 
 def diagnose(
@@ -111,17 +106,31 @@ def _teller(clock: Callable[[], float] = time.perf_counter) -> Callable[[str, fl
     return tell
 
 
-def _free(rung: dict[str, Any]) -> list[str]:
-    """Errors of the free simulation: percent, and in brackets in units of the scatter."""
+def _free_table(ladder: list[dict[str, Any]]) -> Any:
+    """Errors of the models that were run freely; None where none was."""
+    from rich.table import Table
+
     from .show import quantity
 
-    found = rung.get("free") or {}
-    out = []
-    for name in FREE if found else ():
-        part = found[name]
+    rows = [(rung["added"], rung["free"]) for rung in ladder if rung.get("free")]
+    if not rows:
+        return None
+    table = Table(
+        title="Run freely from arrest to arrest through unseen runs: error in % of the measured\n"
+        "(over what the events of these runs scatter by themselves)"
+    )
+    table.add_column("model")
+    for name in ("recurrence", "slip", "creep before the onset", "slips missed"):
+        table.add_column(name, justify="right")
+
+    def error(part: dict[str, Any]) -> str:
         share = "-" if part["relative"] is None else f"{quantity(100.0 * part['relative'], '1', 2)} %"
-        out.append(share + ("" if part["scatters"] is None else f" ({quantity(part['scatters'], '1', 2)})"))
-    return out
+        return share if part["scatters"] is None else f"{share} ({quantity(part['scatters'], '1', 2)})"
+
+    for added, free in rows:
+        errors = (error(free[name]) for name in ("recurrence", "slip", "creep"))
+        table.add_row(f"+ {added}", *errors, f"{free['missed']} of {free['events']}")
+    return table
 
 
 def _print(result: dict[str, Any], out: Path) -> None:
@@ -138,9 +147,6 @@ def _print(result: dict[str, Any], out: Path) -> None:
     table.add_column("cycles")
     for name in ("all", *phases):
         table.add_column(name, justify="right", no_wrap=True)
-    free = any(rung.get("free") for rung in result["ladder"])
-    for name in FREE if free else ():
-        table.add_column(f"free: {name}", justify="right")
     for rung in result["ladder"]:
         label = "static" if rung["added"] is None else f"+ {rung['added']}"
         label = f"without {rung['removed']}" if rung["removed"] else label
@@ -149,12 +155,11 @@ def _print(result: dict[str, Any], out: Path) -> None:
             ("unseen", rung["heldout_error"], rung["heldout_by_phase"]),
         ):
             if total is not None:
-                numbers = (quantity(value, "1", 3) for value in (total, *(parts.get(p) for p in phases)))
-                table.add_row(label, which, *numbers, *_free(rung if which == "unseen" and free else {}))
+                table.add_row(label, which, quantity(total, "1", 3), *(quantity(parts.get(p), "1", 3) for p in phases))
             label = ""
     console.print(table)
-    if free:
-        console.print(FREELY, highlight=False)
+    if (free := _free_table(result["ladder"])) is not None:
+        console.print(free)
     verdict = result["verdict"]
     sure = "" if verdict["confidence"] is None else f" ({100 * verdict['confidence']:.0f} % if it is in the catalogue)"
     console.print(f"[bold]{verdict['kind']}[/bold]: {escape(verdict['text'])}{sure}", highlight=False)

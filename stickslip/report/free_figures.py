@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -54,11 +53,10 @@ def _recurrences(ax: Axes, data: xarray.Dataset) -> None:
     """Per cent by which every slip comes late, and the scatter that events have by themselves."""
     measured = series(data, "free_recurrence", "measured")
     assert measured is not None
-    order = np.argsort(measured)
     scatter = series(data, "free_recurrence", "scatter")
     if scatter is not None:
-        share = 200.0 * (scatter / measured)[order]
-        ax.fill_between(measured[order], -share, share, color=LIGHT, alpha=0.3, lw=0, label="two standard deviations")
+        share = 200.0 * scatter / measured
+        ax.vlines(measured, -share, share, color=LIGHT, alpha=0.35, lw=5, label="two standard deviations")
     for kind, (mark, colour) in _MARKS.items():
         found = series(data, "free_recurrence", kind)
         if found is not None:
