@@ -106,6 +106,33 @@ def _teller(clock: Callable[[], float] = time.perf_counter) -> Callable[[str, fl
     return tell
 
 
+def _free_table(ladder: list[dict[str, Any]]) -> Any:
+    """Errors of the models that were run freely; None where none was."""
+    from rich.table import Table
+
+    from .show import quantity
+
+    rows = [(rung["added"], rung["free"]) for rung in ladder if rung.get("free")]
+    if not rows:
+        return None
+    table = Table(
+        title="Run freely from arrest to arrest through unseen runs: error in % of the measured\n"
+        "(over what the events of these runs scatter by themselves)"
+    )
+    table.add_column("model")
+    for name in ("recurrence", "slip", "creep before the onset", "slips missed"):
+        table.add_column(name, justify="right")
+
+    def error(part: dict[str, Any]) -> str:
+        share = "-" if part["relative"] is None else f"{quantity(100.0 * part['relative'], '1', 2)} %"
+        return share if part["scatters"] is None else f"{share} ({quantity(part['scatters'], '1', 2)})"
+
+    for added, free in rows:
+        errors = (error(free[name]) for name in ("recurrence", "slip", "creep"))
+        table.add_row(f"+ {added}", *errors, f"{free['missed']} of {free['events']}")
+    return table
+
+
 def _print(result: dict[str, Any], out: Path) -> None:
     from rich.console import Console
     from rich.markup import escape
@@ -131,6 +158,8 @@ def _print(result: dict[str, Any], out: Path) -> None:
                 table.add_row(label, which, quantity(total, "1", 3), *(quantity(parts.get(p), "1", 3) for p in phases))
             label = ""
     console.print(table)
+    if (free := _free_table(result["ladder"])) is not None:
+        console.print(free)
     verdict = result["verdict"]
     sure = "" if verdict["confidence"] is None else f" ({100 * verdict['confidence']:.0f} % if it is in the catalogue)"
     console.print(f"[bold]{verdict['kind']}[/bold]: {escape(verdict['text'])}{sure}", highlight=False)

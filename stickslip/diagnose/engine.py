@@ -19,6 +19,7 @@ from ..force.residual import Structure, structures
 from ..force.score import Explained
 from ..segment import Segmentation, segment
 from ..trace import Trace
+from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Judge, Judged, named
 from .pieces import Store, kept, name_of
 from .prepare import Prepared, prepare
@@ -26,6 +27,7 @@ from .trials import Tell, trials
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
 STRUCTURED = 1e-6  # chance of the residual force being a function of some variable, below which something is missing
+MEMBERS = 2  # of a set that are run freely besides the first
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ class Diagnosis:
         floor: of the force at every point: noise and scatter of the last model (N), shape (p,).
         dropped: what was left out, and why.
         in_time: whether the time limit was not met.
+        confirmation: the leading models run freely.
     """
 
     verdict: Verdict
@@ -92,6 +95,7 @@ class Diagnosis:
     floor: Array
     dropped: tuple[str, ...] = field(default=())
     in_time: bool = True
+    confirmation: Confirmation = field(default_factory=Confirmation)
 
     @property
     def fit(self) -> Fit:
@@ -166,7 +170,17 @@ def diagnose(
         if len(taken) + 1 >= max_effects:
             verdict = _end([*taken, done.close[0].tag], replace(done, base=base, close=()), rounds)
     floor = deviations(base)
-    return Diagnosis(verdict, tuple(ladder), tuple(rounds), prepared, floor, tuple(dropped), in_time())
+    complete = in_time()
+    confirmed = confirm(leading(ladder, rounds), ladder[-1].model, prepared, store, tell, in_time)
+    return Diagnosis(verdict, tuple(ladder), tuple(rounds), prepared, floor, tuple(dropped), complete, confirmed)
+
+
+def leading(ladder: Sequence[Rung], rounds: Sequence[Round]) -> dict[Parts, Fit]:
+    """The models that are run freely: base and last of the ladder, and what the data cannot tell from an effect."""
+    fits = [(r.model, r.fit) for r in (ladder[1], ladder[-1])]
+    for rung, done in zip(ladder[1:], rounds, strict=False):
+        fits += [((*rung.model, j.tag), j.candidate.fit) for j in done.close[1 : 1 + MEMBERS]]
+    return {parts: fit for parts, fit in fits if fit is not None}
 
 
 def _told(tell: Tell, name: str, text: str, share: float) -> None:

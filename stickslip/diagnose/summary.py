@@ -21,6 +21,8 @@ from ..units import shown
 from .decide import CHANCE, ERRORS, Judged, best_forms
 from .engine import Diagnosis, Round, Rung
 from .fitted import fitted_model
+from .free_errors import errors
+from .free_words import cautions, free_variables, left_out
 
 Variables = dict[str, Any]
 LISTED = 6  # effects whose smallest visible amplitude is said in the verdict
@@ -49,13 +51,16 @@ def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
             "confidence": None,
             "forms": {r.close[0].tag: dict(r.close[0].candidate.form) for r in d.rounds if r.close},
         },
-        "caution": [] if d.in_time else ["the time limit came before all effects were tried: this is the best so far"],
+        "caution": [
+            *([] if d.in_time else ["the time limit came before all effects were tried: this is the best so far"]),
+            *cautions(d.confirmation, {r.model: error(r.unseen, d) for r in d.ladder[1:] if r.unseen is not None}),
+        ],
         "in_time": d.in_time,
         "ladder": [_rung(r, d) for r in d.ladder],
-        "ranking": _ranking(first, d),
+        "ranking": _ranking(first, d.ladder[1], d),
         "ranking_base": _ranking_base(first, d.ladder[1], d),
         "later_rounds": [
-            {"base": _ranking_base(r, rung, d), "ranking": _ranking(r, d)}
+            {"base": _ranking_base(r, rung, d), "ranking": _ranking(r, rung, d)}
             for r, rung in zip(d.rounds[1:], d.ladder[2:], strict=False)
         ],
         "visible": visible(d),
@@ -69,7 +74,7 @@ def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
         "next_experiment": next_experiment(d),
         "seeds": {},
         "held_out": "every run in turn; by halves where a run has parameters of its own",
-        "dropped": list(d.dropped),
+        "dropped": [*d.dropped, *left_out(d.confirmation)],
         "equations": [{"text": words.text(), "latex": words.latex()}],
         KEY: record(found),
     }  # fmt: skip
@@ -105,7 +110,14 @@ def _rung(rung: Rung, d: Diagnosis) -> dict[str, Any]:
         "by_run": {k.name: error(rung.residual, d, run == r) for r, k in enumerate(d.prepared.runs)},
         "force_error": float(np.sqrt(np.mean(rung.residual[~d.fit.dropped] ** 2)) / d.fit.strength),
         "cost": None if rung.fit is None else rung.fit.cost,
+        "free": _free(rung.model, d),
     }
+
+
+def _free(model: tuple[str, ...], d: Diagnosis) -> dict[str, Any] | None:
+    """Errors of a model that was run freely."""
+    found = d.confirmation.models.get(model)
+    return None if found is None else errors(d.confirmation, found)
 
 
 def _ranking_base(done: Round, rung: Rung, d: Diagnosis) -> dict[str, Any]:
@@ -117,17 +129,17 @@ def _ranking_base(done: Round, rung: Rung, d: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _ranking(done: Round, d: Diagnosis) -> list[dict[str, Any]]:
+def _ranking(done: Round, rung: Rung, d: Diagnosis) -> list[dict[str, Any]]:
     """Effects of a round in their best form, the best first; then those that were not fitted."""
     best = best_forms(done.judged)
     close = {id(j) for j in done.close}
     rows = sorted(best, key=lambda j: (id(j) not in close, -float(j.gain)))
     fitted = {j.tag for j in best}
     left = {c.tag: c for c in done.candidates if c.tag not in fitted}
-    return [*(_ranked(j, done, d) for j in rows), *(_not_ranked(c.tag, c.form, c.note) for c in left.values())]
+    return [*(_ranked(j, done, rung, d) for j in rows), *(_not_ranked(c.tag, c.form, c.note) for c in left.values())]
 
 
-def _ranked(j: Judged, done: Round, d: Diagnosis) -> dict[str, Any]:
+def _ranked(j: Judged, done: Round, rung: Rung, d: Diagnosis) -> dict[str, Any]:
     fit = j.candidate.fit
     assert fit is not None
     spec = catalogue.amplitude(catalogue.get(j.tag))
@@ -155,6 +167,7 @@ def _ranked(j: Judged, done: Round, d: Diagnosis) -> dict[str, Any]:
         ],
         "amplitude": {"name": j.candidate.name, "value": j.amplitude, "std": j.std, "unit": spec.unit},
         "visible": j.candidate.visible,
+        "free": _free((*rung.model, j.tag), d),
     }
 
 
@@ -322,4 +335,4 @@ def variables(d: Diagnosis, curve: Backbone, law: PowerLaw) -> Variables:
         ("law", law.force, "N"),
     ):  # fmt: skip
         out[f"backbone_{name}"] = ("backbone_point", values, {"units": unit})
-    return out
+    return out | free_variables(d.confirmation, d.prepared, d.ladder[1].model, d.ladder[-1].model)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .curve import Curve
+from ..forward import Track
+from .curve import Curve, StepCurve
 from .layout import HOLD, LEVELS, RING_SAMPLES, RING_WINDOWS, SETTLE, Layout
 
 
@@ -59,6 +61,18 @@ def features(curve: Curve, anchors: Anchors, layout: Layout) -> Any:
             hold,
         ]
     )
+
+
+@jax.jit
+def of_tracks(tracks: Track, anchors: Anchors, times: Any) -> Any:
+    """Features of the model in every cycle of a run, shape (n, layout.size).
+
+    Args:
+        tracks, anchors: with a leading axis of cycles.
+        times: the layout's settling and shortest (s), shape (2,).
+    """
+    layout = Layout(times[0], times[1])
+    return jax.lax.map(lambda pair: features(StepCurve(pair[0]), pair[1], layout), (tracks, anchors))
 
 
 def _ringing(curve: Curve, start: Any, settling: float, period: Any, xp: Any) -> tuple[Any, Any]:

@@ -21,14 +21,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, export
 
-from ..features.curve import StepCurve
-from ..features.evaluate import Anchors, features
-from ..features.layout import Layout
+from ..features.evaluate import of_tracks
 from ..features.measurement import Measurement
 from ..forward import Cycles, Track, run_cycles
 from ..solve.stepper import Tolerance
 from .common import Common
-from .composition import Composition, Family, Numbers, run_of
+from .composition import Composition, Family, Numbers, of_this_package, run_of
 from .program import Program
 
 FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)  # errors below a floor
@@ -220,7 +218,7 @@ class Problem:
         def one(task: tuple[int, int]) -> np.ndarray:
             lane, r = task
             z, events = lanes[lane]
-            return np.asarray(_features(self._track(z, events, r), self._data[r][1], times))
+            return np.asarray(of_tracks(self._track(z, events, r), self._data[r][1], times))
 
         # the longest runs first, so that no thread is left with one at the end
         order = np.argsort([-np.count_nonzero(cycles.used) for cycles, _ in self._data])
@@ -255,10 +253,4 @@ def _tracks(family: Family) -> Any:
             family.most_steps,
         )
 
-    return Program(one_run, repr(family) if family.own() else None)
-
-
-@jax.jit
-def _features(tracks: Track, anchors: Anchors, times: Array) -> Array:
-    layout = Layout(times[0], times[1])  # type: ignore[arg-type]  # traced
-    return jax.lax.map(lambda pair: features(StepCurve(pair[0]), pair[1], layout), (tracks, anchors))
+    return Program(one_run, repr(family) if of_this_package(family.structure) else None)

@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
-from .fit import Array, Fit, prior_rows, reach
+from .fit import Array, Fit, moved, prior_rows, reach
+from .problem import Point
 from .scatter import covariance
 
 
@@ -45,30 +47,63 @@ def halves(fit: Fit) -> list[NDArray[np.intp]]:
     return [half for r in runs for half in np.array_split(r, 2) if half.size]
 
 
+class _Parts:
+    """The linear system at the optimum, event by event, so that any of them can be taken out."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit = fit
+        _, whole = covariance(fit.scatter.sizes, fit.known)
+        root = np.linalg.cholesky(np.asarray(whole))
+        self.low, self.high = reach(fit.problem, fit.point)
+        self.free = np.flatnonzero((self.low < 0.0) & (self.high > 0.0))
+        blocks = fit.blocks
+        side = np.concatenate([blocks(fit.slopes.shared)[..., self.free], blocks(fit.marginal)[..., None]], axis=2)
+        white = np.linalg.solve(root, side)
+        self.rows, self.rest = white[..., :-1], white[..., -1]
+        prior, target = prior_rows(fit.problem, fit.point)
+        prior = prior[:, self.free]
+        self.each = np.einsum("eip,eiq->epq", self.rows, self.rows)
+        self.slope = np.einsum("eip,ei->ep", self.rows, self.rest)
+        self.normal = self.each.sum(axis=0) + prior.T @ prior
+        self.right = self.slope.sum(axis=0) + prior.T @ target
+        self.logs = 2.0 * np.where(fit.known.there, np.log(np.diagonal(root, axis1=1, axis2=2)), 0.0).sum(axis=1)
+        self.scale = 1.0 / np.sqrt(np.maximum(np.diag(self.normal), 1e-300))
+
+    def without(self, part: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Matrix and right side, scaled, of all events but these."""
+        matrix = (self.normal - self.each[part].sum(axis=0)) * self.scale[:, None] * self.scale
+        return matrix + 1e-10 * np.eye(len(self.scale)), self.scale * (self.right - self.slope[part].sum(axis=0))
+
+
 def unseen(fit: Fit, left_out: list[NDArray[np.intp]] | None = None) -> Unseen:
     """Predict every fold from the others."""
-    _, whole = covariance(fit.scatter.sizes, fit.known)
-    root = np.linalg.cholesky(np.asarray(whole))
-    low, high = reach(fit.problem, fit.point)
-    free = np.flatnonzero((low < 0.0) & (high > 0.0))
-    blocks = fit.blocks
-    side = np.concatenate([blocks(fit.slopes.shared)[..., free], blocks(fit.marginal)[..., None]], axis=2)
-    white = np.linalg.solve(root, side)
-    rows, rest = white[..., :-1], white[..., -1]
-    prior, target = prior_rows(fit.problem, fit.point)
-    prior = prior[:, free]
-    each = np.einsum("eip,eiq->epq", rows, rows)
-    slope = np.einsum("eip,ei->ep", rows, rest)
-    normal, right = each.sum(axis=0) + prior.T @ prior, slope.sum(axis=0) + prior.T @ target
-    logs = 2.0 * np.where(fit.known.there, np.log(np.diagonal(root, axis1=1, axis2=2)), 0.0).sum(axis=1)
-    cost, out = np.zeros(len(rest)), np.zeros(fit.problem.of.size)
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    parts, blocks = _Parts(fit), fit.blocks
+    cost, out = np.zeros(len(parts.rest)), np.zeros(fit.problem.of.size)
     for part in left_out or folds(fit):
-        matrix = (normal - each[part].sum(axis=0)) * scale[:, None] * scale + 1e-10 * np.eye(len(scale))
-        step = -scale * np.linalg.solve(matrix, scale * (right - slope[part].sum(axis=0)))
-        predicted = rest[part] + rows[part] @ step
-        cost[part] = (predicted**2).sum(axis=1) + logs[part]
-        force = blocks(fit.marginal)[part] + blocks(fit.slopes.shared)[part][..., free] @ step
+        matrix, right = parts.without(part)
+        step = -parts.scale * np.linalg.solve(matrix, right)
+        predicted = parts.rest[part] + parts.rows[part] @ step
+        cost[part] = (predicted**2).sum(axis=1) + parts.logs[part]
+        force = blocks(fit.marginal)[part] + blocks(fit.slopes.shared)[part][..., parts.free] @ step
         there = blocks.there[part]
         out[blocks.index[part][there]] = force[there]
     return Unseen(cost, out)
+
+
+def points(fit: Fit, left_out: list[NDArray[np.intp]]) -> list[Point]:
+    """The parameters that a fit without each of these folds would find, within their bounds; all events alike.
+
+    The step is that of :func:`unseen`, but no element may come to pull the other way: the model is to be run with them.
+    """
+    parts = _Parts(fit)
+    low, high = (bound[parts.free] / parts.scale for bound in (parts.low, parts.high))
+    alike = np.zeros_like(fit.point.events)
+    out = []
+    for part in left_out:
+        matrix, right = parts.without(part)
+        root = np.linalg.cholesky(matrix)
+        found = lsq_linear(root.T, -np.linalg.solve(root, right), (low, high), method="bvls")
+        change = np.zeros(parts.low.size)
+        change[parts.free] = parts.scale * found.x
+        out.append(moved(fit.point, change, alike))
+    return out

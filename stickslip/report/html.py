@@ -48,13 +48,13 @@ def render(result: dict[str, Any], images: Iterable[tuple[str, str, Figure]]) ->
     """HTML of a result and its pictures (section, caption, figure)."""
     import jinja2
 
-    from .tables import lasting, percent, show, tables
+    from .tables import deviation, lasting, percent, show, tables
 
     # results of all commands share the template, so what a result does not have is left blank
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.ChainableUndefined
     )
-    environment.filters |= {"quantity": show, "percent": percent, "lasting": lasting}
+    environment.filters |= {"quantity": show, "percent": percent, "lasting": lasting, "deviation": deviation}
     template = environment.from_string(files(__package__).joinpath("report.html.j2").read_text(encoding="utf-8"))
     shown: dict[str, list[dict[str, str]]] = {}
     for section, caption, drawn in images:

@@ -15,6 +15,7 @@ from .fit_figures import (
     residual_plots,
 )
 from .force_figures import backbone_picture, cycle_picture, residual_picture, runs_of
+from .free_figures import free_picture
 
 if TYPE_CHECKING:
     import xarray
@@ -46,6 +47,12 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
     if "backbone_force" in data and result.get("backbone"):
         caption = "Backbone of the contact as the motion shows it, and the law of a rough contact."
         yield "force", caption, backbone_picture(data, result["backbone"])
+    if "free_run_measured_time" in data and "free_recurrence_measured" in data:
+        caption = (
+            "Models run freely from arrest to arrest through runs that their fit has not seen: the run where the base "
+            "errs most, one of its onsets, and every recurrence."
+        )
+        yield "free", caption, free_picture(data)
     if result.get("static") and "creep0_time" in data:
         yield (
             "static",

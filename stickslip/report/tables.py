@@ -22,6 +22,7 @@ def tables(result: Mapping[str, Any]) -> dict[str, Any]:
     found = {key: _or(result.get(key), empty) for key, empty in _KNOWN.items()}
     found["misfit_rows"] = _misfit_rows(found["misfit"])
     found["ladder_phases"] = list(dict.fromkeys(p for step in found["ladder"] for p in _or(step.get("by_phase"), {})))
+    found["free_simulated"] = any(step.get("free") for step in found["ladder"])
     return found
 
 
@@ -46,6 +47,14 @@ def lasting(seconds: Any) -> str:
 def percent(value: Any, digits: int = 2) -> str:
     """A share as a percentage."""
     return f"{show(100.0 * value, '1', digits)} %" if isinstance(value, (int, float)) else "–"
+
+
+def deviation(part: Any) -> str:
+    """Error of a free simulation: per cent, and in brackets in units of the scatter."""
+    if not isinstance(part, Mapping):
+        return "–"
+    scatters = part.get("scatters")
+    return percent(part.get("relative")) + (f" ({show(scatters, digits=2)})" if scatters is not None else "")
 
 
 def _misfit_rows(misfit: Any) -> list[dict[str, Any]]:

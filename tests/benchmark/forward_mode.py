@@ -46,7 +46,7 @@ def differentiable_rise(curve: StepCurve, levels: Any, after: Any) -> Any:
 @lru_cache(maxsize=16)
 def _program(family: Any) -> Any:
     # fresh ones: what was traced before knows nothing of a differentiable rise
-    run, features = fitting._tracks.__wrapped__(family).function, fitting._features.__wrapped__
+    run, features = fitting._tracks.__wrapped__(family).function, fitting.of_tracks.__wrapped__
 
     def derivatives(numbers, later, moved, moved_later, events, cycles, anchors, times, tolerance):
         def of(numbers, later):
