@@ -68,7 +68,8 @@ def _apart(seen: Sequence[Travel]) -> tuple[dict[int, float], list[int]]:
         found: list[tuple[float, int, float]] = []
         for i in agreed:
             others = [seen[j] for j in agreed if j != i]
-            slopes, variance = np.array([o.slope for o in others]), np.mean([o.std**2 for o in others])
+            slopes = np.array([o.slope for o in others])
+            variance = float(np.mean([o.std**2 for o in others]))
             middle = float(np.median(slopes))
             spread = (1.4826 * float(np.median(np.abs(slopes - middle)))) ** 2
             unlike = seen[i].unlike(float(np.median([o.trend for o in others])))

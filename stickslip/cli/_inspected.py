@@ -60,7 +60,7 @@ def text(result: Mapping[str, Any], variables: Mapping[str, tuple], out: Path | 
         lines += ["", *_fold("; ".join([*(m for key, m in _MEANINGS.items() if key in shown), _ROWS]) + ".", columns)]
     lines.append("")
     for heading, told in (
-        ("What the file states does not go with the motion:", [found["sentence"] for found in result["rig"]]),
+        ("The motion contradicts the file:", [found["sentence"] for found in result["rig"]]),
         ("The data can tell:", result["can"]),
         ("They cannot:", result["cannot"]),
     ):

@@ -34,10 +34,10 @@ def changed(folder: Path, kind: str, run: str, factor: float = 1.0) -> Path:
 
 @pytest.mark.parametrize("run", ["v050", "v400", "holds"])
 @pytest.mark.parametrize(
-    ("kind", "what", "stated"), [("velocity", "drive velocity", 0.0), ("scale", "displacement scale", 1.0), ("clock", "time", 0.0)]
-)  # fmt: skip
+    ("kind", "what"), [("velocity", "drive velocity"), ("scale", "displacement scale"), ("clock", "time")]
+)
 @pytest.mark.parametrize("factor", [0.9, 1.1])
-def test_a_tenth_off_in_one_run_is_named_with_the_true_value(made, run, kind, what, stated, factor):
+def test_a_tenth_off_in_one_run_is_named_with_the_true_value(made, run, kind, what, factor):
     (found,) = findings(changed(made, kind, run, factor))
     assert (found.what, found.run, found.stops) == (what, run, True)
     assert found.value == pytest.approx(found.stated / factor, rel=0.02)

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.features.layout import PHASES, Layout
 from stickslip.checks.spring_force import force_findings, gain_is_wrong, stick_gain
+from stickslip.features.layout import PHASES, Layout
 from stickslip.motion import true_gains
 from stickslip.report import abilities, misfit_sentence, phase_table
 from stickslip.report.describe import describe_trace
