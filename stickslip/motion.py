@@ -1,5 +1,4 @@
-"""What a campaign's numbers say of each other before a model is fitted: whether they go together, and the block's
-displacement where it was not measured."""
+"""The block's displacement where it was not measured: from its velocity, or the spring's force at its true scale."""
 
 from __future__ import annotations
 
@@ -7,47 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .campaign import Campaign
-from .errors import InputError
+from .checks.spring_force import gain_is_wrong, stick_gain
 from .readers.repair import from_load_point
-from .report.describe import gain_is_wrong, stick_gain
-from .report.pace import pace
-from .report.slip_time import at_odds, slip_time
 from .segment import Segmentation, block_motion, segment
 from .trace import Trace
-
-
-def check_pace(traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[str]:
-    """A sentence for each trace whose block and drive do not keep up with each other from slip to slip.
-
-    Raises:
-        InputError: they are so far apart that a unit must be wrong.
-    """
-    notes = []
-    for trace, events in zip(traces, found, strict=True):
-        seen = pace(trace, events)
-        if seen is None or not seen.off:
-            continue
-        if seen.impossible:
-            raise InputError(
-                f"{trace.name}: {seen}", key="trace.drive_velocity",
-                hint="check the drive's velocity, the units of time and displacement, and whether a counter wraps or "
-                "is cleared ('wrap', 'resets')",
-            )  # fmt: skip
-        notes.append(f"{trace.name}: {seen}: check the drive's velocity, and the units of time and displacement.")
-    return notes
-
-
-def slip_times(campaign: Campaign, traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[str]:
-    """A sentence for each mass and spring, where both are known, that do not go with how long slips on them last."""
-    seen: dict[tuple[float, float], dict[str, float]] = {}
-    for trace, events in zip(traces, found, strict=True):
-        rig, lasts = campaign.rig_of(trace.name), slip_time(trace, events)
-        if lasts is not None and isinstance(rig.mass, float) and isinstance(rig.spring_stiffness, float):
-            seen.setdefault((rig.mass, rig.spring_stiffness), {})[trace.name] = lasts
-    said = [(names, at_odds(list(names.values()), *rig)) for rig, names in seen.items()]
-    check = "check mass and stiffness, and the units, also that of time"
-    return [f"{', '.join(names)}: {text}: {check}." for names, text in said if text]
 
 
 def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Segmentation], list[str]]:

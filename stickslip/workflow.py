@@ -159,11 +159,12 @@ def diagnose_campaign(
     import xarray
 
     from .campaign import load_campaign, load_traces
+    from .checks import refuse_impossible, rig_against_motion, stopping
     from .conformance import try_laws
     from .diagnose.engine import diagnose
     from .diagnose.summary import summary
     from .effects import catalogue
-    from .motion import check_pace, slip_times, true_gains, with_displacements
+    from .motion import true_gains, with_displacements
     from .report import abilities, write_report
     from .report.describe import left_out
     from .report.diagnosis_result import trace_sections
@@ -179,10 +180,12 @@ def diagnose_campaign(
     inputs = input_records(loaded)
     events = [segment(t) for t in traces]
     try:
-        notes = [*check_pace(traces, events), *slip_times(loaded, traces, events)]
+        rig = rig_against_motion(loaded, traces, events)
+        refuse_impossible(rig)
         able = abilities(traces, events)
     except InputError as error:
         raise error.at(file=loaded.path) from None
+    notes = [finding.sentence for finding in rig]
     with open_run(out, force=force, resume=True) as run:
         key = json_text(
             {
@@ -197,8 +200,7 @@ def diagnose_campaign(
         pieces = Pieces(run, key)
         ready = pieces.ready()
         # before minutes of fitting, in which a wrong unit may be mended
-        cannot = [line for line in able.cannot if line not in notes]
-        first = [*notes, *cannot, *([f"going on from {ready} finished pieces"] if ready else [])]
+        first = [*notes, *able.cannot, *([f"going on from {ready} finished pieces"] if ready else [])]
         if progress is not None and first:
             progress("\n         ".join(["before anything is fitted:", *first]), 0.0)
         left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), 0.0)
@@ -213,19 +215,23 @@ def diagnose_campaign(
                 jobs=jobs,
                 store=pieces,
                 time_limit=left,
+                wrong=stopping(rig),
                 progress=progress,
             )
         except KeyboardInterrupt:
             text = f"{pieces.ready()} finished pieces are kept, and the same command goes on from them"
             raise KeyboardInterrupt(text) from None
         except InputError as error:
+            for finding in reversed(stopping(rig)):  # with the sign wrong in every run there are no slips to fit
+                error = error.with_hint(finding.sentence, first=True)
             raise error.at(file=loaded.path) from None
         sections, variables = summary(found, loaded.rig)
         result: dict[str, Any] = {
             "kind": "diagnose", "title": loaded.title, **sections, "inputs": inputs, "versions": versions()
         }  # fmt: skip
-        result["notes"] = [*notes, *mended, *implied]
-        result |= {"can": list(able.can), "cannot": cannot}
+        result["rig"] = [finding.plain() for finding in rig]
+        result["notes"] = [*mended, *implied]
+        result |= {"can": list(able.can), "cannot": list(able.cannot)}
         result["dropped"] = [*left_out(traces, segmentations), *result["dropped"]]
         described, pictured = trace_sections(traces, segmentations)
         result |= described

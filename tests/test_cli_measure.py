@@ -126,7 +126,7 @@ def test_tables_fit_the_terminal_and_break_no_word(capsys, monkeypatch, columns)
     words = " ".join(lines).split()
     for word in ("trace", "slips", "event", "onset", "slip", "median", "sensor"):
         assert word in words
-    assert ("displacement" in words) == (columns >= 80)
+    assert ("signal" in words) == (columns >= 80)
     table = lines[next(i for i, line in enumerate(lines) if line.split()[:2] == ["event", "onset"]) :]
     assert [line.split()[0] for line in table[2:5]] == ["1", "2", "3"]
     assert "s" in table[1].split()

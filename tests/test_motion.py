@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from stickslip.campaign import load_campaign, load_traces
+from stickslip.checks import rig_against_motion
+from stickslip.checks.slip_time import at_odds, slip_time
 from stickslip.cli import run
 from stickslip.diagnose import engine
-from stickslip.motion import check_pace, slip_times, true_gains, with_displacements
-from stickslip.report.slip_time import at_odds, slip_time
+from stickslip.motion import true_gains, with_displacements
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
 from stickslip.workflow import diagnose_campaign
@@ -102,12 +103,22 @@ def test_a_drive_or_a_clock_wrong_by_a_thousand_is_refused(tmp_path, capsys, tim
     assert not out.exists()
 
 
-def test_a_block_a_little_ahead_of_its_drive_is_pointed_out_and_fitted():
+@pytest.mark.parametrize("factor", [0.6, 1.0])
+def test_a_block_ahead_of_its_drive_is_pointed_out(tmp_path, factor):
     t, x = moved()
-    trace = Trace("x", t, displacement=x, drive=Drive.constant(0.6 * SPEED, 0.0, t[-1]), noise=1e-9)
-    (said,) = check_pace([trace], [segment(trace)])
-    assert "x: from slip to slip the block moves 42 µm/s, the drive 25.2 µm/s" in said
-    assert check_pace([trace.replace(drive=Drive.constant(SPEED, 0.0, t[-1]))], [segment(trace)]) == []
+    np.savetxt(tmp_path / "x.csv", np.stack([t, 1e6 * x], 1), delimiter=",", header="t [s],x [um]", comments="")
+    (tmp_path / "c.toml").write_text(
+        'schema = 1\n[[trace]]\nfile = "x.csv"\ntime = { column = "t" }\ndisplacement = { column = "x" }\n'
+        f'drive_velocity = "{factor * 1e6 * SPEED} um/s"\n'
+    )
+    campaign = load_campaign(tmp_path / "c.toml")
+    traces = load_traces(campaign)
+    found = rig_against_motion(campaign, traces, [segment(t) for t in traces])
+    assert len(found) == (factor != 1.0)
+    if found:
+        assert "x: from slip to slip the block moves 42 µm/s, the drive 25.2 µm/s" in found[0].sentence
+        assert found[0].stops
+        assert found[0].value == pytest.approx(1 / factor, rel=0.01)
 
 
 @pytest.mark.parametrize(("mass", "off"), [("26 g", False), ("100 g", False), ("26 kg", True), ("26 mg", True)])
@@ -121,7 +132,9 @@ def test_a_mass_wrong_by_a_thousand_is_pointed_out(tmp_path, capsys, mass, off):
     )
     campaign = load_campaign(tmp_path / "c.toml")
     traces = load_traces(campaign)
-    said = slip_times(campaign, traces, [segment(t) for t in traces])
+    found = rig_against_motion(campaign, traces, [segment(t) for t in traces])
+    said = [f.sentence for f in found]
+    assert {f.what for f in found} <= {"mass and spring"}
     assert len(said) == off
     assert run(["inspect", str(tmp_path / "c.toml")]) == 0
     shown = " ".join(capsys.readouterr().out.split())
@@ -144,7 +157,7 @@ def test_a_guessed_mass_and_slips_that_are_not_resolved_are_not_judged(tmp_path)
     campaign = load_campaign(tmp_path / "c.toml")
     (trace,) = load_traces(campaign)
     found = segment(trace)
-    assert slip_times(campaign, [trace], [found]) == []
+    assert rig_against_motion(campaign, [trace], [found]) == ()
     assert slip_time(trace, found) == pytest.approx(0.04, rel=0.05)
     assert slip_time(trace, replace(found, settings=replace(found.settings, window=0.01))) is None
     assert slip_time(trace, replace(found, events=found.events[:3])) is None

@@ -59,7 +59,11 @@ def text(result: Mapping[str, Any], variables: Mapping[str, tuple], out: Path | 
     if shown:
         lines += ["", *_fold("; ".join([*(m for key, m in _MEANINGS.items() if key in shown), _ROWS]) + ".", columns)]
     lines.append("")
-    for heading, told in (("The data can tell:", result["can"]), ("They cannot:", result["cannot"])):
+    for heading, told in (
+        ("The motion contradicts the file:", [found["sentence"] for found in result["rig"]]),
+        ("The data can tell:", result["can"]),
+        ("They cannot:", result["cannot"]),
+    ):
         if told:
             lines.append(heading)
             for line in told:

@@ -167,7 +167,8 @@ def _print(result: dict[str, Any], out: Path) -> None:
     for found in [proposed, *proposed.get("others", ())] if proposed else ():
         between = f" ({' or '.join(found['separates'])})" if proposed.get("others") else ""
         console.print(f"next experiment{between}: {escape(found['text'])}", highlight=False)
-    for text in [*result["notes"], *result["caution"]]:
+    rig = [finding["sentence"] for finding in result["rig"] if not finding["stops"]]  # the verdict says the others
+    for text in [*rig, *result["notes"], *result["caution"]]:
         console.print(escape(text), highlight=False)
     mended = told(result)
     lost = [f"left out: {text}" for text in result["dropped"]]

@@ -90,7 +90,8 @@ def fit(
     force:
         Replace an existing run folder.
     """
-    from ..motion import check_pace, slip_times, true_gains
+    from ..checks import refuse_impossible, rig_against_motion
+    from ..motion import true_gains
     from ..report.describe import left_out
     from ..units import to_si
 
@@ -102,7 +103,8 @@ def fit(
     began = _now()
     loaded, traces, found = load_and_segment(campaign)
     try:
-        notes = [*check_pace(traces, found), *slip_times(loaded, traces, found)]
+        rig = rig_against_motion(loaded, traces, found)
+        refuse_impossible(rig)
     except InputError as error:
         raise error.at(file=loaded.path) from None
     found, mended = true_gains(traces, found)
@@ -111,12 +113,13 @@ def fit(
     else:
         from ._inertial import Options, fit_inertial
 
-        for text in notes:  # before minutes of fitting, in which a wrong unit may be mended
-            print(text, file=sys.stderr)
+        for finding in rig:  # before minutes of fitting, in which a wrong unit may be mended
+            print(finding.sentence, file=sys.stderr)
         options = Options(add, effect, profile, holdout, starts, 1.0 if new_lines else None, most_events, most_steps)
         result, variables = fit_inertial(loaded, traces, found, options)
     result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
-    result["notes"] = [*notes, *mended, *result.get("notes", ())]
+    result["rig"] = [finding.plain() for finding in rig]
+    result["notes"] = [*mended, *result.get("notes", ())]
     # ahead of the events: of these only the first few are printed
     result["dropped"] = [*left_out(traces, found), *result["dropped"]]
     if out is not None:
@@ -232,7 +235,8 @@ def _gains_of_effects(ladder: list[dict[str, Any]]) -> list[str]:
 
 def _text(result: dict[str, Any], out: Path | None) -> str:
     """What is printed."""
-    lines = [f"{result['title']}: {result['model']} model", *result["notes"]]
+    rig = [finding["sentence"] for finding in result["rig"]]
+    lines = [f"{result['title']}: {result['model']} model", *rig, *result["notes"]]
     for key in ("static", "ramps"):
         if result.get(key):
             lines += ["", *_BETWEEN.split(result[key]["text"])]

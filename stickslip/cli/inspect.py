@@ -84,7 +84,7 @@ def inspection(
     loaded: Campaign, traces: list[Trace], found: list[Segmentation]
 ) -> tuple[dict[str, Any], dict[str, tuple]]:
     """``result.json`` of an inspection, and the arrays its pictures need."""
-    from ..motion import slip_times
+    from ..checks import rig_against_motion
     from ..report import abilities, describe_trace, trace_pieces
     from ..report.ripple import stick_ripple
 
@@ -100,10 +100,11 @@ def inspection(
         variables |= trace_pieces(trace, segmentation, i)
         rows.append(row)
     able = abilities(traces, found)
-    cannot = [*able.cannot, *slip_times(loaded, traces, found), *_lacking(loaded, traces, found)]
+    cannot = [*able.cannot, *_lacking(loaded, traces, found)]
     dropped = [f"{t['name']}: {text}" for t in rows for text in (*t["repairs"], *t["dropped"])]
     result = {
         **head(loaded, "inspect"),
+        "rig": [finding.plain() for finding in rig_against_motion(loaded, traces, found)],
         "traces": rows,
         "can": list(able.can),
         "cannot": cannot,

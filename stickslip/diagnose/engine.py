@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from ..campaign import Campaign
+from ..checks import Finding
 from ..effects import catalogue
 from ..force.candidates import Candidate, every_form
 from ..force.fit import Array, Fit, deviations, fit
@@ -86,6 +87,7 @@ class Diagnosis:
         dropped: what was left out, and why.
         in_time: whether the time limit was not met.
         confirmation: the leading models run freely.
+        wrong: what the motion contradicts of the rig as it is stated, so that no effect was tried.
     """
 
     verdict: Verdict
@@ -96,6 +98,7 @@ class Diagnosis:
     dropped: tuple[str, ...] = field(default=())
     in_time: bool = True
     confirmation: Confirmation = field(default_factory=Confirmation)
+    wrong: tuple[Finding, ...] = ()
 
     @property
     def fit(self) -> Fit:
@@ -116,6 +119,7 @@ def diagnose(
     jobs: int | None = None,
     store: Store | None = None,
     time_limit: float | None = None,
+    wrong: Sequence[Finding] = (),
     progress: Callable[[str, float], None] | None = None,
 ) -> Diagnosis:
     """Find out what the base model lacks.
@@ -128,6 +132,7 @@ def diagnose(
         jobs: processes; default the number of cores.
         store: keeps finished pieces.
         time_limit: seconds after which the best answer so far is given.
+        wrong: what the motion contradicts of the rig as it is stated: with any, the base is fitted and no effect tried.
         progress: told the stage and the share of it done.
 
     Raises:
@@ -154,6 +159,9 @@ def diagnose(
     ladder = [Rung(("static",), None, static_residual(base), None, None), _rung(("static", "inertia"), "inertia", base)]
     rounds: list[Round] = []
     verdict: Verdict | None = None
+    if wrong:  # an effect would be fitted to the wrong entry
+        rounds.append(Round(base, (), (), ()))
+        verdict = Verdict("unknown")
     while verdict is None:
         taken = [r.close[0].tag for r in rounds if r.close]
         left = [t for t in tags if t not in taken]
@@ -170,9 +178,12 @@ def diagnose(
         if len(taken) + 1 >= max_effects:
             verdict = _end([*taken, done.close[0].tag], replace(done, base=base, close=()), rounds)
     floor = deviations(base)
+<<<<<<< HEAD
     complete = in_time()
     confirmed = confirm(leading(ladder, rounds), ladder[-1].model, prepared, store, tell, in_time)
-    return Diagnosis(verdict, tuple(ladder), tuple(rounds), prepared, floor, tuple(dropped), complete, confirmed)
+    return Diagnosis(
+        verdict, tuple(ladder), tuple(rounds), prepared, floor, tuple(dropped), complete, confirmed, tuple(wrong)
+    )  # fmt: skip
 
 
 def leading(ladder: Sequence[Rung], rounds: Sequence[Round]) -> dict[Parts, Fit]:

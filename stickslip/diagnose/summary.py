@@ -223,6 +223,9 @@ def visible(d: Diagnosis) -> dict[str, dict[str, Any]]:
 def verdict_text(d: Diagnosis) -> str:
     """The answer in a few sentences."""
     v, last, base = d.verdict, d.ladder[-1], d.ladder[1]
+    if d.wrong:
+        found = " ".join(finding.sentence for finding in d.wrong)
+        return f"{found} Until this is mended no effect is tried, for it would be fitted to the wrong entry."
     before, after = (error(r.unseen, d) for r in (base, last) if r.unseen is not None)
     parts = []
     if v.effects:

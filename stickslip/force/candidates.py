@@ -191,9 +191,7 @@ def _columns(base: Fit, effect: Effect, members: Sequence[dict[str, float]]) -> 
     return np.stack(out)
 
 
-def _refit(
-    base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None, last: int = LAST
-) -> Fit:
+def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None, last: int = LAST) -> Fit:
     """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,)."""
     problem, free = with_start(base.problem, effect, values)
     return refit(problem, _start(base, free, turns), base, last)

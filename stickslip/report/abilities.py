@@ -13,8 +13,6 @@ from ..fit.normalised import is_ramp
 from ..segment import LAWS, Segmentation, Shapes, event_shapes
 from ..trace import Trace
 from ..units import shown
-from .describe import gain_is_wrong, stick_gain
-from .pace import pace
 
 _RING_RATE = 5000.0  # Hz: a contact resonance of some 500 Hz needs ten samples a period
 _NEAR = 1.25  # drive velocities closer than this factor count as one
@@ -42,9 +40,7 @@ def abilities(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) ->
     if not slipping:
         cannot.append("No trace holds a slip: nothing but creep or sliding can be looked at, no dynamic model fitted.")
     shapes = [event_shapes(t, s) for t, s in slipping]
-    verdicts = [
-        judge(pairs, slipping) for judge in (_velocities, _pace, _events, _holds, _virgin, _signals, _slow_noise)
-    ]
+    verdicts = [judge(pairs, slipping) for judge in (_velocities, _events, _holds, _virgin, _signals, _slow_noise)]
     verdicts += [judge(slipping, shapes) for judge in (_slip, _overshoot, _ringing)]
     verdicts += [judge(pairs, slipping) for judge in (_creep, _ramps, _unseen)]
     for good, bad in verdicts:
@@ -78,16 +74,6 @@ def _velocities(pairs: Pairs, slipping: Pairs) -> Verdict:
             "Fewer than three velocities over a factor of four: many effects will stay alike."
         ]
     return [f"{len(groups)} drive velocities ({shown} µm/s) separate what depends on velocity from what does not."], []
-
-
-def _pace(pairs: Pairs, slipping: Pairs) -> Verdict:
-    """From slip to slip a block on a spring keeps up with its load point, whatever the spring."""
-    bad = []
-    for t, s in slipping:
-        found = pace(t, s)
-        if found is not None and found.off:
-            bad.append(f"{t.name}: {found}: check the drive's velocity, and the units of time and displacement.")
-    return [], bad
 
 
 def _events(pairs: Pairs, slipping: Pairs) -> Verdict:
@@ -151,22 +137,6 @@ def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
     ]
     good: list[str] = []
     for t, s in pairs:
-        gain = stick_gain(t, s)
-        if gain is not None and abs(share := 100 * (gain["value"] - 1.0)) > 100 * max(0.02, 3 * gain["std"]):
-            rises = (
-                f"{t.name}: while the block sticks the force rises {gain['value']:.3f} (+-{gain['std']:.3f}) times as "
-                "fast as stiffness times drive"
-            )
-            scale = (
-                f"sensor-gain of about {share:+.0f} %, or the stiffness or the drive's velocity is wrong by as much."
-            )
-            if gain_is_wrong(gain):
-                bad.append(f"{rises}, which no motion of the block explains (creep can only lower it): {scale}")
-            else:
-                bad.append(
-                    f"{rises}: the block creeps along at {-share:.0f} % of the drive's velocity, or {scale} Force "
-                    "alone cannot tell the two apart: measure the block's position as well."
-                )
         if t.name in force and t.spring_stiffness is None and s.settings.unit == "m" and s.settings.gain:
             bad.append(
                 f"{t.name}: the spring's stiffness is not given. Lengths are as if the block stood still early in a "

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks.spring_force import stick_gain
 from ..segment import LEVELS, Event, Segmentation, Shape, Shapes, event_shapes
 from ..trace import Trace
 
@@ -174,39 +175,4 @@ def describe_trace(trace: Trace, found: Segmentation) -> dict[str, Any]:
         "repairs": [str(r) for r in trace.repairs],
         "warnings": [*trace.warnings, *found.warnings],
         "stick_gain": stick_gain(trace, found),
-    }
-
-
-def gain_is_wrong(gain: Mapping[str, float]) -> bool:
-    """Whether the scale of the force must be wrong (see `stick_gain`): it rises faster than the drive can stretch."""
-    return gain["value"] - 1.0 > max(0.02, 3 * gain["std"])
-
-
-def stick_gain(trace: Trace, found: Segmentation) -> dict[str, float] | None:
-    """Slope of the spring's force in early stick over stiffness times drive, for traces of force alone.
-
-    While the block stands still the force must rise by c_s v0; a median slope that differs is an error of the force's
-    scale, of the stiffness or of the drive's velocity (a slope above 1 cannot be creep, which only lowers it).
-    """
-    stiffness, drive, force = trace.spring_stiffness, trace.drive, trace.spring_force
-    if trace.leading != "spring_force" or stiffness is None or drive is None or force is None or not drive.speed:
-        return None
-    slopes = []
-    for event in found.events[1:]:
-        if event.holds or not np.isfinite(event.stick_time):
-            continue
-        begin = event.t_onset - event.stick_time
-        low, high = np.searchsorted(trace.time, [begin + 0.15 * event.stick_time, begin + 0.5 * event.stick_time])
-        if high - low < 30:
-            continue
-        t = trace.time[low:high]
-        rate = np.polynomial.polynomial.polyfit(t - t.mean(), force[low:high], 1)[1]
-        slopes.append(rate / (stiffness * float(drive.velocity(t.mean()))))
-    if len(slopes) < 5:
-        return None
-    spread = 1.4826 * float(np.median(np.abs(slopes - np.median(slopes))))
-    return {
-        "value": float(np.median(slopes)),
-        "std": 1.2533 * spread / float(np.sqrt(len(slopes))),
-        "sticks": float(len(slopes)),
     }

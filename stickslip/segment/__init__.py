@@ -161,6 +161,9 @@ def _regime(
         return "no slip", f"the velocity never passes {shown(settings.threshold, settings.unit + '/s', 3)}"
     pulled = _path(np.asarray(drive.position(time)), 0.0)
     share = moved / pulled if pulled > 0 else 0.0
+    ways = (float(position[-1] - position[0]), float(np.diff(drive.position(time[[0, -1]]))[0]))
+    if share > 0.2 and ways[0] * ways[1] < -0.04 * ways[1] ** 2:
+        return "no slip", "the block moves against its drive: the sign of one of them is wrong"
     if share > 0.5:
         part = f" ({100 * share:.0f} % of its travel)" if share < 1.2 else ""
         return "continuous sliding", f"the block follows the drive{part} without slips"

@@ -158,7 +158,7 @@ def test_the_terminal_says_every_step_of_the_ladder_and_every_experiment(tmp_pat
     result = {
         "ladder": [{"added": added, "removed": removed, **error} for added, removed in steps],
         "verdict": {"kind": "ambiguous", "text": "one of two", "confidence": None},
-        "next_experiment": experiment, "notes": [], "caution": [], "dropped": [],
+        "next_experiment": experiment, "rig": [], "notes": [], "caution": [], "dropped": [],
     }  # fmt: skip
     _print(result, tmp_path)
     said = capsys.readouterr().out

@@ -63,7 +63,10 @@ def test_paper_slider_s_gain_is_found_and_named(real_data, program):
     assert 215 <= sum(event["slip"] > 15e-6 for event in trace["events"]) <= 245
     # the force's scale is known to be about 10 % too large
     assert trace["stick_gain"]["value"] == pytest.approx(1.10, abs=0.02)
-    assert any("sensor-gain of about +11 %" in line or "sensor-gain of about +10 %" in line for line in found["cannot"])
+    assert any(
+        "sensor-gain of about +11 %" in f["sentence"] or "sensor-gain of about +10 %" in f["sentence"]
+        for f in found["rig"]
+    )
     lines = trace["ripple"]["lines"]
     assert "mains, 50 Hz" in trace["ripple"]["text"]
     assert any(line["period"] == pytest.approx(0.399, abs=0.005) for line in lines)

@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from stickslip.checks.spring_force import force_findings, gain_is_wrong, stick_gain
 from stickslip.features.layout import PHASES, Layout
 from stickslip.motion import true_gains
 from stickslip.report import abilities, misfit_sentence, phase_table
-from stickslip.report.describe import describe_trace, gain_is_wrong, stick_gain
+from stickslip.report.describe import describe_trace
 from stickslip.report.ripple import stick_ripple, stick_spectrum
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
@@ -50,18 +51,20 @@ def test_a_force_sensor_that_reads_too_much_is_named_with_its_size():
     trace = sawtooth(gain=1.1, creep=8e-6)
     found = segment(trace)
     assert stick_gain(trace, found)["value"] == pytest.approx(1.1, abs=0.005)
-    text = " ".join(abilities([trace], [found]).cannot)
-    assert "sensor-gain of about +10 %" in text
+    (said,) = force_findings([trace], [found])
+    assert "sensor-gain of about +10 %" in said.sentence
+    assert said.stops
     trace = sawtooth(gain=1.0, creep=8e-6)
-    assert "sensor-gain" not in " ".join(abilities([trace], [segment(trace)]).cannot)
+    assert force_findings([trace], [segment(trace)]) == []
 
 
 def test_a_force_that_rises_too_slowly_may_be_creep_and_is_left_as_it_is():
     trace = sawtooth(gain=0.9, creep=8e-6)
     found = segment(trace)
     assert not gain_is_wrong(stick_gain(trace, found))
-    text = " ".join(abilities([trace], [found]).cannot)
-    assert "creeps along at 10 % of the drive's velocity, or sensor-gain of about -10 %" in text
+    (said,) = force_findings([trace], [found])
+    assert "creeps along at 10 % of the drive's velocity, or sensor-gain of about -10 %" in said.sentence
+    assert not said.stops
     assert true_gains([trace], [found]) == ([found], [])
     fast = sawtooth(gain=1.1, creep=8e-6)
     (mended,), (note,) = true_gains([fast], [segment(fast)])

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..campaign import Campaign
 from ..segment import Segmentation
 from ..trace import Trace
 from ..units import shown
+from .finding import Finding
 
 _FEW = 4  # slips from which their time is known
 _WINDOWS = 5  # of the estimator (and samples) in a slip, from which its time is that of the block
@@ -39,3 +41,23 @@ def at_odds(times: Sequence[float], mass: float, stiffness: float) -> str | None
         f"slips last {shown(seen, 's', 2)}, half a period of {shown(mass, 'kg', 3)} on {shown(stiffness, 'N/m', 3)} "
         f"is {shown(expected, 's', 2)}; on that spring a block of {shown(wanted, 'kg', 2)} would slip so"
     )
+
+
+def mass_findings(campaign: Campaign, traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[Finding]:
+    """A finding for each mass and spring, where both are known, that do not go with how long slips on them last."""
+    seen: dict[tuple[float, float], dict[str, float]] = {}
+    for trace, events in zip(traces, found, strict=True):
+        rig, lasts = campaign.rig_of(trace.name), slip_time(trace, events)
+        if lasts is not None and isinstance(rig.mass, float) and isinstance(rig.spring_stiffness, float):
+            seen.setdefault((rig.mass, rig.spring_stiffness), {})[trace.name] = lasts
+    out = []
+    for (mass, stiffness), slips in seen.items():
+        times = list(slips.values())
+        text = at_odds(times, mass, stiffness)
+        if text:
+            wanted = stiffness * (float(np.median(times)) / np.pi) ** 2
+            sentence = f"{', '.join(slips)}: {text}: check mass and stiffness, and the units, also that of time."
+            run = next(iter(slips)) if len(slips) == 1 and len(traces) > 1 else None
+            # damping makes a slip last longer by a factor that nobody knows
+            out.append(Finding("mass and spring", run, mass, wanted, wanted * np.log(_LONGER), "kg", sentence))
+    return out

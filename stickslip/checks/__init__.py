@@ -1,0 +1,6 @@
+"""The rig as the file states it, held against what the measured motion says of it, before any model is fitted."""
+
+from .finding import Finding, refuse_impossible, stopping
+from .rig import rig_against_motion
+
+__all__ = ["Finding", "refuse_impossible", "rig_against_motion", "stopping"]

@@ -1,0 +1,90 @@
+"""Scale of a spring force, from how fast it rises while the block sticks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..segment import Segmentation
+from ..trace import Trace
+from .finding import Finding
+from .scales import COMMON
+
+_FEWEST = 5  # sticks
+_SAID = 0.02  # smaller errors of the scale are not spoken of
+
+
+def stick_gain(trace: Trace, found: Segmentation) -> dict[str, float] | None:
+    """Slope of the spring's force in early stick over stiffness times drive, for traces of force alone.
+
+    While the block stands still the force must rise by c_s v0; a median slope that differs is an error of the force's
+    scale, of the stiffness or of the drive's velocity (a slope above 1 cannot be creep, which only lowers it).
+    """
+    stiffness, drive, force = trace.spring_stiffness, trace.drive, trace.spring_force
+    if trace.leading != "spring_force" or stiffness is None or drive is None or force is None or not drive.speed:
+        return None
+    slopes = []
+    for event in found.events[1:]:
+        if event.holds or not np.isfinite(event.stick_time):
+            continue
+        begin = event.t_onset - event.stick_time
+        low, high = np.searchsorted(trace.time, [begin + 0.15 * event.stick_time, begin + 0.5 * event.stick_time])
+        if high - low < 30:
+            continue
+        t = trace.time[low:high]
+        rate = np.polynomial.polynomial.polyfit(t - t.mean(), force[low:high], 1)[1]
+        slopes.append(rate / (stiffness * float(drive.velocity(t.mean()))))
+    if len(slopes) < _FEWEST:
+        return None
+    spread = 1.4826 * float(np.median(np.abs(slopes - np.median(slopes))))
+    return {
+        "value": float(np.median(slopes)),
+        "std": 1.2533 * spread / float(np.sqrt(len(slopes))),
+        "sticks": float(len(slopes)),
+    }
+
+
+def gain_is_wrong(gain: Mapping[str, float]) -> bool:
+    """Whether the scale of the force must be wrong (see `stick_gain`): it rises faster than the drive can stretch."""
+    return gain["value"] - 1.0 > max(_SAID, 3 * gain["std"])
+
+
+def force_findings(traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[Finding]:
+    """A finding for each record of force alone that does not rise as stiffness and drive want it.
+
+    One that rises too slowly stops nothing, since a block that creeps along makes the same; nor does a scale that is
+    too large by as little as a sensor's gain may be.
+    """
+    out = []
+    for trace, events in zip(traces, found, strict=True):
+        gain = stick_gain(trace, events)
+        if gain is None or abs(gain["value"] - 1.0) <= max(_SAID, 3 * gain["std"]):
+            continue
+        share, wrong = 100 * (gain["value"] - 1.0), gain_is_wrong(gain)
+        rises = (
+            f"{trace.name}: while the block sticks the force rises {gain['value']:.3f} (+-{gain['std']:.3f}) times as "
+            "fast as stiffness times drive"
+        )
+        scale = f"sensor-gain of about {share:+.0f} %, or the stiffness or the drive's velocity is wrong by as much."
+        if wrong:
+            text = f"{rises}, which no motion of the block explains (creep can only lower it): {scale}"
+        else:
+            text = (
+                f"{rises}: the block creeps along at {-share:.0f} % of the drive's velocity, or {scale} Force alone "
+                "cannot tell the two apart: measure the block's position as well."
+            )
+        stops = wrong and gain["value"] - 1.0 > COMMON
+        out.append(
+            Finding(
+                "spring force scale",
+                trace.name,
+                1.0,
+                1.0 / gain["value"],
+                gain["std"] / gain["value"] ** 2,
+                "1",
+                text,
+                stops,
+            )
+        )
+    return out
