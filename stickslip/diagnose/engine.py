@@ -178,7 +178,6 @@ def diagnose(
         if len(taken) + 1 >= max_effects:
             verdict = _end([*taken, done.close[0].tag], replace(done, base=base, close=()), rounds)
     floor = deviations(base)
-<<<<<<< HEAD
     complete = in_time()
     confirmed = confirm(leading(ladder, rounds), ladder[-1].model, prepared, store, tell, in_time)
     return Diagnosis(

@@ -95,7 +95,7 @@ def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[s
     """An effect in some of its forms, each refitted in full; then each once more from where the best of them ended."""
     made = [_tried(base, explained, tag, form) for form in forms]
     fitted = [c for c in made if c.fit is not None]
-    if len(fitted) < 2:
+    if len(fitted) < 2 or catalogue.get(tag).periodic is not None:
         return made
     best = min(fitted, key=_cost)
     assert best.fit is not None
@@ -124,11 +124,9 @@ def _better(one: Candidate, other: Candidate) -> Candidate:
 def _from(base: Fit, c: Candidate, values: dict[str, float]) -> Candidate:
     """The candidate refitted from other values of its parameters (SI)."""
     effect = catalogue.get(c.tag)(**c.form)
-    start = {name: values.get(name, value) for name, value in c.start.items() if not is_own(name)}
-    own = [f for f in base.problem.composition.phases]
-    turns = None if c.fit is None or effect.periodic is None else c.fit.point.phases[len(own) :]
+    start = {name: values.get(name, value) for name, value in c.start.items()}
     try:
-        return replace(c, fit=_refit(base, effect, start, None if turns is None or not len(turns) else turns[0]))
+        return replace(c, fit=_refit(base, effect, start), start=start)
     except StickslipError:
         return replace(c, fit=None)
 

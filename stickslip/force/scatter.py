@@ -103,7 +103,7 @@ class Known:
 
     @cached_property
     def shifts(self) -> tuple[Array, Array]:
-        """Covariance (N^2) of two forces by errors of the position of 1 m: alike where near, and in a walk of 1 m/s^0.5."""
+        """Covariance (N^2) by errors of the position of 1 m, alike where near, and by a walk of 1 m/s^0.5."""
         moved = np.where(self.there, self.tangent, 0.0)
         pairs = moved[:, :, None] * moved[:, None, :]
         return pairs * self.near, pairs * np.minimum(self.elapsed[:, :, None], self.elapsed[:, None, :])

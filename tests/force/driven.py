@@ -11,11 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from stickslip.conformance.rig import base_model
-from stickslip.contact import Bank
 from stickslip.effects import catalogue
-from stickslip.effects.base import Contact, Effect, Motion
+from stickslip.effects.base import Effect
 from stickslip.force.along import Held, Way, along, turning
-from stickslip.model import Forces, Model, State
+from stickslip.model import Model
 from stickslip.params import specs
 from stickslip.solve import Steps, Tolerance, integrate
 
