@@ -229,7 +229,7 @@ def diagnose_campaign(
         result: dict[str, Any] = {
             "kind": "diagnose", "title": loaded.title, **sections, "inputs": inputs, "versions": versions()
         }  # fmt: skip
-        result["rig"] = [finding.plain() for finding in rig]
+        result["rig"] = [f.plain() for f in dict.fromkeys((*rig, *found.wrong))]
         result["notes"] = [*mended, *implied]
         result |= {"can": list(able.can), "cannot": list(able.cannot)}
         result["dropped"] = [*left_out(traces, segmentations), *result["dropped"]]

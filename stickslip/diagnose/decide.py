@@ -6,7 +6,9 @@
 2. *Named*: the seen effect that predicts unseen runs best.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference event by
    event. Where a law is in it with a special case of it, the special case stays: it needs less.
-4. *Unknown*: nothing is seen, but the residual force is a function of a variable.
+4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
+   effect predicts unseen runs better than it, nothing is named.
+5. *Unknown*: nothing is seen, but the residual force is a function of a variable.
 """
 
 from __future__ import annotations
@@ -28,30 +30,22 @@ DISPERSION = 2.0  # of the fall of the cost, over that of perfectly known covari
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A refitted effect beside the model without it.
+class Compared:
+    """A refitted model beside the one that it adds something to.
 
     Attributes:
-        candidate: what was tried.
+        fit: of it.
         gain: fall of the cost.
         chance: of such a fall by chance, corrected for all that was tried.
         unseen: fall of the predictive cost of every event left out, shape (E,).
         fall: of the error on unseen runs, as a share of it.
-        amplitude, std: in SI.
     """
 
-    candidate: Candidate
+    fit: Fit
     gain: float
     chance: float
     unseen: Array
     fall: float
-    amplitude: float
-    std: float
-
-    @property
-    def tag(self) -> str:
-        """Of the effect."""
-        return self.candidate.tag
 
     @property
     def error(self) -> float:
@@ -63,6 +57,25 @@ class Judged:
     def seen(self) -> bool:
         """Rule 1."""
         return self.chance < CHANCE and float(self.unseen.sum()) > ERRORS * self.error and self.fall > 0.0
+
+
+@dataclass(frozen=True)
+class Judged(Compared):
+    """A refitted effect beside the model without it.
+
+    Attributes:
+        candidate: what was tried.
+        amplitude, std: in SI.
+    """
+
+    candidate: Candidate
+    amplitude: float
+    std: float
+
+    @property
+    def tag(self) -> str:
+        """Of the effect."""
+        return self.candidate.tag
 
 
 class Judge:
@@ -82,13 +95,20 @@ class Judge:
         own = [f for f in fit.problem.composition.phases if f.name.startswith(f"{candidate.tag}.")]
         free = [f for f in fit.free if f.name.startswith(f"{candidate.tag}.")]
         number = len(free) + len(own) * len(fit.problem.runs)
-        gain = max(self.base.cost - fit.cost, 0.0)
-        chance = min(1.0, float(chi2.sf(gain / DISPERSION, number)) * candidate.members * self.tried)
-        without, predicted = self._unseen[bool(own)], unseen(fit, self._halves if own else self._runs)
-        fall = 1.0 - self._error(predicted.residual) / self._error(without.residual)
+        found = self.beside(fit, number, candidate.members, bool(own))
         name = candidate.name
         std = fit.std().get(name, np.inf)
-        return Judged(candidate, gain, chance, without.cost - predicted.cost, fall, fit.values[name], std)
+        return Judged(
+            found.fit, found.gain, found.chance, found.unseen, found.fall, candidate, fit.values[name], std
+        )  # fmt: skip
+
+    def beside(self, fit: Fit, number: int, members: int = 1, own: bool = False) -> Compared:
+        """A model with ``number`` parameters more, the best of ``members``; ``own`` where runs have their own."""
+        gain = max(self.base.cost - fit.cost, 0.0)
+        chance = min(1.0, float(chi2.sf(gain / DISPERSION, number)) * members * self.tried)
+        without, predicted = self._unseen[own], unseen(fit, self._halves if own else self._runs)
+        fall = 1.0 - self._error(predicted.residual) / self._error(without.residual)
+        return Compared(fit, gain, chance, without.cost - predicted.cost, fall)
 
     def _error(self, residual: Array) -> float:
         use = ~self.base.dropped
@@ -111,14 +131,15 @@ def named(judged: Sequence[Judged]) -> list[Judged]:
     if not seen:
         return []
     best = max(seen, key=lambda j: float(j.unseen.sum()))
-    close = [best, *(j for j in seen if j is not best and _as_well(best, j))]
+    close = [best, *(j for j in seen if j is not best and as_well(best, j))]
     tags = {j.tag for j in close}
     # what contains another of them needs more to say the same
     simple = [j for j in close if not set(catalogue.get(j.tag).generalises) & (tags - {j.tag})]
     return simple or close
 
 
-def _as_well(best: Judged, other: Judged) -> bool:
+def as_well(best: Compared, other: Compared) -> bool:
+    """Whether a model predicts the unseen runs as well as the best one, within the error of their difference."""
     difference = best.unseen - other.unseen
     total, error = float(difference.sum()), float(np.sqrt(difference.size) * np.std(difference, ddof=1))
     return total < ERRORS * error or total < LEAST

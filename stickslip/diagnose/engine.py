@@ -17,11 +17,12 @@ from ..force.candidates import Candidate, every_form
 from ..force.fit import Array, Fit, deviations, fit
 from ..force.heldout import unseen
 from ..force.residual import Structure, structures
+from ..force.rig import slips_finding, spring_freed
 from ..force.score import Explained
 from ..segment import Segmentation, segment
 from ..trace import Trace
 from .confirm import Confirmation, Parts, confirm
-from .decide import DISPERSION, Judge, Judged, named
+from .decide import DISPERSION, Compared, Judge, Judged, as_well, named
 from .pieces import Store, kept, name_of
 from .prepare import Prepared, prepare
 from .trials import Tell, trials
@@ -40,12 +41,21 @@ class Round:
         judged: every form that was fitted.
         candidates: everything that was tried.
         close: what was named, and behind it what these data cannot tell from it.
+        rival: the model with the spring's stiffness free in place of an effect, where the file states it.
     """
 
     base: Fit
     judged: tuple[Judged, ...]
     candidates: tuple[Candidate, ...]
     close: tuple[Judged, ...]
+    rival: Compared | None = None
+
+    @property
+    def doubt(self) -> Compared | None:
+        """The spring or mass other than stated, where no effect predicts unseen runs better than that."""
+        rival = self.rival
+        doubted = rival is not None and rival.seen and (not self.close or as_well(self.close[0], rival))
+        return rival if doubted else None
 
 
 @dataclass(frozen=True)
@@ -169,6 +179,13 @@ def diagnose(
         key = name.replace(" ", "")
         done = one_round(base, left, jobs, partial(_told, tell, name), in_time, store, key)
         rounds.append(done)
+        if done.doubt is not None:
+            wrong = (*wrong, slips_finding(base, done.doubt.fit))
+            tied = done.close and as_well(done.doubt, done.close[0])
+            verdict = Verdict(
+                "ambiguous" if tied else "unknown", tuple(taken), tuple(j.tag for j in done.close) if tied else ()
+            )
+            break
         if not done.close or not in_time():
             verdict = _end(taken, done, rounds)
             break
@@ -210,7 +227,9 @@ def one_round(
     tried = trials(base, tags, jobs, tell, in_time, store, name)
     judge = Judge(base, max(len(every_form(tags)), 1))
     judged = tuple(j for j in map(judge, tried) if j is not None)
-    return Round(base, judged, tuple(tried), tuple(named(judged)))
+    freed = spring_freed(base)
+    rival = None if freed is None else judge.beside(freed, 1)
+    return Round(base, judged, tuple(tried), tuple(named(judged)), rival)
 
 
 def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: str = "round") -> Fit:

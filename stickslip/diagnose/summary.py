@@ -225,7 +225,10 @@ def verdict_text(d: Diagnosis) -> str:
     v, last, base = d.verdict, d.ladder[-1], d.ladder[1]
     if d.wrong:
         found = " ".join(finding.sentence for finding in d.wrong)
-        return f"{found} Until this is mended no effect is tried, for it would be fitted to the wrong entry."
+        if not any(done.candidates for done in d.rounds):
+            return f"{found} Until this is mended no effect is tried, for it would be fitted to the wrong entry."
+        alike = f" These data cannot tell this from {' or '.join(v.set)}." if v.set else ""
+        return f"{found} No effect predicts unseen runs better than that.{alike}"
     before, after = (error(r.unseen, d) for r in (base, last) if r.unseen is not None)
     parts = []
     if v.effects:
