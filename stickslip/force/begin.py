@@ -94,7 +94,10 @@ def begin(
             log("rig.spring_stiffness", "N/m", stiffness, width, low or stiffness / 10, high or stiffness * 10,
                 "stiffness of the driving spring")
         )  # fmt: skip
-    del mass_width, lightest, heaviest, weighed
+    if not weighed and measured:  # with neither known all forces have one free scale, and the guess of the mass stays
+        free.append(
+            log("rig.mass", "kg", mass, mass_width, lightest or mass / 10, heaviest or mass * 10, "mass of the block")
+        )
     begun = np.zeros((0, len(runs)))
     if not virgin.all():
         unit = strength
