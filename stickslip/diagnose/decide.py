@@ -50,8 +50,7 @@ class Compared:
     @property
     def error(self) -> float:
         """Standard error of the sum of ``unseen``."""
-        n = self.unseen.size
-        return float(np.sqrt(n) * np.std(self.unseen, ddof=1)) if n > 1 else np.inf
+        return standard_error(self.unseen)
 
     @property
     def seen(self) -> bool:
@@ -132,17 +131,35 @@ def named(judged: Sequence[Judged]) -> list[Judged]:
         return []
     best = max(seen, key=lambda j: float(j.unseen.sum()))
     close = [best, *(j for j in seen if j is not best and as_well(best, j))]
-    tags = {j.tag for j in close}
-    # what contains another of them needs more to say the same
-    simple = [j for j in close if not set(catalogue.get(j.tag).generalises) & (tags - {j.tag})]
+    # what contains another of them must pay for what it has more
+    simple = [j for j in close if not any(_no_better(j, o) for o in close if o.tag in catalogue.get(j.tag).generalises)]
     return simple or close
+
+
+def _no_better(general: Judged, special: Judged) -> bool:
+    """Whether a law gains no more over a special case of it than its further parameters cost (Schwarz's criterion)."""
+    more = len(general.fit.free) - len(special.fit.free)
+    return (general.gain - special.gain) / DISPERSION < more * float(np.log(general.unseen.size))
 
 
 def as_well(best: Compared, other: Compared) -> bool:
     """Whether a model predicts the unseen runs as well as the best one, within the error of their difference."""
     difference = best.unseen - other.unseen
-    total, error = float(difference.sum()), float(np.sqrt(difference.size) * np.std(difference, ddof=1))
-    return total < ERRORS * error or total < LEAST
+    total = float(difference.sum())
+    return total < ERRORS * standard_error(difference) or total < LEAST
+
+
+def standard_error(difference: Array) -> float:
+    """Of the sum of what events say for one model against another (differences of predictive cost), shape (E,).
+
+    Two models whose predictions differ by d standard deviations differ in cost by d^2 + 2 d e, with e of unit variance
+    under the better of them: the variance of the sum is four times the sum, and by DISPERSION more. Where events agree
+    among themselves better than that, their own scatter counts; where a few of them say all (those after a hold), it
+    says nothing of the error.
+    """
+    n = difference.size
+    own = float(np.sqrt(n) * np.std(difference, ddof=1)) if n > 1 else np.inf
+    return min(own, float(np.sqrt(4.0 * DISPERSION * abs(difference.sum()))))
 
 
 LEAST = 6.0  # of the predictive cost: a likelihood ratio of twenty

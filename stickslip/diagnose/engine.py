@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -22,12 +22,13 @@ from ..force.score import Explained
 from ..segment import Segmentation, segment
 from ..trace import Trace
 from .confirm import Confirmation, Parts, confirm
-from .decide import DISPERSION, Compared, Judge, Judged, as_well, named
+from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named
 from .pieces import Store, kept, name_of
 from .prepare import Prepared, prepare
 from .trials import Tell, trials
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
+BEST = 10  # effects of a round that are tried again beside the one that was named
 STRUCTURED = 1e-6  # chance of the residual force being a function of some variable, below which something is missing
 MEMBERS = 2  # of a set that are run freely besides the first
 
@@ -67,6 +68,7 @@ class Rung:
         residual: of the force with all events alike, on the runs it was fitted to (N), shape (p,).
         unseen: the same of runs left out; None for the static model, which has no fit of its own.
         fit: None for the static model.
+        removed: an effect that is not needed any more with those that came after it.
     """
 
     model: tuple[str, ...]
@@ -74,6 +76,7 @@ class Rung:
     residual: Array
     unseen: Array | None
     fit: Fit | None
+    removed: str | None = None
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,7 @@ class Diagnosis:
 
     Attributes:
         verdict, ladder, rounds: what was found, and how.
+        named: effects of the last model, each with the round in which it was last told from others.
         prepared: the data.
         floor: of the force at every point: noise and scatter of the last model (N), shape (p,).
         dropped: what was left out, and why.
@@ -103,6 +107,7 @@ class Diagnosis:
     verdict: Verdict
     ladder: tuple[Rung, ...]
     rounds: tuple[Round, ...]
+    named: Mapping[str, Round]
     prepared: Prepared
     floor: Array
     dropped: tuple[str, ...] = field(default=())
@@ -167,46 +172,109 @@ def diagnose(
     tell("fitting the base model", 0.5)
     base = kept(store, "base", prepared.problem, lambda: fit(prepared.problem, prepared.start))
     ladder = [Rung(("static",), None, static_residual(base), None, None), _rung(("static", "inertia"), "inertia", base)]
-    rounds: list[Round] = []
+    search = Search(base, ladder, jobs, tell, in_time, store)
     verdict: Verdict | None = None
     if wrong:  # an effect would be fitted to the wrong entry
-        rounds.append(Round(base, (), (), ()))
+        search.rounds.append(Round(base, (), (), ()))
         verdict = Verdict("unknown")
     while verdict is None:
-        taken = [r.close[0].tag for r in rounds if r.close]
-        left = [t for t in tags if t not in taken]
-        name = f"round {len(rounds) + 1}"
-        key = name.replace(" ", "")
-        done = one_round(base, left, jobs, partial(_told, tell, name), in_time, store, key)
-        rounds.append(done)
+        done = search.round([t for t in tags if t not in search.named])
         if done.doubt is not None:
-            wrong = (*wrong, slips_finding(base, done.doubt.fit))
+            wrong = (*wrong, slips_finding(done.base, done.doubt.fit))
             tied = done.close and as_well(done.doubt, done.close[0])
-            verdict = Verdict(
-                "ambiguous" if tied else "unknown", tuple(taken), tuple(j.tag for j in done.close) if tied else ()
-            )
-            break
-        if not done.close or not in_time():
-            verdict = _end(taken, done, rounds)
-            break
-        tell(f"{name}: the model with {done.close[0].tag}", 1.0)
-        base = settled(base, done.close[0].candidate, store, key)
-        ladder.append(_rung((*ladder[-1].model, done.close[0].tag), done.close[0].tag, base))
-        if len(taken) + 1 >= max_effects:
-            verdict = _end([*taken, done.close[0].tag], replace(done, base=base, close=()), rounds)
-    floor = deviations(base)
+            alike = tuple(j.tag for j in done.close) if tied else ()
+            verdict = Verdict("ambiguous" if tied else "unknown", tuple(search.named), alike)
+        elif not done.close or not in_time():
+            verdict = _end(search.named, done)
+        else:
+            search.add(done)
+            if len(search.named) >= max_effects:
+                verdict = _end(search.named, Round(search.base, (), (), ()))
+    floor = deviations(search.base)
     complete = in_time()
-    confirmed = confirm(leading(ladder, rounds), ladder[-1].model, prepared, store, tell, in_time)
+    confirmed = confirm(leading(ladder, search.named), ladder[-1].model, prepared, store, tell, in_time)
     return Diagnosis(
-        verdict, tuple(ladder), tuple(rounds), prepared, floor, tuple(dropped), complete, confirmed, tuple(wrong)
+        verdict, tuple(ladder), tuple(search.rounds), dict(search.named), prepared, floor, tuple(dropped), complete,
+        confirmed, tuple(wrong),
     )  # fmt: skip
 
 
-def leading(ladder: Sequence[Rung], rounds: Sequence[Round]) -> dict[Parts, Fit]:
+class Search:
+    """The model as it grows: effects added, and each tried again with those that came after it.
+
+    Attributes:
+        base: the model as it stands.
+        ladder: its steps.
+        rounds: all effects on top of each model.
+        named: effects of the model, each with the round in which it was last told from others.
+    """
+
+    def __init__(
+        self, base: Fit, ladder: list[Rung], jobs: int, tell: Tell, in_time: Callable[[], bool], store: Store | None
+    ) -> None:
+        self.base, self.ladder = base, ladder
+        self.rounds: list[Round] = []
+        self.named: dict[str, Round] = {}
+        self._jobs, self._tell, self._in_time, self._store = jobs, tell, in_time, store
+
+    def round(self, tags: Sequence[str]) -> Round:
+        """Every effect of these on top of the model."""
+        name = f"round {len(self.rounds) + 1}"
+        done = self._tried(self.base, tags, name)
+        self.rounds.append(done)
+        return done
+
+    def add(self, done: Round) -> None:
+        """Take up what a round named, and try again each effect named before."""
+        tag, key = done.close[0].tag, f"round{len(self.rounds)}"
+        self._tell(f"round {len(self.rounds)}: the model with {tag}", 1.0)
+        self._take(settled(done.base, done.close[0].candidate, self._store, key), tag, None)
+        self.named[tag] = done
+        for earlier in list(self.named)[:-1]:
+            if self._in_time():
+                self._again(earlier)
+
+    def _again(self, tag: str) -> None:
+        """An effect tried once more, beside the best of its own round, with all others in the model."""
+        name = f"again {tag} in round {len(self.rounds)}"
+        key = name.replace(" ", "-")
+        problem = self.base.problem.with_composition(self.base.problem.composition.without(tag))
+        keep = [not f.name.startswith(f"{tag}.") for f in self.base.problem.composition.shared]
+        turns = [not f.name.startswith(f"{tag}.") for f in self.base.problem.composition.phases]
+        at = replace(self.base.point, z=self.base.point.z[keep], phases=self.base.point.phases[turns])
+        without = kept(
+            self._store, f"{key}-without", problem,
+            lambda: fit(problem, at, self.base.scatter, dropped=self.base.dropped, first=True),
+        )  # fmt: skip
+        seen = sorted((j for j in best_forms(self.named[tag].judged) if j.seen), key=lambda j: -float(j.unseen.sum()))
+        tags = [j.tag for j in seen if j.tag == tag or j.tag not in self.named][:BEST]
+        done = self._tried(without, tags, name)
+        if not done.close:
+            del self.named[tag]
+            self._take(without, None, tag)
+        elif done.close[0].tag == tag:
+            self.named[tag] = done
+        else:
+            other = done.close[0].tag
+            self._take(settled(without, done.close[0].candidate, self._store, key), other, tag)
+            self.named = {other if t == tag else t: done if t == tag else r for t, r in self.named.items()}
+
+    def _tried(self, base: Fit, tags: Sequence[str], name: str) -> Round:
+        key = name.replace(" ", "")
+        return one_round(base, tags, self._jobs, partial(_told, self._tell, name), self._in_time, self._store, key)
+
+    def _take(self, base: Fit, added: str | None, removed: str | None) -> None:
+        self.base = base
+        model = [t for t in self.ladder[-1].model if t != removed]
+        self.ladder.append(_rung((*model, *([added] if added else [])), added, base, removed))
+
+
+def leading(ladder: Sequence[Rung], named: Mapping[str, Round]) -> dict[Parts, Fit]:
     """The models that are run freely: base and last of the ladder, and what the data cannot tell from an effect."""
     fits = [(r.model, r.fit) for r in (ladder[1], ladder[-1])]
-    for rung, done in zip(ladder[1:], rounds, strict=False):
-        fits += [((*rung.model, j.tag), j.candidate.fit) for j in done.close[1 : 1 + MEMBERS]]
+    for done in named.values():
+        parts = (*ladder[1].model, *(e.tag for e in done.base.problem.composition.effects))
+        fits += [((*parts, j.tag), j.candidate.fit) for j in done.close[1 : 1 + MEMBERS]]
     return {parts: fit for parts, fit in fits if fit is not None}
 
 
@@ -243,23 +311,23 @@ def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: s
     )  # fmt: skip
 
 
-def _end(taken: Sequence[str], last: Round, rounds: Sequence[Round]) -> Verdict:
+def _end(named: Mapping[str, Round], last: Round) -> Verdict:
     """Nothing more is seen: what that means."""
-    sets = [r.close for r in rounds if len(r.close) > 1]
+    taken, sets = tuple(named), [r.close for r in named.values() if len(r.close) > 1]
     structure = None
     found = structures(last.base, Explained(last.base), DISPERSION)
     if found and found[0].chance < STRUCTURED and not last.close:
         structure = found[0]
     if structure is not None:
-        return Verdict("unknown", tuple(taken), tuple(dict.fromkeys(j.tag for c in sets for j in c)), structure)
+        return Verdict("unknown", taken, tuple(dict.fromkeys(j.tag for c in sets for j in c)), structure)
     if sets:
         every = tuple(dict.fromkeys([*taken, *(j.tag for c in sets for j in c)]))
-        return Verdict("ambiguous", tuple(taken), every)
-    return Verdict("missing" if taken else "complete", tuple(taken), tuple(taken))
+        return Verdict("ambiguous", taken, every)
+    return Verdict("missing" if taken else "complete", taken, taken)
 
 
-def _rung(model: tuple[str, ...], added: str, found: Fit) -> Rung:
-    return Rung(model, added, found.marginal, unseen(found).residual, found)
+def _rung(model: tuple[str, ...], added: str | None, found: Fit, removed: str | None = None) -> Rung:
+    return Rung(model, added, found.marginal, unseen(found).residual, found, removed)
 
 
 def static_residual(base: Fit) -> Array:

@@ -49,7 +49,7 @@ def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
             "text": verdict_text(d),
             "reasons": reasons(d),
             "confidence": None,
-            "forms": {r.close[0].tag: dict(r.close[0].candidate.form) for r in d.rounds if r.close},
+            "forms": {tag: dict(r.close[0].candidate.form) for tag, r in d.named.items()},
         },
         "caution": [
             *([] if d.in_time else ["the time limit came before all effects were tried: this is the best so far"]),
@@ -61,7 +61,9 @@ def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
         "ranking_base": _ranking_base(first, d.ladder[1], d),
         "later_rounds": [
             {"base": _ranking_base(r, rung, d), "ranking": _ranking(r, rung, d)}
-            for r, rung in zip(d.rounds[1:], d.ladder[2:], strict=False)
+            for r in d.rounds[1:]
+            for rung in d.ladder[2:]
+            if rung.fit is r.base
         ],
         "visible": visible(d),
         "structure": _structure(d),
@@ -102,7 +104,7 @@ def _rung(rung: Rung, d: Diagnosis) -> dict[str, Any]:
     return {
         "model": list(rung.model),
         "added": rung.added,
-        "removed": None,
+        "removed": rung.removed,
         "train_error": error(rung.residual, d),
         "heldout_error": None if rung.unseen is None else error(rung.unseen, d),
         "by_phase": by_phase(rung.residual, d),
@@ -197,7 +199,7 @@ def failures(j: Judged, done: Round) -> list[str]:
 def reasons(d: Diagnosis) -> list[str]:
     """What the naming of each effect rests on."""
     out = []
-    for done in d.rounds:
+    for done in d.named.values():
         if done.close:
             j = done.close[0]
             out.append(
@@ -243,7 +245,7 @@ def verdict_text(d: Diagnosis) -> str:
             f"({'; '.join(amounts)})."
         )
     if v.kind == "ambiguous":
-        sets = [[j.tag for j in r.close] for r in d.rounds if len(r.close) > 1]
+        sets = [[j.tag for j in r.close] for r in d.named.values() if len(r.close) > 1]
         parts.append("These data cannot tell " + "; nor ".join(" from ".join(s) for s in sets) + ".")
     if v.kind == "unknown" and v.structure is not None:
         parts.append(
@@ -263,7 +265,7 @@ def verdict_text(d: Diagnosis) -> str:
 
 def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
     """For effects that these data cannot tell apart: what the catalogue knows to separate them."""
-    sets = [r.close for r in d.rounds if len(r.close) > 1]
+    sets = [r.close for r in d.named.values() if len(r.close) > 1]
     if not sets:
         return None
     made = []
