@@ -4,8 +4,9 @@
    members of its family, among as many effects; and unseen runs are predicted better: their likelihood by more than
    2.5 standard errors over their events, and their error (root mean square over floor) as well.
 2. *Named*: the seen effect that predicts unseen runs best.
-3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference event by
-   event. Where a law is in it with a special case of it, the special case stays: it needs less.
+3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. One whose
+   amplitude is beyond where such amplitudes lie leaves it, if another's is not; a law that contains another of the set
+   leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
    effect predicts unseen runs better than it, nothing is named.
 5. *Unknown*: nothing is seen, but the residual force is a function of a variable.
@@ -76,6 +77,12 @@ class Judged(Compared):
         """Of the effect."""
         return self.candidate.tag
 
+    @property
+    def usual(self) -> bool:
+        """Whether the amplitude lies where such amplitudes lie, within the error."""
+        low, high = catalogue.amplitude(catalogue.get(self.tag)).usual or (-np.inf, np.inf)
+        return low - ERRORS * self.std <= self.amplitude <= high + ERRORS * self.std
+
 
 class Judge:
     """The model without, and how it predicts what it has not seen."""
@@ -131,6 +138,8 @@ def named(judged: Sequence[Judged]) -> list[Judged]:
         return []
     best = max(seen, key=lambda j: float(j.unseen.sum()))
     close = [best, *(j for j in seen if j is not best and as_well(best, j))]
+    # an amplitude beyond where such amplitudes lie imitates something
+    close = [j for j in close if j.usual] or close
     # what contains another of them must pay for what it has more
     simple = [j for j in close if not any(_no_better(j, o) for o in close if o.tag in catalogue.get(j.tag).generalises)]
     return simple or close
@@ -152,14 +161,14 @@ def as_well(best: Compared, other: Compared) -> bool:
 def standard_error(difference: Array) -> float:
     """Of the sum of what events say for one model against another (differences of predictive cost), shape (E,).
 
-    Two models whose predictions differ by d standard deviations differ in cost by d^2 + 2 d e, with e of unit variance
-    under the better of them: the variance of the sum is four times the sum, and by DISPERSION more. Where events agree
-    among themselves better than that, their own scatter counts; where a few of them say all (those after a hold), it
-    says nothing of the error.
+    An event that two models predict d standard deviations apart differs in cost by d^2 + 2 d e, with e of unit variance
+    under the better one: its variance is four times its size, and by DISPERSION more. Where events agree among
+    themselves better than that, their own scatter counts; where a few of them say all (those after a hold), it says
+    nothing of the error.
     """
     n = difference.size
     own = float(np.sqrt(n) * np.std(difference, ddof=1)) if n > 1 else np.inf
-    return min(own, float(np.sqrt(4.0 * DISPERSION * abs(difference.sum()))))
+    return min(own, float(np.sqrt(4.0 * DISPERSION * np.abs(difference).sum())))
 
 
 LEAST = 6.0  # of the predictive cost: a likelihood ratio of twenty

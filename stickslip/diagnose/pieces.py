@@ -47,7 +47,8 @@ def name_of(tag: str, form: Mapping[str, str]) -> str:
 def save_candidate(store: Store, key: str, candidate: Candidate) -> None:
     """Keep a candidate."""
     head = json.dumps({name: getattr(candidate, name) for name in _FACTS})
-    point = {} if candidate.fit is None else _arrays(candidate.fit.point)
+    fit = candidate.fit
+    point = {} if fit is None else {**_arrays(fit.point), "sizes": fit.scatter.sizes}
     store.save(key, {"head": np.array(head), **point})
 
 
@@ -61,7 +62,7 @@ def load_candidate(store: Store, key: str, base: Fit) -> Candidate | None:
         return Candidate(**head, fit=None)
     effect = catalogue.get(head["tag"])(**head["form"])
     problem, _ = with_start(base.problem, effect, head["start"])
-    return Candidate(**head, fit=at(problem, _point(found), base.scatter, base.dropped, base.known))
+    return Candidate(**head, fit=at(problem, _point(found), Scatter(found["sizes"]), base.dropped, base.known))
 
 
 def _arrays(point: Point) -> dict[str, np.ndarray]:

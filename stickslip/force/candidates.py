@@ -15,7 +15,7 @@ from ..effects.base import Effect, Geometry
 from ..errors import StickslipError
 from ..fit.parameters import Free, effect_parameters
 from ..params import Spec, specs
-from .fit import LAST, Array, Fit, continued, refit
+from .fit import LAST, Array, Fit, adapted, continued, refit
 from .problem import Point, Problem, is_own
 from .score import Explained, signatures
 
@@ -92,15 +92,20 @@ def _axis(spec: Spec, own: float) -> tuple[float, ...]:
 
 
 def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[str, str]]) -> list[Candidate]:
-    """An effect in some of its forms, each refitted in full; then each once more from where the best of them ended."""
+    """An effect in some of its forms, each refitted in full, then once more from where the best of them ended.
+
+    The best is given sizes of its own of what is random.
+    """
     made = [_tried(base, explained, tag, form) for form in forms]
-    fitted = [c for c in made if c.fit is not None]
-    if len(fitted) < 2 or catalogue.get(tag).periodic is not None:
+    best = min(made, key=_cost)
+    if best.fit is None:
         return made
-    best = min(fitted, key=_cost)
+    if catalogue.get(tag).periodic is None:
+        own = {n.partition(".")[2]: v for n, v in best.fit.values.items() if n.startswith(f"{tag}.")}
+        made = [c if c is best or c.fit is None else _better(c, _from(base, c, own)) for c in made]
+        best = min(made, key=_cost)
     assert best.fit is not None
-    own = {n.partition(".")[2]: v for n, v in best.fit.values.items() if n.startswith(f"{tag}.")}
-    return [c if c is best or c.fit is None else _better(c, _from(base, c, own)) for c in made]
+    return [replace(c, fit=adapted(best.fit)) if c is best else c for c in made]
 
 
 def _tried(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> Candidate:

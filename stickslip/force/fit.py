@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 from ..errors import FitError
 from ..fit.parameters import Free
 from .problem import PULL, Point, Problem, Slopes
-from .scatter import Blocks, Known, Scatter, covariance, estimate
+from .scatter import Blocks, Known, Scatter, covariance, estimate, misfit
 
 Array = NDArray[np.float64]
 BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean
@@ -293,6 +293,27 @@ def continued(found: Fit) -> Fit:
     return _found(
         found.problem, point, slopes, found.scatter, found.dropped, found.known, found.evaluations + count
     )  # fmt: skip
+
+
+def adapted(found: Fit) -> Fit:
+    """A refit with sizes of its own of what is random; what carries the noise to a force stays that of its base.
+
+    Under the sizes of a model that lacks an effect, events look as scattered as the effect makes them, and laws that
+    describe it more or less well look alike.
+    """
+    problem, blocks = found.problem, found.blocks
+    point, slopes, sizes, evaluations = found.point, found.slopes, found.scatter, found.evaluations
+    for _ in range(ROUNDS):
+        known = found.known.with_local(blocks(slopes.local))
+        marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", known.local, point.events)
+        before = misfit(sizes.sizes, marginal, known)
+        sizes = estimate(sizes, marginal, known, NEWTON)
+        fallen = before - misfit(sizes.sizes, marginal, known)
+        point, slopes, total, count = descend(problem, point, slopes, sizes, known, blocks, STEPS)
+        evaluations += count
+        if fallen + total < 1.0:
+            break
+    return _found(problem, point, slopes, sizes, found.dropped, found.known, evaluations)
 
 
 def descend(

@@ -127,8 +127,8 @@ def _alike(s: Array, k: Known) -> tuple[Array, Array, Array]:
     return own[:, :, None] * own[:, None, :] * k.near, s[7] ** 2 * placed, s[8] ** 2 * walked
 
 
-def _cost(sizes: Array, residual: Array, k: Known) -> float:
-    """Twice the negative logarithm of the likelihood, and of what is expected of the sizes."""
+def misfit(sizes: Array, residual: Array, k: Known) -> float:
+    """Twice the negative logarithm of the likelihood of residuals (E, n), and of what is expected of the sizes."""
     try:
         root = np.linalg.cholesky(covariance(sizes, k)[1])
     except np.linalg.LinAlgError:
@@ -178,7 +178,7 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     low = np.append(CENTRES[:-1] - 5.0 * WIDTHS[:-1], -0.05)
     high = np.append(CENTRES[:-1] + 4.0 * WIDTHS[:-1], 1.0)
     sizes, damping = np.clip(start.sizes, low, high), 1e-2
-    cost = _cost(sizes, residual, known)
+    cost = misfit(sizes, residual, known)
     for _ in range(steps):
         gradient, information = _slopes(sizes, residual, known)
         free = ~(((sizes <= low) & (gradient > 0.0)) | ((sizes >= high) & (gradient < 0.0)))
@@ -188,7 +188,7 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
             step = np.zeros(sizes.size)
             step[free] = -np.linalg.solve(matrix, gradient[free])
             trial = np.clip(sizes + np.clip(step, -FARTHEST, FARTHEST), low, high)
-            there = _cost(trial, residual, known)
+            there = misfit(trial, residual, known)
             if there < cost:
                 fallen, cost, sizes, damping = cost - there, there, trial, max(0.1 * damping, 1e-6)
                 break

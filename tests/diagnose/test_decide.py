@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from stickslip.diagnose.decide import CHANCE, ERRORS, Judged, best_forms, named
+from stickslip.diagnose.decide import CHANCE, DISPERSION, ERRORS, Judged, best_forms, named, standard_error
 from stickslip.force.candidates import Candidate
 
 EVENTS = 40
 
 
 def judged(tag: str, gain: float, each: float, *, spread: float = 1.0, chance: float = 1e-9, fall: float = 0.2,
-           form: dict[str, str] | None = None) -> Judged:  # fmt: skip
+           form: dict[str, str] | None = None, parameters: int = 8, amplitude: float = 0.01) -> Judged:  # fmt: skip
     """An effect whose gain on every unseen event is ``each``, give or take ``spread``."""
     swing = spread * np.where(np.arange(EVENTS) % 2, 1.0, -1.0)
-    return Judged(Candidate(tag, form or {}, gain, None), gain, chance, each + swing, fall, 0.01, 0.001)
+    fit: Any = SimpleNamespace(free=range(parameters))
+    return Judged(
+        fit, gain, chance, each + swing, fall, Candidate(tag, form or {}, gain, None), amplitude, 0.001
+    )  # fmt: skip
 
 
 def test_what_predicts_unseen_runs_best_is_named():
@@ -46,10 +52,28 @@ def test_what_predicts_as_well_event_by_event_is_a_set():
 
 
 def test_of_a_law_and_its_special_case_the_special_case_stays():
-    both = [judged("rate-and-state", 310.0, 8.05), judged("contact-ageing", 300.0, 8.0)]
+    both = [judged("rate-and-state", 304.0, 8.05, parameters=9), judged("contact-ageing", 300.0, 8.0)]
     assert [j.tag for j in named(both)] == ["contact-ageing"]
+    paid = [judged("rate-and-state", 312.0, 8.05, parameters=9), judged("contact-ageing", 300.0, 8.0)]
+    assert [j.tag for j in named(paid)] == ["rate-and-state", "contact-ageing"]
     alone = [judged("rate-and-state", 410.0, 12.0), judged("contact-ageing", 300.0, 8.0)]
     assert [j.tag for j in named(alone)] == ["rate-and-state"]
+
+
+def test_an_amplitude_beyond_where_such_amplitudes_lie_leaves_a_set():
+    pair = [judged("velocity-weakening", 300.0, 8.0, amplitude=-0.02), judged("direct-effect", 300.0, 8.0)]
+    assert [j.tag for j in named(pair)] == ["direct-effect"]
+    within = [judged("velocity-weakening", 300.0, 8.0, amplitude=-0.002), judged("direct-effect", 300.0, 8.0)]
+    assert len(named(within)) == 2
+    assert [j.tag for j in named(pair[:1])] == ["velocity-weakening"]
+
+
+def test_a_few_events_that_say_all_are_enough():
+    """After two holds of forty sticks one law is right by 130 each, and elsewhere both are."""
+    difference = np.zeros(EVENTS)
+    difference[[10, 20]] = 130.0
+    assert standard_error(difference) == pytest.approx(np.sqrt(4.0 * DISPERSION * 260.0))
+    assert difference.sum() > ERRORS * standard_error(difference)
 
 
 def test_every_effect_stands_once_in_its_best_form():
