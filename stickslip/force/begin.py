@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -108,6 +109,7 @@ def begin(
         begun = np.array([[0.0 if k.virgin else 1.0 - float(np.median(f)) / strength
                            for k, f in zip(runs, onsets, strict=True)]])  # fmt: skip
     yields = reach * np.geomspace(*REACH, elements)
+    runs = [replace(k, stiffness=None) if k.stiffness == stiffness else k for k in runs]  # one spring for all of them
     composition = Composition(mass, yields, tuple(free), fixed, (), (nominal, width_nominal))
     problem = Problem(composition, runs)
     flat = np.full(elements, strength / elements)

@@ -267,7 +267,7 @@ def fit(
             break
     made = known_of(problem, point, slopes, blocks, out)
     point, slopes, _, count = descend(problem, point, slopes, sizes, made, blocks, LAST)
-    return _found(problem, point, slopes, sizes, out, made, evaluations + count)
+    return adapted(_found(problem, point, slopes, sizes, out, made, evaluations + count))
 
 
 def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:

@@ -13,7 +13,7 @@ import numpy as np
 from ..checks.finding import Finding
 from ..fit.parameters import Free
 from ..units import shown
-from .fit import Fit, refit
+from .fit import Fit, adapted, refit
 from .problem import Point
 
 SPRING = "rig.spring_stiffness"
@@ -42,7 +42,7 @@ def spring_freed(base: Fit) -> Fit | None:
     free = (*composition.shared, spring, *composition.phases)
     problem = base.problem.with_composition(replace(composition, free=free, fixed=fixed))
     point: Point = replace(base.point, z=np.insert(base.point.z, first, spring.inward(stated)))
-    return refit(problem, point, base)
+    return adapted(refit(problem, point, base))
 
 
 def slips_finding(base: Fit, freed: Fit) -> Finding:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip.force.knots import PHASES
-from stickslip.force.scatter import NAMES, Blocks, Known, Scatter, covariance, estimate
+from stickslip.force.scatter import NAMES, Blocks, Known, Scatter, _slopes, covariance, estimate, misfit
 
 STRENGTH = 0.25  # N
 EVENTS, POINTS = 60, 48
@@ -81,6 +81,19 @@ def test_sizes_are_found_in_what_was_drawn_from_them():
     off = dict(zip(NAMES, found.sizes - true(), strict=True))
     for name in NAMES:
         assert abs(off[name]) < (0.5 if name in ("walk", "position", "offset") else 0.3), (name, off)
+
+
+def test_slopes_are_those_of_the_cost():
+    known = events(short=True)
+    residual = np.random.default_rng(3).standard_normal((EVENTS, POINTS)) * 1e-3 * STRENGTH * known.there
+    at = true() + 0.3
+    gradient, information = _slopes(at, residual, known)
+    for step in (1e-3, 1e-4, 1e-5):
+        seen = [
+            (misfit(at + d, residual, known) - misfit(at - d, residual, known)) / (2 * step) for d in step * np.eye(10)
+        ]
+        np.testing.assert_allclose(gradient, seen, rtol=2e-4, atol=1e-4 * np.abs(gradient).max())
+    assert np.linalg.eigvalsh(information).min() > 0.0
 
 
 def test_blocks_go_side_by_side_and_back():

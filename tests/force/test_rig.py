@@ -1,0 +1,48 @@
+"""Spring over mass from the slips themselves: a wrong entry is found with its size, a right one is left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from stickslip.diagnose.decide import Judge
+from stickslip.force.fit import fit
+from stickslip.force.rig import SPRING, slips_finding, spring_freed
+from stickslip.units import shown
+
+from .conftest import Case
+
+
+def stated(case: Case, factor: float):
+    """The base fitted with the stiffness in the file wrong by a factor."""
+    composition = case.problem.composition
+    fixed = {**composition.fixed, SPRING: factor * composition.fixed[SPRING]}
+    return fit(case.problem.with_composition(replace(composition, fixed=fixed)), case.point)
+
+
+@pytest.mark.parametrize("factor", [1.05, 0.9])
+def test_a_stiffness_that_is_wrong_is_found_with_the_true_one(small, factor):
+    base = stated(small, factor)
+    freed = spring_freed(base)
+    assert freed is not None
+    true = small.truth["rig"]["spring_stiffness"]
+    assert freed.values[SPRING] == pytest.approx(true, rel=5e-3)
+    assert Judge(base, 40).beside(freed, 1).seen
+    finding = slips_finding(base, freed)
+    assert finding.stops
+    assert finding.stated == pytest.approx(factor * true, rel=1e-6)
+    weighs = shown(freed.values["rig.mass"] * finding.stated / finding.value, "kg", 3)
+    assert f"a block of {weighs} on the spring" in finding.sentence
+
+
+def test_a_stiffness_that_is_right_is_left_alone(small):
+    base = stated(small, 1.0)
+    freed = spring_freed(base)
+    assert freed is not None
+    assert abs(freed.values[SPRING] - base.values[SPRING]) < 4.0 * freed.std()[SPRING] + 1e-3 * base.values[SPRING]
+    assert not Judge(base, 40).beside(freed, 1).seen
+
+
+def test_a_spring_that_is_free_already_has_no_rival(begun):
+    assert spring_freed(fit(begun.problem, begun.point, rounds=1)) is None
