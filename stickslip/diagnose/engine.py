@@ -178,7 +178,7 @@ def diagnose(
         search.rounds.append(Round(base, (), (), ()))
         verdict = Verdict("unknown")
     while verdict is None:
-        done = search.round([t for t in tags if t not in search.named])
+        done = search.round([t for t in tags if t not in search.named and t not in search.gone])
         if done.doubt is not None:
             wrong = (*wrong, slips_finding(done.base, done.doubt.fit))
             tied = done.close and as_well(done.doubt, done.close[0])
@@ -207,6 +207,7 @@ class Search:
         ladder: its steps.
         rounds: all effects on top of each model.
         named: effects of the model, each with the round in which it was last told from others.
+        gone: effects that were taken out again; they are not tried any more, so that the search ends.
     """
 
     def __init__(
@@ -215,6 +216,7 @@ class Search:
         self.base, self.ladder = base, ladder
         self.rounds: list[Round] = []
         self.named: dict[str, Round] = {}
+        self.gone: set[str] = set()
         self._jobs, self._tell, self._in_time, self._store = jobs, tell, in_time, store
 
     def round(self, tags: Sequence[str]) -> Round:
@@ -247,7 +249,7 @@ class Search:
             lambda: fit(problem, at, self.base.scatter, dropped=self.base.dropped, first=True),
         )  # fmt: skip
         seen = sorted((j for j in best_forms(self.named[tag].judged) if j.seen), key=lambda j: -float(j.unseen.sum()))
-        tags = [j.tag for j in seen if j.tag == tag or j.tag not in self.named][:BEST]
+        tags = [j.tag for j in seen if j.tag == tag or j.tag not in {*self.named, *self.gone}][:BEST]
         done = self._tried(without, tags, name)
         if not done.close:
             del self.named[tag]
@@ -265,6 +267,7 @@ class Search:
 
     def _take(self, base: Fit, added: str | None, removed: str | None) -> None:
         self.base = base
+        self.gone |= {removed} if removed else set()
         model = [t for t in self.ladder[-1].model if t != removed]
         self.ladder.append(_rung((*model, *([added] if added else [])), added, base, removed))
 

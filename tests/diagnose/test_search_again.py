@@ -1,0 +1,106 @@
+"""An effect that was named is tried again with those that came after it: kept, exchanged or taken out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip.diagnose import engine
+from stickslip.diagnose.decide import Judged
+from stickslip.force.candidates import Candidate
+from stickslip.force.problem import Composition
+
+EVENTS = 30
+
+
+def judged(tag: str, each: float) -> Judged:
+    """An effect that predicts every unseen event better by ``each``."""
+    fit: Any = SimpleNamespace(free=range(6), tag=tag)
+    return Judged(
+        fit, EVENTS * each, 1e-9, np.full(EVENTS, each), 0.2, Candidate(tag, {}, 1.0, fit), 0.01, 0.001
+    )  # fmt: skip
+
+
+class Model(SimpleNamespace):
+    """A stand-in for a fit: the tags of its effects."""
+
+    def __init__(self, tags: tuple[str, ...]) -> None:
+        composition = SimpleNamespace(shared=(), phases=(), without=self._without)
+        problem = SimpleNamespace(composition=composition, with_composition=lambda made: made)
+        point = SimpleNamespace(z=np.zeros(0), phases=np.zeros((0, 1)))
+        super().__init__(tags=tags, problem=problem, point=point, scatter=None, dropped=None)
+
+    def _without(self, tag: str) -> Model:
+        return Model(tuple(t for t in self.tags if t != tag))
+
+
+@pytest.fixture
+def search(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A search whose rounds are looked up by the model they stand on and what is left to try."""
+    table: dict[tuple[str, ...], dict[str, float]] = {}
+
+    def one_round(base: Any, tags: Sequence[str], *_: Any) -> engine.Round:
+        found = [judged(t, each) for t, each in table[base.tags].items() if t in tags]
+        return engine.Round(base, tuple(found), (), tuple(engine.named(found)))
+
+    monkeypatch.setattr(engine, "one_round", one_round)
+    monkeypatch.setattr(engine, "replace", lambda point, **_: point)
+    monkeypatch.setattr(engine, "fit", lambda problem, *_, **__: problem)
+    monkeypatch.setattr(engine, "settled", lambda base, c, *_: Model((*base.tags, c.tag)))
+    monkeypatch.setattr(
+        engine,
+        "_rung",
+        lambda model, added, fit, removed=None: engine.Rung(model, added, np.zeros(0), None, fit, removed),
+    )
+    ladder = [engine._rung(("static", "inertia"), "inertia", Model(()))]
+    made = engine.Search(Model(()), ladder, 1, lambda *_: None, lambda: True, None)
+    made.table = table
+    return made
+
+
+def grown(search: Any, tags: Sequence[str]) -> None:
+    while (done := search.round([t for t in tags if t not in search.named and t not in search.gone])).close:
+        search.add(done)
+
+
+def test_what_is_still_needed_stays(search):
+    search.table |= {
+        (): {"wear": 20.0, "tilt": 10.0}, ("wear",): {"tilt": 9.0}, ("tilt",): {"wear": 19.0}, ("wear", "tilt"): {},
+    }  # fmt: skip
+    grown(search, ["wear", "tilt"])
+    assert list(search.named) == ["wear", "tilt"]
+    assert search.ladder[-1].model == ("static", "inertia", "wear", "tilt")
+    assert search.base.tags == ("wear", "tilt")
+
+
+def test_what_stood_in_for_another_is_taken_out(search):
+    search.table |= {
+        (): {"wear": 20.0, "tilt": 15.0}, ("wear",): {"tilt": 9.0}, ("tilt",): {}, ("wear", "tilt"): {},
+    }  # fmt: skip
+    grown(search, ["wear", "tilt"])
+    assert list(search.named) == ["tilt"]
+    assert search.ladder[-1].removed == "wear"
+    assert search.ladder[-1].model == ("static", "inertia", "tilt")
+
+
+def test_what_another_replaces_is_exchanged(search):
+    search.table |= {
+        (): {"sensor-gain": 20.0, "wear": 18.0, "tilt": 10.0}, ("sensor-gain",): {"tilt": 9.0},
+        ("tilt",): {"sensor-gain": 5.0, "wear": 25.0}, ("tilt", "wear"): {},
+    }  # fmt: skip
+    grown(search, ["sensor-gain", "wear", "tilt"])
+    assert list(search.named) == ["wear", "tilt"]
+    assert (search.ladder[-1].added, search.ladder[-1].removed) == ("wear", "sensor-gain")
+    assert set(search.ladder[-1].model) == {"static", "inertia", "tilt", "wear"}
+
+
+def test_a_model_without_an_effect_has_none_of_its_parameters():
+    free = tuple(SimpleNamespace(name=n) for n in ("rig.damping", "wear.drift", "tilt.slope"))
+    effects: Any = (SimpleNamespace(tag="wear"), SimpleNamespace(tag="tilt"))
+    made = Composition(0.1, np.ones(3), free, {}, effects).without("wear")  # type: ignore[arg-type]
+    assert [f.name for f in made.free] == ["rig.damping", "tilt.slope"]
+    assert [e.tag for e in made.effects] == ["tilt"]
