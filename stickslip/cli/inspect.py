@@ -84,7 +84,8 @@ def inspection(
     loaded: Campaign, traces: list[Trace], found: list[Segmentation]
 ) -> tuple[dict[str, Any], dict[str, tuple]]:
     """``result.json`` of an inspection, and the arrays its pictures need."""
-    from ..checks import rig_against_motion
+    from ..checks import rig_against_motion, stopping
+    from ..diagnose.spring import spring_finding
     from ..report import abilities, describe_trace, trace_pieces
     from ..report.ripple import stick_ripple
 
@@ -102,9 +103,12 @@ def inspection(
     able = abilities(traces, found)
     cannot = [*able.cannot, *_lacking(loaded, traces, found)]
     dropped = [f"{t['name']}: {text}" for t in rows for text in (*t["repairs"], *t["dropped"])]
+    rig = list(rig_against_motion(loaded, traces, found))
+    if not stopping(rig) and (wrong := spring_finding(loaded, traces, found)) is not None:
+        rig.append(wrong)
     result = {
         **head(loaded, "inspect"),
-        "rig": [finding.plain() for finding in rig_against_motion(loaded, traces, found)],
+        "rig": [finding.plain() for finding in rig],
         "traces": rows,
         "can": list(able.can),
         "cannot": cannot,
