@@ -2,11 +2,11 @@
 
 1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many
    members of its family, among as many effects; and unseen runs are predicted better: their likelihood by more than
-   2.5 standard errors over their events, and their error (root mean square over floor) as well.
+   2.5 standard errors over their events, and their error (root mean square over floor) as well; and its parameters lie
+   where such values lie (``usual`` in the catalogue), within their errors.
 2. *Named*: the seen effect that predicts unseen runs best.
-3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. One whose
-   amplitude is beyond where such amplitudes lie leaves it, if another's is not; a law that contains another of the set
-   leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
+3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
+   contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
    effect predicts unseen runs better than it, nothing is named.
 5. *Unknown*: nothing is seen, but the residual force is a function of a variable.
@@ -66,11 +66,13 @@ class Judged(Compared):
     Attributes:
         candidate: what was tried.
         amplitude, std: in SI.
+        strange: parameters of the effect that lie beyond where such values lie.
     """
 
     candidate: Candidate
     amplitude: float
     std: float
+    strange: tuple[str, ...] = ()
 
     @property
     def tag(self) -> str:
@@ -79,9 +81,26 @@ class Judged(Compared):
 
     @property
     def usual(self) -> bool:
-        """Whether the amplitude lies where such amplitudes lie, within the error."""
-        low, high = catalogue.amplitude(catalogue.get(self.tag)).usual or (-np.inf, np.inf)
-        return low - ERRORS * self.std <= self.amplitude <= high + ERRORS * self.std
+        """Whether amplitude and inner parameters lie where such values lie, within their errors."""
+        return not self.strange
+
+    @property
+    def seen(self) -> bool:
+        """Rule 1."""
+        return super().seen and self.usual
+
+
+def strange(fit: Fit, tag: str) -> tuple[str, ...]:
+    """Names of an effect's parameters that lie beyond where such values lie, by more than their errors allow."""
+    deviations = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    out = []
+    for f, z, sd in zip(fit.free, fit.point.z, deviations, strict=False):
+        if f.usual is None or not f.name.startswith(f"{tag}."):
+            continue
+        low, high = (f.inward(max(v, f.lower) if f.scale == "log" else v) for v in f.usual)
+        if not low - ERRORS * sd <= z <= high + ERRORS * sd:
+            out.append(f.name)
+    return tuple(out)
 
 
 class Judge:
@@ -105,7 +124,8 @@ class Judge:
         name = candidate.name
         std = fit.std().get(name, np.inf)
         return Judged(
-            found.fit, found.gain, found.chance, found.unseen, found.fall, candidate, fit.values[name], std
+            found.fit, found.gain, found.chance, found.unseen, found.fall, candidate, fit.values[name], std,
+            strange(fit, candidate.tag),
         )  # fmt: skip
 
     def beside(self, fit: Fit, number: int, members: int = 1, own: bool = False) -> Compared:
@@ -138,8 +158,6 @@ def named(judged: Sequence[Judged]) -> list[Judged]:
         return []
     best = max(seen, key=lambda j: float(j.unseen.sum()))
     close = [best, *(j for j in seen if j is not best and as_well(best, j))]
-    # an amplitude beyond where such amplitudes lie imitates something
-    close = [j for j in close if j.usual] or close
     # what contains another of them must pay for what it has more
     simple = [j for j in close if not any(_no_better(j, o) for o in close if o.tag in catalogue.get(j.tag).generalises)]
     return simple or close

@@ -1,4 +1,4 @@
-"""Mass and spring of the file against the slips, before a diagnosis: the base fitted with the stiffness stated and free."""
+"""Mass and spring of the file against the slips, before a diagnosis: the base with the stiffness stated, and free."""
 
 from __future__ import annotations
 

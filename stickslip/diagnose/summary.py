@@ -191,6 +191,8 @@ def failures(j: Judged, done: Round) -> list[str]:
         out.append(f"unseen runs are not predicted better by more than {ERRORS:g} standard errors")
     if j.fall <= 0.0:
         out.append("the error on unseen runs does not fall")
+    if j.strange:
+        out.append(f"{' and '.join(j.strange)} would lie where such values do not")
     if not out and done.close:
         out.append(f"{done.close[0].tag} predicts unseen runs better")
     return out

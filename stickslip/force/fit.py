@@ -174,14 +174,16 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
         row[a + b : a + b + k] = 1.0 / point.weights.sum() / deviation
         rows.append(row)
         target.append((np.log(point.weights.sum()) - np.log(level)) / deviation)
-    unit = point.weights.sum() / k
+    # in shares of the mean weight as it is: else a contact as a whole weaker would look smoother
+    whole, second = point.weights.sum(), np.diff(np.eye(k), 2, axis=0)
+    bent = k / (BEND * whole) * (second @ point.weights)
     bend = np.zeros((k - 2, size))
-    bend[:, a + b : a + b + k] = np.diff(np.eye(k), 2, axis=0) / (BEND * unit)
+    bend[:, a + b : a + b + k] = k / (BEND * whole) * second - bent[:, None] / whole
     alike = np.zeros((c, size))
     alike[:, a + b + k :] = np.eye(c) / problem.systematic
     return (
         np.vstack([*rows, bend, alike]),
-        np.concatenate([target, bend[:, a + b : a + b + k] @ point.weights, point.common / problem.systematic]),
+        np.concatenate([target, bent, point.common / problem.systematic]),
     )
 
 

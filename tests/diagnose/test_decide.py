@@ -8,19 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.diagnose.decide import CHANCE, DISPERSION, ERRORS, Judged, best_forms, named, standard_error
+from stickslip.diagnose.decide import CHANCE, DISPERSION, ERRORS, Judged, best_forms, named, standard_error, strange
+from stickslip.effects import catalogue
+from stickslip.fit.parameters import effect_parameters
 from stickslip.force.candidates import Candidate
 
 EVENTS = 40
 
 
-def judged(tag: str, gain: float, each: float, *, spread: float = 1.0, chance: float = 1e-9, fall: float = 0.2,
-           form: dict[str, str] | None = None, parameters: int = 8, amplitude: float = 0.01) -> Judged:  # fmt: skip
+def judged(
+    tag: str, gain: float, each: float, *, spread: float = 1.0, chance: float = 1e-9, fall: float = 0.2,
+    form: dict[str, str] | None = None, parameters: int = 8, strange: tuple[str, ...] = (),
+) -> Judged:  # fmt: skip
     """An effect whose gain on every unseen event is ``each``, give or take ``spread``."""
     swing = spread * np.where(np.arange(EVENTS) % 2, 1.0, -1.0)
     fit: Any = SimpleNamespace(free=range(parameters))
     return Judged(
-        fit, gain, chance, each + swing, fall, Candidate(tag, form or {}, gain, None), amplitude, 0.001
+        fit, gain, chance, each + swing, fall, Candidate(tag, form or {}, gain, None), 0.01, 0.001, strange
     )  # fmt: skip
 
 
@@ -60,12 +64,23 @@ def test_of_a_law_and_its_special_case_the_special_case_stays():
     assert [j.tag for j in named(alone)] == ["rate-and-state"]
 
 
-def test_an_amplitude_beyond_where_such_amplitudes_lie_leaves_a_set():
-    pair = [judged("velocity-weakening", 300.0, 8.0, amplitude=-0.02), judged("direct-effect", 300.0, 8.0)]
-    assert [j.tag for j in named(pair)] == ["direct-effect"]
-    within = [judged("velocity-weakening", 300.0, 8.0, amplitude=-0.002), judged("direct-effect", 300.0, 8.0)]
-    assert len(named(within)) == 2
-    assert [j.tag for j in named(pair[:1])] == ["velocity-weakening"]
+def test_what_lies_where_no_such_effect_lies_is_not_seen():
+    pair = [judged("velocity-weakening", 300.0, 8.5, strange=("velocity-weakening.drop",)), judged("wear", 300.0, 8.0)]
+    assert [j.tag for j in named(pair)] == ["wear"]
+    assert named(pair[:1]) == []
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "deviation", "inside"), [(-0.02, 0.001, False), (-0.002, 0.001, True), (0.1, 0.001, True)]
+)
+def test_parameters_lie_where_they_usually_do_within_their_errors(amplitude, deviation, inside):
+    (free, *_) = effect_parameters(catalogue.get("velocity-weakening")())
+    assert free.usual == (0.0, 0.4)
+    fit: Any = SimpleNamespace(
+        free=(free,), covariance=np.diag([free.inward(deviation) ** 2]),
+        point=SimpleNamespace(z=np.array([free.inward(amplitude)])),
+    )  # fmt: skip
+    assert strange(fit, "velocity-weakening") == (() if inside else ("velocity-weakening.drop",))
 
 
 def test_a_few_events_that_say_all_are_enough():
