@@ -9,7 +9,8 @@
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
    effect predicts unseen runs better than it, nothing is named.
-5. *Unknown*: nothing is seen, but the residual force is a function of a variable.
+5. *Unknown*: nothing more is seen, but the residual force is a function of a variable, and that would explain more
+   than half of what the named effects do.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from ..force.heldout import folds, halves, unseen
 
 CHANCE = 1e-3  # of any effect at all being seen where nothing is missing
 ERRORS = 2.5  # standard errors
-DISPERSION = 2.0  # of the fall of the cost, over that of perfectly known covariances
+DISPERSION = 3.0  # of the fall of the cost where nothing is hidden, over that of perfectly known covariances
 
 
 @dataclass(frozen=True)

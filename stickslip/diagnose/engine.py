@@ -28,6 +28,7 @@ from .prepare import Prepared, prepare
 from .trials import Tell, trials
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
+LEFT = 0.5  # of what named effects explain, from which what is left is no matter of a law's form any more
 BEST = 10  # effects of a round that are tried again beside the one that was named
 STRUCTURED = 1e-6  # chance of the residual force being a function of some variable, below which something is missing
 MEMBERS = 2  # of a set that are run freely besides the first
@@ -319,7 +320,8 @@ def _end(named: Mapping[str, Round], last: Round) -> Verdict:
     taken, sets = tuple(named), [r.close for r in named.values() if len(r.close) > 1]
     structure = None
     found = structures(last.base, Explained(last.base), DISPERSION)
-    if found and found[0].chance < STRUCTURED and not last.close:
+    explained = sum(r.close[0].gain for r in named.values())
+    if found and found[0].chance < STRUCTURED and found[0].fall > LEFT * explained and not last.close:
         structure = found[0]
     if structure is not None:
         return Verdict("unknown", taken, tuple(dict.fromkeys(j.tag for c in sets for j in c)), structure)
