@@ -244,8 +244,13 @@ def fit(
         dropped: points left out; default those that are found to lie far off.
 
     Raises:
-        FitError: the model gives no finite force at the start.
+        FitError: the model gives no finite force at the start, or none at all.
     """
+    if not point.weights.sum() > 0.0:
+        raise FitError(
+            "along this motion the contact would hold no force: check mass and spring, and the signs and units of "
+            "drive and displacement"
+        )
     blocks = Blocks.of(problem.of, problem.events)
     sizes = Scatter.wide() if scatter is None else scatter
     out = np.zeros(problem.of.size, bool) if dropped is None else dropped
@@ -336,7 +341,8 @@ def descend(
             trial = moved(point, share * change, point.events + share * (events - point.events))
             there = problem.evaluate(trial)
             count += 1
-            then = system.objective(trial, there) if np.isfinite(there.residual).all() else np.inf
+            held = np.isfinite(there.residual).all() and trial.weights.sum() > 0.0
+            then = system.objective(trial, there) if held else np.inf
             if then < now:
                 point, slopes, fallen = trial, there, now - then
                 break

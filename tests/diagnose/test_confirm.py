@@ -50,7 +50,7 @@ def aged(tmp_path_factory):
     case = made(folder, 11, (seen("contact-ageing", "logarithm", 10.0),), spring_known=True)
     base = fit(case.problem, case.point)
     form = next(iter(catalogue.forms(catalogue.get("contact-ageing"))))
-    return prepared(case), base, settled(base, try_effect(base, Explained(base), "contact-ageing", form))
+    return prepared(case), base, settled(base, try_effect(base, Explained(base), "contact-ageing", [form])[0])
 
 
 def of_all(c, parts):
