@@ -14,7 +14,7 @@ from ..fit.effective import EffectiveLine, effective_line
 from ..fit.parameters import to_si
 from ..fit.record import Fitted
 from ..fit.static_table import StaticRig
-from ..fit.surface import sensitivity, surface_prior
+from ..fit.surface import sensitivity
 from ..uncertainty import flat_directions, null_directions, relative
 from ..units import shown
 
@@ -80,9 +80,8 @@ def effective(fit: Fitted, rig: Any) -> dict[str, Any] | None:
         f"{' (from the fitted strength)' if fitted else ' (guessed)' if known.guessed else ''}; {line.note}."
         " The deviations are of the fit alone: other lines of the same surface differ by more."
     )
-    prior = surface_prior(rig)
     return {
-        "text": text if prior is None else f"{text} {prior.text}",
+        "text": text,
         "H": line.hurst,
         "H_std": hurst_std,
         "h_rms": line.h_rms,
