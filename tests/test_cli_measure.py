@@ -230,26 +230,47 @@ def test_paper_s_alignment_is_an_option(capsys):
     assert results[1]["fits"][0]["h_rms"] > 1.5 * results[0]["fits"][0]["h_rms"]
 
 
-@pytest.mark.slow
-def test_inertial_fit_of_a_simulated_campaign(capsys):
-    from stickslip.challenge.generator.__main__ import main
+def test_inertial_fit_of_a_generated_campaign(capsys):
+    from stickslip.challenge.generator import Run, make_campaign
 
-    main(["camp", "--seed", "3"])
+    runs = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4), Run("v400", 4e-4, 4))
+    rig = make_campaign(Path("camp"), 11, (), runs=runs, spring_known=True)["rig"]
     assert (
-        run(["fit", "camp/campaign.toml", "--out", "fitted", "--most-events", "4", "--profile", "weakening.drop"]) == 0
+        run(["fit", "camp/campaign.toml", "--out", "fitted", "--profile", "weakening.drop", "--holdout", "v400"]) == 0
     )
     found = json.loads(Path("fitted/result.json").read_text())
-    assert [step["model"] for step in found["ladder"]] == [["static"], ["static", "inertia"]]
-    assert found["ladder"][1]["train_error"] < 1.5 < found["ladder"][0]["train_error"]
-    assert found["misfit"]["sentence"].startswith("The data are described")
-    assert found["parameters"]["contact.u_max"]["std"] > 0
-    assert (
-        found["profiles"][0]["interval"][0]
-        < found["parameters"]["weakening.drop"]["value"]
-        < found["profiles"][0]["interval"][1]
-    )
+    static, base = found["ladder"]
+    assert [static["model"], base["model"]] == [["static"], ["static", "inertia"]]
+    assert base["train_error"] < 1.5 < static["train_error"]
+    assert base["heldout_error"] < 1.5
+    assert set(base["by_run"]) == {"v100", "v200"}
+    assert any("v400: kept aside" in line for line in found["dropped"])
+    assert base["free"] is not None
+    p = found["parameters"]
+    for name, value in (
+        ("weakening.drop", 1.0 - rig["mu_k"] / rig["mu_s"]),
+        ("weakening.slip_distance", rig["slip_length"]),
+        ("rig.damping", rig["damping"]),
+        ("contact.strength", rig["mu_s"] * sum(rig["loads"])),
+    ):
+        assert p[name]["value"] == pytest.approx(value, rel=0.03), name
+    assert p["contact.u_max"]["std"] > 0
+    (profile,) = found["profiles"]
+    assert profile["interval"][0] < p["weakening.drop"]["value"] < profile["interval"][1]
     assert 0.02 <= found["effective"]["H"] <= 0.98
     assert all(word in found["identifiability"][-1] for word in ("h_rms", "line_length", "only together"))
+    shown = capsys.readouterr().out
+    assert "on unseen runs" in shown and "weakening.drop is determined on both sides" in shown
+    assert run(["simulate", "fitted", "--out", "again"]) == 0
+    assert run(["compare", "fitted", "fitted"]) == 0
+
+
+def test_an_effect_that_only_shapes_the_backbone_is_not_added(capsys):
+    from stickslip.challenge.generator import Run, make_campaign
+
+    make_campaign(Path("camp"), 11, (), runs=(Run("v100", 1e-4, 3),))
+    message = refused(capsys, "fit", "camp/campaign.toml", "--add", "machine-compliance:where=series")
+    assert "--add" in message and "backbone" in message
 
 
 # what is wrong with the input -> words of the one message
@@ -375,12 +396,11 @@ def test_a_unit_that_hides_all_slips_is_doubted_where_it_matters(capsys):
     ("arguments", "words"),
     [
         (["--model", "static", "--add", "tilt"], ("--add", "dynamic")),
-        (["--starts", "0"], ("--starts", "1 to 100")),
         (["--v-lim", "1 kg"], ("--v-lim", "m/s")),
         (["--model", "other"], ("static", "inertial")),
         (["--add", "tild"], ("tild", "tilt")),
         (["--add", "machine-compliance:where=serial"], ("--add", "allowed", "machine-compliance:where=series")),
-        (["--profile", "contact.umax"], ("--profile", "contact.u_max")),
+        (["--profile", "weakening.drp"], ("--profile", "weakening.drop")),
         (["--model", "static", "--v-lim", "60 um/s"], ("static", "not faster than v_lim")),
     ],
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import sys
 import textwrap
@@ -36,14 +35,10 @@ def fit(
     effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
     profile: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     holdout: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
-    starts: int = 4,
     align: Literal["consistent", "paper"] = "consistent",
     time: Literal["exact", "paper"] = "exact",
     v_lim: str = "1 um/s",
     sampling: Literal["log", "uniform"] = "log",
-    new_lines: Annotated[bool, Parameter(negative="")] = False,
-    most_events: int = 8,
-    most_steps: int = 3072,
     json: Annotated[bool, Parameter(negative="")] = False,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -64,12 +59,10 @@ def fit(
     effect:
         A Python file with an effect of your own, to be used with --add. Its code is run.
     profile:
-        Profile likelihood of a parameter: --profile contact.u_max. May be given several times.
+        Profile likelihood of a parameter: --profile weakening.drop. May be given several times.
     holdout:
-        A run the dynamic fit may not see, on which every model is tried: --holdout v400.csv. May be given several
-        times. Default: runs whose role in the campaign is "held-out", else none.
-    starts:
-        Starts of the dynamic fit: the first from the data, the others spread by the priors.
+        A run that is kept aside: no fit sees it. --holdout v400.csv. May be given several times. Default: runs whose
+        role in the campaign is "held-out", else none. Of the others each is predicted from a fit without it.
     align:
         Static: what is laid on the measured passage of v_lim, the model's passage or (paper) its end.
     time:
@@ -78,13 +71,6 @@ def fit(
         Static: speed of the block at which a creep process ends.
     sampling:
         Static: windows even in the logarithm of the time left, or even in time as in the paper.
-    new_lines:
-        Dynamic: the surfaces meet anew at every event; default is what the scatter of the events says.
-    most_events:
-        Dynamic: so many events of a run are used, the first ones.
-    most_steps:
-        Dynamic: so many steps of integration are made in one cycle; more for ringing that hardly anything damps, and
-        for cycles of more than 30 s.
     json:
         Print the result as JSON.
     force:
@@ -97,7 +83,7 @@ def fit(
 
     speed = to_si(v_lim, "m/s", key="--v-lim")
     dynamic = {"--add": add, "--profile": profile, "--holdout": holdout}
-    _check(model, dynamic, speed, starts=starts, most_events=most_events, most_steps=most_steps)
+    _check(model, dynamic, speed)
     if out is not None:
         refuse_existing(out, force)
     began = _now()
@@ -115,8 +101,7 @@ def fit(
 
         for finding in rig:  # before minutes of fitting, in which a wrong unit may be mended
             print(finding.sentence, file=sys.stderr)
-        options = Options(add, effect, profile, holdout, starts, 1.0 if new_lines else None, most_events, most_steps)
-        result, variables = fit_inertial(loaded, traces, found, options)
+        result, variables = fit_inertial(loaded, traces, found, Options(add, effect, profile, holdout))
     result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
     result["rig"] = [finding.plain() for finding in rig]
     result["notes"] = [*mended, *result.get("notes", ())]
@@ -133,13 +118,9 @@ def _now() -> float:
     return clock.perf_counter()
 
 
-def _check(model: str, dynamic: dict[str, tuple[str, ...]], speed: float, **counts: int) -> None:
+def _check(model: str, dynamic: dict[str, tuple[str, ...]], speed: float) -> None:
     for what in (flag for flag, given in dynamic.items() if given and model == "static"):
         raise InputError(f"{what} belongs to the dynamic model", key=what, hint="leave it out, or use --model inertial")
-    for name, (least, most) in {"starts": (1, 100), "most_events": (1, 200), "most_steps": (512, 100_000)}.items():
-        if not least <= counts[name] <= most:
-            key = "--" + name.replace("_", "-")
-            raise InputError("out of range", key=key, value=counts[name], allowed=f"{least} to {most}")
     if speed <= 0:
         raise InputError("the speed must be positive", key="--v-lim", value=speed)
 
@@ -217,20 +198,13 @@ def _named(model: list[str]) -> str:
     return " + ".join("added mass" if tag == "inertia" and i != first else tag for i, tag in enumerate(model))
 
 
-def _gains_of_effects(ladder: list[dict[str, Any]]) -> list[str]:
-    """What each added effect takes off the cost, and for how many parameters."""
-    lines = []
-    for before, step in itertools.pairwise(ladder):
-        if before.get("cost") is None:
-            continue
-        gain = before["cost"] - step["cost"]
-        off = f"{gain:.1f}" if gain > 0.05 else "nothing"
-        lines.append(
-            f"{step['added']} takes {off} off the cost (robust chi-square, priors included): "
-            f"{before['cost']:.1f} without, {step['cost']:.1f} with it and "
-            f"{step['parameters'] - before['parameters']} more free parameters"
-        )
-    return lines
+def _gains_of_effects(gains: dict[str, float]) -> list[str]:
+    """What each added effect takes off the cost."""
+    return [
+        f"{tag} takes {f'{gain:.1f}' if gain > 0.05 else 'nothing'} off the cost (twice the negative logarithm of the "
+        "likelihood, priors included)"
+        for tag, gain in gains.items()
+    ]
 
 
 def _text(result: dict[str, Any], out: Path | None) -> str:
@@ -241,19 +215,18 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
         if result.get(key):
             lines += ["", *_BETWEEN.split(result[key]["text"])]
     if result.get("ladder"):
+        ladder = result["ladder"]
+        phases = list(dict.fromkeys(phase for step in ladder for phase in step["by_phase"]))
         rows = [
-            [_named(step["model"]), *(show.quantity(step[k], "1", 3) for k in ("train_error", "heldout_error"))]
-            for step in result["ladder"]
+            [
+                _named(step["model"]),
+                *(show.quantity(step[k], "1", 3) for k in ("train_error", "heldout_error")),
+                *(show.quantity(step["by_phase"].get(phase), "1", 3) for phase in phases),
+            ]
+            for step in ladder
         ]
-        lines += ["", show.table(["model", "error", "on unseen runs"], rows), *_gains_of_effects(result["ladder"])]
-    if result.get("misfit"):
-        table = result["misfit"]["table"]
-        rows = [
-            [run, show.quantity(v, "m/s", 3), *(show.quantity(e, "1", 3) for e in errors)]
-            for run, v, errors in zip(table["runs"], table["velocities"], table["errors"], strict=True)
-        ]
-        lines += ["", "residual over floor, by phase and run:", show.table(["run", "drive", *table["phases"]], rows)]
-        lines += ["", result["misfit"]["sentence"]]
+        lines += ["", show.table(["model", "error", "on unseen runs", *phases], rows)]
+        lines += [*_gains_of_effects(result["gains"]), *result["caution"]]
     if result.get("parameters"):
         rows = [
             [name, show.quantity(p["value"], p["unit"]), "+-", show.quantity(p["std"], p["unit"], 3), p["note"]]

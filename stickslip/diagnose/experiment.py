@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import StickslipError
 from ..fit.composition import Composition
-from ..fit.inertial import Fit
+from ..fit.record import Fitted
 from ..floors import Scatter
 from .bench import estimates, prepared, until_slips
 from .menu import BACK, HELD_AT, LONGEST, MENU, Conditions, Experiment, quantity
@@ -36,7 +36,7 @@ _WORDS = {
 
 
 class Rival(Protocol):
-    """A fitted model, such as a `Candidate` that was refitted."""
+    """A fitted model."""
 
     @property
     def tag(self) -> str:
@@ -47,7 +47,7 @@ class Rival(Protocol):
         """The family of models."""
 
     @property
-    def fit(self) -> Fit | None:
+    def fit(self) -> Fitted | None:
         """The member of it, and its covariance."""
 
 

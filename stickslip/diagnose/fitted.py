@@ -30,22 +30,19 @@ def fitted_model(found: Fit, law: PowerLaw, traces: Sequence[Trace], contacts: i
     composition = found.problem.composition
     free: list[Free] = []
     z: list[float] = []
-    std: list[float] = []
     weights = slice(len(composition.shared) + found.point.phases.size, None)
     k = found.point.weights.size
     part = found.covariance[weights, weights][:k, :k]
     relative = float(np.sqrt(max(part.sum(), 0.0))) / found.strength
-    sd = np.sqrt(np.maximum(np.diag(law.covariance), 0.0))
     contact = (
-        ("contact.strength", "N", found.strength, relative, "friction force of all contacts at full strength"),
-        ("contact.u_max", "m", law.u_max, float(sd[0]), "displacement at which the last element slides"),
-        ("contact.p", "1", law.p, float(sd[1]) * (law.p - 1.0) / law.p, "exponent of the backbone"),
-        ("contact.spread", "1", law.spread, float(sd[2]), "rms of ln(u_max) over the contacts"),
+        ("contact.strength", "N", found.strength, "friction force of all contacts at full strength"),
+        ("contact.u_max", "m", law.u_max, "displacement at which the last element slides"),
+        ("contact.p", "1", law.p, "exponent of the backbone"),
+        ("contact.spread", "1", law.spread, "rms of ln(u_max) over the contacts"),
     )
-    for name, unit, value, deviation, doc in contact:
+    for name, unit, value, doc in contact:
         free.append(Free(name, unit, "log", value, value, math.inf, value / 1e3, value * 1e3, doc))
         z.append(math.log(value))
-        std.append(deviation)
     first = len(free)
     for f, value in zip(composition.shared, found.point.z, strict=True):
         free.append(f)
@@ -60,7 +57,9 @@ def fitted_model(found: Fit, law: PowerLaw, traces: Sequence[Trace], contacts: i
             free.append(_renamed(f, f"{f.name}.{r}"))
             z.append(angle)
     covariance = np.zeros((len(free), len(free)))
-    covariance[:first, :first] = np.diag(np.square(std))
+    covariance[0, 0] = relative**2
+    exponent = np.array([1.0, (law.p - 1.0) / law.p, 1.0])  # d ln(p) by d ln(p - 1)
+    covariance[1:first, 1:first] = law.covariance * np.outer(exponent, exponent)
     covariance[first : first + shared, first : first + shared] = found.covariance[:shared, :shared]
     made = Composition(composition.mass, contacts, BINS, tuple(free), dict(composition.fixed), composition.effects)
     force, friction = (_guess(getattr(rig, key, None)) for key in ("normal_force", "friction_coefficient"))

@@ -21,7 +21,7 @@ UNHEARD = "no ringing is heard after the slips, so the contact's stiffness is kn
 
 @dataclass(frozen=True)
 class Prepared:
-    """What a diagnosis works on.
+    """What a diagnosis or a fit of the dynamic model works on.
 
     Attributes:
         problem, start: the base model along the measured motion, and where its fit begins.
@@ -71,9 +71,9 @@ def prepare(
         usable = [t for t in traces if t.displacement is not None and t.drive is not None]
         slips = max((len(s.events) for s in segmentations), default=0)
         raise InputError(
-            f"{'one slip' if slips == 1 else 'no slip'} in any run: a diagnosis needs two at least in one of them"
+            f"{'one slip' if slips == 1 else 'no slip'} in any run: the dynamic model needs two at least in one of them"
             if usable and slips < FEWEST
-            else "a diagnosis needs the displacement of the block, the motion of the drive, and slips",
+            else "the dynamic model needs the displacement of the block, the motion of the drive, and slips",
             file=campaign.path,
             key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in traces[:4]) + ", ..." * (len(traces) > 4),
             hint="record longer, drive slower or with a softer spring; others can be inspected and fitted with "
@@ -99,5 +99,5 @@ def _why_not(trace: Trace, found: Segmentation) -> str:
     if trace.drive is None:
         return "no drive is given"
     if len(found.events) < FEWEST:
-        return f"{len(found.events)} slips, of which a diagnosis needs {FEWEST}"
+        return f"{len(found.events)} slips, of which the dynamic model needs {FEWEST}"
     return ""

@@ -35,10 +35,7 @@ def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
         d: what was found.
         rig: of the campaign.
     """
-    curve = backbone(d.fit)
-    law = power_law(curve, int(rig.contacts or 1))
-    found = fitted_model(d.fit, law, d.prepared.traces, int(rig.contacts or 1), rig)
-    words = solved(found)
+    sections, arrays, _ = fitted_sections(d, rig)
     first = d.rounds[0]
     result = {
         "schema": 1,
@@ -51,12 +48,7 @@ def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
             "confidence": None,
             "forms": {tag: dict(r.close[0].candidate.form) for tag, r in d.named.items()},
         },
-        "caution": [
-            *([] if d.in_time else ["the time limit came before all effects were tried: this is the best so far"]),
-            *cautions(d.confirmation, {r.model: error(r.unseen, d) for r in d.ladder[1:] if r.unseen is not None}),
-        ],
         "in_time": d.in_time,
-        "ladder": [_rung(r, d) for r in d.ladder],
         "ranking": _ranking(first, d.ladder[1], d),
         "ranking_base": _ranking_base(first, d.ladder[1], d),
         "later_rounds": [
@@ -67,20 +59,45 @@ def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
         ],
         "visible": visible(d),
         "structure": _structure(d),
+        "next_experiment": next_experiment(d),
+        "seeds": {},
+        **sections,
+    }
+    return result, arrays
+
+
+def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, Fitted]:
+    """What there is to say of a ladder of fits, however its effects were chosen.
+
+    Args:
+        d: the ladder; its rounds may be missing.
+        rig: of the campaign.
+
+    Returns:
+        Entries of the result, the variables of its arrays, and the last model to be simulated.
+    """
+    curve = backbone(d.fit)
+    law = power_law(curve, int(rig.contacts or 1))
+    found = fitted_model(d.fit, law, d.prepared.traces, int(rig.contacts or 1), rig)
+    words = solved(found)
+    result = {
+        "caution": [
+            *([] if d.in_time else ["the time limit came before all effects were tried: this is the best so far"]),
+            *cautions(d.confirmation, {r.model: error(r.unseen, d) for r in d.ladder[1:] if r.unseen is not None}),
+        ],
+        "ladder": [_rung(r, d) for r in d.ladder],
         "scatter": d.fit.scatter.named(),
         "parameters": parameters(d.fit, found),
         "backbone": {
             "u_max": law.u_max, "p": law.p, "spread": law.spread, "misfit": law.misfit,
             "strength": float(curve.force[-1]), "stiffness": float((d.fit.point.weights / _reach(d)).sum()),
         },
-        "next_experiment": next_experiment(d),
-        "seeds": {},
         "held_out": "every run in turn; by halves where a run has parameters of its own",
         "dropped": [*d.dropped, *left_out(d.confirmation)],
         "equations": [{"text": words.text(), "latex": words.latex()}],
         KEY: record(found),
     }  # fmt: skip
-    return result, variables(d, curve, law)
+    return result, variables(d, curve, law), found
 
 
 def _reach(d: Diagnosis) -> Array:

@@ -11,7 +11,6 @@ from . import (  # noqa: F401  (each module registers its effect)
     drive_ripple,
     flash_heating,
     inertia,
-    learned,
     load_modulation,
     machine_compliance,
     nonlinear_spring,

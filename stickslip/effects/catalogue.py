@@ -87,7 +87,6 @@ def _accept_prior(spec: Spec, key: str, amplitude: bool) -> None:
 
 EFFECTS: Registry[type[Effect]] = Registry("stickslip.effects", "effect", prepare=accept, name=lambda cls: cls.tag)
 _user: dict[str, type[Effect]] = {}
-_unlisted: dict[str, type[Effect]] = {}
 
 
 def register(cls: type[Effect]) -> type[Effect]:
@@ -104,12 +103,6 @@ def register(cls: type[Effect]) -> type[Effect]:
         _user[cls.tag] = cls
         return cls
     return EFFECTS.register(cls.tag, cls)
-
-
-def unlisted(cls: type[Effect]) -> type[Effect]:
-    """Class decorator: an effect that can be made by its tag, and that no list holds and no diagnosis tries."""
-    _unlisted[cls.tag] = accept(cls)
-    return cls
 
 
 def tags() -> list[str]:
@@ -130,8 +123,6 @@ def all() -> dict[str, type[Effect]]:
 def get(tag: str) -> type[Effect]:
     """The class of that tag; `InputError` naming the nearest where there is none."""
     everything = all()
-    if tag in _unlisted:
-        return _unlisted[tag]
     if tag not in everything:
         raise InputError(f"there is no effect '{tag}'", hint=unknown(tag))
     return everything[tag]

@@ -132,8 +132,7 @@ def measure(
         raise InputError(
             f"every run begins with a cycle of more than {longest(most_steps):.3g} s, for which the dynamic model has "
             "no steps",
-            hint="drive faster, or give a fit more steps (--most-steps), or fit single creep processes with --model "
-            "static",
+            hint="drive faster, or fit single creep processes with --model static",
         )
     dropped += [
         f"{t.name}: {most_cycles} of {len(s.events)} slips are used, the first ones"

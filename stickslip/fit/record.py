@@ -12,11 +12,9 @@ import numpy as np
 
 from ..effects import catalogue
 from ..effects.base import Effect
-from ..features.measurement import Measurement
 from ..model import LoadPoint, Model
 from ..params import specs, variants
 from .composition import Composition, run_of
-from .inertial import Fit
 from .parameters import Free, to_si, vector
 
 KEY = "fitted_model"  # of its section in result.json
@@ -104,56 +102,6 @@ def pieces_drive(pieces: Sequence[tuple[float, float]]) -> LoadPoint:
     v, dt = np.array(pieces, float).T
     times, positions = (np.concatenate([[0.0], np.cumsum(part)]) for part in (dt, v * dt))
     return LoadPoint(jnp.asarray(times), jnp.asarray(positions))
-
-
-def fitted(composition: Composition, fit: Fit, measurement: Measurement, rig: Any = None) -> Fitted:
-    """What a fit found.
-
-    Args:
-        composition: the family of models.
-        fit: of it.
-        measurement: what it was fitted to.
-        rig: ``[rig]`` of the campaign, for the load on a contact.
-    """
-    m = measurement
-    force, friction = (_guess(getattr(rig, key, None)) for key in ("normal_force", "friction_coefficient"))
-    return Fitted(composition, fit.z, fit.covariance, tuple(_driven(m, r) for r in range(m.runs)), force, friction)
-
-
-def _guess(value: Any) -> float | None:
-    """A rig's value, or the guess at one that was not measured."""
-    found = getattr(value, "guess", value)
-    return None if found is None else float(found)
-
-
-def _clean(velocity: float) -> float:
-    """Without the rounding errors of a quotient."""
-    return float(f"{velocity:.12g}")
-
-
-def _driven(m: Measurement, r: int) -> Driven:
-    used = np.asarray(m.cycles.used[r])
-    times, positions = np.asarray(m.cycles.load_times[r]), np.asarray(m.cycles.load_positions[r])
-    begin, end = float(m.cycles.start[r][0]), float(np.max(np.asarray(m.cycles.limit[r])[used]))
-    slopes = np.diff(positions) / np.diff(times)
-    edges = np.concatenate([[-np.inf], times[1:-1], [np.inf]])  # it goes on at its last velocity
-    pieces: list[tuple[float, float]] = []
-    for slope, a, b in zip(slopes, edges[:-1], edges[1:], strict=True):
-        length = min(b, end) - max(a, begin)
-        if length <= 0.0:
-            continue
-        if pieces and math.isclose(slope, pieces[-1][0], rel_tol=1e-6, abs_tol=1e-15):
-            pieces[-1] = (pieces[-1][0], pieces[-1][1] + length)
-        else:
-            pieces.append((_clean(slope), float(length)))
-    own = float(np.asarray(m.cycles.stiffness)[r])
-    return Driven(
-        m.names[r],
-        _clean(m.velocities[r]),
-        tuple(pieces) if len(pieces) <= MOST_PIECES else (),
-        own if math.isfinite(own) else None,
-        bool(m.cycles.virgin[r]),
-    )
 
 
 def record(found: Fitted) -> dict[str, Any]:

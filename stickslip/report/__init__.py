@@ -4,7 +4,6 @@ from .abilities import Abilities, abilities
 from .describe import describe_trace, event_units
 from .html import REPORT, write_report
 from .pieces import trace_pieces
-from .sentences import misfit_sentence, phase_table
 
 __all__ = [
     "REPORT",
@@ -12,8 +11,6 @@ __all__ = [
     "abilities",
     "describe_trace",
     "event_units",
-    "misfit_sentence",
-    "phase_table",
     "trace_pieces",
     "write_report",
 ]

@@ -128,7 +128,7 @@ def unused_channels(trace: Trace) -> list[str]:
     mean, low, high = (float(f(trace.normal_load)) for f in (np.mean, np.min, np.max))
     return [
         f"normal_load is not used by the models, which take the constant one of [rig]: mean {mean:.3g} N, "
-        f"{low:.3g} to {high:.3g} N; the errors of the dynamic model are drawn against it"
+        f"{low:.3g} to {high:.3g} N"
     ]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, remark, scaled, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
 from .figures import series
 
 if TYPE_CHECKING:
@@ -22,78 +22,6 @@ _MARKS = {
     "recurrence": ("D", "#4f772d"),
     "hold": ("v", "#7b5ea7"),
 }
-_COORDINATES = (
-    ("position", "m", "position at the slip"),
-    ("velocity", "m/s", "drive velocity"),
-    ("start", "s", "time in the run"),
-    ("contact_time", "s", "time in contact"),
-    ("load", "N", "spring force at the slip"),
-    ("event", "1", "event"),
-)
-
-
-def _error(value: float) -> str:
-    """Two digits, and never a power of ten."""
-    return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
-
-
-@styled
-def heat_map(table: Mapping[str, Any]) -> Figure:
-    """Errors of runs (rows, by velocity) and phases (columns), logarithmic colours from 1 to 30 floors."""
-    errors = np.array([[np.nan if e is None else e for e in row] for row in table["errors"]], float)
-    longest = max((min(len(str(name)), 30) for name in table["runs"]), default=0)
-    made, axes = figure(1, 1, width=6.0 + 0.09 * longest, height=1.4 + 0.38 * len(table["runs"]))
-    ax = axes[0, 0]
-    shown = ax.imshow(np.log10(np.clip(errors, 0.3, 100.0)), cmap="OrRd", vmin=-0.3, vmax=1.6, aspect="auto")
-    for i, j in np.argwhere(np.isfinite(errors)):
-        ax.text(j, i, _error(errors[i, j]), ha="center", va="center", color="white" if errors[i, j] > 10 else DARK)
-    ax.set_xticks(range(len(table["phases"])), [plain(p, 30) for p in table["phases"]])
-    speeds = ["" if v is None else f"  {v * 1e6:.3g} µm/s" for v in table["velocities"]]
-    ax.set_yticks(range(len(table["runs"])), [plain(n, 30) + v for n, v in zip(table["runs"], speeds, strict=True)])
-    ax.grid(False)
-    bar = made.colorbar(shown, ax=ax, ticks=np.log10([0.5, 1, 3, 10, 30]))
-    bar.ax.set_yticklabels(["0.5", "1", "3", "10", "30"])
-    bar.set_label("residual / floor")
-    return made
-
-
-@styled
-def residual_plots(data: xarray.Dataset) -> Figure:
-    """Error of every cycle by phase against position, velocity, time, time in contact, force and event number.
-
-    Against the normal load instead of the spring force where it was measured.
-    """
-    made, axes = figure(2, 3, width=11.0, height=6.0)
-    phases = [str(p) for p in data["phase"].values]
-    error = data["residual"].values  # (cycle, phase)
-    pressed = ("normal_load", "N", "measured normal load")
-    against = [pressed if c[0] == "load" and "cycle_normal_load" in data else c for c in _COORDINATES]
-    for ax, (name, unit, text) in zip(axes.flat, against, strict=True):
-        x = data[f"cycle_{name}"].values.astype(float) if f"cycle_{name}" in data else np.full(error.shape[0], np.nan)
-        if not np.isfinite(x).any():
-            remark(ax, f"{text}: not known")
-            continue
-        k, shown = scaled(x, unit)
-        for j, phase in enumerate(phases):
-            mark, colour = _MARKS.get(phase, ("x", DARK))
-            ok = np.isfinite(error[:, j]) & (error[:, j] > 0)
-            ax.plot(x[ok] * k, error[ok, j], mark, ms=4, color=colour, label=plain(phase, 30), alpha=0.85)
-        ax.axhline(1.0, color=LIGHT, lw=1.0, ls="--")
-        ax.set_yscale("log")
-        if name == "velocity" and np.nanmax(x) > 3 * max(np.nanmin(x), 1e-300):
-            ax.set_xscale("log")
-            # the velocities themselves: a logarithmic axis labels every digit of a short range, one over the other
-            driven = np.unique(np.round(x[np.isfinite(x)] * k, 6))
-            ax.set_xticks(driven[:8], [f"{v:.3g}" for v in driven[:8]])
-            ax.minorticks_off()
-        ax.set(
-            xlabel=text + (f" / ({shown})" if "/" in shown else f" / {shown}" if shown != "1" else ""),
-            ylabel="residual / floor",
-        )
-    marks = {label: mark for ax in axes.flat for mark, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    if marks:
-        made.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=len(marks), fontsize=8)
-    return made
 
 
 @styled

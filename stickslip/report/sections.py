@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 from .figures import ripple_picture, series, trace_picture
 from .fit_figures import (
     creep_grid,
-    heat_map,
     ladder_picture,
     profile_picture,
     ramp_grid,
-    residual_plots,
 )
 from .force_figures import backbone_picture, cycle_picture, residual_picture, runs_of
 from .free_figures import free_picture
@@ -30,11 +28,6 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
         unseen = any(step.get("heldout_error") is not None for step in result["ladder"])
         runs = "on fitted and on unseen runs" if unseen else "on fitted runs; no run was kept aside"
         yield "ladder", f"Error of every model by phase, {runs}.", ladder_picture(result["ladder"])
-    misfit = result.get("misfit") or {}
-    if misfit.get("table"):
-        yield "misfit", "Error by phase of the cycle and drive velocity.", heat_map(misfit["table"])
-    if "residual" in data:
-        yield "misfit", "Error of every cycle against what might explain it.", residual_plots(data)
     if runs_of(data):
         names = list((result.get("ladder") or [{}])[-1].get("by_run") or [])
         yield (

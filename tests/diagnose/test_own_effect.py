@@ -62,7 +62,7 @@ def files(tmp_path, monkeypatch, request):
 def test_it_is_fitted(files, tmp_path):
     own, campaign = files
     out = tmp_path / "fit"
-    command = ["fit", campaign, *own, "--add", "surface-finish", "--starts", "1", "--out", str(out)]
+    command = ["fit", campaign, *own, "--add", "surface-finish", "--out", str(out)]
     assert run(command) == 0
     result = read_result(out)
     without, with_it = result["ladder"][-2:]
@@ -78,7 +78,7 @@ def test_it_is_fitted_beside_another(files, tmp_path):
     own, campaign = files
     out = tmp_path / "fit"
     added = ["--add", "surface-finish", "--add", "contact-ageing"]
-    assert run(["fit", campaign, *own, *added, "--starts", "1", "--out", str(out)]) == 0
+    assert run(["fit", campaign, *own, *added, "--out", str(out)]) == 0
     result = read_result(out)
     assert result["ladder"][-1]["model"] == ["static", "inertia", "surface-finish", "contact-ageing"]
     size, rate = (result["parameters"][name] for name in ("surface-finish.size", "contact-ageing.rate"))

@@ -192,7 +192,7 @@ def test_the_commands_say_it(capsys: pytest.CaptureFixture[str]) -> None:
 def test_one_symbol_one_meaning() -> None:
     """In every model of two effects, whatever their forms, also where two LaTeX commands print the same letter."""
     block, weakening = Block(), Weakening()
-    everything = {**every_form(), ("learned-force",): catalogue.make("learned-force")}
+    everything = every_form()
     for (a, one), (b, two) in itertools.combinations(everything.items(), 2):
         if a[0] == b[0]:
             continue
@@ -266,10 +266,10 @@ def test_symbols_are_found_and_written_otherwise() -> None:
     assert distinct([catalogue.make("tilt"), catalogue.make("wear")]) == [{}, {}]
 
 
-@pytest.mark.parametrize("key", [*TOLD, ("learned-force",)], ids="-".join)
+@pytest.mark.parametrize("key", TOLD, ids="-".join)
 def test_every_formula_can_be_shown(key: tuple[str, ...]) -> None:
     """As text and as LaTeX: the overview, the law of the form, and the model it stands in, symbols made distinct."""
-    effect = every_form().get(key) or catalogue.make(*key)
+    effect = every_form()[key]
     twin = (effect, Push(), effect)
     model = equations(twin, block=Block(), weakening=Weakening(), contact=PowerLaw())
     formulas = [

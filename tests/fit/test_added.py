@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from stickslip.cli import _inertial
+from stickslip.campaign import Rig
 from stickslip.cli._inertial import chosen
-from stickslip.cli.fit import _named
+from stickslip.cli.fit import _gains_of_effects, _named
+from stickslip.diagnose.climb import climb
+from stickslip.diagnose.fitted import fitted_model
+from stickslip.diagnose.prepare import prepare
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
-from stickslip.fit.record import Fitted, from_record, record
-from stickslip.floors import floors
+from stickslip.fit.record import from_record, record
+from stickslip.force.backbone import backbone, power_law
+from stickslip.segment import segment
 
 from . import synthetic
 
 
 def test_the_usual_form_unless_another_is_named():
     effects = chosen(("machine-compliance", "tilt:by=contact", "wear: course = saturating , changes=thresholds"))
-    assert [e.tag for e in effects] == ["machine-compliance", "tilt", "wear"]
-    assert effects[0].where == "read-out"
-    assert effects[1].by == "contact"
-    assert (effects[2].changes, effects[2].course) == ("thresholds", "saturating")
-    (partly,) = chosen(("wear:course=logarithmic",))
-    assert (partly.changes, partly.course) == ("friction", "logarithmic")
+    assert effects == [
+        ("machine-compliance", {}), ("tilt", {"by": "contact"}),
+        ("wear", {"course": "saturating", "changes": "thresholds"}),
+    ]  # fmt: skip
+    assert chosen(("wear:course=logarithmic",)) == [("wear", {"course": "logarithmic"})]
 
 
 @pytest.mark.parametrize(
@@ -55,22 +60,30 @@ def test_the_added_mass_has_a_name_of_its_own():
     assert _named(["static", "inertia", "tilt", "inertia"]) == "static + inertia + tilt + added mass"
 
 
-@pytest.mark.slow
+def test_an_effect_that_takes_nothing_off_is_said_to():
+    said = _gains_of_effects({"viscous-drag": 23.8, "wear": 0.0})
+    assert said[0].startswith("viscous-drag takes 23.8 off the cost")
+    assert said[1].startswith("wear takes nothing off the cost")
+
+
 def test_the_added_mass_is_fitted_and_kept():
-    data = synthetic.measured(synthetic.traces(effect=catalogue.make("inertia", share=0.05)))
-    train = np.asarray(data.cycles.used)
-    (added,) = chosen(("inertia",))
-    composition, found, ladder = _inertial._climb(
-        data, synthetic.composition(), [added], floors(data), train, 1, lambda *a: None
+    rng = np.random.default_rng(1)
+    traces = [
+        t.replace(displacement=t.displacement + 5e-9 * rng.standard_normal(t.time.size), noise=5e-9)
+        for t in synthetic.traces(effect=catalogue.make("inertia", share=0.05))
+    ]
+    rig = Rig(mass=synthetic.composition().mass, contacts=4, spring_stiffness=1000.0)
+    prepared = prepare(
+        SimpleNamespace(rig=rig, rig_of=lambda name: rig, path=None), traces, [segment(t) for t in traces]
     )
-    assert [step["added"] for step in ladder] == [None, None, "inertia"]
-    assert ladder[-1]["parameters"] == ladder[-2]["parameters"] + 1
-    share, std = found.values["inertia.share"], found.std()["inertia.share"]
+    done, gains = climb(prepared, chosen(("inertia",)), lambda *a: None)
+    assert [rung.added for rung in done.ladder] == [None, "inertia", "inertia"]
+    share, std = done.fit.values["inertia.share"], done.fit.std()["inertia.share"]
     assert std < 0.01
     assert abs(share - 0.05) < 3 * std
-    assert ladder[-1]["cost"] < 0.2 * ladder[-2]["cost"]
-    back = from_record(record(Fitted(composition, found.z, found.covariance)))
+    assert gains["inertia"] > 20.0
+    law = power_law(backbone(done.fit), 4)
+    back = from_record(record(fitted_model(done.fit, law, traces, 4)))
     assert back.parts == ("static", "inertia")
     (effect,) = back.effects()
     assert effect.tag == "inertia"
-    assert float(effect.share) == pytest.approx(share, rel=1e-9)

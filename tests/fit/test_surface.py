@@ -1,24 +1,13 @@
 """The prior of a contact that follows from the roughness of a rig."""
 
-import contextlib
-import io
-import json
-
 import numpy as np
 import pytest
-import xarray
 
 from stickslip.campaign import Rig
 from stickslip.challenge.generator.lines import Surface, press, rough_line
-from stickslip.cli import run
 from stickslip.errors import InputError
-from stickslip.fit.effective import effective_line
-from stickslip.fit.static_table import StaticRig
 from stickslip.fit.surface import nearest_exponent, sensitivity, surface_prior
-from stickslip.report.fit_figures import residual_plots
 from stickslip.uncertainty import null_directions
-
-from . import synthetic
 
 KNOWN = {"contacts": 4, "normal_force": 0.31, "friction_coefficient": 0.21, "H": 0.3, "h_rms": 2.46e-6}
 
@@ -134,81 +123,3 @@ def test_the_derivatives_are_those_of_the_prior():
 def test_lines_pressed_flat_are_no_prior():
     with pytest.raises(InputError, match="touch over their whole length"):
         surface_prior(rig(h_rms=1e-9))
-
-
-@pytest.fixture
-def short_run(tmp_path):
-    """One run of the model with known parameters, two slips under noise of 30 nm: too little to tell the contact.
-
-    The normal load is recorded beside it, growing by a tenth from 1.2 N.
-    """
-    (trace,) = synthetic.traces((1e-4,), slips=2.6)
-    um = 1e6 * np.asarray(trace.displacement) + 0.03 * np.random.default_rng(3).standard_normal(trace.time.size)
-    load = 1.2 * (1 + 0.1 * np.asarray(trace.time) / trace.time[-1])
-    np.savetxt(tmp_path / "a.csv", np.column_stack([trace.time, um, load]), delimiter=",", fmt="%.10g")
-
-    def fitted(more):
-        path = tmp_path / "c.toml"
-        path.write_text(
-            f"""schema = 1
-[rig]
-mass = "89.4 g"
-contacts = 4
-normal_force = "0.31 N"
-friction_coefficient = {0.26 / 4 / 0.31}
-spring_stiffness = "1000 N/m"
-{more}
-[[trace]]
-name = "a"
-file = "a.csv"
-time = {{ column = 1, unit = "s" }}
-displacement = {{ column = 2, unit = "um" }}
-normal_load = {{ column = 3, unit = "N" }}
-drive_velocity = "100 um/s"
-virgin = true
-"""
-        )
-        out = io.StringIO()
-        with contextlib.redirect_stdout(out):
-            where = ["--out", str(tmp_path / "out"), "--force"]
-            assert run(["fit", str(path), "--starts", "1", "--most-events", "2", "--json", *where]) == 0
-        return json.loads(out.getvalue())
-
-    return fitted
-
-
-def test_the_roughness_narrows_a_whole_fit_and_follows_from_it(short_run, tmp_path):
-    true = {"contact.u_max": synthetic.TRUTH["contact.u_max"][1], "contact.p": synthetic.TRUTH["contact.p"][1]}
-    line = effective_line(*true.values(), StaticRig(0.31, 0.26 / 4 / 0.31, 4, 1000.0))
-    without, known = short_run(""), short_run(f'H = {line.hurst}\nh_rms = "{1e6 * line.h_rms} um"')
-    prior = surface_prior(rig(friction_coefficient=0.26 / 4 / 0.31, H=line.hurst, h_rms=line.h_rms))
-    for name, guess in (("contact.u_max", prior.u_max), ("contact.p", prior.p)):
-        far, near = (result["parameters"][name] for result in (without, known))
-        assert near["std"] / near["value"] < 0.6 * far["std"] / far["value"]
-        # it is the mean of what the data say alone and of the prior, by their widths
-        own, prior_width = far["std"] / far["value"], guess.width
-        mean = np.average(np.log([far["value"], guess.value]), weights=[own**-2, prior_width**-2])
-        assert abs(np.log(near["value"]) - mean) < near["std"] / near["value"]
-        assert near["std"] / near["value"] < 1.1 * prior_width
-        assert abs(near["value"] - true[name]) < 2 * near["std"]
-    # both say which rough line has the curve of all contacts together
-    spread = synthetic.TRUTH["contact.spread"][1]
-    together = effective_line(*true.values(), StaticRig(0.31, 0.26 / 4 / 0.31, 4, 1000.0), spread)
-    for result in (without, known):
-        found = result["effective"]
-        assert abs(found["H"] - together.hurst) < 2 * found["H_std"]
-        assert abs(found["h_rms"] - together.h_rms) < 2 * found["h_rms_std"]
-    assert known["effective"]["H"] == pytest.approx(together.hurst, abs=0.1)
-    assert known["effective"]["h_rms"] == pytest.approx(together.h_rms, rel=0.2)
-    assert known["effective"]["H_std"] < without["effective"]["H_std"] < 0.5
-    for result in (without, known):
-        assert f"H = {result['effective']['H']:.2f}" in result["effective"]["text"]
-        assert any("h_rms" in text and "line_length" in text for text in result["identifiability"])
-    assert "Prior of the contact from the rig's H and h_rms: u_max = 890 nm" in known["effective"]["text"]
-    assert "Prior" not in without["effective"]["text"]
-    # the load that was measured is not in the model: said, and the errors stand beside it
-    assert "a: normal_load is not used by the models" in known["dropped"][0]
-    with xarray.open_dataset(tmp_path / "out" / "arrays.nc") as arrays:
-        load = arrays["cycle_normal_load"].values
-        assert residual_plots(arrays).axes[4].get_xlabel() == "measured normal load / N"
-    assert 1.2 < load[0] < load[-1] < 1.32

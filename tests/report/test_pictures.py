@@ -9,7 +9,7 @@ from stickslip.cli.show import quantity
 from stickslip.plots.style import scaled
 from stickslip.report import trace_pieces
 from stickslip.report.figures import trace_picture
-from stickslip.report.fit_figures import creep_grid, heat_map, ladder_picture, ramp_grid
+from stickslip.report.fit_figures import creep_grid, ladder_picture, ramp_grid
 from stickslip.report.tables import show
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
@@ -58,11 +58,6 @@ def test_a_long_way_is_drawn_as_distance_to_the_load_point():
     assert line.get_xdata().size < 0.05 * trace.time.size
     tips = [shown[np.abs(line.get_xdata() - k * PERIOD) < 0.5 * PERIOD].max() for k in range(1, 200)]
     assert tips == pytest.approx([SPEED * PERIOD - gap.min()] * 199, rel=0.03)
-
-
-def test_errors_in_a_heat_map_have_no_powers_of_ten():
-    table = {"phases": ["creep", "slip", "hold"], "runs": ["a"], "velocities": [5e-5], "errors": [[1.234, 162.4, None]]}
-    assert [text.get_text() for text in heat_map(table).axes[0].texts] == ["1.2", "162"]
 
 
 def test_grids_of_fits_say_which_line_is_the_model():

@@ -1,14 +1,11 @@
 """Sentences about data and misfit, the ripple in the sticks, the gain of a force sensor."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from stickslip.checks.spring_force import force_findings, gain_is_wrong, stick_gain
-from stickslip.features.layout import PHASES, Layout
 from stickslip.motion import true_gains
-from stickslip.report import abilities, misfit_sentence, phase_table
+from stickslip.report import abilities
 from stickslip.report.describe import describe_trace
 from stickslip.report.ripple import stick_ripple, stick_spectrum
 from stickslip.segment import segment
@@ -143,56 +140,3 @@ def test_events_are_described_with_their_units():
     assert row["units"]["slip"] == "m"
     assert event["slip"] == pytest.approx(42e-6 * event["recurrence"], rel=0.1)
     assert event["t_arrest"] > event["t_onset"]
-
-
-def measured(phase, growth, point=None, runs=4):
-    """A measurement whose misfit lies in one phase and changes with the drive's velocity."""
-    layout = Layout(0.06, 0.004)
-    velocities = 5e-5 * 2.0 ** np.arange(runs)
-    values = np.zeros((runs, 5, layout.size))
-    index = layout.phase_index() == PHASES.index(phase)
-    if point is not None:
-        index &= np.arange(layout.size) < layout.slices()["creep"].start + point
-    values[..., index] = 10.0
-    values *= (velocities / velocities[0])[:, None, None] ** growth
-    anchors = SimpleNamespace(creep=np.broadcast_to(np.geomspace(0.004, 1.0, 16), (runs, 5, 16)))
-    m = SimpleNamespace(
-        layout=layout, values=values, valid=np.ones(values.shape, bool), velocities=velocities, anchors=anchors
-    )
-    z = [float(np.sqrt(np.mean(values[..., layout.phase_index() == i] ** 2))) for i in range(len(PHASES))]
-    by_phase = {p: max(e, 0.3) for p, e in zip(PHASES, z, strict=True)}
-    return misfit_sentence(m, np.zeros_like(values), np.ones_like(values), by_phase)
-
-
-def test_the_sentence_says_where_and_how_it_depends_on_velocity():
-    text = measured("creep", 1.0, point=7)
-    assert "before the slip" in text
-    assert "the last" in text
-    assert "grows with velocity" in text
-    assert "falls with velocity" in measured("ring-down", -1.0)
-    assert "ring-down" in measured("ring-down", -1.0)
-    assert "same at all velocities" in measured("hold", 0.0)
-    share = int(text.split(" %")[0])
-    assert share >= 80
-
-
-def test_a_good_fit_is_not_called_a_failure():
-    layout = Layout(0.06, 0.004)
-    values = np.full((2, 3, layout.size), 0.9)
-    anchors = SimpleNamespace(creep=np.broadcast_to(np.geomspace(0.004, 1.0, 16), (2, 3, 16)))
-    m = SimpleNamespace(
-        layout=layout,
-        values=values,
-        valid=np.ones(values.shape, bool),
-        velocities=np.array([1e-5, 2e-5]),
-        anchors=anchors,
-    )
-    text = misfit_sentence(m, np.zeros_like(values), np.ones_like(values), dict.fromkeys(PHASES, 0.9))
-    assert text.startswith("The data are described as well as they allow")
-
-
-def test_table_is_sorted_by_velocity():
-    table = phase_table({"fast": {"slip": 2.0}, "slow": {"creep": 1.0, "slip": 3.0}}, {"fast": 4e-4, "slow": 5e-5})
-    assert table["runs"] == ["slow", "fast"]
-    assert table["phases"] == ["creep", "slip"]
-    assert table["errors"] == [[1.0, 3.0], [None, 2.0]]
