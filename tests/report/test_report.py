@@ -247,5 +247,5 @@ def test_a_browser_shows_it(tmp_path, browser):
     dom = browser("--dump-dom", f"file://{path}").stdout
     page = Reader(dom)
     assert "script" not in page.tags
-    assert len(page.images) == 4
+    assert len(page.images) == 2
     assert "<title>bad</title>" not in dom
