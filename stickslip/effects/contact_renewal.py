@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -85,17 +86,22 @@ class ContactRenewal(Memory, Threshold, Flow):
         step = contact.stiffness * motion.dx
         plain = contact.force + step  # with no renewal
         capped = jnp.clip(plain, -cap, cap)
-        before, after = jnp.zeros_like(step), jnp.zeros_like(step)  # the newborn
-        offs = []
-        for (gone, mean), spread in zip([first, *[middle] * (YOUNG - 1), last], state.spread, strict=True):
+        aged = [first, *[middle] * (YOUNG - 1), last]
+
+        def older(younger: tuple[Array, Array], own: tuple[Array, ...]) -> tuple[tuple[Array, Array], Array]:
+            before, after = younger
+            gone, mean, spread = own
             force = contact.force + spread
             # written as a difference, so that it vanishes exactly where the rate does
             renewed = -force * gone - step * (1.0 - mean) + after * (1.0 - mean) + before * (mean - 1.0 + gone)
             other = jnp.clip(plain + (spread + renewed), -cap, cap)
-            offs.append(other - capped)
-            before, after = force, other
-        change = sum((weight * off for weight, off in zip(weights, offs, strict=True)), jnp.zeros_like(step))
-        spread = jnp.stack([off - change for off in offs])
+            return (force, other), other - capped
+
+        newborn = (jnp.zeros_like(step), jnp.zeros_like(step))
+        gone, mean = (jnp.stack([pair[i] for pair in aged]) for i in range(2))
+        _, offs = jax.lax.scan(older, newborn, (gone, mean, state.spread))
+        change = jnp.sum(jnp.stack(weights) * offs, axis=0)
+        spread = offs - change
         return Junctions(spread, -change, -change * capped / cap**2)
 
     def strength(self, state: Junctions, motion: Motion, contact: Contact) -> Array:

@@ -64,46 +64,40 @@ def lead(model: Model, t: Array, drive: Array) -> Array:
     return drive + sum((e.lead(t, drive) for e in model.effects if isinstance(e, Drive)), jnp.zeros(()))
 
 
-def along(model: Model, way: Way) -> Held:
+def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
     """Drive the model along a motion.
 
     Args:
         model: its load point is not used; the motion brings its own.
         way: what moves.
+        knots: number of those that count; the rest is padding, costs nothing and is zero in the result. Default all.
     """
     bank = model.shaped()
     led = lead(model, way.t, way.drive)
     mass = model.mass()
     start = model.rest(way.t[0], way.x[0], way.v[0])
+    dt, dx = jnp.diff(way.t, prepend=way.t[:1]), jnp.diff(way.x, prepend=way.x[:1])
+    items = (way.t, dt, way.x, dx, way.v, led, way.turn, way.strength, way.stretch)
+    share = 1.0 / jnp.where(bank.strength > 0.0, bank.strength, 1.0)
 
-    def step(carry: tuple[State, Array], item: tuple[Array, ...]) -> tuple[tuple[State, Array], tuple[Array, ...]]:
-        state, pull = carry
-        t, dt, x, dx, v, at, turn, strength, stretch = item
+    def step(i: Array, carry: tuple[State, Array, Held]) -> tuple[State, Array, Held]:
+        state, pull, held = carry
+        t, dt, x, dx, v, at, turn, strength, stretch = (a[i] for a in items)
         own = Bank(bank.stiffness * (strength / stretch), bank.strength * strength)
         contact = Contact(state.force, own.stiffness, own.strength, pull, state.cap, mass)
         motion = Motion(t, dt, x, v, turn, dx, at)
         state, forces = model.advance(state, own, contact, motion)
         sticks = jnp.abs(state.force) < state.cap * (1.0 - 1e-6)
         tangent = jnp.sum(jnp.where(sticks, state.stiffness, 0.0))
-        out = (forces.spring, forces.body, forces.contact, state.force, tangent)
-        return (state, forces.spring), out
+        here = Held(forces.spring, forces.body, forces.contact, state.force * share, tangent)
+        return state, forces.spring, Held(*(a.at[i].set(b) for a, b in zip(held, here, strict=True)))
 
-    dt, dx = jnp.diff(way.t), jnp.diff(way.x)
-    items = (way.t[1:], dt, way.x[1:], dx, way.v[1:], led[1:], way.turn[1:], way.strength[1:], way.stretch[1:])
+    n, none = way.t.size, jnp.zeros(way.t.size)
     pull = model.pull(led[0] - way.x[0])
-    _, (pulls, body, contact, elements, tangent) = jax.lax.scan(step, (start, pull), items)
-
-    def begun(first: Array, rest: Array) -> Array:
-        return jnp.concatenate([first[None], rest])
-
-    share = bank.strength
-    return Held(
-        begun(pull, pulls),
-        begun(jnp.zeros(()), body),
-        begun(jnp.zeros(()), contact),
-        begun(jnp.zeros_like(share), elements / jnp.where(share > 0.0, share, 1.0)),
-        begun(jnp.sum(bank.stiffness), tangent),
-    )
+    first = Held(
+        none.at[0].set(pull), none, none, jnp.zeros((n, share.size)), none.at[0].set(jnp.sum(bank.stiffness))
+    )  # fmt: skip
+    return jax.lax.fori_loop(1, n if knots is None else knots, step, (start, pull, first))[2]
 
 
 def turning(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -114,7 +108,7 @@ def turning(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float6
     return np.concatenate([[0.0], np.where(reverses, 0.5 * np.diff(t) * before**2 / apart, 0.0)])
 
 
-def undone(model: Model, way: Way, force: Array) -> Way:
+def undone(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Way:
     """The motion of the block from that of the reading: the chain of sensor effects undone.
 
     By van Cittert's iteration ``x <- x + (reading - sensor(x))``, which needs nothing but the sensor itself; it ends
@@ -124,25 +118,29 @@ def undone(model: Model, way: Way, force: Array) -> Way:
         model: with effects on the sensor.
         way: the reading in place of the displacement.
         force: that the contact holds at the knots (N), for sensors that see it, shape (n,).
+        knots: number of those that count.
     """
     if not any(isinstance(e, Sensor) for e in model.effects):
         return way
     seen = way.x
     for _ in range(PASSES):
-        shift = way.x + (seen - read(model, way, force)) - seen
+        shift = way.x + (seen - read(model, way, force, knots)) - seen
         way = way._replace(x=seen + shift, v=way.v + _slope(shift, way.t) - _slope(way.x - seen, way.t))
     return way
 
 
-def read(model: Model, way: Way, force: Array) -> Array:
+def read(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Array:
     """What the sensors show of a motion (m), shape (n,); arguments as of :func:`undone`, ``way`` that of the block."""
     sensors: list[Any] = sorted((e for e in model.effects if isinstance(e, Sensor)), key=lambda e: e.place)
     bank = model.shaped()
     memory = tuple(e.start(bank) if isinstance(e, Memory) else () for e in sensors)
     zero, mass = jnp.zeros_like(bank.stiffness), model.mass()
+    dt, dx = jnp.diff(way.t, prepend=way.t[:1]), jnp.diff(way.x, prepend=way.x[:1])
+    items = (way.t, dt, way.x, dx, way.v, way.drive, force)
 
-    def step(states: Any, item: tuple[Array, ...]) -> tuple[Any, Array]:
-        t, dt, x, dx, v, at, f = item
+    def step(i: Array, carry: tuple[Any, Array]) -> tuple[Any, Array]:
+        states, readings = carry
+        t, dt, x, dx, v, at, f = (a[i] for a in items)
         contact = Contact(zero, bank.stiffness, bank.strength, f, zero, mass)
         motion = Motion(t, dt, x, v, jnp.zeros(()), dx, at)
         states = tuple(
@@ -151,11 +149,10 @@ def read(model: Model, way: Way, force: Array) -> Array:
         shown = x
         for e, m in zip(sensors, states, strict=True):
             shown = e.read(m, shown, motion, f)
-        return states, shown
+        return states, readings.at[i].set(shown)
 
-    items = (way.t[1:], jnp.diff(way.t), way.x[1:], jnp.diff(way.x), way.v[1:], way.drive[1:], force[1:])
-    _, shown = jax.lax.scan(step, memory, items)
-    return jnp.concatenate([way.x[:1], shown])
+    last = way.t.size if knots is None else knots
+    return jax.lax.fori_loop(1, last, step, (memory, way.x))[1]
 
 
 def _slope(y: Array, t: Array) -> Array:

@@ -156,6 +156,7 @@ class Problem:
         )
         self.elapsed = np.concatenate([k.elapsed for k in runs])
         self._index = _indices(runs, n, first)
+        self._knots = np.array([k.t.size for k in runs])
         virgin = np.isin(self.of, [f for f, k in zip(first[:-1], runs, strict=True) if k.virgin])
         hats = _hats(self.place)
         # quantisation, filters and hum leave about as much alike in all cycles as the noise of one sample is
@@ -190,7 +191,7 @@ class Problem:
             for a in program(
                 point.z, scales, point.phases.T * phase_scale, phase_scale, fixed, leaves,
                 np.maximum(point.weights, EMPTY), c.reach,
-                own, self.way, self._index, np.concatenate([point.events, np.zeros((1, 3))]),
+                own, self.way, self._index, self._knots, np.concatenate([point.events, np.zeros((1, 3))]),
             )
         )  # fmt: skip
         values = self.values(point)
@@ -300,7 +301,7 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
 
     def forces(
         z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, own: Any,
-        way: Way, index: Any,
+        way: Way, index: Any, knots: Any,
     ) -> Any:  # fmt: skip
         si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
         values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
@@ -313,28 +314,30 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
         if any(isinstance(e, Sensor) for e in effects):
             # the measured force, near enough for a sensor that sees it
             force = model.block.spring_stiffness * (way.drive - way.x)
-            seen = undone(model, way, force)
+            seen = undone(model, way, force, knots)
         shift = seen.x - way.x
         moved = seen._replace(
             x=seen.x + event[by_arrest, 2],
             strength=jnp.exp(event[by_event, 0]),
             stretch=jnp.exp(event[by_event, 1]),
         )
-        held = along(model, moved)
+        held = along(model, moved, knots)
         return (held.pull + held.body - held.contact, shift, model.mass()), (held.elements, held.tangent)
 
     def whole(
         z: Any, scales: Any, turns: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any,
-        own: Any, way: Way, index: Any, event: Any,
+        own: Any, way: Way, index: Any, knots: Any, event: Any,
     ) -> Any:  # fmt: skip
         effects = jax.tree.unflatten(structure, leaves)
         size = a + b + 3
         rows = jnp.eye(size)
 
-        def of_run(turn: Any, own: Any, way: Way, index: Any) -> Any:
+        def of_run(run: Any) -> Any:
+            turn, own, way, index, knots = run
+
             def moved(row: Any) -> Any:
                 def f(z: Any, turn: Any, event: Any) -> Any:
-                    return forces(z, turn, event, scales, fixed, effects, weights, reach, own, way, index)
+                    return forces(z, turn, event, scales, fixed, effects, weights, reach, own, way, index, knots)
 
                 # all events, and the phase of whatever run, are moved at once: each acts on its own points only
                 step = jnp.broadcast_to(row[a + b :], event.shape).at[-1].set(0.0)
@@ -346,6 +349,7 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
             (q, shift, mass), (dq, dshift, dmass), (elements, tangent) = jax.vmap(moved, out_axes=(None, 0, None))(rows)
             return q, shift, mass, dq, dshift, dmass, elements, tangent
 
-        return jax.vmap(of_run)(turns, own, way, index)
+        # one after the other: the shorter ones cost less then
+        return jax.lax.map(of_run, (turns, own, way, index, knots))
 
     return jax.jit(whole)

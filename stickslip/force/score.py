@@ -56,7 +56,7 @@ def _arguments(fit: Fit) -> tuple[Any, ...]:
     turned = {n: turns[:, j] for j, n in enumerate(names)}
     return (
         values, turned, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), c.reach, own, problem.way,
-        problem._index, np.concatenate([point.events, np.zeros((1, 3))]),
+        problem._index, problem._knots, np.concatenate([point.events, np.zeros((1, 3))]),
     )  # fmt: skip
 
 
@@ -83,11 +83,12 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Any:
 
     def one(
         values: Any, known: Any, turned: Any, leaves: Any, weights: Any, reach: Any, own: Any, way: Way, index: Any,
-        event: Any,
+        knots: Any, event: Any,
     ) -> Any:  # fmt: skip
         effects = jax.tree.unflatten(base, leaves)
 
-        def of_run(turned: Any, own: Any, way: Way, index: Any) -> Any:
+        def of_run(run: Any) -> Any:
+            turned, own, way, index, knots = run
             everything = {**known, **turned}
 
             def forces(amplitude: Any) -> Any:
@@ -104,21 +105,21 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Any:
                 seen = moving
                 if any(isinstance(e, Sensor) for e in model.effects):
                     force = model.block.spring_stiffness * (moving.drive - moving.x)
-                    seen = undone(model, moving, force)
+                    seen = undone(model, moving, force, knots)
                 by_event, by_arrest = index
                 moved = seen._replace(
                     x=seen.x + event[by_arrest, 2], strength=jnp.exp(event[by_event, 0]),
                     stretch=jnp.exp(event[by_event, 1]),
                 )  # fmt: skip
-                held = along(model, moved)
+                held = along(model, moved, knots)
                 return held.pull + held.body - held.contact, seen.x - way.x, model.mass()
 
             start = values[names[place]]
             return jax.jvp(forces, (start,), (jnp.ones(()),))[1]
 
-        return jax.vmap(of_run)(turned, own, way, index)
+        return jax.lax.map(of_run, (turned, own, way, index, knots))
 
-    return jax.jit(jax.vmap(one, in_axes=(0, *[None] * 9)))
+    return jax.jit(jax.vmap(one, in_axes=(0, *[None] * 10)))
 
 
 class Explained:
