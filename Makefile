@@ -37,7 +37,6 @@ layers: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/python -m tests.benchmark
-	$(BIN)/python -m tests.benchmark.fit_peers
 
 test-newest:
 	test -x .venv-newest/bin/python || $(PYTHON) -m venv .venv-newest

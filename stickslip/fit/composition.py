@@ -42,13 +42,6 @@ class Numbers(NamedTuple):
     effects: tuple[Effect, ...]
 
 
-def of_this_package(structure: Any) -> bool:
-    """Whether all effects of this structure are this package's own, so that its code says all of their laws."""
-    effects = jax.tree.unflatten(structure, [0.0] * structure.num_leaves)
-    package = __name__.split(".")[0]
-    return all(type(e).__module__.split(".")[0] == package for e in effects)
-
-
 class Family(NamedTuple):
     """What decides about a compiled program: of a composition all but its numbers and which of them are free.
 

@@ -13,15 +13,18 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import export
 
 from ..contact import Bank
-from ..fit.composition import of_this_package
-from ..fit.problem import FINE
-from ..fit.program import Program
 from ..forward import MOST_STEPS, Cycles, Track, run_cycles
 from ..model import LoadPoint, Model
 from ..solve.stepper import Tolerance
+from ..traced import Program, of_this_package
 from .problem import EMPTY, PULL, Point, Problem, model_of
+
+FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)
+
+export.register_namedtuple_serialization(Track, serialized_name="stickslip.forward.Track")  # what is kept returns one
 
 
 def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events: np.ndarray | None = None) -> Track:

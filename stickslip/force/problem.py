@@ -23,6 +23,7 @@ from ..contact import Bank
 from ..effects.base import Effect, Sensor
 from ..fit.parameters import Free, to_si
 from ..model import Block, LoadPoint, Model, Weakening
+from ..traced import Program, of_this_package
 from .along import Way, along, undone
 from .knots import Knots
 
@@ -295,7 +296,7 @@ def _set(effect: Effect, values: dict[str, Any]) -> Effect:
 
 
 @lru_cache(maxsize=256)
-def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) -> Any:
+def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) -> Program:
     """The compiled forces at the knots, shape (R, n), with derivatives in shared, phases and locals."""
     a, b = len(names), len(phases)
 
@@ -352,4 +353,4 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
         # one after the other: the shorter ones cost less then
         return jax.lax.map(of_run, (turns, own, way, index, knots))
 
-    return jax.jit(whole)
+    return Program(whole, f"along {names} {phases} {structure}" if of_this_package(structure) else None)

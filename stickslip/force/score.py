@@ -13,6 +13,7 @@ import numpy as np
 from ..contact import Bank
 from ..effects.base import Effect, Sensor
 from ..params import specs
+from ..traced import Program, of_this_package
 from .along import Way, along, undone
 from .fit import Array, Fit
 from .problem import EMPTY, PULL, Problem, model_of
@@ -77,7 +78,7 @@ def _at_points(problem: Problem, fit: Fit, q: Array, shift: Array, mass: Array, 
 
 
 @lru_cache(maxsize=256)
-def _program(base: Any, structure: Any, cls: type[Effect]) -> Any:
+def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
     names = tuple(specs(cls))
     place = names.index(cls.amplitude)
 
@@ -119,7 +120,9 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Any:
 
         return jax.lax.map(of_run, (turned, own, way, index, knots))
 
-    return jax.jit(jax.vmap(one, in_axes=(0, *[None] * 10)))
+    every = jax.vmap(one, in_axes=(0, *[None] * 10))
+    own = of_this_package(base) and cls.__module__.split(".")[0] == __name__.split(".")[0]
+    return Program(every, f"signature {base} {structure}" if own else None)
 
 
 class Explained:

@@ -1,15 +1,14 @@
-"""Where a dynamic fit starts when springs are stated for single traces."""
+"""Where a dynamic fit starts from what the campaign file says, and the ringing that is heard in the records."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from stickslip.campaign import Rig, load_campaign, load_traces
+from stickslip.campaign import load_campaign, load_traces
+from stickslip.diagnose.prepare import prepare
 from stickslip.errors import InputError
-from stickslip.features.measurement import measure
-from stickslip.fit.start import FALLBACK_FREQUENCY, base_composition, ring_period, ringing
-from stickslip.fit.surface import surface_prior
+from stickslip.fit.start import FALLBACK_FREQUENCY, ring_period, ringing
 from stickslip.segment import segment
 
 RIG = 'schema = 1\n[rig]\nmass = "89.4 g"\ncontacts = 4\nnormal_force = "0.31 N"\nfriction_coefficient = 0.2\n'
@@ -37,7 +36,7 @@ def start(tmp_path):
         path.write_text(rig + more + "".join(TRACE.format(name=f"t{i}") + extra for i, extra in enumerate(traces)))
         loaded = load_campaign(path)
         found = load_traces(loaded)
-        return base_composition(loaded, measure(found, [segment(t) for t in found], ring_period=2e-3))
+        return prepare(loaded, found, [segment(t) for t in found]).problem.composition
 
     return compose
 
@@ -71,19 +70,6 @@ def test_a_guessed_mass_is_fitted_within_its_bounds(start):
     (mass,) = [f for f in found.free if f.name == "rig.mass"]
     assert (mass.start, mass.lower, mass.upper) == pytest.approx((0.09, 0.08, 0.1))
     assert not [f for f in weighed.free if f.name == "rig.mass"]
-    z, nodes = np.array([f.inward(f.start) for f in found.free]), (np.array([0.0, 1.0]), np.array([0.0, 5e-5]))
-    assert float(found.model(z, np.zeros(2), nodes, np.nan).mass()) == pytest.approx(0.09)
-    z[[f.name for f in found.free].index("rig.mass")] = mass.inward(0.085)
-    assert float(found.model(z, np.zeros(2), nodes, np.nan).mass()) == pytest.approx(0.085)
-
-
-def test_a_guess_of_the_load_widens_that_of_the_strength(start):
-    def width(rig):
-        return next(f for f in start(SPRING, "", rig=rig).free if f.name == "contact.strength").width
-
-    guess = '{ guess = "0.31 N", lower = "0.1 N", upper = "1 N" }'
-    assert width(RIG.replace('"0.31 N"', guess)) == pytest.approx(np.log(10.0) / 4.0)
-    assert width(RIG) == 0.1
 
 
 def test_a_guess_of_a_spring_in_a_trace_counts(start):
@@ -93,20 +79,6 @@ def test_a_guess_of_a_spring_in_a_trace_counts(start):
     assert (stiffness.lower, stiffness.upper, stiffness.prior) == pytest.approx((2000.0, 3500.0, 2500.0))
     with pytest.raises(InputError, match="different guesses"):
         start("", guess, guess.replace("2500", "2600"))
-
-
-def test_the_roughness_is_the_prior_of_the_contact(start):
-    rough = 'H = 0.3\nh_rms = "2.46 um"\n'
-    before = {f.name: f for f in start(SPRING, "").free}
-    after = {f.name: f for f in start(SPRING + rough, "").free}
-    prior = surface_prior(Rig(contacts=4, normal_force=0.31, friction_coefficient=0.2, H=0.3, h_rms=2.46e-6))
-    for name, guess in (("u_max", prior.u_max), ("p", prior.p), ("spread", prior.spread)):
-        assert after[f"contact.{name}"].prior == pytest.approx(guess.value)
-        assert after[f"contact.{name}"].width == pytest.approx(guess.width)
-        assert before[f"contact.{name}"].prior != pytest.approx(guess.value, rel=1e-3)
-    # the ringing still tells where to begin, with the shape of the lines
-    stiffness = [f["contact.p"].start / f["contact.u_max"].start for f in (before, after)]
-    assert stiffness[0] == pytest.approx(stiffness[1])
 
 
 RATE, COUNT = 1e4, 8e-9
@@ -208,9 +180,3 @@ def test_runs_of_different_rigs_are_refused(start):
         start(SPRING, "", 'mass = "300 g"\n')
     assert error.value.file is not None
     assert "t1: 0.3" in str(error.value)
-
-
-def test_half_a_roughness_is_refused_with_its_place(start):
-    with pytest.raises(InputError, match="says nothing without") as error:
-        start(SPRING + "H = 0.3\n", "")
-    assert str(error.value.file).endswith("c.toml")

@@ -23,9 +23,9 @@ import jax
 import numpy as np
 from jax import export
 
-from ..cache import folder_for
+from .cache import folder_for
 
-PACKAGE = Path(__file__).parents[1]
+PACKAGE = Path(__file__).parent
 MADE_WITH = ("jax", "jaxlib", "diffrax", "equinox", "lineax", "optimistix", "numpy")  # and with this package's code
 FORGOTTEN = 30 * 86400.0  # s after which traces of other versions are removed
 _DIGEST = hashlib.sha256().digest_size
@@ -77,6 +77,13 @@ class Program:
                 return jax.jit(flat)
             _write(path, kept)
         return jax.jit(export.deserialize(bytearray(kept)).call)
+
+
+def of_this_package(structure: Any) -> bool:
+    """Whether all effects of this structure are this package's own, so that its code says all of their laws."""
+    effects = jax.tree.unflatten(structure, [0.0] * structure.num_leaves)
+    package = __name__.split(".")[0]
+    return all(type(e).__module__.split(".")[0] == package for e in effects)
 
 
 def _read(path: Path) -> bytes | None:

@@ -14,17 +14,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from stickslip import traced
 from stickslip.effects import catalogue
 from stickslip.effects.base import Effect
-from stickslip.fit import program
-from stickslip.fit.composition import Family
-from stickslip.fit.problem import _tracks
-from stickslip.fit.program import Program
+from stickslip.force.problem import _program
+from stickslip.traced import Program
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(program, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(traced, "_folder", lambda: tmp_path)
     return tmp_path
 
 
@@ -86,7 +85,7 @@ def test_nothing_is_kept_without_a_name_or_of_what_calls_back_into_python(folder
 @pytest.mark.parametrize("how", ["gone", "read-only"])
 def test_a_folder_that_cannot_be_written_does_no_harm(folder, monkeypatch, how):
     if how == "gone":
-        monkeypatch.setattr(program, "_folder", lambda: folder / "gone")
+        monkeypatch.setattr(traced, "_folder", lambda: folder / "gone")
     else:
 
         def refuse(*args, **kwargs):
@@ -101,7 +100,7 @@ def test_a_folder_that_cannot_be_written_does_no_harm(folder, monkeypatch, how):
 
 def test_no_trace_is_kept_of_code_that_was_changed_since_it_was_loaded(folder, tmp_path_factory, monkeypatch):
     package = tmp_path_factory.mktemp("package")
-    monkeypatch.setattr(program, "PACKAGE", package)
+    monkeypatch.setattr(traced, "PACKAGE", package)
     (package / "law.py").write_text("x = 1")
     os.utime(package / "law.py", (0.0, 0.0))
     Program(Counted(), "one")(PARTS, 3.0)
@@ -121,7 +120,7 @@ def test_an_output_that_is_no_known_container_is_traced_every_time(folder):
 ADDS = """
 from stickslip import cache
 cache.enable()
-from stickslip.fit.program import Program
+from stickslip.traced import Program
 print(Program(lambda x: x + 1.0, "adds")(1.0))
 """
 
@@ -139,9 +138,9 @@ def test_traces_belong_to_the_code_and_old_ones_of_other_code_go(tmp_path, monke
     package, cache = tmp_path / "package", tmp_path / "cache"
     package.mkdir(), cache.mkdir()
     (package / "law.py").write_text("x = 1")
-    monkeypatch.setattr(program, "PACKAGE", package)
-    monkeypatch.setattr(program, "folder_for", lambda name: cache)
-    of = program._of_this_version.__wrapped__
+    monkeypatch.setattr(traced, "PACKAGE", package)
+    monkeypatch.setattr(traced, "folder_for", lambda name: cache)
+    of = traced._of_this_version.__wrapped__
     assert of() is None  # changed since it was loaded: neither are traces of the new code those of this process
     os.utime(package / "law.py", (0.0, 0.0))
     first = of()
@@ -155,7 +154,7 @@ def test_traces_belong_to_the_code_and_old_ones_of_other_code_go(tmp_path, monke
     assert of() == second
     assert set(cache.iterdir()) == {second}
     for change in (
-        lambda: monkeypatch.setattr(program, "version", lambda name: f"{name} 9.9"),
+        lambda: monkeypatch.setattr(traced, "version", lambda name: f"{name} 9.9"),
         lambda: monkeypatch.setenv("EQX_ON_ERROR", "breakpoint"),
         lambda: monkeypatch.setattr(jax, "default_backend", lambda: "another"),
     ):
@@ -168,40 +167,22 @@ def test_traces_of_effects_from_elsewhere_are_not_kept():
     class Elsewhere(Effect):
         tag = "elsewhere"
 
-    def of(*effects):
-        return Family(4, 64, 3072, (), jax.tree.structure(effects))
+    def name(*effects, names=("weakening.drop",)):
+        return _program(names, (), jax.tree.structure(effects)).name
 
     wear, other = catalogue.get("wear")(), catalogue.get("wear")(course="saturating")
-    assert _tracks(of(wear, Elsewhere())).name is None
-    names = {_tracks(f).name for f in (of(), of(wear), of(other), of(wear)._replace(bins=32))}
-    assert None not in names
-    assert len(names) == 4
+    assert name(wear, Elsewhere()) is None
+    found = {name(), name(wear), name(other), name(wear, names=("weakening.drop", "wear.rate"))}
+    assert None not in found
+    assert len(found) == 4
 
 
-CAMPAIGN = """
-import sys
-from pathlib import Path
-import numpy as np
-from stickslip.fit import program
-from stickslip.fit.problem import Problem, _tracks
-from tests.fit import synthetic
+def test_a_force_is_the_same_from_a_kept_trace(folder, small):
+    def evaluated():
+        _program.cache_clear()
+        return small.problem.evaluate(small.point)
 
-campaign = synthetic.measured(synthetic.traces())
-events = np.zeros((*campaign.values.shape[:2], 2))
-
-def features(folder):
-    program._folder = lambda: folder
-    _tracks.cache_clear()
-    return Problem(synthetic.composition(), campaign).features(synthetic.truth(), events)
-
-folder = Path(sys.argv[1])
-first, again, none = features(folder), features(folder), features(None)
-assert len(list(folder.iterdir())) == 1
-np.testing.assert_array_equal(again, first)
-np.testing.assert_array_equal(none, first)
-"""
-
-
-def test_a_campaign_has_the_same_features_from_a_kept_trace(tmp_path):
-    environment = {**os.environ, "EQX_ON_ERROR": "nan"}  # as where compiled code is kept; what raises calls back
-    subprocess.run([sys.executable, "-c", CAMPAIGN, str(tmp_path)], env=environment, check=True)
+    first, again = evaluated(), evaluated()
+    assert len(list(folder.iterdir())) == 1
+    for name in ("residual", "shared", "local"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(first, name))
