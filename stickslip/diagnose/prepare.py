@@ -10,7 +10,7 @@ from ..errors import InputError, nearest
 from ..features.measurement import doubts
 from ..fit.start import ringing, shared_rig
 from ..force.begin import begin
-from ..force.knots import Knots, Scales, knots, scales
+from ..force.knots import Knots, Scales, knots, scales, too_coarse
 from ..force.problem import Point, Problem
 from ..segment import Segmentation
 from ..trace import Trace
@@ -83,7 +83,11 @@ def prepare(
     period = ringing(kept, segments)
     if period is None:
         dropped.append(UNHEARD)
-    times = scales(list(segments), period, min(t.sampling_rate for t in kept))
+    rate = min(t.sampling_rate for t in kept)
+    times = scales(list(segments), period, rate)
+    coarse = too_coarse(times, rate)
+    if coarse is not None:
+        dropped.append(coarse)
     runs = [knots(t, s, times) for t, s in used]
     rig = shared_rig(campaign, [t.name for t in kept])
     try:

@@ -35,6 +35,8 @@ SHARE = 0.25  # of a stick that the samples of either end may take
 UNSTEADY = 4.0  # levels of slow noise by which two windows must differ
 BACK = 5.0  # noise levels of one sample within which a step back is noise
 HASTE = 5.0  # noise levels that the block moves in a window of the nucleation
+HALF = 3.0  # samples, the least half-width of the test function
+COARSE = 0.15  # of a slip, the largest half-width that still resolves its inertia
 HUM = 50.0  # Hz, the mains
 
 
@@ -115,7 +117,18 @@ def scales(segmentations: list[Segmentation], ring: float | None, rate: float) -
     """The times of a campaign: medians over its slips, and the period of the ringing (s) where one is heard."""
     slip = float(np.median([e.duration for s in segmentations for e in s.events]))
     half = min(ring, slip / 8.0) if ring else slip / 12.0
-    return Scales(max(half, 3.0 / rate), ring or 0.0, slip)
+    return Scales(max(half, HALF / rate), ring or 0.0, slip)
+
+
+def too_coarse(times: Scales, rate: float) -> str | None:
+    """A sentence where samples lie too far apart for the inertia of a slip (sampling rate in Hz), else None."""
+    if times.half <= COARSE * times.slip:
+        return None
+    return (
+        f"sampling at {rate:.4g} Hz is too coarse for inertia: the acceleration is a mean over {2e3 * times.half:.3g} ms "
+        f"of a slip of {1e3 * times.slip:.3g} ms, so mass, damping and what acts within a slip are told badly; "
+        f"{HALF / (COARSE * times.slip):.3g} Hz would do"
+    )
 
 
 def kernels(half: float, rate: float) -> tuple[Array, Array, Array]:
