@@ -2,7 +2,8 @@
 
 1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many
    members of its family, among as many effects; and unseen runs are predicted better: their likelihood by more than
-   2.5 standard errors over their events, and their error (root mean square over floor) as well; and its parameters lie
+   2.5 standard errors over their events, and their error (root mean square in standard deviations of the model
+   without, correlations within events counted) as well; and its parameters lie
    where such values lie (``usual`` in the catalogue), within their errors.
 2. *Named*: the seen effect that predicts unseen runs best.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
@@ -23,8 +24,9 @@ from scipy.stats import chi2
 
 from ..effects import catalogue
 from ..force.candidates import Candidate
-from ..force.fit import Array, Fit, deviations
+from ..force.fit import Array, Fit
 from ..force.heldout import folds, halves, unseen
+from ..force.scatter import covariance
 
 CHANCE = 1e-3  # of any effect at all being seen where nothing is missing
 ERRORS = 2.5  # standard errors
@@ -111,7 +113,7 @@ class Judge:
         self.base, self.tried = base, tried
         self._runs, self._halves = folds(base), halves(base)
         self._unseen = {False: unseen(base, self._runs), True: unseen(base, self._halves)}
-        self._floor = deviations(base)
+        self._root = np.linalg.cholesky(covariance(base.scatter.sizes, base.known)[1])
 
     def __call__(self, candidate: Candidate) -> Judged | None:
         """The candidate beside it; None where it was not fitted."""
@@ -138,8 +140,8 @@ class Judge:
         return Compared(fit, gain, chance, without.cost - predicted.cost, fall)
 
     def _error(self, residual: Array) -> float:
-        use = ~self.base.dropped
-        return float(np.sqrt(np.mean((residual[use] / self._floor[use]) ** 2)))
+        white = np.linalg.solve(self._root, self.base.blocks(residual)[..., None])
+        return float(np.sqrt(np.sum(white**2) / np.sum(~self.base.dropped)))
 
 
 def best_forms(judged: Sequence[Judged]) -> list[Judged]:

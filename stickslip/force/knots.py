@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ Index = NDArray[np.intp]
 
 CREEP, NUCLEATION, SLIP, RING = range(4)
 PHASES = ("creep", "nucleation", "slip", "ring-down")
-POINTS = ("at", "phase", "of", "rate", "acceleration", "white", "shaken", "place", "elapsed")
+POINTS = ("at", "phase", "of", "rate", "acceleration", "place", "elapsed")
 TOWARDS, EVEN = 36, 16  # windows of a stick: spaced as the logarithm of the time to the onset, and evenly
 RINGS = 12.0  # periods after an arrest that are followed sample by sample
 BEFORE = 8.0  # half-widths of the test function before an onset from where every sample is followed
@@ -75,8 +76,8 @@ class Knots:
         phase: of the points, an index of PHASES.
         of: event of the points.
         rate, acceleration: of the reading at the points, under the test function (m/s, m/s2).
-        white: standard deviation of the reading at the points, from the noise of one sample (m).
-        shaken: the same of the acceleration (m/s2).
+        seen: (p, N) from the samples of the reading to displacement at the knots, rate and acceleration at the points:
+            the way that the noise of every sample takes into a point.
         place: coordinate along which misfits are alike, one unit apart little (1).
         elapsed: time since the arrest before, or the start (s).
         noise: standard deviation of one sample (m).
@@ -99,8 +100,7 @@ class Knots:
     of: Index
     rate: Array
     acceleration: Array
-    white: Array
-    shaken: Array
+    seen: tuple[csr_array, csr_array, csr_array]
     place: Array
     elapsed: Array
     noise: float
@@ -166,13 +166,13 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     noise = max(float(trace.noise or 0.0), 1e-13)
     d = np.asarray(trace.drive.position(t))
     x = x - _hum(t, x, found.events, rate, times)
-    smoothed, speed = _smooth(x, noise, rate, times)
+    smoothed, speed, smoother = _smooth(x, noise, rate, times)
     breaks = np.searchsorted(t, trace.drive.breakpoints)
     steady, raw = speed, x
     step = max(trace.resolution or 0.0, 2.0 * noise, UNSTEADY * _unsteady(x, t, found.events, rate))
     if extra is not None:
         x = x + extra[: x.size]
-        smoothed, speed = _smooth(x, noise, rate, times)
+        smoothed, speed, smoother = _smooth(x, noise, rate, times)
     phi, first, second = kernels(times.half, rate)
     h = phi.size // 2
     pieces = _Pieces(step)
@@ -194,7 +194,7 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     if n - edge > 4 * h:
         last = len(events)
         pieces.windows(_apart(_edges(edge, n, n, breaks), raw, step, breaks), last, t, x, d, compared=False)
-    return pieces.made(trace, t, (phi, first, second), events, noise, times)
+    return pieces.made(trace, t, (phi, first, second), events, noise, times, smoother)
 
 
 def _even(t: Array, x: Array) -> tuple[Array, Array]:
@@ -247,8 +247,30 @@ def _unsteady(x: Array, t: Array, events: tuple[Event, ...], rate: float) -> flo
     return float(np.median(found)) if found else 0.0
 
 
-def _smooth(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, Array]:
-    """Displacement and velocity where every sample counts.
+@dataclass(frozen=True)
+class Smoother:
+    """Weights of the samples around one in its smoothed displacement.
+
+    Attributes:
+        slow, fast: of slow motion and of what is added to it, shape (2 h + 1,) both.
+        gain: how much of that is added at every sample, shape (N,).
+    """
+
+    slow: Array
+    fast: Array
+    gain: Array
+
+    def matrix(self, index: Index) -> csr_array:
+        """From all samples to the smoothed displacement at some of them."""
+        h, n = self.slow.size // 2, self.gain.size
+        around = np.clip(index[:, None] + np.arange(-h, h + 1), 0, n - 1)
+        weights = self.slow + self.gain[index][:, None] * self.fast
+        rows = np.repeat(np.arange(index.size), 2 * h + 1)
+        return coo_array((weights.ravel(), (rows, around.ravel())), shape=(index.size, n)).tocsr()
+
+
+def _smooth(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, Array, Smoother]:
+    """Displacement and velocity where every sample counts, and how the former is made of the samples.
 
     Slow motion by a parabola over a ringing period, on top of it what a parabola over a third of it adds, shrunk by as
     much as noise adds to it in squares: the noise of one sample, taken for motion, would be a path that weakens the
@@ -257,23 +279,25 @@ def _smooth(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, 
     period = times.ring or times.half
     wide, narrow = (max(round(width * rate) // 2 * 2 + 1, 3) for width in (period, period / 3.0))
     if wide < 5:
-        return x, np.gradient(x) * rate
+        return x, np.gradient(x) * rate, Smoother(np.ones(1), np.zeros(1), np.zeros(x.size))
 
-    def parabola(length: int, derivative: int) -> Array:
+    def parabola(y: Array, length: int, derivative: int = 0) -> Array:
         if length < 5:
-            return x if derivative == 0 else np.gradient(x) * rate
-        return savgol_filter(x, length, 2, deriv=derivative, delta=1.0 / rate)
+            return y if derivative == 0 else np.gradient(y) * rate
+        return savgol_filter(y, length, 2, deriv=derivative, delta=1.0 / rate)
 
-    slow = parabola(wide, 0)
-    fast = parabola(narrow, 0) - slow
-    middle = np.zeros(2 * wide + 1)
+    slow = parabola(x, wide)
+    fast = parabola(x, narrow) - slow
     pulse = np.zeros(2 * wide + 1)
     pulse[wide] = 1.0
-    middle = (savgol_filter(pulse, narrow, 2) if narrow >= 5 else pulse) - savgol_filter(pulse, wide, 2)
-    level = noise**2 * float((middle**2).sum())
+    still = parabola(pulse, wide)
+    more = parabola(pulse, narrow) - still
+    level = noise**2 * float((more**2).sum())
     seen = np.maximum(uniform_filter1d(fast**2, wide), 1e-300)
     gain = np.sqrt(np.maximum(1.0 - level / seen, 0.0))
-    return slow + gain * fast, parabola(wide, 1) + gain * (parabola(narrow, 1) - parabola(wide, 1))
+    own = slice(wide - wide // 2, wide + wide // 2 + 1)
+    smoother = Smoother(still[own], more[own], gain)
+    return slow + gain * fast, parabola(x, wide, 1) + gain * (parabola(x, narrow, 1) - parabola(x, wide, 1)), smoother
 
 
 def _fast(events: tuple[Event, ...], e: int, times: Scales, rate: float, n: int, t: Array, h: int) -> tuple[int, int]:
@@ -363,6 +387,7 @@ class _Pieces:
         self.weight: list[Array] = []
         self.event: list[Index] = []
         self.slow: list[NDArray[np.bool_]] = []
+        self.sample: list[tuple[int, Index]] = []
         self.size = 0
         self.points: list[dict[str, Array]] = []
 
@@ -392,12 +417,14 @@ class _Pieces:
             self.points.append(
                 {
                     "knot": index.astype(float), "at": mean[0], "count": count.astype(float),
+                    "low": edges[:-1].astype(float),
                     "of": np.full(count.size, float(e)), "phase": np.full(count.size, float(CREEP)),
                 }
             )  # fmt: skip
 
     def samples(self, index: Index, t: Array, x: Array, v: Array, d: Array, events: tuple[Event, ...], e: int) -> None:
         """Samples as they are."""
+        self.sample.append((self.size, index))
         middle = 0.5 * (events[e].t_onset + events[e].t_arrest)
         self._add(
             t[index], x[index], v[index], d[index], np.where(t[index] < middle, e, e + 1), False, np.ones(index.size)
@@ -428,7 +455,7 @@ class _Pieces:
 
     def made(
         self, trace: Trace, t: Array, weights: tuple[Array, Array, Array], events: tuple[Event, ...], noise: float,
-        times: Scales,
+        times: Scales, smoother: Smoother,
     ) -> Knots:  # fmt: skip
         knot_t = np.concatenate(self.t)
         d = np.concatenate(self.d)
@@ -448,7 +475,9 @@ class _Pieces:
         rows: list[list[Index]] = [[], []]
         values: list[list[Array]] = [[], [], []]
         fast_rows: list[Index] = []
-        out: dict[str, list[Array]] = {k: [] for k in ("at", "of", "phase", "rate", "acceleration", "white", "shaken")}
+        averaged: tuple[list[Any], ...] = ([], [], [])  # rows, samples and weights of windows
+        shaken: tuple[list[Any], ...] = ([], [], [], [])  # the same under the derivatives of the test function
+        out: dict[str, list[Array]] = {k: [] for k in ("at", "of", "phase", "rate", "acceleration")}
         p = 0
         columns_window: list[Index] = []
         rows_window: list[Index] = []
@@ -460,8 +489,11 @@ class _Pieces:
                 columns_window.append(piece["knot"].astype(int))
                 knot = piece["knot"].astype(int)
                 piece["rate"], piece["acceleration"] = v[knot], bends[knot]
-                piece["white"] = noise / np.sqrt(piece["count"])
-                piece["shaken"] = np.zeros(size)
+                count = piece["count"].astype(int)
+                begin = np.repeat(piece["low"].astype(int) - np.cumsum(count) + count, count)
+                averaged[0].append(np.repeat(index, count))
+                averaged[1].append(begin + np.arange(count.sum()))
+                averaged[2].append(np.repeat(1.0 / count, count))
             else:
                 centre = piece["centre"].astype(int)
                 offsets = np.arange(-h, h + 1)
@@ -476,8 +508,10 @@ class _Pieces:
                     for into, kernel in zip(values, (phi, first, second), strict=True):
                         into.append((part * kernel).ravel())
                 fast_rows.append(index)
-                piece["white"] = np.full(size, noise * np.sqrt((phi**2).sum()))
-                piece["shaken"] = np.full(size, noise * np.sqrt((second**2).sum()))
+                shaken[0].append(row)
+                shaken[1].append((centre[:, None] + offsets).ravel())
+                for into, kernel in zip(shaken[2:], (first, second), strict=True):
+                    into.append(np.tile(kernel, size))
             for key, into in out.items():
                 into.append(piece[key])
             p += size
@@ -486,9 +520,14 @@ class _Pieces:
         c = np.concatenate([*rows[1], *columns_window])
         ones = [np.ones(w.size) for w in rows_window]
         mean = coo_array((np.concatenate([*values[0], *ones]), (r, c)), shape=shape).tocsr()
-        smooth = tuple(
-            coo_array((np.concatenate(k or [np.zeros(0)]), (_joined(rows[0]), _joined(rows[1]))), shape=shape).tocsr()
-            for k in values[1:]
+        smooth = tuple(_sparse(k, rows[0], rows[1], shape) for k in values[1:])
+        # samples that are knots themselves, by the knots' smoothing; of the windows between them nothing is known here
+        at_samples = np.concatenate([first + np.arange(i.size) for first, i in self.sample] or [np.zeros(0, int)])
+        smoothed = smoother.matrix(np.concatenate([i for _, i in self.sample] or [np.zeros(0, int)]))
+        of_windows = _sparse(averaged[2], averaged[0], averaged[1], (p, t.size))
+        seen = (
+            mean[:, at_samples] @ smoothed + of_windows,
+            *(_sparse(k, shaken[0], shaken[1], (p, t.size)) for k in shaken[2:]),
         )
         made = {k: np.concatenate(w) for k, w in out.items()}
         event = np.concatenate(self.event)
@@ -497,7 +536,7 @@ class _Pieces:
         keep = (of < len(events)) & ((of > 0) | trace.virgin)
         knots_made = Knots(
             trace.name, knot_t, x, v, d, turn, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
-            made["at"], phase, of, made["rate"], made["acceleration"], made["white"], made["shaken"],
+            made["at"], phase, of, made["rate"], made["acceleration"], seen,
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, events, float(t[0])),
             noise, trace.spring_stiffness, trace.virgin,
         )  # fmt: skip
@@ -523,6 +562,10 @@ def _onward(x: Array, weight: Array, slow: NDArray[np.bool_], event: Index, nois
     return out
 
 
+def _sparse(values: list[Array], rows: list[Index], columns: list[Index], shape: tuple[int, int]) -> csr_array:
+    return coo_array((np.concatenate(values or [np.zeros(0)]), (_joined(rows), _joined(columns))), shape=shape).tocsr()
+
+
 def _joined(pieces: list[Index]) -> Index:
     return np.concatenate([p.ravel() for p in pieces]) if pieces else np.zeros(0, int)
 
@@ -532,6 +575,7 @@ def selected(k: Knots, keep: NDArray[np.bool_]) -> Knots:
     index = np.flatnonzero(keep)
     return replace(
         k, mean=k.mean[index], smooth=(k.smooth[0][index], k.smooth[1][index]),
+        seen=(k.seen[0][index], k.seen[1][index], k.seen[2][index]),
         **{n: getattr(k, n)[index] for n in POINTS},
     )  # fmt: skip
 

@@ -152,8 +152,8 @@ class Problem:
         self.of = np.concatenate([k.of + f for k, f in zip(runs, first[:-1], strict=True)])
         self.run = np.concatenate([np.full(k.at.size, r) for r, k in enumerate(runs)])
         self.event_run = np.concatenate([np.full(k.events, r) for r, k in enumerate(runs)])
-        self.phase, self.place, self.at, self.white, self.shaken = (
-            np.concatenate([getattr(k, name) for k in runs]) for name in ("phase", "place", "at", "white", "shaken")
+        self.phase, self.place, self.at = (
+            np.concatenate([getattr(k, name) for k in runs]) for name in ("phase", "place", "at")
         )
         self.elapsed = np.concatenate([k.elapsed for k in runs])
         self._index = _indices(runs, n, first)

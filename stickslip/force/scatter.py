@@ -2,9 +2,9 @@
 
 Residuals of one event belong together, those of two events do not. The covariance of an event's residuals is
 
-    S = diag(w^2 + numeric) + Z D Z' + L K L',    K_ij = exp(-|s_i - s_j|)
+    S = N + diag(numeric) + Z D Z' + L K L',    K_ij = exp(-|s_i - s_j|)
 
-with the sensor's noise w carried to a force by the stiffness of what sticks, random effects D (strength, yield
+with the noise N of the sensor's samples carried to a force by stiffness and inertia together, random effects D (strength, yield
 displacements, position at the arrest), and misfit whose size L depends on the phase of the cycle and, for errors of the
 position, on the stiffness, and a random walk of the reading since the arrest. All sizes are estimated from the campaign
 itself by maximum likelihood.
@@ -79,9 +79,14 @@ class Blocks:
 
 @dataclass(frozen=True)
 class Known:
-    """What the covariance is made of, at the points of every event, shape (E, n)."""
+    """What the covariance is made of, at the points of every event, shape (E, n).
 
-    white: Array
+    ``noise`` is the covariance (N^2) by the noise of samples, shape (E, n, n); ``dropped`` a variance (N^2) that takes
+    a point's weight.
+    """
+
+    noise: Array
+    dropped: Array
     local: Array
     phase: Array
     tangent: Array
@@ -113,9 +118,9 @@ def covariance(sizes: Array, k: Known) -> tuple[Array, Array]:
     """The covariance without and with the random effects (N^2), shape (E, n, n)."""
     s = np.exp(sizes)
     misfit, position, walk = _alike(s, k)
-    plain = misfit + position + walk
+    plain = misfit + position + walk + s[9] ** 2 * k.noise
     at = np.arange(plain.shape[1])
-    plain[:, at, at] += np.where(k.there, (s[9] * k.white) ** 2 + (NUMERIC * k.strength) ** 2, 1.0)
+    plain[:, at, at] += np.where(k.there, k.dropped + (NUMERIC * k.strength) ** 2, 1.0)
     scaled = k.local * s[:3]
     return plain, plain + scaled @ np.swapaxes(scaled, 1, 2)
 
@@ -157,13 +162,10 @@ def _slopes(sizes: Array, residual: Array, k: Known) -> tuple[Array, Array]:
         own = (k.phase == p) & k.there
         gradient[3 + p] = 2.0 * (traces - a * pulled)[own].sum()
         moved[..., 3 + p] = own * pulled + np.einsum("eij,ej->ei", misfit, own * a)
-    for i, part in ((7, position), (8, walk)):
+    for i, part in ((7, position), (8, walk), (9, s[9] ** 2 * k.noise)):
         pulled = np.einsum("eij,ej->ei", part, a)
         gradient[i] = 2.0 * (np.einsum("eij,eij->", inverse, part) - (a * pulled).sum())
         moved[..., i] = 2.0 * pulled
-    noise = np.where(k.there, (s[9] * k.white) ** 2, 0.0)
-    gradient[9] = 2.0 * (noise * (np.diagonal(inverse, axis1=1, axis2=2) - a**2)).sum()
-    moved[..., 9] = 2.0 * noise * a
     information = np.einsum("eia,eij,ejb->ab", moved, inverse, moved, optimize=True)
     gradient += 2.0 * (sizes - CENTRES) / WIDTHS**2
     return gradient, information + np.diag(2.0 / WIDTHS**2)

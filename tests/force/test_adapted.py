@@ -25,7 +25,7 @@ def test_sizes_too_large_are_found_again(fitted):
     assert found.cost < loose.cost - 50.0
     assert found.cost == pytest.approx(fitted.cost, abs=5.0)
     assert found.scatter.named()["stretch"] < 0.5 * wide.named()["stretch"]
-    assert found.known.white is fitted.known.white  # what carries the noise stays, or costs could not be compared
+    assert found.known.noise is fitted.known.noise  # what carries the noise stays, or costs could not be compared
 
 
 def test_an_optimum_stays_where_it_is(fitted):

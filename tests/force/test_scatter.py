@@ -30,8 +30,10 @@ def events(short: bool = False) -> Known:
     if short:
         there[::2, -7:] = False
         local[~there] = 0.0
+    near = np.exp(-np.abs(np.subtract.outer(np.arange(POINTS), np.arange(POINTS))) / 0.5)
+    noise = (1e-4 * STRENGTH) ** 2 * near * there[:, :, None] * there[:, None, :]
     return Known(
-        np.full(shape, 1e-4 * STRENGTH), local, np.tile(phase, (EVENTS, 1)), np.tile(tangent, (EVENTS, 1)), place,
+        noise, np.zeros(shape), local, np.tile(phase, (EVENTS, 1)), np.tile(tangent, (EVENTS, 1)), place,
         elapsed, there, STRENGTH,
     )  # fmt: skip
 

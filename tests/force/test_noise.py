@@ -1,0 +1,48 @@
+"""Noise of single samples in the residual force: what the covariance says is what trials show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stickslip.force.fit import fit, noise
+from stickslip.force.knots import RING, knots
+from stickslip.force.problem import Problem
+from stickslip.force.scatter import Blocks
+
+TRIALS = 120
+SMALL = 1e-12  # m, so that nothing but the linear answer is seen
+
+
+def test_noise_of_the_samples_reaches_the_force_as_stated(small):
+    """Near the contact's resonance spring and inertia undo each other: parts taken one by one would say far more."""
+    problem = small.problem
+    point = fit(problem, small.point).point
+    blocks = Blocks.of(problem.of, problem.events)
+    slopes = problem.evaluate(point)
+    rng, drawn = np.random.default_rng(4), []
+    for _ in range(TRIALS):
+        shaken = [
+            knots(t, s, small.times, SMALL * rng.standard_normal(t.time.size))
+            for t, s in zip(small.traces, small.found, strict=True)
+        ]
+        drawn.append(Problem(problem.composition, shaken).evaluate(point).residual - slopes.residual)
+    levels = np.concatenate([np.full(k.at.size, k.noise) for k in problem.runs])
+    seen = blocks(np.stack(drawn, axis=1) / SMALL * levels[:, None])
+    stated, local = noise(problem, point, slopes, blocks), blocks(slopes.local)
+    variances, along, apart = [], [], []
+    for e, phase in enumerate(blocks(problem.phase)):
+        ringing = np.flatnonzero((phase == RING) & blocks.there[e])
+        if ringing.size < 10:
+            continue
+        # the error of the position at the arrest is an effect of its own in the model of what is random
+        offset = local[e, ringing, 2] / np.linalg.norm(local[e, ringing, 2])
+        without = np.eye(ringing.size) - np.outer(offset, offset)
+        shown, told = without @ seen[e][ringing], without @ stated[e][np.ix_(ringing, ringing)] @ without
+        variances.append(np.mean(shown**2, axis=1) / np.diag(told))
+        values, vectors = np.linalg.eigh(told)
+        along.append((np.mean((vectors.T @ shown) ** 2, axis=1) / values)[1:])
+        apart.append(values[1] / values[-1])
+    assert len(variances) > 4
+    assert 0.85 < np.median(np.concatenate(variances)) < 1.2
+    assert 0.7 < np.median(np.concatenate(along)) < 1.6
+    assert np.median(apart) < 1e-2  # what is left near the resonance, to what there is away from it
