@@ -125,8 +125,8 @@ def too_coarse(times: Scales, rate: float) -> str | None:
     if times.half <= COARSE * times.slip:
         return None
     return (
-        f"sampling at {rate:.4g} Hz is too coarse for inertia: the acceleration is a mean over {2e3 * times.half:.3g} ms "
-        f"of a slip of {1e3 * times.slip:.3g} ms, so mass, damping and what acts within a slip are told badly; "
+        f"sampling at {rate:.4g} Hz is too coarse for inertia: the acceleration is a mean over {2e3 * times.half:.3g} "
+        f"ms of a slip of {1e3 * times.slip:.3g} ms, so mass, damping and what acts within a slip are told badly; "
         f"{HALF / (COARSE * times.slip):.3g} Hz would do"
     )
 
