@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -32,10 +33,12 @@ def kept(store: Store | None, key: str, problem: Problem, make: Callable[[], Fit
     """A fit of the problem from the store, or made and kept there."""
     found = store.load(key) if store is not None else None
     if found is not None:
+        problem = problem.with_composition(replace(problem.composition, reach=np.asarray(found["reach"], float)))
         return at(problem, _point(found), Scatter(found["sizes"]), found["dropped"].astype(bool))
     fit = make()
     if store is not None:
-        store.save(key, {**_arrays(fit.point), "sizes": fit.scatter.sizes, "dropped": fit.dropped})
+        reach = fit.problem.composition.reach
+        store.save(key, {**_arrays(fit.point), "sizes": fit.scatter.sizes, "dropped": fit.dropped, "reach": reach})
     return fit
 
 

@@ -11,12 +11,14 @@ from scipy.optimize import lsq_linear
 
 from ..errors import FitError
 from ..fit.parameters import Free
+from .bank import placed, spacing
 from .problem import PULL, Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, covariance, estimate, misfit
 
 Array = NDArray[np.float64]
 BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean
 FARTHEST = 1.5  # step of a parameter on the search scale
+PLACED = 2  # rounds after which the bank's elements are put where the strength is
 ROUNDS = 10  # times that the scatter is estimated anew
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
 HALVINGS = 5  # of a step that does not lower the cost
@@ -177,7 +179,7 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
         rows.append(row)
         target.append((np.log(point.weights.sum()) - np.log(level)) / deviation)
     # in shares of the mean weight as it is: else a contact as a whole weaker would look smoother
-    whole, second = point.weights.sum(), np.diff(np.eye(k), 2, axis=0)
+    whole, second = point.weights.sum(), np.diff(np.eye(k), 2, axis=0) / spacing(problem.composition.reach)
     bent = k / (BEND * whole) * (second @ point.weights)
     bend = np.zeros((k - 2, size))
     bend[:, a + b : a + b + k] = k / (BEND * whole) * second - bent[:, None] / whole
@@ -222,7 +224,7 @@ def known_of(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks, dro
     """What the covariance is made of, at a point."""
     strength = float(point.weights.sum())
     return Known(
-        noise(problem, point, slopes, blocks), np.where(blocks(dropped), strength**2, 0.0), blocks(slopes.local),
+        noise(problem, point, slopes, blocks), blocks(strength**2 * dropped), blocks(slopes.local),
         blocks(problem.phase), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed), blocks.there,
         strength,
     )  # fmt: skip
@@ -263,7 +265,8 @@ def fit(
     Args:
         problem: data and composition.
         point: where to begin.
-        scatter: sizes of what is random; default what is usually expected, estimated after the first round.
+        scatter: sizes of what is random; default what is usually expected, estimated after the first round. Without
+            them nothing is known of the contact either, and the bank's elements are put where its strength is.
         rounds, steps: of the search.
         first: whether the sizes are estimated before the first step too (else after the first round).
         dropped: points left out; default those that are found to lie far off.
@@ -284,6 +287,9 @@ def fit(
     if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
         raise FitError("the model gives no finite force along the motion")
     for turn in range(rounds):
+        if scatter is None and turn == PLACED:
+            problem, point = placed(problem, point)
+            slopes = problem.evaluate(point)
         made = known_of(problem, point, slopes, blocks, out)
         if turn or first:
             marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
@@ -295,7 +301,7 @@ def fit(
                 sizes = estimate(sizes, marginal, made, NEWTON)
         point, slopes, total, count = descend(problem, point, slopes, sizes, made, blocks, steps)
         evaluations += count
-        if turn > 2 and total < 1.0:
+        if turn > PLACED + 2 and total < 1.0:
             break
     made = known_of(problem, point, slopes, blocks, out)
     point, slopes, _, count = descend(problem, point, slopes, sizes, made, blocks, LAST)
