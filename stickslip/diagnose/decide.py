@@ -3,8 +3,8 @@
 1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many
    members of its family, among as many effects; and unseen runs are predicted better: their likelihood by more than
    2.5 standard errors over their events, and their error (root mean square in standard deviations of the model
-   without, correlations within events counted) as well; and its parameters lie
-   where such values lie (``usual`` in the catalogue), within their errors.
+   without, correlations within events counted) as well. Parameters beyond where such values lie (``usual`` in the
+   catalogue) have their price in the likelihood: the range is four standard deviations wide.
 2. *Named*: the seen effect that predicts unseen runs best.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.stats import chi2
@@ -52,6 +52,16 @@ class Compared:
     fall: float
 
     @property
+    def price(self) -> float:
+        """Of improbable parameters, in units of the cost."""
+        return 0.0
+
+    @property
+    def better(self) -> float:
+        """By how much the unseen runs are predicted better, in units of the cost."""
+        return float(self.unseen.sum()) - self.price
+
+    @property
     def error(self) -> float:
         """Standard error of the sum of ``unseen``."""
         return standard_error(self.unseen)
@@ -59,7 +69,7 @@ class Compared:
     @property
     def seen(self) -> bool:
         """Rule 1."""
-        return self.chance < CHANCE and float(self.unseen.sum()) > ERRORS * self.error and self.fall > 0.0
+        return self.chance < CHANCE and self.better > ERRORS * self.error and self.fall > 0.0
 
 
 @dataclass(frozen=True)
@@ -69,13 +79,14 @@ class Judged(Compared):
     Attributes:
         candidate: what was tried.
         amplitude, std: in SI.
-        strange: parameters of the effect that lie beyond where such values lie.
+        odd: of each parameter of the effect that lies beyond where such values lie, by how many standard deviations
+            of their range.
     """
 
     candidate: Candidate
     amplitude: float
     std: float
-    strange: tuple[str, ...] = ()
+    odd: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def tag(self) -> str:
@@ -83,27 +94,22 @@ class Judged(Compared):
         return self.candidate.tag
 
     @property
-    def usual(self) -> bool:
-        """Whether amplitude and inner parameters lie where such values lie, within their errors."""
-        return not self.strange
-
-    @property
-    def seen(self) -> bool:
-        """Rule 1."""
-        return super().seen and self.usual
+    def price(self) -> float:
+        """Of parameters beyond where such values lie."""
+        return DISPERSION * sum(far**2 for far in self.odd.values())
 
 
-def strange(fit: Fit, tag: str) -> tuple[str, ...]:
-    """Names of an effect's parameters that lie beyond where such values lie, by more than their errors allow."""
-    deviations = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    out = []
-    for f, z, sd in zip(fit.free, fit.point.z, deviations, strict=False):
+def odd(fit: Fit, tag: str) -> dict[str, float]:
+    """Parameters of an effect beyond where such values lie: by how many quarters of that range."""
+    out = {}
+    for f, z in zip(fit.free, fit.point.z, strict=False):
         if f.usual is None or not f.name.startswith(f"{tag}."):
             continue
         low, high = (f.inward(max(v, f.lower) if f.scale == "log" else v) for v in f.usual)
-        if not low - ERRORS * sd <= z <= high + ERRORS * sd:
-            out.append(f.name)
-    return tuple(out)
+        beyond = max(low - z, z - high, 0.0) / (0.25 * (high - low))
+        if beyond > 0.0:
+            out[f.name] = float(beyond)
+    return out
 
 
 class Judge:
@@ -123,18 +129,20 @@ class Judge:
         own = [f for f in fit.problem.composition.phases if f.name.startswith(f"{candidate.tag}.")]
         free = [f for f in fit.free if f.name.startswith(f"{candidate.tag}.")]
         number = len(free) + len(own) * len(fit.problem.runs)
-        found = self.beside(fit, number, candidate.members, bool(own))
+        far = odd(fit, candidate.tag)
+        price = DISPERSION * sum(d**2 for d in far.values())
+        found = self.beside(fit, number, candidate.members, bool(own), price)
         name = candidate.name
         std = fit.std().get(name, np.inf)
         return Judged(
             found.fit, found.gain, found.chance, found.unseen, found.fall, candidate, fit.values[name], std,
-            strange(fit, candidate.tag),
+            far,
         )  # fmt: skip
 
-    def beside(self, fit: Fit, number: int, members: int = 1, own: bool = False) -> Compared:
+    def beside(self, fit: Fit, number: int, members: int = 1, own: bool = False, price: float = 0.0) -> Compared:
         """A model with ``number`` parameters more, the best of ``members``; ``own`` where runs have their own."""
         gain = max(self.base.cost - fit.cost, 0.0)
-        chance = min(1.0, float(chi2.sf(gain / DISPERSION, number)) * members * self.tried)
+        chance = min(1.0, float(chi2.sf(max(gain - price, 0.0) / DISPERSION, number)) * members * self.tried)
         without, predicted = self._unseen[own], unseen(fit, self._halves if own else self._runs)
         fall = 1.0 - self._error(predicted.residual) / self._error(without.residual)
         return Compared(fit, gain, chance, without.cost - predicted.cost, fall)
@@ -149,9 +157,9 @@ def best_forms(judged: Sequence[Judged]) -> list[Judged]:
     out: dict[str, Judged] = {}
     for j in sorted(judged, key=lambda j: -j.gain):
         other = out.get(j.tag)
-        if other is None or (j.gain > other.gain - 4.0 and j.unseen.sum() > other.unseen.sum()):
+        if other is None or (j.gain > other.gain - 4.0 and j.better > other.better):
             out[j.tag] = j
-    return sorted(out.values(), key=lambda j: -float(j.unseen.sum()) if j.seen else np.inf)
+    return sorted(out.values(), key=lambda j: -j.better if j.seen else np.inf)
 
 
 def named(judged: Sequence[Judged]) -> list[Judged]:
@@ -159,7 +167,7 @@ def named(judged: Sequence[Judged]) -> list[Judged]:
     seen = [j for j in best_forms(judged) if j.seen]
     if not seen:
         return []
-    best = max(seen, key=lambda j: float(j.unseen.sum()))
+    best = max(seen, key=lambda j: j.better)
     close = [best, *(j for j in seen if j is not best and as_well(best, j))]
     # what contains another of them must pay for what it has more
     simple = [j for j in close if not any(_no_better(j, o) for o in close if o.tag in catalogue.get(j.tag).generalises)]
@@ -169,13 +177,15 @@ def named(judged: Sequence[Judged]) -> list[Judged]:
 def _no_better(general: Judged, special: Judged) -> bool:
     """Whether a law gains no more over a special case of it than its further parameters cost (Schwarz's criterion)."""
     more = len(general.fit.free) - len(special.fit.free)
-    return (general.gain - special.gain) / DISPERSION < more * float(np.log(general.unseen.size))
+    return (general.gain - general.price - special.gain + special.price) / DISPERSION < more * float(
+        np.log(general.unseen.size)
+    )
 
 
 def as_well(best: Compared, other: Compared) -> bool:
     """Whether a model predicts the unseen runs as well as the best one, within the error of their difference."""
     difference = best.unseen - other.unseen
-    total = float(difference.sum())
+    total = best.better - other.better
     return total < ERRORS * standard_error(difference) or total < LEAST
 
 

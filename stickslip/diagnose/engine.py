@@ -249,7 +249,7 @@ class Search:
             self._store, f"{key}-without", problem,
             lambda: fit(problem, at, self.base.scatter, dropped=self.base.dropped, first=True),
         )  # fmt: skip
-        seen = sorted((j for j in best_forms(self.named[tag].judged) if j.seen), key=lambda j: -float(j.unseen.sum()))
+        seen = sorted((j for j in best_forms(self.named[tag].judged) if j.seen), key=lambda j: -j.better)
         tags = [j.tag for j in seen if j.tag == tag or j.tag not in {*self.named, *self.gone}][:BEST]
         done = self._tried(without, tags, name)
         if not done.close:

@@ -224,7 +224,7 @@ def known_of(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks, dro
     """What the covariance is made of, at a point."""
     strength = float(point.weights.sum())
     return Known(
-        noise(problem, point, slopes, blocks), blocks(strength**2 * dropped), blocks(slopes.local),
+        noise(problem, point, slopes, blocks), blocks(np.where(dropped, strength**2, 0.0)), blocks(slopes.local),
         blocks(problem.phase), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed), blocks.there,
         strength,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.diagnose.decide import CHANCE, DISPERSION, ERRORS, Judged, best_forms, named, standard_error, strange
+from stickslip.diagnose.decide import CHANCE, DISPERSION, ERRORS, Judged, best_forms, named, odd, standard_error
 from stickslip.effects import catalogue
 from stickslip.fit.parameters import effect_parameters
 from stickslip.force.candidates import Candidate
@@ -18,13 +18,13 @@ EVENTS = 40
 
 def judged(
     tag: str, gain: float, each: float, *, spread: float = 1.0, chance: float = 1e-9, fall: float = 0.2,
-    form: dict[str, str] | None = None, parameters: int = 8, strange: tuple[str, ...] = (),
+    form: dict[str, str] | None = None, parameters: int = 8, far: dict[str, float] | None = None,
 ) -> Judged:  # fmt: skip
     """An effect whose gain on every unseen event is ``each``, give or take ``spread``."""
     swing = spread * np.where(np.arange(EVENTS) % 2, 1.0, -1.0)
     fit: Any = SimpleNamespace(free=range(parameters))
     return Judged(
-        fit, gain, chance, each + swing, fall, Candidate(tag, form or {}, gain, None), 0.01, 0.001, strange
+        fit, gain, chance, each + swing, fall, Candidate(tag, form or {}, gain, None), 0.01, 0.001, far or {}
     )  # fmt: skip
 
 
@@ -64,23 +64,22 @@ def test_of_a_law_and_its_special_case_the_special_case_stays():
     assert [j.tag for j in named(alone)] == ["rate-and-state"]
 
 
-def test_what_lies_where_no_such_effect_lies_is_not_seen():
-    pair = [judged("velocity-weakening", 300.0, 8.5, strange=("velocity-weakening.drop",)), judged("wear", 300.0, 8.0)]
+def test_what_lies_far_from_where_such_effects_lie_is_not_seen():
+    pair = [judged("velocity-weakening", 300.0, 8.5, far={"velocity-weakening.drop": 12.0}), judged("wear", 300.0, 8.0)]
     assert [j.tag for j in named(pair)] == ["wear"]
     assert named(pair[:1]) == []
 
 
-@pytest.mark.parametrize(
-    ("amplitude", "deviation", "inside"), [(-0.02, 0.001, False), (-0.002, 0.001, True), (0.1, 0.001, True)]
-)
-def test_parameters_lie_where_they_usually_do_within_their_errors(amplitude, deviation, inside):
+@pytest.mark.parametrize(("amplitude", "quarters"), [(-0.02, 0.2), (0.1, 0.0), (0.6, 2.0)])
+def test_parameters_beyond_their_usual_range_have_a_price(amplitude, quarters):
     (free, *_) = effect_parameters(catalogue.get("velocity-weakening")())
     assert free.usual == (0.0, 0.4)
-    fit: Any = SimpleNamespace(
-        free=(free,), covariance=np.diag([free.inward(deviation) ** 2]),
-        point=SimpleNamespace(z=np.array([free.inward(amplitude)])),
-    )  # fmt: skip
-    assert strange(fit, "velocity-weakening") == (() if inside else ("velocity-weakening.drop",))
+    fit: Any = SimpleNamespace(free=(free,), point=SimpleNamespace(z=np.array([free.inward(amplitude)])))
+    found = odd(fit, "velocity-weakening")
+    assert found == (pytest.approx({"velocity-weakening.drop": quarters}) if quarters else {})
+    dear = judged("velocity-weakening", 300.0, 8.5, far=found)
+    assert dear.price == pytest.approx(DISPERSION * quarters**2)
+    assert dear.better == pytest.approx(float(dear.unseen.sum()) - dear.price)
 
 
 def test_a_few_events_that_say_all_are_enough():
