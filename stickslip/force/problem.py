@@ -30,6 +30,7 @@ from .knots import Knots
 Array = NDArray[np.float64]
 PHASE = "phase"
 PULL = "start.pull"  # of the spring at the start of a record, where the contact is not virgin (N)
+PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
 EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
 NODES = (
     -8.0,
@@ -295,7 +296,7 @@ def _set(effect: Effect, values: dict[str, Any]) -> Effect:
     return effect
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=PROGRAMS)
 def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) -> Program:
     """The compiled forces at the knots, shape (R, n), with derivatives in shared, phases and locals."""
     a, b = len(names), len(phases)

@@ -16,7 +16,7 @@ from ..params import specs
 from ..traced import Program, of_this_package
 from .along import Way, along, undone
 from .fit import Array, Fit
-from .problem import EMPTY, PULL, Problem, model_of
+from .problem import EMPTY, PROGRAMS, PULL, Problem, model_of
 from .scatter import covariance
 
 CHUNK = 64  # members evaluated at once
@@ -77,7 +77,7 @@ def _at_points(problem: Problem, fit: Fit, q: Array, shift: Array, mass: Array, 
     return out
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=PROGRAMS)
 def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
     names = tuple(specs(cls))
     place = names.index(cls.amplitude)
