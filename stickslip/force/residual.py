@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from .fit import Array, Fit
+from .knots import RING
 from .score import Explained
 
 NODES = 7
@@ -40,7 +41,8 @@ def coordinates(fit: Fit) -> dict[str, Array]:
     runs = problem.runs
     x = np.concatenate([k.mean @ k.x for k in runs])
     drive = np.concatenate([k.mean @ k.drive for k in runs])
-    rate = np.concatenate([k.rate for k in runs])
+    # while it rings the noise of the rate is that of the force a sample or two later, and would look like a law
+    rate = np.where(problem.phase == RING, 0.0, np.concatenate([k.rate for k in runs]))
     shared = fit.values.get("rig.spring_stiffness", np.nan)
     stiffness = np.concatenate([np.full(k.at.size, shared if k.stiffness is None else k.stiffness) for k in runs])
     number = problem.of - problem.first[problem.run]
