@@ -81,26 +81,28 @@ class ContactRenewal(Memory, Threshold, Flow):
         own = 1.0 - state.deficit
         cap = filled(contact.cap / filled(own))
         width = filled(contact.strength / filled(contact.stiffness)) / YOUNG  # of a young class, in age (m)
-        weights, rates = _ages(width, self.rate)
+        dies, rates = _ages(width, self.rate)
         first, middle, last = (_decay(rate * motion.path) for rate in rates)
         step = contact.stiffness * motion.dx
         plain = contact.force + step  # with no renewal
         capped = jnp.clip(plain, -cap, cap)
         aged = [first, *[middle] * (YOUNG - 1), last]
 
-        def older(younger: tuple[Array, Array], own: tuple[Array, ...]) -> tuple[tuple[Array, Array], Array]:
-            before, after = younger
-            gone, mean, spread = own
+        def older(younger: tuple[Array, ...], own: tuple[Array, ...]) -> tuple[tuple[Array, ...], Array]:
+            before, after, survives, change = younger
+            gone, mean, share, spread = own
             force = contact.force + spread
             # written as a difference, so that it vanishes exactly where the rate does
             renewed = -force * gone - step * (1.0 - mean) + after * (1.0 - mean) + before * (mean - 1.0 + gone)
             other = jnp.clip(plain + (spread + renewed), -cap, cap)
-            return (force, other), other - capped
+            off = other - capped
+            return (force, other, survives * (1.0 - dies), change + survives * share * off), off
 
-        newborn = (jnp.zeros_like(step), jnp.zeros_like(step))
+        zero = jnp.zeros_like(step)
         gone, mean = (jnp.stack([pair[i] for pair in aged]) for i in range(2))
-        _, offs = jax.lax.scan(older, newborn, (gone, mean, state.spread))
-        change = jnp.sum(jnp.stack(weights) * offs, axis=0)
+        shares = jnp.stack([*[dies] * YOUNG, jnp.ones_like(dies)])
+        newborn = (zero, zero, jnp.ones_like(dies), zero)
+        (_, _, _, change), offs = jax.lax.scan(older, newborn, (gone, mean, shares, state.spread))
         spread = offs - change
         return Junctions(spread, -change, -change * capped / cap**2)
 
@@ -111,8 +113,8 @@ class ContactRenewal(Memory, Threshold, Flow):
         return force - state.change
 
 
-def _ages(width: Array, rate: Array) -> tuple[list[Array], tuple[Array, ...]]:
-    """Share of the junctions in each class (n,), and 1/(gap to the next younger class's mean age) (1/m).
+def _ages(width: Array, rate: Array) -> tuple[Array, tuple[Array, ...]]:
+    """Share of the junctions that die within a class (n,), and 1/(gap to the next younger class's mean age) (1/m).
 
     The rates are those of the youngest, of the other young ones, and of the oldest class.
     """
@@ -121,14 +123,8 @@ def _ages(width: Array, rate: Array) -> tuple[list[Array], tuple[Array, ...]]:
     safe = jnp.where(small, 1.0, x)
     # mean age of a class after its youngest, in widths
     centre = jnp.where(small, 0.5 - x / 12.0 + x**3 / 720.0, 1.0 / safe - 1.0 / jnp.expm1(safe))
-    dies, survives = -jnp.expm1(-x), jnp.ones_like(x)
-    shares = []
-    for _ in range(YOUNG):
-        shares.append(survives * dies)
-        survives = survives * (1.0 - dies)
-    shares.append(survives)
     oldest = rate / (1.0 + x * (1.0 - centre))
-    return shares, (1.0 / (width * centre), 1.0 / width, oldest)
+    return -jnp.expm1(-x), (1.0 / (width * centre), 1.0 / width, oldest)
 
 
 def _decay(z: Array) -> tuple[Array, Array]:
