@@ -14,6 +14,7 @@ from .base import Contact, Flow, Memory, Motion, Threshold
 from .catalogue import register
 from .sliding import filled
 
+Four = tuple[Array, Array, Array, Array]
 YOUNG = 7  # classes of age below that at which a junction reaches its cap; one more holds all older ones
 
 
@@ -88,7 +89,7 @@ class ContactRenewal(Memory, Threshold, Flow):
         capped = jnp.clip(plain, -cap, cap)
         aged = [first, *[middle] * (YOUNG - 1), last]
 
-        def older(younger: tuple[Array, ...], own: tuple[Array, ...]) -> tuple[tuple[Array, ...], Array]:
+        def older(younger: Four, own: Four) -> tuple[Four, Array]:
             before, after, survives, change = younger
             gone, mean, share, spread = own
             force = contact.force + spread
