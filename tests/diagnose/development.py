@@ -1,35 +1,40 @@
 """How often a diagnosis is right on campaigns of the independent simulator: what docs/diagnosis tabulates.
 
 ``python -m tests.diagnose.development FOLDER PART --seed S`` makes the campaigns of a part, diagnoses each (going on
-where it was stopped), and prints the answers as a table and the rate. Parts: ``one`` (every effect that can be seen,
+where it was stopped), prints the answers as a table with their rates, and writes them to
+``docs/results/development.json``, from which the page draws its tables. Parts: ``one`` (every effect that can be seen,
 once with the same lines at every event and once with new ones), ``nothing``, ``two``, ``left-out`` (as ``one``
 with the same lines, but the effect and laws that contain it are not in the catalogue that is tried), and ``strong``
-(as ``one`` with the same lines, at the largest amplitude that is plausible, where that is more). All of a part take
-days: ``--only 3 1`` diagnoses these.
+(as ``one`` with the same lines, at the largest amplitude that is plausible, where that is more). A campaign takes
+about two minutes of one processor: ``--only 3 1`` diagnoses these.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stickslip.challenge.answers import Answer, is_exact, is_right, read_answer
+from stickslip import __version__
+from stickslip.challenge.answers import read_answer
 from stickslip.challenge.detection import amplitude, largest_multiple, visible_forms
 from stickslip.challenge.generator import CATALOGUED, EFFECTS
 from stickslip.challenge.make import make_challenge
+from stickslip.challenge.marks import mark, rate
 from stickslip.challenge.mix import Case, Hidden, case_seed
 from stickslip.challenge.run import Progress, run_challenge
 from stickslip.challenge.seal import RUNS, read_seal, read_truth
-from stickslip.runstore import read_result
 from stickslip.workflow import diagnose_campaign
 
 MULTIPLE = 10.0  # of detection, or the largest at which the block slips
 VELOCITIES, HOLDS = (5e-5, 1e-4, 2e-4, 4e-4), (1.0, 5.0)  # m/s, s
+RESULTS = Path(__file__).parents[2] / "docs" / "results" / "development.json"
 PARTS = {"one": "one", "nothing": "nothing", "two": "two", "left-out": "outside", "strong": "one"}
 
 
@@ -95,59 +100,54 @@ class LeftOut:
         return diagnose_campaign(campaign, out, jobs=1, candidates=tried)
 
 
-@dataclass(frozen=True)
-class Tally:
-    """How many campaigns of a part were answered, and how.
-
-    Attributes:
-        answered: how many.
-        exact: the answer is the truth. right: or a set of at most three that holds it.
-        table: every answer, a row each (Markdown).
-        shown: in how many the base model alone is not within its limits, so that an effect was looked for.
-        shown_exact, shown_right: of these.
-        passed_by: of these, in how many something hidden was scored and not refitted.
-    """
-
-    answered: int
-    exact: int
-    right: int
-    table: str
-    shown: int
-    shown_exact: int
-    shown_right: int
-    passed_by: int
-
-
-def tally(folder: Path) -> Tally:
-    """The answers so far."""
-    rows = ["| hidden | lines | times detection | looked for | said | unseen error |", "|---|---|---|---|---|---|"]
-    answers: list[tuple[bool, bool, bool, bool]] = []
-    for truth in read_truth(folder)["cases"]:
-        answer = read_answer(folder / RUNS, truth["name"])
-        if answer.kind == "not run":
-            continue
-        tags = tuple(e["tag"] for e in truth["effects"])
-        ranking = read_result(folder / RUNS / truth["name"])["ranking"] if answer.kind != "failed" else []
-        refitted = {r["effect"] for r in ranking if r["refit"]}
-        passed_by = bool({r["effect"] for r in ranking if r["effect"] in tags} - refitted)
-        right = is_exact(truth["kind"], tags, answer), is_right(truth["kind"], tags, answer)
-        answers.append((bool(ranking), *right, passed_by))
-        times = ", ".join(f"{e['multiple']:.3g}" for e in truth["effects"])
-        lines = "new" if truth["new_lines"] else "same"
-        rows.append(
-            f"| {', '.join(tags) or 'nothing'} | {lines} | {times} | {'yes' if ranking else 'no'}"
-            f"{', not refitted' if passed_by else ''} | {_said(answer)} | {_errors(answer)} |"
-        )
-    exact, right = (sum(a[i] for a in answers) for i in (1, 2))
-    return Tally(len(answers), exact, right, "\n".join(rows), *(sum(a[0] and a[i] for a in answers) for i in range(4)))
+def tally(folder: Path, seed: int) -> dict[str, Any]:
+    """The answers so far, with their rates (Wilson's intervals at 95 %)."""
+    marked = [mark(truth, read_answer(folder / RUNS, truth["name"])) for truth in read_truth(folder)["cases"]]
+    marked = [m for m in marked if m.answer.kind != "not run"]
+    hidden = [m for m in marked if m.tags]
+    sizes = [s for m in hidden for s in m.sizes]
+    return {
+        "seed": seed,
+        "version": __version__,
+        "date": date.today().isoformat(),
+        "rates": {
+            "exact": rate(m.exact for m in marked),
+            "right": rate(m.right for m in marked),
+            "something wrong named": rate(not set(m.answer.named) <= set(m.tags) for m in marked),
+            "complete": rate(m.answer.kind == "complete" for m in marked),
+            "amplitude within two deviations": rate(bool(s.within(2.0)) for s in sizes if s.std is not None),
+        },
+        "cases": [
+            {
+                "hidden": list(m.tags),
+                "multiples": [e["multiple"] for e in m.effects],
+                "lines": "new" if m.circumstances["new_lines"] else "same",
+                "kind": m.answer.kind,
+                "named": list(m.answer.named),
+                "set": list(m.answer.set),
+                "unseen": [m.answer.base, m.answer.final],
+                "seconds": m.answer.seconds,
+            }
+            for m in marked
+        ],
+    }
 
 
-def _said(answer: Answer) -> str:
-    return f"`{answer.kind}` {', '.join(answer.set or answer.named)}".strip()
+def table(found: dict[str, Any]) -> str:
+    """Every answer, a row each (Markdown)."""
+    rows = ["| hidden | lines | times detection | said | unseen error |", "|---|---|---|---|---|"]
+    for case in found["cases"]:
+        times = ", ".join(f"{m:.3g}" for m in case["multiples"])
+        said = f"`{case['kind']}` {', '.join(case['set'] or case['named'])}".strip()
+        errors = " -> ".join(f"{e:.2f}" for e in case["unseen"] if e is not None)
+        rows.append(f"| {', '.join(case['hidden']) or 'nothing'} | {case['lines']} | {times} | {said} | {errors} |")
+    return "\n".join(rows)
 
 
-def _errors(answer: Answer) -> str:
-    return " -> ".join(f"{e:.2f}" for e in (answer.base, answer.final) if e is not None)
+def keep(part: str, found: dict[str, Any]) -> None:
+    """Write a part among the results that the page draws from."""
+    known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
+    RESULTS.write_text(json.dumps({**known, part: found}, indent=1) + "\n", encoding="utf-8")
 
 
 def tell(p: Progress) -> None:
@@ -165,7 +165,7 @@ def measure(
     number: int = 100,
     workers: int | None = None,
     only: Sequence[int] | None = None,
-) -> Tally:
+) -> dict[str, Any]:
     """Make the campaigns of a part in a folder, unless they are there, and diagnose those that are not yet.
 
     ``only`` are the numbers of campaigns to diagnose, in this order; default all.
@@ -179,7 +179,7 @@ def measure(
         diagnosis = LeftOut({case["name"]: case["effects"][0]["tag"] for case in read_truth(folder)["cases"]})
     names = None if only is None else [f"case-{i:03d}" for i in only]
     run_challenge(folder, workers=workers, only=names, diagnosis=diagnosis, tell=tell)
-    return tally(folder)
+    return tally(folder, seed)
 
 
 def main() -> None:
@@ -193,12 +193,10 @@ def main() -> None:
     parser.add_argument("--only", type=int, nargs="+", help="numbers of campaigns, from 1")
     options = parser.parse_args()
     found = measure(options.folder, options.part, options.seed, options.number, options.workers, options.only)
-    print(found.table)
-    print(f"\n{found.answered} answered: {found.exact} exact, {found.right} right")
-    print(
-        f"{found.shown} in which something was looked for: {found.shown_exact} exact, {found.shown_right} right, "
-        f"{found.passed_by} with something hidden that was not refitted"
-    )
+    print(table(found))
+    for name, r in found["rates"].items():
+        print(f"{name}: {r['count']} of {r['of']}" + (f" ({r['low']:.0%} to {r['high']:.0%})" if r["of"] else ""))
+    keep(options.part, found)
 
 
 if __name__ == "__main__":
