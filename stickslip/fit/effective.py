@@ -22,6 +22,7 @@ class EffectiveLine:
         mismatch: rms difference of the two curves over u_max.
         n_springs, length: N and L (m).
         note: what to think of it.
+        edge: whether it is the last line that there is, so that deviations mean nothing.
     """
 
     hurst: float
@@ -31,6 +32,7 @@ class EffectiveLine:
     n_springs: int
     length: float
     note: str
+    edge: bool = False
 
 
 def effective_line(u_max: float, p: float, rig: StaticRig, spread: float = 0.0) -> EffectiveLine:
@@ -58,12 +60,13 @@ def effective_line(u_max: float, p: float, rig: StaticRig, spread: float = 0.0) 
     hurst, height = float(best.x[0]), float(np.exp(best.x[1]))
     mismatch = float(np.sqrt(np.mean(best.fun**2)))
     note = "effective parameters of the distribution of gaps, not a topography"
-    if min(hurst - HURST[0], HURST[1] - hurst) < 1e-3 or min(best.x[1] - low, high - best.x[1]) < 1e-3:
+    edge = min(hurst - HURST[0], HURST[1] - hurst) < 1e-3 or min(best.x[1] - low, high - best.x[1]) < 1e-3
+    if edge:
         note += "; at the edge of what such lines can do: this contact has no rough line of that kind"
     elif mismatch > 0.02:
         note += "; no such line has quite this curve"
     limit = 1.0 / (p - 1.0) if p > 1.0 else float("nan")
-    return EffectiveLine(hurst, height, limit, mismatch, rig.n_springs, rig.length, note)
+    return EffectiveLine(hurst, height, limit, mismatch, rig.n_springs, rig.length, note, edge)
 
 
 def _displacement(tau: np.ndarray, u_max: float, p: float, spread: float, contacts: int) -> np.ndarray:

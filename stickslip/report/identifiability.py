@@ -20,6 +20,8 @@ from ..units import shown
 
 CONTACT = ("contact.u_max", "contact.p", "contact.spread")
 
+ALONE = " The deviations are of the fit alone: other lines of the same surface differ by more."
+
 
 def identifiability(fit: Fitted, rig: Any, line: dict[str, Any] | None) -> list[str]:
     """The identifiability table in words: directions that the fit leaves open, and what is behind u_max and p.
@@ -70,15 +72,16 @@ def effective(fit: Fitted, rig: Any) -> dict[str, Any] | None:
         return effective_line(u_max, p, known, spread)
 
     line = line_of(values)
-    hurst_std, rms_std = _line_std(fit, line_of)
+    hurst_std, rms_std = (np.nan, np.nan) if line.edge else _line_std(fit, line_of)
+    known_to = ("", "") if line.edge else (f" +- {hurst_std:.2f}", f" +- {shown(rms_std, 'm', 2)}")
     unequal = f", spread over {contacts} contacts by {values[CONTACT[2]]:.2g}" if CONTACT[2] in values else ""
     text = (
         f"Effective rough line of a contact with u_max = {shown(values['contact.u_max'], 'm', 3)} and p = "
-        f"{values['contact.p']:.3g}{unequal}: H = {line.hurst:.2f} +- {hurst_std:.2f}, h_rms = "
-        f"{shown(line.h_rms, 'm', 3)} +- {shown(rms_std, 'm', 2)}, for L = {shown(line.length, 'm')}, "
+        f"{values['contact.p']:.3g}{unequal}: H = {line.hurst:.2f}{known_to[0]}, h_rms = "
+        f"{shown(line.h_rms, 'm', 3)}{known_to[1]}, for L = {shown(line.length, 'm')}, "
         f"N = {line.n_springs}, F_n = {known.normal_force:.3g} N and friction {known.friction:.3g}"
         f"{' (from the fitted strength)' if fitted else ' (guessed)' if known.guessed else ''}; {line.note}."
-        " The deviations are of the fit alone: other lines of the same surface differ by more."
+        f"{'' if line.edge else ALONE}"
     )
     return {
         "text": text,
