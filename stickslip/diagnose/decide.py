@@ -1,10 +1,9 @@
 """From refitted effects to an answer, by few rules.
 
 1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many
-   members of its family, among as many effects; and unseen runs are predicted better: their likelihood by more than
-   2.5 standard errors over their events, and their error (root mean square in standard deviations of the model
-   without, correlations within events counted) as well. Parameters beyond where such values lie (``usual`` in the
-   catalogue) have their price in the likelihood: the range is four standard deviations wide.
+   members of its family, among as many effects; and the likelihood of unseen runs is better by more than 2.5 standard
+   errors over their events. Parameters beyond where such values lie (``usual`` in the catalogue) have their price in
+   it: the range is four standard deviations wide.
 2. *Named*: the seen effect that predicts unseen runs best.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
@@ -26,7 +25,6 @@ from ..effects import catalogue
 from ..force.candidates import Candidate
 from ..force.fit import Array, Fit
 from ..force.heldout import folds, halves, unseen
-from ..force.scatter import covariance
 
 CHANCE = 1e-3  # of any effect at all being seen where nothing is missing
 ERRORS = 2.5  # standard errors
@@ -42,14 +40,12 @@ class Compared:
         gain: fall of the cost.
         chance: of such a fall by chance, corrected for all that was tried.
         unseen: fall of the predictive cost of every event left out, shape (E,).
-        fall: of the error on unseen runs, as a share of it.
     """
 
     fit: Fit
     gain: float
     chance: float
     unseen: Array
-    fall: float
 
     @property
     def price(self) -> float:
@@ -69,7 +65,7 @@ class Compared:
     @property
     def seen(self) -> bool:
         """Rule 1."""
-        return self.chance < CHANCE and self.better > ERRORS * self.error and self.fall > 0.0
+        return self.chance < CHANCE and self.better > ERRORS * self.error
 
 
 @dataclass(frozen=True)
@@ -119,7 +115,6 @@ class Judge:
         self.base, self.tried = base, tried
         self._runs, self._halves = folds(base), halves(base)
         self._unseen = {False: unseen(base, self._runs), True: unseen(base, self._halves)}
-        self._root = np.linalg.cholesky(covariance(base.scatter.sizes, base.known)[1])
 
     def __call__(self, candidate: Candidate) -> Judged | None:
         """The candidate beside it; None where it was not fitted."""
@@ -135,7 +130,7 @@ class Judge:
         name = candidate.name
         std = fit.std().get(name, np.inf)
         return Judged(
-            found.fit, found.gain, found.chance, found.unseen, found.fall, candidate, fit.values[name], std,
+            found.fit, found.gain, found.chance, found.unseen, candidate, fit.values[name], std,
             far,
         )  # fmt: skip
 
@@ -144,12 +139,7 @@ class Judge:
         gain = max(self.base.cost - fit.cost, 0.0)
         chance = min(1.0, float(chi2.sf(max(gain - price, 0.0) / DISPERSION, number)) * members * self.tried)
         without, predicted = self._unseen[own], unseen(fit, self._halves if own else self._runs)
-        fall = 1.0 - self._error(predicted.residual) / self._error(without.residual)
-        return Compared(fit, gain, chance, without.cost - predicted.cost, fall)
-
-    def _error(self, residual: Array) -> float:
-        white = np.linalg.solve(self._root, self.base.blocks(residual)[..., None])
-        return float(np.sqrt(np.sum(white**2) / np.sum(~self.base.dropped)))
+        return Compared(fit, gain, chance, without.cost - predicted.cost)
 
 
 def best_forms(judged: Sequence[Judged]) -> list[Judged]:

@@ -206,8 +206,6 @@ def failures(j: Judged, done: Round) -> list[str]:
         out.append(f"chance gives such a gain with probability {j.chance:.2g}")
     if j.better <= ERRORS * j.error:
         out.append(f"unseen runs are not predicted better by more than {ERRORS:g} standard errors")
-    if j.fall <= 0.0:
-        out.append("the error on unseen runs does not fall")
     if out and j.odd:
         out.append(f"{' and '.join(j.odd)} would lie where such values do not")
     if not out and done.close:
