@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
+from scipy.sparse import dia_array
 
 from ..errors import FitError
 from ..fit.parameters import Free
@@ -237,16 +238,17 @@ def noise(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks) -> Arr
     that near the resonance of the contact, where the one nearly undoes the other, little noise is left.
     """
     values = problem.values(point)
-    stiff = slopes.tangent + values.get("rig.spring_stiffness", 0.0)
+    spring = values.get("rig.spring_stiffness", 0.0)
     event, place = np.zeros(problem.of.size, int), np.zeros(problem.of.size, int)
     e, i = np.nonzero(blocks.there)
     event[blocks.index[e, i]], place[blocks.index[e, i]] = e, i
     out = np.zeros((*blocks.there.shape, blocks.there.shape[1]))
     first = 0
-    for run in problem.runs:
+    for run, stiffness in zip(problem.runs, slopes.sticking, strict=True):
         own = slice(first, first + run.at.size)
-        at_knots, rate, acceleration = run.seen
-        carried = at_knots * stiff[own, None] + values["rig.damping"] * rate + values["rig.mass"] * acceleration
+        rate, acceleration = run.moving
+        stiff = dia_array((stiffness + spring, 0), shape=(stiffness.size, stiffness.size))
+        carried = run.mean @ (stiff @ run.reading) + values["rig.damping"] * rate + values["rig.mass"] * acceleration
         pairs = (carried @ carried.T).tocoo()
         i, j = pairs.coords
         together = event[own][i] == event[own][j]

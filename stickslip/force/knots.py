@@ -76,8 +76,8 @@ class Knots:
         phase: of the points, an index of PHASES.
         of: event of the points.
         rate, acceleration: of the reading at the points, under the test function (m/s, m/s2).
-        seen: (p, N) from the samples of the reading to displacement at the knots, rate and acceleration at the points:
-            the way that the noise of every sample takes into a point.
+        reading: (n, N) from the samples of the reading to the displacement at the knots.
+        moving: (p, N) from the samples to rate and acceleration at the points.
         place: coordinate along which misfits are alike, one unit apart little (1).
         elapsed: time since the arrest before, or the start (s).
         noise: standard deviation of one sample (m).
@@ -100,7 +100,8 @@ class Knots:
     of: Index
     rate: Array
     acceleration: Array
-    seen: tuple[csr_array, csr_array, csr_array]
+    reading: csr_array
+    moving: tuple[csr_array, csr_array]
     place: Array
     elapsed: Array
     noise: float
@@ -388,6 +389,7 @@ class _Pieces:
         self.event: list[Index] = []
         self.slow: list[NDArray[np.bool_]] = []
         self.sample: list[tuple[int, Index]] = []
+        self.window: list[tuple[Index, Index]] = []
         self.size = 0
         self.points: list[dict[str, Array]] = []
 
@@ -413,11 +415,11 @@ class _Pieces:
         index = self._add(
             mean[0], mean[1], np.full(count.size, np.nan), mean[2], np.full(count.size, e), True, count.astype(float)
         )
+        self.window.append((index, edges))
         if compared:
             self.points.append(
                 {
                     "knot": index.astype(float), "at": mean[0], "count": count.astype(float),
-                    "low": edges[:-1].astype(float),
                     "of": np.full(count.size, float(e)), "phase": np.full(count.size, float(CREEP)),
                 }
             )  # fmt: skip
@@ -475,8 +477,7 @@ class _Pieces:
         rows: list[list[Index]] = [[], []]
         values: list[list[Array]] = [[], [], []]
         fast_rows: list[Index] = []
-        averaged: tuple[list[Any], ...] = ([], [], [])  # rows, samples and weights of windows
-        shaken: tuple[list[Any], ...] = ([], [], [], [])  # the same under the derivatives of the test function
+        shaken: tuple[list[Any], ...] = ([], [], [], [])  # rows, samples, and weights under the kernels' derivatives
         out: dict[str, list[Array]] = {k: [] for k in ("at", "of", "phase", "rate", "acceleration")}
         p = 0
         columns_window: list[Index] = []
@@ -489,11 +490,6 @@ class _Pieces:
                 columns_window.append(piece["knot"].astype(int))
                 knot = piece["knot"].astype(int)
                 piece["rate"], piece["acceleration"] = v[knot], bends[knot]
-                count = piece["count"].astype(int)
-                begin = np.repeat(piece["low"].astype(int) - np.cumsum(count) + count, count)
-                averaged[0].append(np.repeat(index, count))
-                averaged[1].append(begin + np.arange(count.sum()))
-                averaged[2].append(np.repeat(1.0 / count, count))
             else:
                 centre = piece["centre"].astype(int)
                 offsets = np.arange(-h, h + 1)
@@ -521,14 +517,7 @@ class _Pieces:
         ones = [np.ones(w.size) for w in rows_window]
         mean = coo_array((np.concatenate([*values[0], *ones]), (r, c)), shape=shape).tocsr()
         smooth = tuple(_sparse(k, rows[0], rows[1], shape) for k in values[1:])
-        # samples that are knots themselves, by the knots' smoothing; of the windows between them nothing is known here
-        at_samples = np.concatenate([first + np.arange(i.size) for first, i in self.sample] or [np.zeros(0, int)])
-        smoothed = smoother.matrix(np.concatenate([i for _, i in self.sample] or [np.zeros(0, int)]))
-        of_windows = _sparse(averaged[2], averaged[0], averaged[1], (p, t.size))
-        seen = (
-            mean[:, at_samples] @ smoothed + of_windows,
-            *(_sparse(k, shaken[0], shaken[1], (p, t.size)) for k in shaken[2:]),
-        )
+        moving = tuple(_sparse(k, shaken[0], shaken[1], (p, t.size)) for k in shaken[2:])
         made = {k: np.concatenate(w) for k, w in out.items()}
         event = np.concatenate(self.event)
         of, phase = made["of"].astype(int), made["phase"].astype(int)
@@ -536,11 +525,27 @@ class _Pieces:
         keep = (of < len(events)) & ((of > 0) | trace.virgin)
         knots_made = Knots(
             trace.name, knot_t, x, v, d, turn, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
-            made["at"], phase, of, made["rate"], made["acceleration"], seen,
+            made["at"], phase, of, made["rate"], made["acceleration"],
+            self._reading(smoother, (knot_t.size, t.size)), (moving[0], moving[1]),
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, events, float(t[0])),
             noise, trace.spring_stiffness, trace.virgin,
         )  # fmt: skip
         return selected(knots_made, keep)
+
+    def _reading(self, smoother: Smoother, shape: tuple[int, int]) -> csr_array:
+        """From samples to knots: means over windows, and smoothed samples."""
+        rows, columns, values = [np.zeros(1, int)], [np.zeros(1, int)], [np.ones(1)]  # the start
+        for knot, edges in self.window:
+            count = np.diff(edges)
+            rows.append(np.repeat(knot, count))
+            columns.append(np.arange(edges[0], edges[-1]))
+            values.append(np.repeat(1.0 / count, count))
+        for first, index in self.sample:
+            part = smoother.matrix(index).tocoo()
+            rows.append(first + part.coords[0])
+            columns.append(part.coords[1])
+            values.append(part.data)
+        return _sparse(values, rows, columns, shape)
 
 
 def _onward(x: Array, weight: Array, slow: NDArray[np.bool_], event: Index, noise: float) -> Array:
@@ -575,7 +580,7 @@ def selected(k: Knots, keep: NDArray[np.bool_]) -> Knots:
     index = np.flatnonzero(keep)
     return replace(
         k, mean=k.mean[index], smooth=(k.smooth[0][index], k.smooth[1][index]),
-        seen=(k.seen[0][index], k.seen[1][index], k.seen[2][index]),
+        moving=(k.moving[0][index], k.moving[1][index]),
         **{n: getattr(k, n)[index] for n in POINTS},
     )  # fmt: skip
 

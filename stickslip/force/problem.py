@@ -131,6 +131,7 @@ class Slopes:
         shared: derivatives in z, phases of all runs, weights and what cycles share, shape (p, a + b R + k + c).
         local: in the event's own, shape (p, 3).
         tangent: stiffness of what sticks (N/m), shape (p,).
+        sticking: the same at the knots of every run, shape (n,) each.
         held: force that the model holds (N), shape (p,).
     """
 
@@ -138,6 +139,7 @@ class Slopes:
     shared: Array
     local: Array
     tangent: Array
+    sticking: tuple[Array, ...]
     held: Array
 
 
@@ -230,7 +232,8 @@ class Problem:
             p += run.at.size
         slopes[:, a + b * runs + k :] = tangents[:, None] * self.cycles
         residual += slopes[:, a + b * runs + k :] @ point.common
-        return Slopes(residual, slopes, local, tangents, held)
+        sticking = tuple(tangent[r, : k.t.size] for r, k in enumerate(self.runs))
+        return Slopes(residual, slopes, local, tangents, sticking, held)
 
 
 def _room(size: int) -> int:

@@ -74,10 +74,10 @@ def test_points_have_the_motion_under_the_test_function(small):
 def test_windows_are_means(small):
     for k, trace in zip(small.knots, small.traces, strict=True):
         slow = k.phase == CREEP
-        count = np.diff(k.seen[0].indptr)[slow]
         rows = k.mean[np.flatnonzero(slow)]
         assert np.all(np.diff(rows.indptr) == 1)
         knot = rows.indices
+        count = np.diff(k.reading.indptr)[knot]
         start = np.rint((k.t[knot] - trace.time[0]) * trace.sampling_rate - 0.5 * (count - 1)).astype(int)
         far = count > 20
         assert far.sum() > 20
