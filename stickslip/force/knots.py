@@ -135,21 +135,30 @@ def too_coarse(times: Scales, rate: float) -> str | None:
 def kernels(half: float, rate: float) -> tuple[Array, Array, Array]:
     """The test function (1 - u^2)^5 and its derivatives as weights of samples, shape (2 h + 1,).
 
-    Exact in what they are for: the first gives a constant, the second the slope of a parabola, the third its second
-    derivative (1/s, 1/s2).
+    What the second gives of a polynomial up to the fourth power is what the first gives of its slope, and so for the
+    third and its second derivative (1/s, 1/s2): sampled at a few points, the derivatives themselves do not.
     """
     h = max(round(half * rate), 3)
     u = np.arange(-h, h + 1) / (h + 1.0)
     phi = (1.0 - u * u) ** 5
-    s = np.arange(-h, h + 1) / rate
     phi /= phi.sum()
-    first = -u * (1.0 - u * u) ** 4
-    first = -first
-    first /= (first * s).sum()
-    second = (1.0 - u * u) ** 3 * (9.0 * u * u - 1.0)
-    second -= phi * second.sum()
-    second /= 0.5 * (second * s * s).sum()
-    return phi, first, second
+    first = -10.0 * u * (1.0 - u * u) ** 4
+    second = 10.0 * (1.0 - u * u) ** 3 * (9.0 * u * u - 1.0)
+    scale = (h + 1.0) / rate  # s in one unit of u
+    first = _matched(-first / np.abs(first).sum(), phi, u, 1)
+    second = _matched(second / np.abs(second).sum(), phi, u, 2)
+    return phi, first / scale, second / scale**2
+
+
+def _matched(weights: Array, phi: Array, u: Array, order: int) -> Array:
+    """Weights with the moments of a derivative of ``phi``, by the least of polynomials times ``phi``."""
+    powers = [k for k in range(5) if k % 2 == order % 2]
+    wanted = [float(np.prod(np.arange(k - order + 1, k + 1)) * (phi * u ** (k - order)).sum()) if k >= order else 0.0
+              for k in powers]  # fmt: skip
+    rows = np.stack([u**k for k in powers])
+    basis = np.stack([weights, *(phi * u**k for k in powers)][: len(powers) + 1])
+    found, *_ = np.linalg.lstsq(rows @ basis.T, np.array(wanted), rcond=None)
+    return found @ basis
 
 
 def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None = None) -> Knots:

@@ -54,7 +54,7 @@ def traces(
         stop = 0.26 / (1000.0 * v) + slips * 52e-6 / v
         nodes = (jnp.array([0.0, 1.0]), jnp.array([0.0, v]))
         model = family.model(jnp.asarray(truth()), jnp.zeros(2), nodes, jnp.asarray(np.nan))
-        run, _ = integrate(model, stop, tolerance=Tolerance(1e-3, 1e-12, 1e-8), largest_step=0.005)
+        run, _ = integrate(model, stop, tolerance=Tolerance(1e-5, 1e-14, 1e-10), largest_step=0.005)
         t = np.arange(0.0, stop, 1.0 / rate)
         drive = Drive.constant(v, 0.0, stop)
         out.append(Trace(name=f"v{v * 1e6:.0f}", time=t, displacement=run.at(t).reading, drive=drive, virgin=True))
