@@ -92,7 +92,7 @@ class Judged(Compared):
     @property
     def price(self) -> float:
         """Of parameters beyond where such values lie."""
-        return DISPERSION * sum(far**2 for far in self.odd.values())
+        return _price(self.odd)
 
 
 def odd(fit: Fit, tag: str) -> dict[str, float]:
@@ -106,6 +106,11 @@ def odd(fit: Fit, tag: str) -> dict[str, float]:
         if beyond > 0.0:
             out[f.name] = float(beyond)
     return out
+
+
+def _price(far: Mapping[str, float]) -> float:
+    """In units of the cost, whose falls count as so much less as they scatter more."""
+    return DISPERSION * sum(d**2 for d in far.values())
 
 
 class Judge:
@@ -125,8 +130,7 @@ class Judge:
         free = [f for f in fit.free if f.name.startswith(f"{candidate.tag}.")]
         number = len(free) + len(own) * len(fit.problem.runs)
         far = odd(fit, candidate.tag)
-        price = DISPERSION * sum(d**2 for d in far.values())
-        found = self.beside(fit, number, candidate.members, bool(own), price)
+        found = self.beside(fit, number, candidate.members, bool(own), _price(far))
         name = candidate.name
         std = fit.std().get(name, np.inf)
         return Judged(

@@ -238,7 +238,6 @@ def noise(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks) -> Arr
     that near the resonance of the contact, where the one nearly undoes the other, little noise is left.
     """
     values = problem.values(point)
-    spring = values.get("rig.spring_stiffness", 0.0)
     event, place = np.zeros(problem.of.size, int), np.zeros(problem.of.size, int)
     e, i = np.nonzero(blocks.there)
     event[blocks.index[e, i]], place[blocks.index[e, i]] = e, i
@@ -247,6 +246,7 @@ def noise(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks) -> Arr
     for run, stiffness in zip(problem.runs, slopes.sticking, strict=True):
         own = slice(first, first + run.at.size)
         rate, acceleration = run.moving
+        spring = values.get("rig.spring_stiffness", 0.0) if run.stiffness is None else run.stiffness
         stiff = dia_array((stiffness + spring, 0), shape=(stiffness.size, stiffness.size))
         carried = run.mean @ (stiff @ run.reading) + values["rig.damping"] * rate + values["rig.mass"] * acceleration
         pairs = (carried @ carried.T).tocoo()

@@ -142,23 +142,19 @@ def kernels(half: float, rate: float) -> tuple[Array, Array, Array]:
     u = np.arange(-h, h + 1) / (h + 1.0)
     phi = (1.0 - u * u) ** 5
     phi /= phi.sum()
-    first = -10.0 * u * (1.0 - u * u) ** 4
-    second = 10.0 * (1.0 - u * u) ** 3 * (9.0 * u * u - 1.0)
+    first = _matched(u * (1.0 - u * u) ** 4, phi, u, 1)
+    second = _matched((1.0 - u * u) ** 3 * (9.0 * u * u - 1.0), phi, u, 2)
     scale = (h + 1.0) / rate  # s in one unit of u
-    first = _matched(-first / np.abs(first).sum(), phi, u, 1)
-    second = _matched(second / np.abs(second).sum(), phi, u, 2)
     return phi, first / scale, second / scale**2
 
 
-def _matched(weights: Array, phi: Array, u: Array, order: int) -> Array:
-    """Weights with the moments of a derivative of ``phi``, by the least of polynomials times ``phi``."""
+def _matched(shape: Array, phi: Array, u: Array, order: int) -> Array:
+    """A derivative of ``phi`` by its shape, with polynomials times ``phi`` added that make its moments those of it."""
     powers = [k for k in range(5) if k % 2 == order % 2]
-    wanted = [float(np.prod(np.arange(k - order + 1, k + 1)) * (phi * u ** (k - order)).sum()) if k >= order else 0.0
-              for k in powers]  # fmt: skip
-    rows = np.stack([u**k for k in powers])
-    basis = np.stack([weights, *(phi * u**k for k in powers)][: len(powers) + 1])
-    found, *_ = np.linalg.lstsq(rows @ basis.T, np.array(wanted), rcond=None)
-    return found @ basis
+    moments = [np.prod(np.arange(k - order + 1, k + 1)) * (phi * u ** max(k - order, 0)).sum() for k in powers]
+    basis = np.stack([shape / np.abs(shape).sum(), *(phi * u**k for k in powers)])
+    found, *_ = np.linalg.lstsq(np.stack([u**k for k in powers]) @ basis.T, np.array(moments), rcond=None)
+    return np.asarray(found @ basis)
 
 
 def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None = None) -> Knots:

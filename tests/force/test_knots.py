@@ -25,6 +25,16 @@ def test_kernels_are_exact_for_a_parabola(half):
     assert np.all(phi >= 0.0)
 
 
+@pytest.mark.parametrize("half", [3e-4, 5e-4, 2e-3])
+def test_kernels_have_the_moments_of_the_derivatives_of_the_test_function(half):
+    """Also where it spans a few samples only; the derivatives themselves, sampled, do not."""
+    phi, first, second = kernels(half, RATE)
+    h = phi.size // 2
+    s = np.arange(-h, h + 1) / RATE
+    assert first @ s**3 == pytest.approx(3.0 * (phi @ s**2), rel=1e-7)
+    assert second @ s**4 == pytest.approx(12.0 * (phi @ s**2), rel=1e-7)
+
+
 @pytest.mark.parametrize("half", [2e-3, 4e-3])
 def test_the_weak_form_is_the_mean_of_rate_and_acceleration(half):
     """phi'' on x is phi on x'', also where x'' is no constant over the test function."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from stickslip.force.fit import fit, noise
@@ -46,3 +48,13 @@ def test_noise_of_the_samples_reaches_the_force_as_stated(small):
     assert 0.85 < np.median(np.concatenate(variances)) < 1.2
     assert 0.7 < np.median(np.concatenate(along)) < 1.6
     assert np.median(apart) < 1e-2  # what is left near the resonance, to what there is away from it
+
+
+def test_a_spring_of_the_run_counts_as_that_of_the_rig_does(small):
+    problem, point = small.problem, small.point
+    blocks = Blocks.of(problem.of, problem.events)
+    stiffness = problem.composition.fixed["rig.spring_stiffness"]
+    fixed = {**problem.composition.fixed, "rig.spring_stiffness": 0.1 * stiffness}
+    own = Problem(replace(problem.composition, fixed=fixed), [replace(k, stiffness=stiffness) for k in problem.runs])
+    shared = noise(problem, point, problem.evaluate(point), blocks)
+    np.testing.assert_allclose(noise(own, point, own.evaluate(point), blocks), shared, rtol=1e-12, atol=0.0)

@@ -30,7 +30,7 @@ def fitted(campaign, traces):
     return prepared, fit(prepared.problem, prepared.start)
 
 
-def check(found, rig, within):
+def assert_recovered(found, rig, within):
     truth = {
         "weakening.drop": 1.0 - rig["mu_k"] / rig["mu_s"],
         "weakening.slip_distance": rig["slip_length"],
@@ -48,7 +48,7 @@ def test_displacement_at_any_usual_rate(tmp_path, rate):
     rig, campaign, traces = recorded(tmp_path / "c", rate)
     prepared, found = fitted(campaign, traces)
     assert not [why for why in prepared.dropped if "too coarse" in why]
-    check(found, rig, 0.03)
+    assert_recovered(found, rig, 0.03)
 
 
 @pytest.mark.parametrize("signal", ["spring force", "velocity"])
@@ -65,7 +65,7 @@ def test_spring_force_or_velocity_alone(tmp_path, signal):
             force = rig["spring_stiffness"] * (t.drive.position(t.time) - x + NOISE * white)
             other.append(t.replace(spring_force=force, noise=rig["spring_stiffness"] * NOISE, **bare))
     _, found = fitted(campaign, other)
-    check(found, rig, 0.15 if signal == "velocity" else 0.03)
+    assert_recovered(found, rig, 0.15 if signal == "velocity" else 0.03)
 
 
 def test_samples_too_far_apart_for_inertia_are_said(tmp_path):
