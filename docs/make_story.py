@@ -68,7 +68,7 @@ def measured(axes: Axes, data: xarray.Dataset, facts: dict[str, Any]) -> None:
 def first_creep(campaign: Path) -> dict[str, Any]:
     """The static model fitted to the first creep of the run shown, and the creep of the first two sticks."""
     loaded = ss.load_campaign(campaign)
-    trace = ss.load_traces(loaded)[RUN]
+    trace = loaded.traces[RUN]
     events = segment(trace)
     processes, _ = creep_processes(trace, events)
     rig = StaticRig.of(loaded.rig)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InputError
+from .resolution import estimate_resolution, noise_level
+from .units import factor_to_si, to_si
 
 Array = NDArray[np.float64]
 SIGNALS = {"displacement": "m", "velocity": "m/s", "spring_force": "N"}
@@ -109,6 +113,15 @@ class Drive:
             knots.append(stop)
             values.append(min(max(value, float(y[stop]) - tolerance), float(y[stop]) + tolerance))
         return cls(t[knots], np.array(values))
+
+    @classmethod
+    def sampled(
+        cls, time: ArrayLike, position: ArrayLike, resolution: float = 0.0, noise: float | None = None
+    ) -> Drive:
+        """A drive from measured positions (m), straight within a few counts and what their noise (m) makes."""
+        values = np.asarray(position, float)
+        level = noise_level(values, resolution or None) if noise is None else noise
+        return cls.from_samples(time, values, max(1.5 * resolution, 4 * level, 1e-9 * float(np.ptp(values)), 1e-15))
 
     def _piece(self, time: ArrayLike) -> NDArray[np.intp]:
         return np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, self.times.size - 2)
@@ -245,6 +258,66 @@ class Trace:
                 raise InputError(f"trace '{self.name}': {name} holds values that are not finite")
             object.__setattr__(self, name, array)
 
+    @classmethod
+    def from_arrays(
+        cls, name: str = "run", *, time: Any, displacement: Any = None, velocity: Any = None, spring_force: Any = None,
+        drive_velocity: float | str | None = None, drive_position: Any = None, resolution: float | str | None = None,
+        noise: float | str | None = None, spring_stiffness: float | str | None = None, virgin: bool = False,
+        role: str = "",
+    ) -> Trace:  # fmt: skip
+        """A run from arrays, without a file.
+
+        Args:
+            name: unique within its campaign.
+            time: s, shape (n,). Arrays, lists, pandas Series and xarray DataArrays are taken; those of xarray may have
+                ``attrs["units"]``, all others are in SI.
+            displacement, velocity, spring_force: of the block (m, m/s, N), shape (n,); at least one.
+            drive_velocity: of the load point, a number in m/s or text such as ``"50 um/s"``; or
+            drive_position: the measured load point (m), shape (n,).
+            resolution, noise: one count, and the standard deviation of one sample, of the leading signal; default what
+                the record itself shows.
+            spring_stiffness: N/m or text, where this run's spring is known.
+            virgin, role: as of the class.
+
+        Raises:
+            InputError: no signal, lengths that differ, times that do not increase, values that are not finite, both
+                ways of giving the drive, a unit that cannot be read.
+        """
+        given = {"displacement": displacement, "velocity": velocity, "spring_force": spring_force}
+        si = {**SIGNALS, "drive_position": "m"}
+        arrays: dict[str, Any] = {
+            key: _si_array(v, si[key], f"{name}: {key}") for key, v in given.items() if v is not None
+        }
+        t = _si_array(time, "s", f"{name}: time")
+        if drive_velocity is not None and drive_position is not None:
+            raise InputError(
+                f"trace '{name}': the drive is given more than once", hint="give drive_velocity or drive_position"
+            )
+        if not arrays:
+            raise InputError(f"trace '{name}' has no signal", allowed="displacement, velocity or spring_force")
+        leading = next(key for key in SIGNALS if key in arrays)
+
+        def known(value: float | str | None, unit: str, key: str) -> float | None:
+            return None if value is None else to_si(value, unit, key=f"{name}: {key}")
+
+        count = known(resolution, SIGNALS[leading], "resolution")
+        count = estimate_resolution(arrays[leading]) if count is None else count
+        level = known(noise, SIGNALS[leading], "noise")
+        level = noise_level(arrays[leading], count) if level is None else level
+        speed = known(drive_velocity, "m/s", "drive_velocity")
+        drive = None if speed is None else Drive.constant(speed, float(t[0]), float(t[-1]))
+        if drive_position is not None:
+            arrays["drive_position"] = position = _si_array(drive_position, "m", f"{name}: drive_position")
+            drive = Drive.sampled(t, position)
+        digest = hashlib.sha256(t.tobytes())
+        for key, values in arrays.items():
+            digest.update(key.encode() + values.tobytes())
+        return cls(
+            name, t, **arrays, drive=drive, resolution=count, noise=level, virgin=virgin, role=role,
+            spring_stiffness=known(spring_stiffness, "N/m", "spring_stiffness"),
+            provenance=Provenance("", digest.hexdigest(), "arrays"),
+        )  # fmt: skip
+
     @property
     def leading(self) -> str:
         """Name of the signal that is measured best known to tell events: displacement, else velocity, else force."""
@@ -273,6 +346,17 @@ class Trace:
     def replace(self, **changes: object) -> Trace:
         """A copy with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+
+def _si_array(values: Any, unit: str, what: str) -> Array:
+    """Values as an array of its own in the SI ``unit``; text in ``attrs["units"]`` says another unit of theirs."""
+    written = getattr(values, "attrs", {}).get("units")
+    factor = 1.0 if written is None else factor_to_si(str(written), unit, key=what)
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what} holds no numbers ({error})") from None
+    return array * factor
 
 
 def _frozen(values: ArrayLike, what: str) -> Array:

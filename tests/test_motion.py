@@ -13,9 +13,9 @@ from stickslip.checks.slip_time import at_odds, slip_time
 from stickslip.cli import run
 from stickslip.diagnose import engine
 from stickslip.motion import true_gains, with_displacements
+from stickslip.objects.diagnosis import diagnose_campaign
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
-from stickslip.workflow import diagnose_campaign
 
 STIFFNESS, SPEED = 168.0, 42e-6  # N/m, m/s
 

@@ -2,7 +2,7 @@
 
 from .assemble import file_sha256, load_trace, load_traces
 from .fields import Unmeasured
-from .load import Campaign, load_campaign
+from .load import Campaign, described, load_campaign
 from .models import CampaignFile, Channel, Rig, TraceEntry
 from .template import campaign_template, campaign_text
 
@@ -15,6 +15,7 @@ __all__ = [
     "Unmeasured",
     "campaign_template",
     "campaign_text",
+    "described",
     "file_sha256",
     "load_campaign",
     "load_trace",

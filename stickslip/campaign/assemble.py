@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..readers import Columns, read_columns
-from ..readers.noise import estimate_resolution, noise_level
 from ..readers.repair import (
     correct_clock,
     despike,
@@ -24,6 +23,7 @@ from ..readers.repair import (
     join_resets,
     unwrap,
 )
+from ..resolution import estimate_resolution, noise_level
 from ..trace import SIGNALS, Drive, Provenance, Repair, Trace
 from ..units import factor_to_si
 from .load import Campaign, trace_file
@@ -336,10 +336,7 @@ class _Assembly:
             return Drive.from_pieces(ends[late], speeds[late], float(time[0]))
         if "drive_position" in data:
             position = data["drive_position"]
-            count = resolution["drive_position"] or 0.0
-            span = float(np.ptp(position))
-            tolerance = max(1.5 * count, 4 * noise["drive_position"], 1e-9 * span, 1e-15)
-            return Drive.from_samples(time, position, tolerance)
+            return Drive.sampled(time, position, resolution["drive_position"] or 0.0, noise["drive_position"])
         return None
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -25,6 +27,7 @@ class Campaign:
         title, note: free text.
         rig: what is known of the apparatus, SI.
         entries: one for each trace.
+        filed: whether there are such files; else the traces were made of arrays.
     """
 
     path: Path
@@ -33,6 +36,7 @@ class Campaign:
     note: str
     rig: Rig
     entries: tuple[TraceEntry, ...]
+    filed: bool = True
 
     @property
     def folder(self) -> Path:
@@ -47,6 +51,8 @@ class Campaign:
     @property
     def files(self) -> list[Path]:
         """All files with measured numbers, each once."""
+        if not self.filed:
+            return []
         names = [name for entry in self.entries for name in (entry.file, *(name for _, name in _further(entry)))]
         return [self.folder / name for name in dict.fromkeys(names)]
 
@@ -91,6 +97,27 @@ def load_campaign(path: str | Path) -> Campaign:
         for key, name in (("file", entry.file), *_further(entry)):
             trace_file(path, name, outside=entry.outside, key=f"trace[{number}].{key}")
     return Campaign(path, read.sha256, file.title, file.note, file.rig, entries)
+
+
+def described(names: Sequence[str], rig: Mapping[str, Any], title: str = "") -> Campaign:
+    """A campaign whose traces are there already.
+
+    Args:
+        names: of the traces.
+        rig: keys and values as under ``[rig]`` of a campaign file.
+        title: free text.
+
+    Raises:
+        InputError: an unknown key, a missing unit, a value out of range, two traces of one name.
+    """
+    try:
+        checked = Rig.model_validate(dict(rig))
+    except ValidationError as error:
+        raise readable(error, Rig, "", None) from None
+    if repeated := [name for name, count in Counter(names).items() if count > 1]:
+        raise InputError(f"two traces have the same name '{repeated[0]}'", hint="give one of them another name")
+    entries = tuple(TraceEntry.model_construct(file=name, name=name) for name in names)
+    return Campaign(Path(title or "campaign"), "", title, "", checked, entries, filed=False)
 
 
 def trace_file(campaign: Path, name: str, *, outside: bool, key: str) -> tuple[Path, bool]:

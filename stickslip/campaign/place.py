@@ -40,7 +40,7 @@ def key_lines(text: str) -> dict[Place, int]:
     return lines
 
 
-def readable(error: ValidationError, model: type[BaseModel], text: str, file: Path) -> InputError:
+def readable(error: ValidationError, model: type[BaseModel], text: str, file: Path | None) -> InputError:
     """The first fault of a validation as an `InputError`; the number of further ones is said."""
     faults = error.errors()
     # an unknown key explains a missing one, so it comes first

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, RunFolderError, StickslipError
+from ..objects.diagnosis import check_counts, diagnose_campaign
+from ..objects.kept import code_digest
 from ..runstore import alone, json_text, versions, write_aside
-from ..workflow import check_counts, code_digest, diagnose_campaign
 from .cluster import Workers, cluster
 from .one_case import REFUSED, Diagnosis, do_case, failures, is_done
 from .seal import CASES, RUNS, case_names, check_seal, digest

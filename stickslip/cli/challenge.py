@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from .working import working
+from ..progress import working
 
 if TYPE_CHECKING:
     from ..challenge.run import Progress

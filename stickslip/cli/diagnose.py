@@ -10,9 +10,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from ..progress import EVERY, Stage
 from ..runstore import json_text
-from ..workflow import diagnose_campaign
-from .working import EVERY, Stage
 
 UNRESOLVED = 3
 
@@ -57,6 +56,8 @@ def diagnose(
     force:
         Replace an existing run folder.
     """
+    from ..objects.diagnosis import diagnose_campaign
+
     chosen = None if candidates is None else [c.strip() for c in candidates.split(",") if c.strip()]
     out = _named_after(Path(campaign)) if out is None else out
     result = diagnose_campaign(

@@ -13,15 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..runstore import Run, json_text, open_run, refuse_existing
+from ..progress import working
+from ..runstore import json_text, refuse_existing
+from ..units import to_si
 from . import show
-from .inspect import head, load_and_segment
-from .working import working
 
 if TYPE_CHECKING:
-    from ..campaign import Campaign
-    from ..segment import Segmentation
-    from ..trace import Trace
+    from ..objects import Fit, StaticFit
 
 _BETWEEN = re.compile(r"(?<=\.) (?=[A-Z])")  # sentences
 
@@ -76,46 +74,38 @@ def fit(
     force:
         Replace an existing run folder.
     """
-    from ..checks import refuse_impossible, rig_against_motion
-    from ..motion import true_gains
-    from ..report.describe import left_out
-    from ..units import to_si
+    from ..objects import load_campaign
+    from ..objects.fit import fit as fit_dynamic
+    from ..objects.fit import fit_static
 
     speed = to_si(v_lim, "m/s", key="--v-lim")
     dynamic = {"--add": add, "--profile": profile, "--holdout": holdout}
     _check(model, dynamic, speed)
     if out is not None:
         refuse_existing(out, force)
-    began = _now()
-    loaded, traces, found = load_and_segment(campaign)
-    try:
-        rig = rig_against_motion(loaded, traces, found)
-        refuse_impossible(rig)
-    except InputError as error:
-        raise error.at(file=loaded.path) from None
-    found, mended = true_gains(traces, found)
+    began = clock.perf_counter()
+    loaded = load_campaign(campaign, effect)
     if model == "static":
-        result, variables = _static(loaded, traces, found, align, time, speed, sampling)
+        _ = loaded.findings  # a rig that cannot be is refused
+        with working("creep processes") as tell:
+            found: StaticFit | Fit = fit_static(
+                loaded, align=align, time=time, v_lim=speed, sampling=sampling, progress=tell
+            )
+        profiles = {}
     else:
-        from ._inertial import Options, fit_inertial
-
-        for finding in rig:  # before minutes of fitting, in which a wrong unit may be mended
+        for finding in loaded.findings:  # before minutes of fitting, in which a wrong unit may be mended
             print(finding.sentence, file=sys.stderr)
-        result, variables = fit_inertial(loaded, traces, found, Options(add, effect, profile, holdout))
-    result = {**head(loaded, "fit"), "model": model, **result, "seconds": round(_now() - began, 3)}
-    result["rig"] = [finding.plain() for finding in rig]
-    result["notes"] = [*mended, *result.get("notes", ())]
-    # ahead of the events: of these only the first few are printed
-    result["dropped"] = [*left_out(traces, found), *result["dropped"]]
+        with working("fitting") as tell:
+            fitted = fit_dynamic(loaded, add, holdout=holdout, key="--add", profiles=profile, progress=tell)
+            fitted.confirm(tell)
+            profiles = {"profiles": [fitted.profile(name, tell) for name in profile]}
+        found = fitted
+    more = {**profiles, "seconds": round(clock.perf_counter() - began, 3)}
+    result = {**found.result, **more}
     if out is not None:
-        with open_run(out, force=force) as run:
-            _write(run, result, variables)
+        found.save(out, force, **more)
     print(json_text(result) if json else _folded(_text(result, out)))
     return 0
-
-
-def _now() -> float:
-    return clock.perf_counter()
 
 
 def _check(model: str, dynamic: dict[str, tuple[str, ...]], speed: float) -> None:
@@ -123,61 +113,6 @@ def _check(model: str, dynamic: dict[str, tuple[str, ...]], speed: float) -> Non
         raise InputError(f"{what} belongs to the dynamic model", key=what, hint="leave it out, or use --model inertial")
     if speed <= 0:
         raise InputError("the speed must be positive", key="--v-lim", value=speed)
-
-
-def _static(
-    loaded: Campaign,
-    traces: list[Trace],
-    found: list[Segmentation],
-    align: Literal["consistent", "paper"],
-    form: Literal["exact", "paper"],
-    v_lim: float,
-    sampling: str,
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    from ..fit.static_table import StaticRig
-    from ..report import describe_trace, trace_pieces
-    from ..report.static_result import static_result
-
-    def rig_of(trace: Trace) -> StaticRig:
-        try:
-            return StaticRig.of(loaded.rig_of(trace.name), spring_stiffness=trace.spring_stiffness)
-        except InputError as error:
-            raise error.at(file=loaded.path) from None
-
-    with working("creep processes") as tell:
-        try:
-            result, variables = static_result(
-                traces,
-                found,
-                rig_of,
-                align=align,
-                form=form,
-                v_lim=v_lim,
-                sampling=sampling,
-                springs=loaded.rig.springs,
-                progress=lambda done, of: tell(f"{done} of {of} fitted", done / of),
-            )
-        except InputError as error:
-            raise error.at(file=loaded.path) from None
-    kept = [t.name for t in traces if t.role == "held-out"]
-    if kept:
-        text = f"creep of held-out runs ({', '.join(kept)}) is fitted as well: every creep process is fitted by itself"
-        result["notes"] = [text]
-    result["traces"] = [describe_trace(t, s) for t, s in zip(traces, found, strict=True)]
-    for i, (t, s) in enumerate(zip(traces, found, strict=True)):
-        variables |= trace_pieces(t, s, i)
-    return result, variables
-
-
-def _write(run: Run, result: dict[str, Any], variables: dict[str, Any]) -> None:
-    import xarray
-
-    from ..report import write_report
-
-    coordinates = variables.pop("coordinates", {})
-    run.arrays(xarray.Dataset(variables, coords=coordinates, attrs={"title": result["title"]}))
-    run.json(result)
-    write_report(run.folder)
 
 
 def _folded(text: str) -> str:

@@ -16,6 +16,7 @@ from ..effects import catalogue
 from ..force.candidates import Candidate, every_form
 from ..force.fit import Array, Fit, deviations, fit
 from ..force.heldout import unseen
+from ..force.problem import Point, Problem
 from ..force.residual import Structure, structures
 from ..force.rig import slips_finding, spring_freed
 from ..force.score import Explained
@@ -241,25 +242,19 @@ class Search:
         """An effect tried once more, beside the best of its own round, with all others in the model."""
         name = f"again {tag} in round {len(self.rounds)}"
         key = name.replace(" ", "-")
-        problem = self.base.problem.with_composition(self.base.problem.composition.without(tag))
-        keep = [not f.name.startswith(f"{tag}.") for f in self.base.problem.composition.shared]
-        turns = [not f.name.startswith(f"{tag}.") for f in self.base.problem.composition.phases]
-        at = replace(self.base.point, z=self.base.point.z[keep], phases=self.base.point.phases[turns])
-        without = kept(
-            self._store, f"{key}-without", problem,
-            lambda: fit(problem, at, self.base.scatter, dropped=self.base.dropped, first=True),
-        )  # fmt: skip
+        problem, _ = _taken_out(self.base, tag)
+        apart = kept(self._store, f"{key}-without", problem, lambda: without(self.base, tag))
         seen = sorted((j for j in best_forms(self.named[tag].judged) if j.seen), key=lambda j: -j.better)
         tags = [j.tag for j in seen if j.tag == tag or j.tag not in {*self.named, *self.gone}][:BEST]
-        done = self._tried(without, tags, name)
+        done = self._tried(apart, tags, name)
         if not done.close:
             del self.named[tag]
-            self._take(without, None, tag)
+            self._take(apart, None, tag)
         elif done.close[0].tag == tag:
             self.named[tag] = done
         else:
             other = done.close[0].tag
-            self._take(settled(without, done.close[0].candidate, self._store, key), other, tag)
+            self._take(settled(apart, done.close[0].candidate, self._store, key), other, tag)
             self.named = {other if t == tag else t: done if t == tag else r for t, r in self.named.items()}
 
     def _tried(self, base: Fit, tags: Sequence[str], name: str) -> Round:
@@ -271,6 +266,21 @@ class Search:
         self.gone |= {removed} if removed else set()
         model = [t for t in self.ladder[-1].model if t != removed]
         self.ladder.append(_rung((*model, *([added] if added else [])), added, base, removed))
+
+
+def without(base: Fit, tag: str) -> Fit:
+    """The model without one of its effects, fitted anew with what is random."""
+    problem, point = _taken_out(base, tag)
+    return fit(problem, point, base.scatter, dropped=base.dropped, first=True)
+
+
+def _taken_out(base: Fit, tag: str) -> tuple[Problem, Point]:
+    composition, point = base.problem.composition, base.point
+    own = f"{tag}."
+    keep = [not f.name.startswith(own) for f in composition.shared]
+    turns = [not f.name.startswith(own) for f in composition.phases]
+    problem = base.problem.with_composition(composition.without(tag))
+    return problem, replace(point, z=point.z[keep], phases=point.phases[turns])
 
 
 def leading(ladder: Sequence[Rung], named: Mapping[str, Round]) -> dict[Parts, Fit]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..readers.noise import estimate_resolution, noise_level
+from ..resolution import estimate_resolution, noise_level
 from ..trace import Drive, Trace
 from ..units import shown
 from .choose import choose_settings

@@ -8,7 +8,7 @@ import pytest
 
 from stickslip.challenge.generator import Run, make_campaign
 from stickslip.errors import InputError
-from stickslip.workflow import diagnose_campaign
+from stickslip.objects.diagnosis import diagnose_campaign
 
 from .wrong_entries import findings, hidden, wrong
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.readers.noise import estimate_resolution, noise_level
 from stickslip.readers.repair import (
     correct_clock,
     despike,
@@ -15,6 +14,7 @@ from stickslip.readers.repair import (
     join_resets,
     unwrap,
 )
+from stickslip.resolution import estimate_resolution, noise_level
 from stickslip.trace import Drive, Trace
 
 LSB = 7.91e-9

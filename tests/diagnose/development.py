@@ -30,7 +30,7 @@ from stickslip.challenge.marks import mark, rate
 from stickslip.challenge.mix import Case, Hidden, case_seed
 from stickslip.challenge.run import Progress, run_challenge
 from stickslip.challenge.seal import RUNS, read_seal, read_truth
-from stickslip.workflow import diagnose_campaign
+from stickslip.objects.diagnosis import diagnose_campaign
 
 MULTIPLE = 10.0  # of detection, or the largest at which the block slips
 VELOCITIES, HOLDS = (5e-5, 1e-4, 2e-4, 4e-4), (1.0, 5.0)  # m/s, s

@@ -11,8 +11,9 @@ from stickslip.cli import run
 from stickslip.cli.diagnose import _print, _teller
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
+from stickslip.objects.diagnosis import diagnose_campaign
+from stickslip.objects.kept import Pieces
 from stickslip.runstore import open_run
-from stickslip.workflow import Pieces, diagnose_campaign
 
 OWN = """from stickslip.effects import Threshold
 from stickslip.params import parameter

@@ -11,7 +11,7 @@ import pytest
 
 from stickslip.challenge.generator.campaigns import Run, make_campaign
 from stickslip.errors import InputError
-from stickslip.workflow import diagnose_campaign
+from stickslip.objects.diagnosis import diagnose_campaign
 
 CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect"
 ORDERS = {"reversed": [3, 2, 1, 0], "slowest-two": [1, 0, 2, 3], "random": random.Random(1).sample(range(4), 4)}

@@ -13,9 +13,9 @@ from stickslip.conformance import check_effect
 from stickslip.effects import catalogue
 from stickslip.errors import InputError
 from stickslip.force.candidates import every_form
+from stickslip.objects.kept import code_digest
 from stickslip.scenario import make_scenario, simulate
 from stickslip.scenario.demonstration import RIG
-from stickslip.workflow import code_digest
 
 MODULE = """
 from jax import Array

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from stickslip.campaign import Rig
-from stickslip.cli._inertial import chosen
 from stickslip.cli.fit import _gains_of_effects, _named
-from stickslip.diagnose.climb import climb
+from stickslip.diagnose.climb import chosen, climb
 from stickslip.diagnose.fitted import fitted_model
 from stickslip.diagnose.prepare import prepare
 from stickslip.effects import catalogue

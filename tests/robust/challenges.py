@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.challenge.seal import CASES, TRUTH, make_seal
+from stickslip.objects.kept import Pieces
 from stickslip.runstore import file_record, open_run
-from stickslip.workflow import Pieces
 
 
 def _line(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Long work on stderr: what is being done, how far it is, and how long it may still take."""
+"""Long work on stderr or in a notebook: what is being done, how far it is, and how long it may still take."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ class Stage:
 def working(title: str) -> Iterator[Tell]:
     """A line with a bar on stderr; gives a function ``tell(text, share=None)``.
 
-    ``share`` (0 to 1) is how much is done; time left follows from it. Where stderr is no terminal a line is written
-    every half minute.
+    ``share`` (0 to 1) is how much is done; time left follows from it. A notebook shows the bar under the cell; where
+    stderr is neither that nor a terminal a line is written every half minute.
     """
-    if not sys.stderr.isatty():
+    if not sys.stderr.isatty() and "ipykernel" not in sys.modules:
         yield _lines(title)
         return
     from rich import progress as bars

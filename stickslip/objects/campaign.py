@@ -1,0 +1,259 @@
+"""A campaign: the measured runs of one apparatus with their events, and what can be done with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+from .. import campaign as files
+from ..checks import Finding, refuse_impossible, rig_against_motion
+from ..conformance import load_effects
+from ..errors import InputError, nearest
+from ..motion import true_gains, with_displacements
+from ..readers.repair import from_load_point
+from ..report.describe import left_out
+from ..segment import Segmentation, segment
+from ..trace import Trace
+from .shown import Shown, facts, table
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from ..diagnose.prepare import Prepared
+    from .diagnosis import Diagnosis
+    from .fit import Fit, StaticFit
+    from .inspection import Inspection
+    from .run import Tell
+
+
+class Campaign(Shown):
+    """Measured runs of one apparatus.
+
+    Args:
+        description: what the campaign file says, or what :func:`stickslip.campaign.described` makes without a file.
+        traces: the runs, in its order.
+        effects: Python files with effects of one's own that were loaded with it.
+
+    Attributes:
+        description, traces, effects: as given.
+    """
+
+    def __init__(
+        self, description: files.Campaign, traces: Sequence[Trace], effects: Sequence[str | Path] = ()
+    ) -> None:
+        self.description, self.traces, self.effects = description, tuple(traces), tuple(map(Path, effects))
+
+    @classmethod
+    def from_traces(
+        cls, traces: Sequence[Trace], rig: Mapping[str, Any] | None = None, title: str = "",
+        effects: Sequence[str | Path] = (),
+    ) -> Campaign:  # fmt: skip
+        """A campaign without a file.
+
+        Args:
+            traces: the runs, such as of :meth:`stickslip.Trace.from_arrays`.
+            rig: keys and values as under ``[rig]`` of a campaign file: ``{"mass": "89 g", "contacts": 4}``.
+            title: free text.
+            effects: Python files with effects of one's own; their code is run.
+
+        Raises:
+            InputError: no trace, two of one name, a key or value of the rig that cannot be used.
+        """
+        if not traces:
+            raise InputError("a campaign needs at least one trace")
+        load_effects(effects)
+        described = files.described([t.name for t in traces], rig or {}, title)
+        own = [_with_spring(t, described) for t in traces]
+        return cls(described, [from_load_point(t) for t in own], effects)
+
+    @property
+    def title(self) -> str:
+        """Of the campaign; the name of its file where it has none."""
+        return self.description.title or self.description.path.stem
+
+    @property
+    def rig(self) -> files.Rig:
+        """What is known of the apparatus (SI)."""
+        return self.description.rig
+
+    @property
+    def names(self) -> list[str]:
+        """Of the runs."""
+        return [t.name for t in self.traces]
+
+    def __len__(self) -> int:
+        return len(self.traces)
+
+    def __getitem__(self, name: str) -> Trace:
+        for trace in self.traces:
+            if trace.name == name:
+                return trace
+        raise InputError(f"there is no trace '{name}'", file=self._file, hint=nearest(name, self.names))
+
+    @cached_property
+    def events(self) -> tuple[Segmentation, ...]:
+        """Slips of every run."""
+        return tuple(segment(t) for t in self.traces)
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the motion contradicts of the rig as it is stated.
+
+        Raises:
+            InputError: block and drive are so far apart that a unit must be wrong.
+        """
+        try:
+            found = rig_against_motion(self.description, self.traces, self.events)
+            refuse_impossible(found)
+        except InputError as error:
+            raise error.at(file=self._file) from None
+        return tuple(found)
+
+    @cached_property
+    def scaled(self) -> tuple[tuple[Segmentation, ...], tuple[str, ...]]:
+        """Slips with the scale of spring forces set right where sticks show it wrong, and a sentence for each."""
+        segmentations, notes = true_gains(self.traces, self.events)
+        return tuple(segmentations), tuple(notes)
+
+    @cached_property
+    def displaced(self) -> tuple[tuple[Trace, ...], tuple[str, ...]]:
+        """The runs with displacements, derived where they were not measured, and a sentence for each of these."""
+        traces, notes = with_displacements(self.traces, self.scaled[0])
+        return tuple(traces), tuple(notes)
+
+    @cached_property
+    def lost(self) -> tuple[str, ...]:
+        """What was left out of the data, in words."""
+        return tuple(left_out(self.traces, self.scaled[0]))
+
+    def prepare(self, holdout: Sequence[str] = ()) -> Prepared:
+        """The problem of the force along the measured motion, and where the fit of the base begins.
+
+        Args:
+            holdout: runs to keep aside.
+
+        Raises:
+            InputError: no run of that name, no run that can take part, or the mass is not given.
+        """
+        from ..diagnose.prepare import prepare
+
+        try:
+            return prepare(self.description, self.displaced[0], self.scaled[0], holdout)
+        except InputError as error:
+            raise error.at(file=self._file) from None
+
+    def inspect(self) -> Inspection:
+        """Events of every run, what was mended or left out, and what these data can tell."""
+        from .inspection import inspect
+
+        return inspect(self)
+
+    @overload
+    def fit(self, effects: Sequence[str] = ..., model: Literal["inertial"] = ..., **options: Any) -> Fit: ...
+    @overload
+    def fit(self, effects: Sequence[str], model: Literal["static"], **options: Any) -> StaticFit: ...
+    def fit(
+        self, effects: Sequence[str] = (), model: Literal["inertial", "static"] = "inertial", **options: Any
+    ) -> Fit | StaticFit:
+        """Fit a model to all runs.
+
+        Args:
+            effects: of the dynamic model, such as ``"contact-ageing"`` or ``"machine-compliance:where=series"``.
+            model: ``"inertial"``, the force along the measured motion, or ``"static"``, every creep process by itself.
+            options: ``holdout`` (names of runs no fit sees) and ``progress`` of the dynamic model; ``align``, ``time``,
+                ``v_lim``, ``sampling`` and ``progress`` of the static one (see ``stickslip fit --help``).
+
+        Raises:
+            InputError: no run can take part, an effect that is not known or only shapes the backbone.
+            FitError: no finite model.
+        """
+        from .fit import fit, fit_static
+
+        if model == "static":
+            if effects:
+                raise InputError("effects belong to the dynamic model", key="effects", hint='use model="inertial"')
+            return fit_static(self, **options)
+        return fit(self, effects, **options)
+
+    def diagnose(self, **options: Any) -> Diagnosis:
+        """Find the physical effect that the base model lacks; see :func:`stickslip.objects.diagnosis.diagnose`."""
+        from .diagnosis import diagnose
+
+        return diagnose(self, **options)
+
+    def to_xarray(self, name: str) -> xarray.Dataset:
+        """Signals of a run over time (s), SI units in the attributes."""
+        import xarray
+
+        from ..trace import SIGNALS
+
+        trace = self[name]
+        units = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
+        signals = {key: ("time", getattr(trace, key), {"units": unit}) for key, unit in units.items()}
+        known = {key: v for key, v in signals.items() if v[1] is not None}
+        if trace.drive is not None:
+            known["load_point"] = ("time", trace.drive.position(trace.time), {"units": "m"})
+        return xarray.Dataset(known, coords={"time": ("time", trace.time, {"units": "s"})}, attrs={"title": name})
+
+    @property
+    def summary(self) -> pandas.DataFrame:
+        """A row for each run (SI)."""
+        rows = {
+            t.name: {
+                "slips": len(s.events),
+                "drive (m/s)": t.drive_velocity,
+                "length (s)": t.duration,
+                "sampling (Hz)": t.sampling_rate,
+                "signal": t.leading,
+                "virgin": t.virgin,
+            }
+            for t, s in zip(self.traces, self.events, strict=True)
+        }
+        return table(rows, "run")
+
+    def inputs(self) -> list[dict[str, str]]:
+        """Name and SHA-256 of everything with measured numbers."""
+        from ..runstore import file_record
+
+        if not self.description.filed:
+            return [{"file": t.name, "sha256": t.provenance.sha256} for t in self.traces]
+        return [file_record(path) for path in (self.description.path, *self.description.files)]
+
+    @property
+    def _file(self) -> Path | None:
+        return self.description.path if self.description.filed else None
+
+    def _parts(self) -> list[Any]:
+        return [facts({"campaign": self.title, "runs": len(self)}), self.summary]
+
+
+def _with_spring(trace: Trace, described: files.Campaign) -> Trace:
+    """The run with the rig's spring, where its own is not known."""
+    known = described.rig.spring_stiffness
+    if trace.spring_stiffness is None and isinstance(known, float):
+        return trace.replace(spring_stiffness=known)
+    return trace
+
+
+def load_campaign(path: str | Path, effects: Sequence[str | Path] = (), progress: Tell | None = None) -> Campaign:
+    """Read a campaign file and the runs it names.
+
+    Args:
+        path: of the TOML file (``stickslip new campaign`` writes one with every key explained).
+        effects: Python files with effects of one's own; their code is run.
+        progress: told what is read and the share of it done.
+
+    Raises:
+        InputError: the file, a trace, a unit or an effect's file cannot be used.
+    """
+    load_effects(effects)
+    description = files.load_campaign(path)
+    traces = []
+    for i, entry in enumerate(description.entries):
+        if progress is not None:
+            progress(f"reading {entry.label}", i / len(description.entries))
+        traces.append(files.load_trace(description, entry))
+    return Campaign(description, traces, effects)

@@ -1,0 +1,302 @@
+"""A diagnosis: which effect the base model lacks, how large it is, and what these data cannot tell."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..checks import stopping
+from ..conformance import try_laws
+from ..diagnose.climb import Climbed
+from ..diagnose.engine import Diagnosis as Found
+from ..diagnose.engine import diagnose as search
+from ..diagnose.pieces import Store
+from ..diagnose.summary import summary
+from ..effects import catalogue
+from ..errors import InputError, nearest
+from ..report import abilities, write_report
+from ..report.diagnosis_result import trace_sections
+from ..runstore import json_text, open_run, refuse_existing, versions
+from .campaign import Campaign, load_campaign
+from .fit import Fit
+from .kept import Pieces, code_digest
+from .run import Tell, dataset, head, save
+from .shown import Shown, facts, table
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+class Diagnosis(Shown):
+    """The outcome of :meth:`Campaign.diagnose`.
+
+    Attributes:
+        campaign: what was diagnosed.
+        found: the search and where it ended.
+        result: plain data, as in ``result.json``.
+        variables: arrays behind the pictures, as ``(dimension, values, attributes)``.
+    """
+
+    def __init__(self, campaign: Campaign, found: Found, result: dict[str, Any], variables: dict[str, Any]) -> None:
+        self.campaign, self.found, self.result, self.variables = campaign, found, result, variables
+
+    @property
+    def verdict(self) -> dict[str, Any]:
+        """``kind``, ``effects``, ``set``, ``text``, ``reasons`` and ``forms``."""
+        return dict(self.result["verdict"])
+
+    @property
+    def next_experiment(self) -> dict[str, Any] | None:
+        """What would tell apart what these data cannot: ``text`` and the effects it ``separates``."""
+        found = self.result["next_experiment"]
+        return None if found is None else dict(found)
+
+    @property
+    def best(self) -> Fit:
+        """The last model."""
+        gains = {tag: done.close[0].gain for tag, done in self.found.named.items() if done.close}
+        made = Fit(self.campaign, Climbed(self.found.prepared, self.found.ladder, gains))
+        made._confirmation = self.found.confirmation
+        return made
+
+    @property
+    def ladder(self) -> pandas.DataFrame:
+        """A row for each model: fitted and unseen error in floors, and by how much its effect lowered the cost."""
+        return self.best.ladder
+
+    @cached_property
+    def candidates(self) -> pandas.DataFrame:
+        """A row for each effect of the first round, the best first: gain, amplitude, what speaks against it.
+
+        ``visible`` is the smallest amplitude that the last model would have shown (five standard deviations, SI).
+        """
+        rows: dict[str, dict[str, Any]] = {}
+        seen = self.result["visible"]
+        for row in self.result["ranking"]:
+            size = row["amplitude"] or {}
+            rows[row["effect"]] = {
+                "gain": row.get("gain", np.nan),
+                "unseen gain": row.get("heldout_cost", np.nan),
+                "+-": row.get("heldout_cost_std", np.nan),
+                "unseen error": row.get("heldout_error", np.nan),
+                "amplitude": size.get("value", np.nan),
+                "std": size.get("std", np.nan),
+                "unit": size.get("unit", ""),
+                "visible": seen.get(row["effect"], {}).get("amplitude", np.nan),
+                "against": "; ".join(row.get("failures", ())) or row["note"],
+            }
+        return table(rows, "effect")
+
+    @cached_property
+    def arrays(self) -> xarray.Dataset:
+        """As in ``arrays.nc``."""
+        return dataset(self.variables, self.campaign.title)
+
+    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
+        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
+
+        Args:
+            folder: where. force: replace an existing run folder. more: entries for ``result.json`` besides.
+
+        Raises:
+            RunFolderError: the folder exists or cannot be written.
+        """
+        return save(self, folder, force, **more)
+
+    def _parts(self) -> list[Any]:
+        told = self.verdict
+        proposed = self.next_experiment
+        parts: list[Any] = [f"{told['kind']}: {told['text']}", self.ladder]
+        if len(self.candidates):
+            parts.append(self.candidates[["gain", "unseen gain", "+-", "amplitude", "std", "unit", "against"]].head(8))
+        if proposed is not None:
+            parts.append(facts({"next experiment": proposed["text"]}))
+        return parts
+
+
+def diagnose(
+    campaign: Campaign,
+    *,
+    candidates: Sequence[str] | None = None,
+    max_effects: int = 4,
+    holdout: Sequence[str] = (),
+    jobs: int | None = None,
+    time_limit: float | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    progress: Tell | None = None,
+) -> Diagnosis:
+    """Find the physical effect that the base model lacks, add it, repeat.
+
+    Args:
+        campaign: the runs.
+        candidates: tags of the effects to try; default the whole catalogue.
+        max_effects: at most so many are added one after the other.
+        holdout: runs to keep aside, besides those whose role in the campaign is "held-out".
+        jobs: processes; default one a core.
+        time_limit: seconds after which the best answer so far is given; it says so.
+        out: run folder for ``result.json``, ``arrays.nc``, ``report.html`` and the finished pieces, from which an
+            interrupted diagnosis goes on; default none.
+        force: replace an existing run folder.
+        progress: told the stage and the share of it done.
+
+    Raises:
+        InputError: a tag or number that cannot be used, no run that can take part, a rig that cannot be.
+        RunFolderError: the folder cannot be written.
+    """
+    check_counts(max_effects, jobs)
+    check_time(time_limit)
+    began = time.perf_counter()
+    if candidates is not None:
+        _check_candidates(candidates)
+    try_laws(catalogue.get(tag) for tag in (catalogue.tags() if candidates is None else candidates))
+    rig = campaign.findings
+    try:
+        able = abilities(campaign.traces, campaign.events)
+    except InputError as error:
+        raise error.at(file=campaign.description.path) from None
+
+    def found(store: Store | None, ready: int) -> Diagnosis:
+        # before minutes of fitting, in which a wrong unit may be mended
+        first = [f.sentence for f in rig] + list(able.cannot)
+        first += [f"going on from {ready} finished pieces"] if ready else []
+        if progress is not None and first:
+            progress("\n         ".join(["before anything is fitted:", *first]), 0.0)
+        left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), 0.0)
+        try:
+            done = search(
+                campaign.description,
+                campaign.displaced[0],
+                campaign.scaled[0],
+                candidates=candidates,
+                max_effects=max_effects,
+                holdout=holdout,
+                jobs=jobs,
+                store=store,
+                time_limit=left,
+                wrong=stopping(rig),
+                progress=progress,
+            )
+        except InputError as error:
+            for finding in reversed(stopping(rig)):  # with the sign wrong in every run there are no slips to fit
+                error = error.with_hint(finding.sentence, first=True)
+            raise error.at(file=campaign.description.path) from None
+        return _made(campaign, done, able, round(time.perf_counter() - began, 1))
+
+    if out is None:
+        return found(None, 0)
+    with open_run(out, force=force, resume=True) as run:
+        key = json_text(
+            {
+                "inputs": campaign.inputs(),
+                "holdout": list(holdout),
+                "versions": versions(),
+                "code": code_digest(campaign.effects),
+            }
+        )
+        pieces = Pieces(run, key)
+        try:
+            made = found(pieces, pieces.ready())
+        except KeyboardInterrupt:
+            text = f"{pieces.ready()} finished pieces are kept, and the same command goes on from them"
+            raise KeyboardInterrupt(text) from None
+        run.arrays(made.arrays)
+        run.json(made.result)
+        write_report(run.folder)
+    return made
+
+
+def _made(campaign: Campaign, done: Found, able: Any, seconds: float) -> Diagnosis:
+    sections, variables = summary(done, campaign.rig)
+    traces, segmentations = campaign.displaced[0], campaign.scaled[0]
+    described, pictured = trace_sections(traces, segmentations)
+    result: dict[str, Any] = {
+        **head(campaign, "diagnose"),
+        **sections,
+        "rig": [f.plain() for f in dict.fromkeys((*campaign.findings, *done.wrong))],
+        "notes": [*campaign.scaled[1], *campaign.displaced[1]],
+        "can": list(able.can),
+        "cannot": list(able.cannot),
+        "dropped": [*campaign.lost, *sections["dropped"]],
+        **described,
+        "seconds": seconds,
+    }
+    return Diagnosis(campaign, done, result, variables | pictured)
+
+
+def diagnose_campaign(
+    campaign: str | Path,
+    out: str | Path,
+    *,
+    effect_files: Sequence[str | Path] = (),
+    force: bool = False,
+    **options: Any,
+) -> dict[str, Any]:
+    """Diagnose a campaign file into a run folder.
+
+    Args:
+        campaign: the TOML file. out: the run folder.
+        effect_files: Python files with effects of one's own, which are run.
+        force, options: as of :func:`diagnose`.
+
+    Returns:
+        What ``result.json`` holds.
+
+    Raises:
+        InputError: the campaign, a trace, a tag or a number cannot be used.
+        RunFolderError: the folder cannot be written.
+    """
+    check_counts(options.get("max_effects", 1), options.get("jobs"))
+    check_time(options.get("time_limit"))
+    refuse_existing(Path(out), force)  # before traces are read
+    return diagnose(load_campaign(campaign, effect_files), out=out, force=force, **options).result
+
+
+def check_counts(max_effects: int, jobs: int | None = None) -> None:
+    """Refuse numbers that a diagnosis could only fail on after its first fit.
+
+    Raises:
+        InputError: fewer than one effect or process.
+    """
+    for key, value, hint in (
+        ("--max-effects", max_effects, "leave it out for up to 4; stickslip fit fits the base model alone"),
+        ("--jobs", jobs, "leave it out for one process a core"),
+    ):
+        if value is not None and value < 1:
+            raise InputError("out of range", key=key, value=value, allowed="1 or more", hint=hint)
+
+
+def check_time(limit: float | None) -> None:
+    """Refuse a time limit that is none.
+
+    Raises:
+        InputError: it is not positive.
+    """
+    if limit is not None and not limit > 0.0:
+        raise InputError(
+            "out of range", key="--time-limit", value=limit, allowed="more than 0 s", hint="leave it out for no limit"
+        )
+
+
+def _check_candidates(tags: Sequence[str]) -> None:
+    """All that is wrong with a choice of effects, at once."""
+    if not any(tags):
+        raise InputError("no effect is named", key="--candidates", hint="leave it out, and all effects are tried")
+    known = catalogue.tags()
+    wrong = [tag for tag in tags if tag not in known]
+    if wrong:
+        named = {tag: nearest(tag, known) for tag in wrong}
+        every = nearest("", known)  # said once, not for each that is near none
+        hints = [f"{tag}: {hint}" if len(wrong) > 1 else hint for tag, hint in named.items() if hint != every]
+        hints += [every] if every in named.values() else []
+        raise InputError(
+            f"there is no effect {' and no effect '.join(repr(tag) for tag in wrong)}",
+            key="--candidates",
+            hint="\n  ".join([*hints, catalogue.OWN]),
+        )

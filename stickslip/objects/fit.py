@@ -1,0 +1,591 @@
+"""A fit: the model as it stands, how far it is from the measurement, and what can be changed in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ..conformance import try_laws
+from ..diagnose.climb import Climbed, chosen, climb, extended, pinned, profiled, replaced, shortened
+from ..diagnose.confirm import Confirmation
+from ..diagnose.fitted import fitted_model
+from ..diagnose.summary import fitted_sections
+from ..effects import catalogue
+from ..errors import InputError, nearest
+from ..fit.parameters import Free, effect_parameters
+from ..fit.record import Fitted
+from ..force.backbone import backbone, power_law
+from ..force.fit import Fit as ForceFit
+from ..force.fit import at, deviations
+from ..force.fit import fit as fit_force
+from ..force.heldout import unseen
+from ..force.knots import PHASES
+from ..force.residual import coordinates
+from ..report.diagnosis_result import trace_sections
+from ..report.identifiability import effective, identifiability
+from ..units import shown, to_si
+from .picture import FitPlots
+from .run import Tell, dataset, head, save
+from .shown import Shown, facts, table
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from .campaign import Campaign
+
+STRENGTH = "contact.strength"
+MEANINGS = {STRENGTH: "friction force of all contacts at full strength", "rig.mass": "mass of the block"}
+VARIABLES = {"displacement": "m", "velocity": "m/s", "spring force": "N", "time in contact": "s"}
+
+
+def _silent(text: str, share: float) -> None:
+    """Nobody listens."""
+
+
+class Fit(Shown):
+    """The dynamic model along the measured motion, with the effects that were added.
+
+    It does not change: whatever changes the model returns another.
+
+    Args:
+        campaign: what was fitted.
+        climbed: the models, the last of which is the model as it stands.
+        by_hand: whether parameters were set by hand after the last fit.
+
+    Attributes:
+        campaign, climbed, by_hand: as given.
+        plot: pictures.
+    """
+
+    def __init__(self, campaign: Campaign, climbed: Climbed, by_hand: bool = False) -> None:
+        self.campaign, self.climbed, self.by_hand = campaign, climbed, by_hand
+        self.plot = FitPlots(self)
+        self._confirmation: Confirmation | None = None
+
+    # what it is
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Tags of what is in the model."""
+        return self.climbed.ladder[-1].model
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Tags of the effects that were added to the base."""
+        return tuple(e.tag for e in self._fit.problem.composition.effects)
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        """Free parameters that all runs share, with bounds and priors."""
+        return self._fit.free
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Name -> value (SI) of every parameter that all runs share, and the contact's strength."""
+        return {STRENGTH: self._fit.strength, **self._fit.values}
+
+    @cached_property
+    def std(self) -> dict[str, float]:
+        """Name -> standard deviation (SI) of every free one."""
+        weights = slice(self._first_weight, self._first_weight + self._fit.point.weights.size)
+        whole = float(self._fit.covariance[weights, weights].sum())
+        return {STRENGTH: float(np.sqrt(max(whole, 0.0))), **self._fit.std()}
+
+    @cached_property
+    def parameters(self) -> pandas.DataFrame:
+        """Value and standard deviation (SI), unit, prior and meaning of every parameter that all runs share."""
+        free = {f.name: f for f in self.free}
+        rows: dict[str, dict[str, Any]] = {}
+        for name, value in self.values.items():
+            f = free.get(name)
+            unit = "N" if name == STRENGTH else f.unit if f is not None else _unit_of(name)
+            rows[name] = {
+                "value": value,
+                "std": self.std.get(name, 0.0),
+                "unit": unit,
+                "prior": "measured" if name == STRENGTH else "given" if f is None else f.known,
+                "meaning": f.doc if f is not None else MEANINGS.get(name, ""),
+            }
+        return table(rows, "parameter")
+
+    @cached_property
+    def covariance(self) -> xarray.DataArray:
+        """Covariance (SI) of the free parameters that all runs share, shape (a, a)."""
+        import xarray
+
+        names = [f.name for f in self.free]
+        slope = np.array([f.slope(float(z)) for f, z in zip(self.free, self._fit.point.z, strict=True)])
+        part = self._fit.covariance[: len(names), : len(names)] * slope[:, None] * slope
+        return xarray.DataArray(
+            part, dims=("parameter", "other"), coords={"parameter": names, "other": names}, name="covariance"
+        )
+
+    # how far it is from the measurement
+
+    @cached_property
+    def force(self) -> xarray.Dataset:
+        """Measured force of the contact and the model's at every point (N), with where and when it was.
+
+        ``residual`` is measured less model with all events alike, ``floor`` the standard deviation that noise and the
+        scatter of events make.
+        """
+        import xarray
+
+        found, problem = self._fit, self._fit.problem
+        where = coordinates(found)
+        names = np.array([k.name for k in problem.runs])
+        coords: dict[str, Any] = {
+            "run": ("point", names[problem.run]),
+            "event": ("point", problem.of - problem.first[problem.run]),
+            "phase": ("point", np.array(PHASES)[problem.phase]),
+            "time": ("point", problem.at, {"units": "s"}),
+        }
+        for name, unit in VARIABLES.items():
+            coords[name.replace(" ", "_")] = ("point", where[name], {"units": unit, "long_name": name})
+        held = found.slopes.held
+        data = {
+            "measured": held + found.residual, "model": held, "residual": found.marginal, "floor": self._floor,
+            "stiffness": found.slopes.tangent,
+        }  # fmt: skip
+        units = {"stiffness": "N/m"}
+        made = {k: ("point", v, {"units": units.get(k, "N")}) for k, v in data.items()}
+        made["left_out"] = ("point", found.dropped, {"long_name": "beyond what is random: a jump of the sensor"})
+        return xarray.Dataset(
+            made, coords=coords, attrs={"title": self.campaign.title, "model": " + ".join(self.parts)}
+        )
+
+    @property
+    def residuals(self) -> xarray.DataArray:
+        """Residual force over its floor at every point (1): one standard deviation where the model is right."""
+        found = (self.force.residual / self.force.floor).rename("residual")
+        return found.assign_attrs(units="1", long_name="residual force / floor")
+
+    @cached_property
+    def errors(self) -> pandas.DataFrame:
+        """Root mean square of the residual force over its floor: a row for each phase of the cycle, a column a run."""
+        return self._errors(self._fit.marginal)
+
+    @cached_property
+    def unseen_errors(self) -> pandas.DataFrame:
+        """The same on runs that are left out of the fit, each in turn."""
+        return self._errors(unseen(self._fit).residual)
+
+    @property
+    def error(self) -> float:
+        """Of all points together."""
+        return float(self.errors.loc["all", "all"])
+
+    @property
+    def unseen_error(self) -> float:
+        """Of all points on runs that were left out."""
+        return float(self.unseen_errors.loc["all", "all"])
+
+    @cached_property
+    def ladder(self) -> pandas.DataFrame:
+        """A row for each model on the way here: fitted and unseen error in floors, and by how much its effect helps."""
+        rows: dict[Any, dict[str, Any]] = {}
+        for rung in self.climbed.ladder:
+            what = f"without {rung.removed}" if rung.removed else rung.added or "static"
+            rows[len(rows)] = {
+                "model": " + ".join(rung.model),
+                "step": what if rung.removed or rung.added is None else f"+ {what}",
+                "error": self._error(rung.residual),
+                "unseen error": np.nan if rung.unseen is None else self._error(rung.unseen),
+                "gain": self.climbed.gains.get(rung.added or "", np.nan),
+            }
+        return table(rows, "rung")
+
+    @cached_property
+    def backbone(self) -> xarray.Dataset:
+        """The contact's backbone as measured (N over m) with its standard deviation, and a rough contact's law."""
+        import xarray
+
+        curve = backbone(self._fit)
+        law = power_law(curve, self._contacts)
+        return xarray.Dataset(
+            {
+                "force": ("displacement", curve.force, {"units": "N"}),
+                "std": ("displacement", curve.std, {"units": "N"}),
+                "law": ("displacement", law.force, {"units": "N", "long_name": "1 - (1 - u/u_max)^p"}),
+            },
+            coords={"displacement": ("displacement", curve.displacement, {"units": "m"})},
+            attrs={"u_max": law.u_max, "p": law.p, "spread": law.spread, "misfit": law.misfit},
+        )
+
+    # what can be changed
+
+    def with_values(self, values: Mapping[str, float | str]) -> Fit:
+        """The model with parameters set by hand, nothing fitted.
+
+        Args:
+            values: name -> value in SI, or text with a unit; those of :attr:`free`, and ``contact.strength``.
+
+        Raises:
+            InputError: no free parameter of that name, or a value beyond its bounds.
+        """
+        known = {f.name: i for i, f in enumerate(self.free)}
+        z, weights = self._fit.point.z.copy(), self._fit.point.weights
+        for name, value in values.items():
+            if name == STRENGTH:
+                strength = to_si(value, "N", key=name)
+                if not strength > 0.0:
+                    raise InputError("out of range", key=name, value=value, allowed="more than 0 N")
+                weights = weights * (strength / self._fit.strength)
+                continue
+            f = self.free[self._index(name, known)]
+            number = to_si(value, f.unit, key=name)
+            if not f.lower <= number <= f.upper:
+                allowed = f"{shown(f.lower, f.unit)} to {shown(f.upper, f.unit)}"
+                raise InputError("out of range", key=name, value=value, allowed=allowed)
+            z[known[name]] = f.inward(number)
+        found = self._fit
+        moved = at(found.problem, replace(found.point, z=z, weights=weights), found.scatter, found.dropped, found.known)
+        return Fit(self.campaign, replaced(self.climbed, moved), by_hand=True)
+
+    def refit(self, locked: Sequence[str] = ()) -> Fit:
+        """Fitted anew from where it stands.
+
+        Args:
+            locked: parameters that stay as they are.
+
+        Raises:
+            InputError: no free parameter of that name.
+        """
+        known = {f.name: i for i, f in enumerate(self.free)}
+        found = self._fit
+        held = {name: float(found.point.z[self._index(name, known)]) for name in locked}
+        problem = pinned(found, held, 1e-6) if held else found.problem
+        again = fit_force(problem, found.point, found.scatter, dropped=found.dropped, first=True)
+        if held:
+            free = again.problem.with_composition(
+                replace(again.problem.composition, free=found.problem.composition.free)
+            )
+            again = at(free, again.point, again.scatter, again.dropped, again.known)
+        return Fit(self.campaign, replaced(self.climbed, again))
+
+    def add(self, effect: str) -> Fit:
+        """The model with an effect more, fitted: ``fit.add("contact-ageing")``.
+
+        Args:
+            effect: tag, or ``tag:name=value`` for another form of its law than the usual one.
+
+        Raises:
+            InputError: no such effect or form, one that is in the model already, or that only shapes the backbone.
+            FitError: it could not be fitted.
+        """
+        ((tag, form),) = chosen([effect], "effect")
+        if tag in self.effects:
+            raise InputError("the effect is in the model already", key="effect", value=effect)
+        try_laws([catalogue.get(tag)])
+        return Fit(self.campaign, extended(self.climbed, tag, form))
+
+    def remove(self, effect: str) -> Fit:
+        """The model without one of its effects, fitted anew.
+
+        Raises:
+            InputError: it is not in the model.
+        """
+        if effect not in self.effects:
+            raise InputError(
+                "the effect is not in the model", key="effect", value=effect, hint=nearest(effect, self.effects)
+            )
+        return Fit(self.campaign, shortened(self.climbed, effect))
+
+    # what it foretells
+
+    def predict(self, progress: Tell | None = None) -> pandas.DataFrame:
+        """Errors of the model run freely, from arrest to arrest, through runs it was not fitted to.
+
+        Returns:
+            A row for each run: relative errors (1) of recurrence, slip and creep before the onset; slips missed.
+        """
+        from ..diagnose.free_errors import errors
+
+        c = self.confirm(progress)
+        free = c.models.get(self.parts)
+        if free is None:
+            raise InputError("the model could not be run freely", hint="; ".join(c.notes))
+        found = errors(c, free)
+        rows = {"all": found, **found["by_run"]}
+        measures = ("recurrence", "slip", "creep")
+        return table(
+            {
+                name: {**{m: row[m]["relative"] for m in measures}, "missed": row["missed"], "events": row["events"]}
+                for name, row in rows.items()
+            },
+            "run",
+        )
+
+    @cached_property
+    def fitted(self) -> Fitted:
+        """The model as a family that can be simulated; the contact by the law fitted to its backbone."""
+        law = power_law(backbone(self._fit), self._contacts)
+        return fitted_model(self._fit, law, self.climbed.prepared.traces, self._contacts, self.campaign.rig)
+
+    def scenario(self, changes: Sequence[str] = (), run: str | None = None, events: int = 5) -> Any:
+        """The model as a scenario, for :func:`stickslip.simulate`.
+
+        Args:
+            changes: such as ``"drive.velocity=100um/s"``.
+            run: drive as this measured run was; default at the first run's velocity, for so many ``events``.
+            events: slips to simulate where the drive has one velocity.
+        """
+        from ..scenario.fitted import FittedRun
+
+        record = FittedRun(Path(), {"title": self.campaign.title}, self.fitted)
+        return record.scenario(changes, run, events)
+
+    def simulate(self, changes: Sequence[str] = (), run: str | None = None, events: int = 5) -> xarray.Dataset:
+        """Run the model freely under another drive; arguments as of :meth:`scenario`."""
+        from ..scenario import simulate
+
+        return simulate(self.scenario(changes, run, events))
+
+    def profile(self, name: str, progress: Tell | None = None) -> dict[str, Any]:
+        """Profile likelihood of a parameter: held at values around its best one, all others fitted.
+
+        Returns:
+            ``name``, ``unit``, ``value`` (SI), ``rise`` (of the cost, in units of chi-square), ``interval`` (95 %; None
+            for an open end) and ``text``.
+
+        Raises:
+            InputError: no free parameter of that name.
+        """
+        known = {f.name: i for i, f in enumerate(self.free)}
+        f = self.free[self._index(name, known)]
+        found = profiled(self._fit, name, progress or _silent)
+        low, high = (f.outward(v) if np.isfinite(v) else None for v in found.interval)
+        low_text, high_text = ("-" if v is None else shown(v, f.unit, 3) for v in (low, high))
+        return {
+            "name": name,
+            "unit": f.unit,
+            "value": [f.outward(float(v)) for v in found.z],
+            "rise": found.rise,
+            "interval": [low, high],
+            "text": f"{found.text}; 95 % interval {low_text} to {high_text}",
+        }
+
+    # what is kept
+
+    def confirm(self, progress: Tell | None = None) -> Confirmation:
+        """Base and last model run freely through the measured cycles; simulated once."""
+        if self._confirmation is None:
+            self._confirmation = self.climbed.confirmed(progress or _silent)
+        return self._confirmation
+
+    @cached_property
+    def _sections(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        found = self.climbed.as_diagnosis(self.confirm())
+        sections, variables, fitted = fitted_sections(found, self.campaign.rig)
+        traces, segmentations = self.campaign.displaced[0], self.campaign.scaled[0]
+        described, pictured = trace_sections(traces, segmentations)
+        line = effective(fitted, self.campaign.rig)
+        result = {
+            **head(self.campaign, "fit"),
+            "model": "inertial",
+            "model_parts": list(self.parts),
+            **sections,
+            "gains": dict(self.climbed.gains),
+            "profiles": [],
+            "effective": line,
+            "identifiability": identifiability(fitted, self.campaign.rig, line),
+            **described,
+            "fit": {
+                "cost": self._fit.cost,
+                "evaluations": self._fit.evaluations,
+                "covariance": fitted.covariance,
+                "ring_period": self.climbed.prepared.scales.ring,
+                "cycles": self._fit.problem.events,
+            },
+            "rig": [finding.plain() for finding in self.campaign.findings],
+            "notes": [*self.campaign.scaled[1], *self.campaign.displaced[1]],
+            "dropped": [*self.campaign.lost, *sections["dropped"]],
+        }
+        return result, variables | pictured
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Plain data, as in ``result.json``."""
+        return self._sections[0]
+
+    @cached_property
+    def arrays(self) -> xarray.Dataset:
+        """As in ``arrays.nc``: measured and model force, the backbone, the runs thinned for pictures."""
+        return dataset(self._sections[1], self.campaign.title)
+
+    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
+        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
+
+        Args:
+            folder: where. force: replace an existing run folder. more: entries for ``result.json`` besides.
+
+        Raises:
+            RunFolderError: the folder exists or cannot be written.
+        """
+        return save(self, folder, force, **more)
+
+    @property
+    def _fit(self) -> ForceFit:
+        return self.climbed.fit
+
+    @property
+    def _contacts(self) -> int:
+        return int(self.campaign.rig.contacts or 1)
+
+    @property
+    def _first_weight(self) -> int:
+        return len(self.free) + self._fit.point.phases.size
+
+    @cached_property
+    def _floor(self) -> np.ndarray:
+        return deviations(self._fit)
+
+    def _index(self, name: str, known: Mapping[str, int]) -> int:
+        if name not in known:
+            raise InputError("no free parameter of that name", key=name, hint=nearest(name, list(known)))
+        return known[name]
+
+    def _error(self, residual: np.ndarray, where: np.ndarray | None = None) -> float:
+        use = ~self._fit.dropped if where is None else where & ~self._fit.dropped
+        return float(np.sqrt(np.mean((residual[use] / self._floor[use]) ** 2))) if use.any() else float("nan")
+
+    def _errors(self, residual: np.ndarray) -> pandas.DataFrame:
+        problem = self._fit.problem
+        every = np.ones(problem.run.size, bool)
+        runs = {"all": every, **{k.name: problem.run == r for r, k in enumerate(problem.runs)}}
+        phases = {"all": every, **{name: problem.phase == i for i, name in enumerate(PHASES)}}
+        rows = {p: {r: self._error(residual, a & b) for r, b in runs.items()} for p, a in phases.items() if a.any()}
+        return table(rows, "phase")
+
+    def _parts(self) -> list[Any]:
+        what = {
+            "campaign": self.campaign.title,
+            "model": " + ".join(self.parts),
+            "error": f"{self.error:.3g} floors",
+            "on unseen runs": f"{self.unseen_error:.3g}",
+            "parameters": "set by hand" if self.by_hand else None,
+        }
+        return [facts(what), self.parameters[["value", "std", "unit"]], self.errors]
+
+
+class StaticFit(Shown):
+    """The paper's static model, every creep process fitted by itself.
+
+    Attributes:
+        campaign: what was fitted.
+        result: plain data, as in ``result.json``.
+        arrays: measured and fitted creep.
+    """
+
+    def __init__(self, campaign: Campaign, result: dict[str, Any], variables: dict[str, Any]) -> None:
+        self.campaign, self.result = campaign, result
+        self.arrays = dataset(variables, campaign.title)
+
+    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
+        """Keep it as a run folder; as :meth:`Fit.save`."""
+        return save(self, folder, force, **more)
+
+    def _parts(self) -> list[Any]:
+        said = [self.result[key]["text"] for key in ("static", "ramps") if self.result.get(key)]
+        return [facts({"campaign": self.campaign.title, "model": "static"}), *said]
+
+
+def fit(
+    campaign: Campaign, effects: Sequence[str] = (), *, holdout: Sequence[str] = (), key: str = "effects",
+    profiles: Sequence[str] = (), progress: Tell | None = None,
+) -> Fit:  # fmt: skip
+    """Fit the dynamic model along the measured motion (see :meth:`Campaign.fit`).
+
+    Args:
+        campaign: the runs.
+        effects: to add to the base, in this order.
+        holdout: runs that no fit sees.
+        key: what an error calls the effects.
+        profiles: parameters that will be asked for: a wrong name is an error before anything is fitted.
+        progress: told the stage and the share of it done.
+    """
+    forms = chosen(effects, key)
+    try_laws(catalogue.get(tag) for tag, _ in forms)
+    prepared = campaign.prepare(holdout)
+    own = [f.name for tag, form in forms for f in effect_parameters(catalogue.get(tag)(**form))]
+    known = [f.name for f in prepared.problem.composition.shared] + own
+    for name in profiles:
+        if name not in known:
+            raise InputError("no free parameter of that name", key="--profile", value=name, hint=nearest(name, known))
+    return Fit(campaign, climb(prepared, forms, progress or _silent))
+
+
+def fit_static(
+    campaign: Campaign,
+    *,
+    align: Literal["consistent", "paper"] = "consistent",
+    time: Literal["exact", "paper"] = "exact",
+    v_lim: float | str = 1e-6,
+    sampling: Literal["log", "uniform"] = "log",
+    progress: Tell | None = None,
+) -> StaticFit:
+    """Fit the static model to every creep process (see :meth:`Campaign.fit`).
+
+    Args:
+        campaign: the runs.
+        align: what is laid on the measured passage of ``v_lim``, the model's passage or ("paper") its end.
+        time: virtual time with the block's own motion ("exact") or without it ("paper").
+        v_lim: speed of the block at which a creep process ends (m/s, or text with a unit).
+        sampling: windows even in the logarithm of the time left ("log"), or in time as in the paper ("uniform").
+        progress: told the stage and the share of it done.
+
+    Raises:
+        InputError: nothing in the runs can be compared with the static model, or the rig lacks what it takes.
+    """
+    from ..fit.static_table import StaticRig
+    from ..report import describe_trace, trace_pieces
+    from ..report.static_result import static_result
+    from ..trace import Trace
+
+    tell, file = progress or _silent, campaign.description.path
+    traces, found = campaign.traces, campaign.scaled[0]
+
+    def rig_of(trace: Trace) -> StaticRig:
+        return StaticRig.of(campaign.description.rig_of(trace.name), spring_stiffness=trace.spring_stiffness)
+
+    try:
+        result, variables = static_result(
+            traces,
+            found,
+            rig_of,
+            align=align,
+            form=time,
+            v_lim=to_si(v_lim, "m/s", key="v_lim"),
+            sampling=sampling,
+            springs=campaign.rig.springs,
+            progress=lambda done, of: tell(f"{done} of {of} fitted", done / of),
+        )
+    except InputError as error:
+        raise error.at(file=file) from None
+    notes = list(campaign.scaled[1])
+    if kept := [t.name for t in traces if t.role == "held-out"]:
+        notes.append(
+            f"creep of held-out runs ({', '.join(kept)}) is fitted as well: every creep process is fitted by itself"
+        )
+    for i, (t, s) in enumerate(zip(traces, found, strict=True)):
+        variables |= trace_pieces(t, s, i)
+    whole = {
+        **head(campaign, "fit"),
+        "model": "static",
+        **result,
+        "traces": [describe_trace(t, s) for t, s in zip(traces, found, strict=True)],
+        "rig": [finding.plain() for finding in campaign.findings],
+        "notes": notes,
+        "dropped": [*campaign.lost, *result["dropped"]],
+    }
+    return StaticFit(campaign, whole, variables)
+
+
+def _unit_of(name: str) -> str:
+    return {"rig.mass": "kg", "rig.spring_stiffness": "N/m"}.get(name, "1")

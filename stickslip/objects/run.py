@@ -1,0 +1,69 @@
+"""What every result of a campaign has: its head, and how it is kept as a run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from ..runstore import open_run, versions
+
+if TYPE_CHECKING:
+    import xarray
+
+    from .campaign import Campaign
+
+Tell = Callable[[str, float], None]
+
+
+def head(campaign: Campaign, kind: str) -> dict[str, Any]:
+    """What every ``result.json`` made from a campaign begins with."""
+    return {
+        "schema": 1,
+        "kind": kind,
+        "title": campaign.title,
+        "inputs": campaign.inputs(),
+        "versions": versions(),
+    }
+
+
+def dataset(variables: Mapping[str, Any], title: str) -> xarray.Dataset:
+    """Arrays with their units as one data set; an entry ``coordinates`` holds those that are coordinates."""
+    import xarray
+
+    data = dict(variables)
+    return xarray.Dataset(data, coords=data.pop("coordinates", {}), attrs={"title": title})
+
+
+class Result(Protocol):
+    """What can be kept."""
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Plain data, as in ``result.json``."""
+
+    @property
+    def arrays(self) -> xarray.Dataset:
+        """As in ``arrays.nc``."""
+
+
+def save(found: Result, folder: str | Path, force: bool = False, **more: Any) -> Path:
+    """Keep a result as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
+
+    Args:
+        found: what to keep.
+        folder: where; it appears when all of it is written.
+        force: replace an existing run folder.
+        more: entries for ``result.json`` besides.
+
+    Raises:
+        RunFolderError: the folder exists or cannot be written.
+    """
+    from ..report import write_report
+
+    result, arrays = {**found.result, **more}, found.arrays
+    with open_run(folder, force=force) as run:
+        run.arrays(arrays)
+        run.json(result)
+        write_report(run.folder)
+    return Path(folder)
