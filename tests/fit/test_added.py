@@ -37,14 +37,14 @@ def test_the_usual_form_unless_another_is_named():
             ["machine-compliance:where=serial"],
             "allowed: machine-compliance:where=read-out, machine-compliance:where=se",
         ),
-        (["machine-compliance:series"], "--add: no form of machine-compliance (got 'machine-compliance:series')"),
+        (["machine-compliance:series"], "effects: no form of machine-compliance (got 'machine-compliance:series')"),
         (["machine-compliance:were=series"], "allowed: machine-compliance:where=read-out"),
         (["machine-compliance:"], "allowed: machine-compliance:where=read-out"),
         (["tilt:by=spring,by=contact"], "allowed: tilt:by=spring, tilt:by=contact"),
         (["inertia:share=0.05"], "allowed: inertia, which has one form\n  to mend: a fit finds the values of"),
-        (["viscous:by=spring"], "--add: there is no effect 'viscous'"),
-        (["tild"], "--add: there is no effect 'tild'\n  to mend: did you mean 'tilt'"),
-        (["tilt", "wear", "tilt:by=contact"], "--add: an effect can be added once (got 'tilt')"),
+        (["viscous:by=spring"], "effects: there is no effect 'viscous'"),
+        (["tild"], "effects: there is no effect 'tild'\n  to mend: did you mean 'tilt'"),
+        (["tilt", "wear", "tilt:by=contact"], "effects: an effect can be added once (got 'tilt')"),
     ],
 )
 def test_what_cannot_be_added_is_one_message(added, words):
