@@ -11,8 +11,8 @@ from stickslip.campaign import load_campaign, load_traces
 from stickslip.checks import rig_against_motion
 from stickslip.checks.slip_time import at_odds, slip_time
 from stickslip.cli import run
-from stickslip.diagnose import engine
 from stickslip.motion import true_gains, with_displacements
+from stickslip.objects import diagnosis
 from stickslip.objects.diagnosis import diagnose_campaign
 from stickslip.segment import segment
 from stickslip.trace import Drive, Trace
@@ -74,7 +74,7 @@ def test_a_diagnosis_of_spring_force_is_given_the_displacement(tmp_path, monkeyp
     def diagnose(campaign, traces, segmentations, **options):
         raise Seen(traces[0].displacement, segmentations[0])
 
-    monkeypatch.setattr(engine, "diagnose", diagnose)
+    monkeypatch.setattr(diagnosis, "search", diagnose)
     with pytest.raises(Seen) as seen:
         diagnose_campaign(tmp_path / "c.toml", tmp_path / "out")
     displacement, events = seen.value.args

@@ -12,7 +12,7 @@ from typing import Any
 import param
 
 from ..errors import StickslipError
-from ..objects import Campaign, Diagnosis, Fit
+from ..objects import Campaign, Fit
 
 BASE = "the base model"
 

@@ -122,7 +122,7 @@ def test_without_a_folder_it_is_named_after_the_campaign(tmp_path, monkeypatch, 
         asked.append((str(out), kwargs["candidates"], kwargs["max_effects"], kwargs["holdout"]))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("stickslip.cli.diagnose.diagnose_campaign", stopped)
+    monkeypatch.setattr("stickslip.objects.diagnosis.diagnose_campaign", stopped)
     assert run(["diagnose", file, "--candidates", "tilt", "--max-effects", "1", "--holdout", "v400.csv"]) == 130
     assert asked == [(f"{folder}-diagnosis", ["tilt"], 1, ("v400.csv",))]
 
@@ -196,7 +196,7 @@ def test_an_interrupted_diagnosis_says_what_is_kept_and_goes_on_from_it(tmp_path
             store.save(key, {"z": np.arange(3.0)})
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("stickslip.diagnose.engine.diagnose", stopped)
+    monkeypatch.setattr("stickslip.objects.diagnosis.search", stopped)
     for _ in range(2):
         assert run(["diagnose", str(CAMPAIGN), "--out", str(tmp_path / "run")]) == 130
         said = capsys.readouterr().err

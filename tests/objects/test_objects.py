@@ -1,0 +1,221 @@
+"""Objects for Python: what they say is what the records and an independent computation say."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import stickslip as ss
+from stickslip.errors import InputError
+from stickslip.force.problem import Problem
+from stickslip.runstore import read_result
+
+SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
+RIG = {"mass": "89.4 g", "spring_stiffness": "980.2 N/m", "contacts": 4, "normal_force": "0.31 N",
+       "friction_coefficient": 0.21}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return ss.load_campaign(SHIPPED)
+
+
+@pytest.fixture(scope="module")
+def base(campaign):
+    return campaign.fit()
+
+
+@pytest.fixture(scope="module")
+def aged(base):
+    return base.add("contact-ageing")
+
+
+def test_the_right_effect_makes_the_unseen_error_fall_to_one(base, aged):
+    ladder = aged.ladder
+    assert list(ladder["step"]) == ["static", "+ inertia", "+ contact-ageing"]
+    assert ladder["unseen error"].iloc[1] > 2.0 and 0.85 < ladder["unseen error"].iloc[2] < 1.1
+    assert ladder["gain"].iloc[2] > 500.0
+    assert base.effects == () and aged.effects == ("contact-ageing",)
+
+
+def test_taking_it_out_again_is_the_base(base, aged):
+    again = aged.remove("contact-ageing")
+    for name, value in base.values.items():
+        assert again.values[name] == pytest.approx(value, abs=max(3.0 * base.std.get(name, 0.0), 1e-3 * abs(value)))
+
+
+def test_the_measured_force_is_newtons(campaign, base):
+    """Where the block creeps its inertia is nothing: the contact holds what the spring pulls."""
+    data = base.force
+    creeping = data.isel(point=np.flatnonzero((data.phase == "creep").values))
+    pull = creeping.spring_force.values - base.values["rig.damping"] * creeping.velocity.values
+    off = creeping.measured.values - pull
+    # the event's own offset moves the force by the tangent times some nanometres
+    assert np.abs(np.median(off)) < 2e-3 * base.values["contact.strength"]
+    assert np.corrcoef(creeping.measured.values, pull)[0, 1] > 0.999
+
+
+def test_errors_are_those_of_the_residuals(base):
+    data = base.force
+    kept = ~data.left_out.values
+    z = base.residuals.values
+    for run in np.unique(data.run.values):
+        for phase in np.unique(data.phase.values):
+            own = kept & (data.run.values == run) & (data.phase.values == phase)
+            assert base.errors.loc[phase, run] == pytest.approx(np.sqrt(np.mean(z[own] ** 2)), rel=1e-12)
+
+
+def test_values_set_by_hand_move_the_force_as_the_derivatives_say(base):
+    """A step in a parameter, small against where the force bends, against the slopes of the fit."""
+    name, step = "weakening.drop", 1e-5
+    moved = base.with_values({name: base.values[name] + step})
+    i = [f.name for f in base.free].index(name)
+    f = base.free[i]
+    slope = base._fit.slopes.shared[:, i] / f.slope(float(base._fit.point.z[i]))
+    change = moved.force.residual.values - base.force.residual.values
+    assert np.linalg.norm(change - slope * step) < 0.02 * np.linalg.norm(slope * step)
+    assert moved.by_hand and moved.values["rig.damping"] == base.values["rig.damping"]
+
+
+def test_a_fit_comes_back_from_where_a_hand_left_it(base):
+    name = "weakening.slip_distance"
+    away = base.with_values({name: "1.3 um"})
+    assert away.error > 1.5 * base.error
+    back = away.refit()
+    assert back.values[name] == pytest.approx(base.values[name], abs=4.0 * base.std[name])
+
+
+def test_what_is_locked_stays(base):
+    held = base.with_values({"weakening.drop": 0.2}).refit(locked=["weakening.drop"])
+    assert held.values["weakening.drop"] == pytest.approx(0.2, abs=1e-7)
+    free = held.refit()
+    assert free.values["weakening.drop"] == pytest.approx(
+        base.values["weakening.drop"], abs=4 * base.std["weakening.drop"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"weakening.dorp": 0.2}, "weakening.drop"),
+        ({"weakening.drop": 2.0}, "out of range"),
+        ({"rig.damping": "3 m"}, "not one of"),
+        ({"contact.strength": 0.0}, "more than 0 N"),
+    ],
+)
+def test_a_value_that_cannot_be_set_is_refused_in_words(base, values, said):
+    with pytest.raises(InputError, match=said):
+        base.with_values(values)
+
+
+def test_an_effect_is_added_once_and_taken_out_once(aged, base):
+    with pytest.raises(InputError, match="already"):
+        aged.add("contact-ageing")
+    with pytest.raises(InputError, match="not in the model"):
+        base.remove("contact-ageing")
+
+
+def test_covariance_is_that_of_the_deviations(aged):
+    c = aged.covariance
+    for f in aged.free:
+        assert np.sqrt(float(c.sel(parameter=f.name, other=f.name))) == pytest.approx(aged.std[f.name], rel=1e-9)
+    assert np.linalg.eigvalsh(c.values / np.sqrt(np.outer(np.diag(c), np.diag(c)))).min() > -1e-9
+
+
+def test_what_is_saved_is_what_is_shown(aged, tmp_path):
+    folder = aged.save(tmp_path / "run")
+    kept = read_result(folder)
+    assert kept["ladder"][-1]["train_error"] == pytest.approx(aged.error, rel=1e-9)
+    assert kept["ladder"][-1]["heldout_error"] == pytest.approx(aged.unseen_error, rel=1e-9)
+    again = ss.load_run(folder)
+    assert again.parameters["contact-ageing.rate"]["value"] == pytest.approx(aged.values["contact-ageing.rate"])
+    free = aged.predict()
+    assert kept["ladder"][-1]["free"]["recurrence"]["relative"] == pytest.approx(free.loc["all", "recurrence"])
+    assert (folder / "report.html").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("kind", ["numpy", "pandas", "xarray"])
+def test_a_campaign_of_arrays_is_the_campaign_of_files(campaign, base, kind):
+    """The same numbers by hand: the same fit, whatever they came in."""
+
+    def given(values, unit):
+        if kind == "pandas":
+            return pd.Series(values)
+        if kind == "xarray":
+            return xr.DataArray(values * 1e6, attrs={"units": f"u{unit}"})
+        return values
+
+    traces = [
+        ss.Trace.from_arrays(
+            t.name, time=t.time if kind != "pandas" else pd.Series(t.time), displacement=given(t.displacement, "m"),
+            drive_velocity=f"{t.drive_velocity * 1e6:.9g} um/s" if len(t.drive.times) == 2 else None,
+            drive_position=None if len(t.drive.times) == 2 else t.drive.position(t.time),
+            resolution=t.resolution, noise=t.noise, virgin=t.virgin,
+        )
+        for t in campaign.traces
+    ]  # fmt: skip
+    made = ss.Campaign.from_traces(traces, RIG, "by hand")
+    assert [len(e.events) for e in made.events] == [len(e.events) for e in campaign.events]
+    if kind == "numpy":
+        found = made.fit()
+        for name, value in base.values.items():
+            assert found.values[name] == pytest.approx(value, abs=max(base.std.get(name, 0.0), 1e-3 * abs(value)))
+        assert {record["file"] for record in found.result["inputs"]} == set(made.names)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "said"),
+    [
+        ({"time": [0.0, 1.0, 2.0]}, "no signal"),
+        ({"time": [0.0, 1.0, 1.0], "displacement": [0.0, 1.0, 2.0]}, "does not increase"),
+        ({"time": [0.0, 1.0], "displacement": [0.0, 1.0, 2.0]}, "samples"),
+        ({"time": [0.0, 1.0, 2.0], "displacement": ["a", "b", "c"]}, "no numbers"),
+        ({"time": [0.0, 1.0, 2.0], "displacement": [0.0, 1.0, 2.0], "drive_velocity": "3 N"}, "drive_velocity"),
+        ({"time": [0.0, 1.0, 2.0], "displacement": [0.0, 1.0, 2.0], "drive_velocity": 1e-5,
+          "drive_position": [0.0, 1.0, 2.0]}, "more than once"),
+    ],
+)  # fmt: skip
+def test_arrays_that_cannot_be_used_are_refused_in_words(arrays, said):
+    with pytest.raises(InputError, match=said):
+        ss.Trace.from_arrays(**arrays)
+
+
+def test_a_rig_that_cannot_be_used_is_refused_in_words(campaign):
+    with pytest.raises(InputError, match="unknown key 'masss'"):
+        ss.Campaign.from_traces(campaign.traces, {"masss": "1 kg"})
+    with pytest.raises(InputError, match="same name"):
+        ss.Campaign.from_traces([campaign.traces[0]] * 2, RIG)
+
+
+def test_notebooks_show_tables_and_escape_what_comes_from_files(campaign, base):
+    for made in (campaign, base):
+        html = made._repr_html_()
+        assert html.count("<table") >= 1 and "</div>" in html
+    named = ss.Campaign.from_traces([campaign.traces[0].replace(name="<script>x</script>")], RIG, "<b>t</b>")
+    assert "<script>" not in named._repr_html_() and "<b>" not in named._repr_html_()
+
+
+def test_pictures_have_units(aged):
+    for name in ("trace", "force", "creep", "residual", "backbone", "errors"):
+        made = getattr(aged.plot, name)()
+        labels = [a.get_xlabel() + a.get_ylabel() for a in made.axes]
+        assert name == "errors" or any(" / " in label for label in labels), name
+    with pytest.raises(InputError, match="age"):
+        aged.plot.residual("agee")
+
+
+def test_evaluating_by_hand_follows_a_slider(base):
+    """Ten values a second on one core, and no more than one evaluation each (measured by counting)."""
+    calls = []
+    evaluate = Problem.evaluate
+
+    def counted(self, point):
+        calls.append(point)
+        return evaluate(self, point)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Problem, "evaluate", counted)
+        _ = base.with_values({"weakening.drop": 0.2}).error
+    assert len(calls) == 1
