@@ -56,7 +56,7 @@ class SlipWeakening(Memory, Threshold):
         upper=2e-5,
         usual=(5e-8, 5e-6),
         log=True,
-        grid=(1e-7, 1e-6),
+        grid=(1e-7, 5e-7, 2e-6),
         symbol="D_s",
         doc="slip over which strength is lost",
     )

@@ -58,7 +58,7 @@ class Wear(Memory, Threshold, Stiffness):
         lower=1e-5,
         upper=1.0,
         log=True,
-        grid=(1e-4, 1e-3),
+        grid=(1e-4, 1e-3, 1e-2),
         symbol="s_1",
         doc="path over which it changes",
     )

@@ -15,14 +15,13 @@ from ..effects.base import Effect, Geometry
 from ..errors import StickslipError
 from ..fit.parameters import Free, effect_parameters
 from ..params import Spec, specs
-from .fit import LAST, Array, Fit, adapted, continued, refit
+from .fit import Array, Fit, adapted, refit
 from .problem import Point, Problem, is_own
 from .score import Explained, signatures
 
 FREQUENCIES = 240  # of a periodic effect
 FEW = 12  # members of a family for which no program of their own is compiled
-STARTS = 4  # members of a family from which a refit is begun
-SHORT = 4  # steps of each of them, before the best goes on
+STARTS = 4  # members of a family from which a refit is begun; each to its end, for after a few steps none leads yet
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 LONGEST = 1.5  # of a record: a longer wave is a trend
 
@@ -160,10 +159,8 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
             sign = 1.0 if size >= 0.0 and spec.upper > null else -1.0
             size = sign * min(least, 0.5 * abs((spec.upper if sign > 0 else spec.lower) - null))
         starts.append((i, {**members[i], effect.amplitude: null + size}))
-    short = [(_refit(base, effect, start, last=SHORT if len(starts) > 1 else LAST), i, start) for i, start in starts]
-    found, i, start = min(short, key=lambda item: item[0].cost)
-    if len(starts) > 1:
-        found = continued(found)
+    ends = [(_refit(base, effect, start), i, start) for i, start in starts]
+    found, i, start = min(ends, key=lambda end: end[0].cost)
     return Candidate(
         effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * float(errors[i]), start
     )  # fmt: skip
@@ -194,10 +191,10 @@ def _columns(base: Fit, effect: Effect, members: Sequence[dict[str, float]]) -> 
     return np.stack(out)
 
 
-def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None, last: int = LAST) -> Fit:
+def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
     """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,)."""
     problem, free = with_start(base.problem, effect, values)
-    return refit(problem, _start(base, free, turns), base, last)
+    return refit(problem, _start(base, free, turns), base)
 
 
 def with_start(

@@ -343,16 +343,6 @@ def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
     return _found(problem, point, slopes, base.scatter, base.dropped, base.known, count + 1)
 
 
-def continued(found: Fit) -> Fit:
-    """A fit that has not ended yet, to its end."""
-    point, slopes, _, count = descend(
-        found.problem, found.point, found.slopes, found.scatter, found.known, found.blocks, LAST
-    )
-    return _found(
-        found.problem, point, slopes, found.scatter, found.dropped, found.known, found.evaluations + count
-    )  # fmt: skip
-
-
 def adapted(found: Fit) -> Fit:
     """A refit with sizes of its own of what is random; what carries the noise to a force stays that of its base.
 
