@@ -144,7 +144,10 @@ def by_springs(found: dict[str, Any]) -> str:
     for solver in dict.fromkeys(r["solver"] for r in runs):
         own = {r["springs"]: r for r in runs if r["solver"] == solver}
         first = own[sizes[0]]
-        off = [power(first["onset"]) if "onset" in first else "", f"{first['creep_nm']:.2f}" if "creep_nm" in first else ""]
+        off = [
+            power(first["onset"]) if "onset" in first else "",
+            f"{first['creep_nm']:.2f}" if "creep_nm" in first else "",
+        ]
         rows.append([solver, *(_seconds(own.get(n), found) for n in sizes), *off])
     last = [f"onset ({sizes[0]}), share of the period", f"creep ({sizes[0]}), nm"]
     return table(["solver", *(f"{n} springs" if n == sizes[0] else str(n) for n in sizes), *last], rows)
