@@ -125,7 +125,10 @@ def aims(found: dict[str, Any]) -> str:
     """What the program is to reach, and what was measured."""
     if not found:
         return MISSING
-    rows = [[r["aim"], r["measured"], r["reached"], r["date"], f"`{r['command']}`"] for r in found["rows"]]
+    rows = [
+        [r["aim"], r["measured"], r["reached"], r["date"].replace("-", "\u2011"), f"`{r['command']}`"]
+        for r in found["rows"]
+    ]
     return table(["aim", "measured", "reached", "date", "measured by"], rows) + f"\n\n*{found['machine']}.*"
 
 
