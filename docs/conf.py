@@ -48,5 +48,15 @@ def write_effect_pages(app: Any) -> None:
     effect_pages.write_all(HERE / "effects")
 
 
+def drawn_anew(app: Any, env: Any, added: set[str], changed: set[str], removed: set[str]) -> list[str]:
+    """Pages with tables from files of results that are newer than the page was read."""
+    sources = [HERE / "tables.py", HERE / "results", *HERE.glob("results/*.json"), *HERE.glob("paper/*.json")]
+    newest = max(path.stat().st_mtime_ns for path in sources) // 1000
+    old = [page for page, read in env.all_docs.items() if read < newest and Path(env.doc2path(page)).is_file()]
+    texts = {page: Path(env.doc2path(page)).read_text(encoding="utf-8") for page in old}
+    return [page for page, text in texts.items() if "import tables" in text or ".json" in text]
+
+
 def setup(app: Any) -> None:
     app.connect("config-inited", lambda app, config: write_effect_pages(app))
+    app.connect("env-get-outdated", drawn_anew)

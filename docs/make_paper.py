@@ -12,6 +12,7 @@ import io
 import json
 import tempfile
 import time
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -426,7 +427,12 @@ def static_part(result: dict[str, Any], rig: StaticRig) -> dict[str, Any]:
 def main() -> None:
     OUT.mkdir(exist_ok=True)
     began = time.perf_counter()
-    result: dict[str, Any] = {"version": __version__, "paper": PAPER, "v_lim_um_s": V_LIM * 1e6}
+    result: dict[str, Any] = {
+        "version": __version__,
+        "date": date.today().isoformat(),
+        "paper": PAPER,
+        "v_lim_um_s": V_LIM * 1e6,
+    }
     for part in (fig2, fig4, fig5, alignment, realisations, statistics, weakening, extended):
         start = time.perf_counter()
         result[part.__name__] = part()

@@ -1,4 +1,4 @@
-"""What the documentation is made of: pages of effects, the tutorial's effect, the paper's rigs. Nothing is built."""
+"""What the documentation is made of: pages, tables, effects, the tutorial, the paper's rigs. Nothing is built."""
 
 from __future__ import annotations
 
@@ -23,14 +23,28 @@ DOCS = ROOT / "docs"
 RIGS = sorted((ROOT / "scenarios" / "grzemba2014").glob("*.toml"))
 
 
-@pytest.fixture(scope="module")
-def pages() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("effect_pages", DOCS / "effect_pages.py")
+WRITTEN = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
+RESULTS = sorted((DOCS / "results").glob("*.json"))
+
+
+def script(name: str) -> ModuleType:
+    """A script of docs as a module."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def pages() -> ModuleType:
+    return script("effect_pages")
+
+
+@pytest.fixture(scope="module")
+def tables() -> ModuleType:
+    return script("tables")
 
 
 @pytest.fixture(scope="module")
@@ -137,11 +151,73 @@ def test_the_readme_tells_of_the_run_in_its_picture() -> None:
 
 
 def test_every_picture_and_page_that_is_linked_is_there() -> None:
-    for path in [ROOT / "README.md", *DOCS.glob("*.md")]:
+    for path in WRITTEN:
         text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
         for link in re.findall(r"\]\((?!https?:)([^)#]+)[^)]*\)", text):
             if "effects/" not in link:  # written by the build
                 assert (path.parent / link).exists(), f"{path.name}: {link}"
+
+
+@pytest.mark.parametrize("path", WRITTEN, ids=lambda path: path.stem)
+def test_pages_are_easily_read(path: Path) -> None:
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert max(len(line) for line in lines) <= 300
+    cells = [c.strip() for line in lines if line.startswith("|") for c in re.split(r"(?<!\\)\|", line)[1:-1]]
+    assert [c for c in cells if len(c) > 200] == []
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
+
+
+@pytest.mark.parametrize("path", [p for p in DOCS.glob("*.md") if p.stem != "history"], ids=lambda path: path.stem)
+def test_pages_hold_no_dates_and_commits(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert not re.findall(r"\b20\d\d-\d\d-\d\d\b|\d+ \w+ 20[2-9]\d\b", text), "dates belong to docs/results"
+    assert not re.findall(r"\b(?=[a-f]*\d)(?=\d*[a-f])[0-9a-f]{7,40}\b", text), "a commit is no figure"
+
+
+@pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)
+def test_results_say_their_version_and_date(path: Path) -> None:
+    found = json.loads(path.read_text(encoding="utf-8"))
+    for part in [found] if "version" in found else found.values():
+        assert part["version"] and ("date" in part or all("date" in row for row in part["rows"]))
+
+
+def test_tables_say_what_is_not_measured(tables: ModuleType) -> None:
+    assert tables.part("no-such-file", "part") == {}
+    for draw in (
+        tables.rates,
+        tables.cases,
+        tables.aims,
+        tables.plain,
+        tables.by_springs,
+        tables.by_drive,
+        tables.sizes,
+    ):
+        assert draw({}) == tables.MISSING
+
+
+def test_the_table_of_rates_has_the_parts_that_are_measured(tables: ModuleType) -> None:
+    rate = {"count": 9, "of": 10, "share": 0.9, "low": 0.6, "high": 0.98}
+    none = {"count": 0, "of": 0, "share": None, "low": None, "high": None}
+    case = {
+        "hidden": ["wear"], "multiples": [10.0], "lines": "same", "kind": "ambiguous", "named": ["wear"],
+        "set": ["wear", "tilt"], "unseen": [2.0, None], "seconds": 1.0,
+    }  # fmt: skip
+    part = {
+        "seed": 1,
+        "version": "0.1.0",
+        "date": "2026-01-01",
+        "rates": {"exact": rate, "right": none},
+        "cases": [case],
+    }
+    rows = tables.rates({"one": part}).splitlines()
+    assert rows[0] == "| hidden | campaigns | exact |", "a rate of nothing has no column"
+    assert rows[2].endswith("| 1 | 9 of 10 (60 to 98 %) |")
+    assert sum("not measured yet" in row for row in rows) == len(tables.PARTS) - 1
+    assert "| wear | same | 10 | `ambiguous` | wear, tilt | 2.00 |" in tables.cases(part)
+    assert "Version 0.1.0, 2026-01-01, seed 1" in tables.cases(part)
 
 
 def test_every_picture_has_a_script() -> None:

@@ -1,4 +1,7 @@
-"""Print the benchmark's tables: static curve, solvers at equal accuracy, cost against size, Jacobian, batches."""
+"""Measure static curve, solvers at equal accuracy, cost against size, Jacobian and batches: tables and results.
+
+The tables are printed; docs/results/performance.json, from which docs/performance.md draws them, is written as well.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +14,14 @@ import tempfile
 import time
 from pathlib import Path
 
-from .measuring import head, row, timed
+from .measuring import head, keep, last_table, row, timed
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("static", "solvers", "sizes", "springs", "drive", "events", "jacobian", "batches", "command-line")
 FACTOR = 3.0  # of tolerance, accurate enough at 256 springs (table of solvers)
 
 
-def jacobian() -> None:
+def jacobian(small: bool = False) -> None:
     from .case import Case
     from .own import jacobian_runs
 
@@ -29,9 +32,11 @@ def jacobian() -> None:
         _, cpu, wall = timed(work)
         plain = plain or cpu
         row(name, f"{cpu:.3f}", f"{wall:.3f}", f"{cpu / plain:.1f}")
+    if not small:
+        keep("jacobian", "jacobian", **last_table())
 
 
-def command_line() -> None:
+def command_line(small: bool = False) -> None:
     program = str(Path(sys.executable).with_name("stickslip"))
     head("command", "processor s", "wall s")
     with tempfile.TemporaryDirectory() as folder:
@@ -54,6 +59,8 @@ def command_line() -> None:
                 wall.append(time.perf_counter() - start)
                 cpu.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
             row(name, f"{min(cpu):.2f}", f"{min(wall):.2f}")
+    if not small:
+        keep("command-line", "command-line", **last_table())
 
 
 def main() -> None:
@@ -84,13 +91,13 @@ def main() -> None:
 
         sizes.report(small, sizes_wanted)
     if only in (None, "jacobian"):
-        jacobian()
+        jacobian(small)
     if only in (None, "batches"):
         from . import batches
 
-        batches.report(FACTOR, 8 if small else arguments.sets)
+        batches.report(FACTOR, 8 if small else arguments.sets, kept=not small)
     if only in (None, "command-line"):
-        command_line()
+        command_line(small)
 
 
 if __name__ == "__main__":

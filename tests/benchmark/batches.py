@@ -16,7 +16,7 @@ from stickslip.solve import Tolerance
 from tests.solve.rig import tighter
 
 from .case import Case
-from .measuring import head, row, timed
+from .measuring import head, keep, last_table, row, timed
 from .own import displacement
 
 CHUNK = 10  # runs of one vmap
@@ -64,8 +64,8 @@ def by_processes(theta: np.ndarray, factor: float, workers: int) -> tuple[np.nda
     return np.concatenate([f[0] for f in found]), sum(f[1] for f in found), sum(f[2] for f in found)
 
 
-def report(factor: float, sets: int = 1000, vmapped: int = 100) -> dict[str, float]:
-    """The table; vmap on fewer sets (its cost is the same for every chunk)."""
+def report(factor: float, sets: int = 1000, vmapped: int = 100, kept: bool = True) -> dict[str, float]:
+    """The table; vmap on fewer sets (its cost is the same for every chunk). ``kept``: among the results."""
     theta, workers = parameters(sets), os.cpu_count() or 1
     one_by_one(theta[:1], factor)
     _, single, _ = timed(lambda: one_by_one(theta[:1], factor), 7)
@@ -94,6 +94,8 @@ def report(factor: float, sets: int = 1000, vmapped: int = 100) -> dict[str, flo
         "largest difference of a displacement (in slips) to one run after the other: "
         + ", ".join(f"{name} {gap:.1e} m" for name, gap in gaps.items())
     )
+    if kept:
+        keep("batches", "batches", **last_table(), sets=sets, springs=Case().springs)
     return spent | {"vmap": cpu / vmapped}
 
 

@@ -1,8 +1,7 @@
-"""Cost against size: number of springs, velocity of the drive, number of events. Tables, one JSON, three pictures."""
+"""Cost against size: number of springs, velocity of the drive, number of events. Tables, results, three pictures."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +9,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip import __version__
 from stickslip.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, save, styled
 
 from . import own
 from .case import REFERENCE, Answer, Case, events_of, leapfrog, measure
-from .measuring import head, row, timed
+from .measuring import head, keep, row, timed
 from .solvers import Found, coarsest_leapfrog, coarsest_own
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "performance"
@@ -101,7 +99,7 @@ def events(numbers: Sequence[int] = EVENTS, chosen_at: int = 10) -> Series:
 
 
 def report(small: bool = False, only: Sequence[str] = ("springs", "drive", "events")) -> dict:
-    """All three, or some; JSON and pictures are written for those that ran (not for a small run)."""
+    """All three, or some; results and pictures are written for those that ran (not for a small run)."""
     leapfrog(Case(springs=8, duration=0.1), 5e-5)  # compiles
     parts = {
         "springs": lambda: springs((64, 250), 2) if small else springs(),
@@ -112,12 +110,9 @@ def report(small: bool = False, only: Sequence[str] = ("springs", "drive", "even
     if small:
         return result
     FOLDER.mkdir(exist_ok=True)
-    kept = FOLDER / "sizes.json"
-    known = json.loads(kept.read_text()) if kept.exists() else {}
-    known |= {"version": __version__, **result}
-    kept.write_text(json.dumps(known, indent=1) + "\n")
-    for name in result:
-        save(draw(name, result[name]), FOLDER / f"{name}.png")
+    for name, series in result.items():
+        keep(name, name, series=series)
+        save(draw(name, series), FOLDER / f"{name}.png")
     return result
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from stickslip.contact import Bank
 
 from . import own, peers
 from .case import CREEP, REFERENCE, STEPS, TIMES, Accuracy, Answer, Case, events_of, leapfrog, measure
-from .measuring import head, row, timed
+from .measuring import head, keep, row, timed
 
 FACTORS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)  # the default tolerance is divided by
 
@@ -54,8 +54,8 @@ def coarsest_leapfrog(case: Case, reference: Answer, tell: Callable[[Found], obj
     return found
 
 
-def table(case: Case, limit: float) -> float:
-    """Print the table of one case; the own solver's factor of tolerance that is accurate enough comes back."""
+def table(case: Case, limit: float) -> list[dict[str, Any]]:
+    """Print the table of one case; what each solver needs at its coarsest setting that is accurate enough."""
     leapfrog(Case(springs=8, duration=0.1), 5e-5)  # compiles
     reference, cpu, _ = timed(lambda: leapfrog(case, REFERENCE), 1)
     events = len(events_of(case, reference).onset)
@@ -66,18 +66,25 @@ def table(case: Case, limit: float) -> float:
     )
     head("solver", "setting", "processor s", "steps", "onset", "recurrence", "creep nm", "accurate enough")
     spent: dict[str, float] = {}
+    kept: dict[str, dict[str, Any]] = {}
+
+    def note(name: str, setting: str, **found: Any) -> None:
+        size = {"velocity": case.velocity, "events": events, "springs": case.springs}
+        kept[name] = {**size, "solver": name, "setting": setting, **found}
 
     def tell(name: str, setting: str, steps: object, found: Found) -> None:
         row(
             name, setting, f"{found.cpu:.3f}", steps, f"{found.accuracy.onset:.1e}",
             f"{found.accuracy.recurrence:.1e}", f"{found.accuracy.creep * 1e9:.2g}", "yes" if found.good else "no",
         )  # fmt: skip
+        note(
+            name, setting, processor_s=found.cpu, onset=found.accuracy.onset, creep_nm=found.accuracy.creep * 1e9,
+            enough=found.good,
+        )  # fmt: skip
         if found.good:
             spent[name] = found.cpu
 
-    chosen = coarsest_own(
-        case, reference, tell=lambda f: tell("own solver", f"default tolerance/{f.setting:g}", f.steps, f)
-    )
+    coarsest_own(case, reference, tell=lambda f: tell("own", f"tolerance/{f.setting:g}", f.steps, f))
     coarsest_leapfrog(case, reference, lambda f: tell("leapfrog, numba", f"{f.setting * 1e6:g} us", f.steps, f))
     for name in (*(f"scipy {m}" for m in peers.SCIPY), *(f"diffrax {m}" for m in peers.DIFFRAX)):
         library, method = name.split()
@@ -91,6 +98,7 @@ def table(case: Case, limit: float) -> float:
                 (answer, count), cpu, _ = timed(lambda rtol=rtol, work=work, until=until: work(rtol, until), 1)
             except peers.OverTime as why:
                 row(name, f"rtol {rtol:g}", f"over {limit:g}", "", "", "", "", f"no: {why}")
+                note(name, f"rtol {rtol:g}", processor_s=None, why=str(why), enough=False)
                 if rtol < 1e-3:  # an implicit solver may be slower where it is coarser
                     break
                 continue
@@ -99,9 +107,9 @@ def table(case: Case, limit: float) -> float:
             tell(name, f"rtol {rtol:g}", f"{count} {'calls' if library == 'scipy' else 'steps'}", found)
             if found.good:
                 break
-    if own_cpu := spent.get("own solver"):
+    if own_cpu := spent.get("own"):
         print("\nin times of the own solver: " + ", ".join(f"{n} {c / own_cpu:.3g}" for n, c in spent.items()))
-    return chosen.setting
+    return list(kept.values())
 
 
 SPRINGS = (64, 250, 1000, 4000)
@@ -111,7 +119,10 @@ DRIVES = ((1e-5, 5), (7e-4, 5), (2e-4, 1), (2e-4, 50), (2e-4, 1000))
 
 def report(limit: float, small: bool = False, springs: Sequence[int] = SPRINGS) -> None:
     """A table for each number of springs at 50 um/s, and for other drives and numbers of events."""
+    runs: list[dict[str, Any]] = []
     for n in (64,) if small else springs:
-        table(Case(springs=n, duration=2.0 if small else 5.0), limit)
+        runs += table(Case(springs=n, duration=2.0 if small else 5.0), limit)
     for velocity, events in () if small else DRIVES:
-        table(Case(springs=SPRINGS[0], velocity=velocity).lasting(events), limit)
+        runs += table(Case(springs=SPRINGS[0], velocity=velocity).lasting(events), limit)
+    if not small and tuple(springs) == SPRINGS:
+        keep("solvers", "solvers", limit_s=limit, onset=TIMES, creep_nm=CREEP * 1e9, runs=runs)

@@ -13,11 +13,13 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from stickslip import __version__
 from stickslip.campaign import load_campaign, load_traces
 from stickslip.challenge.detection import amplitude, largest_multiple, visible_forms
 from stickslip.challenge.generator import make_campaign
@@ -170,7 +172,14 @@ def main() -> None:
             print(one, flush=True)
         if time.monotonic() - began > options.seconds:
             break
-    result = {"seed": options.seed, "campaigns": len({t.campaign for t in tried}), **shares(tried)}
+    result = {
+        "version": __version__,
+        "date": date.today().isoformat(),
+        "command": f"python -m tests.checks.wrong_entries FOLDER --number {options.number} --seed {options.seed}",
+        "seed": options.seed,
+        "campaigns": len({t.campaign for t in tried}),
+        **shares(tried),
+    }
     text = json.dumps(result, indent=1)
     print(text)
     if options.out:

@@ -1,0 +1,197 @@
+"""Tables of the pages, drawn from the files in docs/results.
+
+Every file there is written by a script, with the version that it measured and the date. A page draws its tables from
+them in a code cell: ``tables.solvers(tables.part("performance", "solvers"))``. What has not been measured yet is said.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+RESULTS = Path(__file__).resolve().parent / "results"
+MISSING = "*Not measured yet.*"
+PARTS = {
+    "one": "one effect, at ten times the amplitude from which it can be seen",
+    "strong": "one effect, at the largest plausible amplitude",
+    "two": "two effects",
+    "left-out": "one effect, which is not in the catalogue that is tried",
+    "nothing": "nothing hidden",
+}
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+Rows = Iterable[Sequence[object]]
+
+
+def results(name: str) -> dict[str, Any]:
+    """A file of results; empty where it has not been written."""
+    path = RESULTS / f"{name}.json"
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    return found
+
+
+def part(name: str, key: str) -> dict[str, Any]:
+    """A part of a file of results; empty where it has not been measured."""
+    found: dict[str, Any] = results(name).get(key) or {}
+    return found
+
+
+def table(columns: Sequence[str], rows: Rows) -> str:
+    """A table in Markdown; columns in which every cell is empty are left out."""
+    body = [["" if c is None else str(c).replace("|", r"\|") for c in row] for row in rows]
+    kept = [i for i in range(len(columns)) if not body or any(row[i] for row in body)]
+    lines = [columns, ["---"] * len(columns), *body]
+    return "\n".join("| " + " | ".join(line[i] for i in kept) + " |" for line in lines)
+
+
+def source(found: dict[str, Any]) -> str:
+    """Where a table comes from, as the line under it."""
+    seed = f", seed {found['seed']}" if "seed" in found else ""
+    parts = [f"Version {found['version']}, {found['date']}{seed}", found.get("machine"), _code(found.get("command"))]
+    return f"*{'; '.join(p for p in parts if p)}.*"
+
+
+def _code(command: str | None) -> str | None:
+    return f"`{command}`" if command else None
+
+
+def power(x: float, digits: int = 1) -> str:
+    """2.2 · 10⁻⁴ for 2.2e-4."""
+    mantissa, exponent = f"{x:.{digits}e}".split("e")
+    return f"{mantissa} · 10{str(int(exponent)).translate(SUPERSCRIPT)}"
+
+
+def _drawn(draw: Callable[[dict[str, Any]], str]) -> Callable[[dict[str, Any]], str]:
+    """A table with its source, or a word that it is missing."""
+
+    def with_source(found: dict[str, Any]) -> str:
+        return f"{draw(found)}\n\n{source(found)}" if found else MISSING
+
+    with_source.__doc__ = draw.__doc__
+    return with_source
+
+
+# --- diagnosis --------------------------------------------------------------------------------------------------------
+
+
+def rates(found: dict[str, Any]) -> str:
+    """How often a diagnosis is right, a row for each part of ``development.json`` and a column for each rate."""
+    names = list(dict.fromkeys(name for key in PARTS for name in (found.get(key) or {}).get("rates", {})))
+    if not names:
+        return MISSING
+    rows, sources = [], []
+    for key, words in PARTS.items():
+        measured = found.get(key)
+        if not measured:
+            rows.append([words, "", "not measured yet", *[""] * (len(names) - 1)])
+            continue
+        rows.append([words, len(measured["cases"]), *(rate(measured["rates"].get(name)) for name in names)])
+        sources.append(f"`{key}` version {measured['version']}, {measured['date']}, seed {measured['seed']}")
+    return table(["hidden", "campaigns", *names], rows) + f"\n\n*Parts: {'; '.join(sources)}.*"
+
+
+def rate(found: dict[str, Any] | None) -> str:
+    """A count with its interval; nothing where there was nothing to count."""
+    if not found or not found["of"]:
+        return ""
+    interval = f" ({100 * found['low']:.0f} to {100 * found['high']:.0f} %)" if found.get("low") is not None else ""
+    return f"{found['count']} of {found['of']}{interval}"
+
+
+@_drawn
+def cases(found: dict[str, Any]) -> str:
+    """Every campaign of a part: what was hidden, what was said, and how far the error on unseen runs fell."""
+    return table(
+        ["hidden", "lines", "times detection", "answer", "named, or the set", "error on unseen runs"],
+        [
+            [
+                ", ".join(case["hidden"]) or "nothing",
+                case["lines"],
+                ", ".join(f"{m:.3g}" for m in case["multiples"]),
+                f"`{case['kind']}`",
+                ", ".join(case["set"] or case["named"]),
+                " → ".join(f"{e:.2f}" for e in case["unseen"] if e is not None),
+            ]
+            for case in found["cases"]
+        ],
+    )
+
+
+# --- performance ------------------------------------------------------------------------------------------------------
+
+
+def aims(found: dict[str, Any]) -> str:
+    """What the program is to reach, and what was measured."""
+    if not found:
+        return MISSING
+    rows = [
+        [r["aim"], r["measured"], r["reached"], r["date"].replace("-", "\u2011"), f"`{r['command']}`"]
+        for r in found["rows"]
+    ]
+    return table(["aim", "measured", "reached", "date", "measured by"], rows) + f"\n\n*{found['machine']}.*"
+
+
+@_drawn
+def plain(found: dict[str, Any]) -> str:
+    """A table as it was printed."""
+    return table(found["columns"], found["rows"])
+
+
+@_drawn
+def by_springs(found: dict[str, Any]) -> str:
+    """Solvers against the number of springs, at the drive that most runs have."""
+    runs = [r for r in found["runs"] if r["velocity"] == 5e-5]
+    sizes = sorted({r["springs"] for r in runs})
+    rows = []
+    for solver in dict.fromkeys(r["solver"] for r in runs):
+        own = {r["springs"]: r for r in runs if r["solver"] == solver}
+        first = own[sizes[0]]
+        off = [
+            power(first["onset"]) if "onset" in first else "",
+            f"{first['creep_nm']:.2f}" if "creep_nm" in first else "",
+        ]
+        rows.append([solver, *(_seconds(own.get(n), found) for n in sizes), *off])
+    last = [f"onset ({sizes[0]}), share of the period", f"creep ({sizes[0]}), nm"]
+    return table(["solver", *(f"{n} springs" if n == sizes[0] else str(n) for n in sizes), *last], rows)
+
+
+@_drawn
+def by_drive(found: dict[str, Any]) -> str:
+    """Solvers against the drive and the number of events, with the fewest springs."""
+    runs = [r for r in found["runs"] if r["velocity"] != 5e-5]
+    drives = list(dict.fromkeys((r["velocity"], r["events"]) for r in runs))
+    rows = []
+    for solver in dict.fromkeys(r["solver"] for r in runs):
+        own = {(r["velocity"], r["events"]): r for r in runs if r["solver"] == solver}
+        rows.append([solver, *(_seconds(own.get(d), found, setting=True) for d in drives)])
+    return table(["solver", *(f"{v * 1e6:g} µm/s, {n} event{'s' * (n > 1)}" for v, n in drives)], rows)
+
+
+def _seconds(run: dict[str, Any] | None, found: dict[str, Any], setting: bool = False) -> str:
+    """Processor seconds of a run, with what is short of enough."""
+    if run is None:
+        return ""
+    seconds = run["processor_s"]
+    if seconds is None:
+        why = run.get("why", "").removeprefix("reached ")
+        return f"over {found['limit_s']:g}" + (f" ({why})" if why else "")
+    text = "below 0.001" if seconds < 5e-4 else f"{seconds:.3g}"
+    if setting and run["setting"]:
+        text += f" ({run['setting']})"
+    return text if run["enough"] else f"{text}; onset off by {power(run['onset'], 0)}"
+
+
+@_drawn
+def sizes(found: dict[str, Any]) -> str:
+    """Processor seconds against a size, a column for each way."""
+    series = found["series"]
+    numbers = sorted({p["size"] for points in series.values() for p in points})
+    factor = 1e6 if numbers[-1] < 1.0 else 1.0  # velocities
+    rows = []
+    for n in numbers:
+        at = [next((p for p in points if p["size"] == n), None) for points in series.values()]
+        rows.append([f"{factor * n:g}", *("" if p is None else f"{p['processor_s']:.3g}" for p in at)])
+    slopes = [points[0].get("slope") for points in series.values()]
+    rows.append(["slope", *("" if s is None else f"{round(s, 2) + 0.0:.2f}" for s in slopes)])
+    return table(["µm/s" if factor > 1.0 else "number", *(f"{name}, s" for name in series)], rows)
