@@ -40,7 +40,7 @@ drive_velocity = "0.05 mm/s"           # or  drive_position = { column = "drive"
 # or with holds and reversals, 'until' in the record's own time:
 # drive = [ { until = "5 s", velocity = "50 um/s" }, { until = "10 s", velocity = 0 } ]
 virgin = true                          # the contact was freshly set down
-# role = "train"                       # or "held-out"; default: fit takes all runs, diagnose holds some out
+# role = "train"                       # or "held-out"; default: every run is fitted, and predicted from the others
 # start = "1 s"                        # use only a part
 # stop = "20 s"
 # clock_error = "25 ppm"               # the recorder's clock runs fast by this

@@ -34,6 +34,7 @@ from .run import Tell, dataset, head, save
 from .shown import Shown, facts, table
 
 if TYPE_CHECKING:
+    import arviz
     import pandas
     import xarray
 
@@ -370,6 +371,27 @@ class Fit(Shown):
             "interval": [low, high],
             "text": f"{found.text}; 95 % interval {low_text} to {high_text}",
         }
+
+    def sample(self, draws: int = 200, tune: int = 100, chains: int = 2, seed: int = 0) -> arviz.InferenceData:
+        """Draw from the posterior by the No-U-Turn sampler (Hoffman & Gelman, JMLR 15 (2014) 1593; by nutpie).
+
+        The covariance of the residuals is that of the fit, every event is marginalised; gradients are exact.
+
+        Args:
+            draws, tune: of each chain, kept and for adaptation.
+            chains: side by side.
+            seed: of the draws.
+
+        Returns:
+            ``posterior`` holds the free parameters (SI, ``attrs["units"]``) and ``contact.strength``; its
+            ``attrs["trust"]`` says in words whether divergences or R-hat speak against it.
+
+        Raises:
+            InputError: nutpie is not installed, or a number below one.
+        """
+        from .posterior import sample
+
+        return sample(self, draws, tune, chains, seed)
 
     # what is kept
 

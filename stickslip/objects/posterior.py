@@ -1,0 +1,80 @@
+"""A posterior sample of a fit, as ArviZ InferenceData, and whether it can be trusted, in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..fit.parameters import to_si
+from ..force.posterior import Walked, walked
+
+if TYPE_CHECKING:
+    import arviz
+
+    from .fit import Fit
+
+STRENGTH = "contact.strength"
+ALIKE = 1.05  # R-hat from which the chains do not agree
+FEW = 100  # effective draws below which a 95 % interval is rough
+
+
+def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int) -> arviz.InferenceData:
+    """See :meth:`stickslip.Fit.sample`."""
+    if min(draws, tune, chains) < 1:
+        raise InputError("out of range", key="draws, tune, chains", value=f"{draws}, {tune}, {chains}", allowed="1 up")
+    try:
+        import nutpie
+        from nutpie.compiled_pyfunc import from_pyfunc
+    except ImportError:
+        raise InputError("sampling needs nutpie and ArviZ", hint="pip install 'stickslip[posterior]'") from None
+    way, names = walked(fit._fit), [f.name for f in fit.free]
+    model = from_pyfunc(
+        way.size,
+        lambda: lambda x, **_: way.at(np.asarray(x))[1:],
+        lambda *_: lambda x, **__: _expanded(way, names, np.asarray(x)),
+        [np.dtype(np.float64)] * (len(names) + 1),
+        [()] * (len(names) + 1),
+        [*names, STRENGTH],
+        make_initial_point_fn=lambda s: 0.5 * np.random.default_rng(s).standard_normal(way.size),
+    )
+    found = nutpie.sample(
+        model, draws=draws, tune=tune, chains=chains, cores=chains, seed=seed, progress_bar=False, save_warmup=False
+    )
+    units = {f.name: f.unit for f in fit.free} | {STRENGTH: "N"}
+    for name, unit in units.items():
+        found.posterior[name].attrs["units"] = unit
+    found.posterior.attrs.update(title=fit.campaign.title, model=" + ".join(fit.parts), trust=" ".join(trust(found)))
+    return found
+
+
+def _expanded(way: Walked, names: list[str], x: np.ndarray) -> dict[str, Any]:
+    """The parameters (SI) at whitened coordinates."""
+    point, _, _ = way.at(x)
+    values = to_si(way.fit.problem.composition.shared, point.z)
+    return {**{name: np.asarray(values[name]) for name in names}, STRENGTH: np.asarray(point.weights.sum())}
+
+
+def trust(found: arviz.InferenceData) -> list[str]:
+    """Sentences on whether a sample can be trusted: divergences, chains that disagree, few independent draws."""
+    import arviz
+
+    said = []
+    lost, total = int(found.sample_stats["diverging"].sum()), int(found.sample_stats["diverging"].size)
+    if lost:
+        said.append(
+            f"{lost} of {total} draws diverged: the density has edges that the sampler cannot follow, and the tails "
+            "may be too short."
+        )
+    names = list(found.posterior.data_vars)
+    if found.posterior.sizes["chain"] > 1:
+        rhat = arviz.rhat(found)
+        apart = [name for name in names if float(rhat[name]) > ALIKE]
+        if apart:
+            said.append(f"The chains do not agree on {', '.join(apart)} (R-hat above {ALIKE:g}): draw more.")
+    size = arviz.ess(found)
+    few = [name for name in names if float(size[name]) < FEW]
+    if few:
+        said.append(f"Fewer than {FEW} independent draws of {', '.join(few)}: intervals are rough.")
+    return said or [f"No divergence in {total} draws; the chains agree."]
