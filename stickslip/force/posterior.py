@@ -91,4 +91,4 @@ def walked(fit: Fit) -> Walked:
             low, high = f.bounds
             part[i, i] = min(f.width, 0.1 * (high - low)) ** 2
     _, whole = covariance(fit.scatter.sizes, fit.known)
-    return Walked(fit, np.linalg.cholesky(part), np.linalg.cholesky(np.asarray(whole)))
+    return Walked(fit, np.asarray(np.linalg.cholesky(part)), np.asarray(np.linalg.cholesky(np.asarray(whole))))

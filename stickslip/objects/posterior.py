@@ -39,7 +39,7 @@ def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int) -> arviz.Inf
         [*names, STRENGTH],
         make_initial_point_fn=lambda s: 0.5 * np.random.default_rng(s).standard_normal(way.size),
     )
-    found = nutpie.sample(
+    found: Any = nutpie.sample(
         model, draws=draws, tune=tune, chains=chains, cores=chains, seed=seed, progress_bar=False, save_warmup=False
     )
     units = {f.name: f.unit for f in fit.free} | {STRENGTH: "N"}
@@ -56,7 +56,7 @@ def _expanded(way: Walked, names: list[str], x: np.ndarray) -> dict[str, Any]:
     return {**{name: np.asarray(values[name]) for name in names}, STRENGTH: np.asarray(point.weights.sum())}
 
 
-def trust(found: arviz.InferenceData) -> list[str]:
+def trust(found: Any) -> list[str]:
     """Sentences on whether a sample can be trusted: divergences, chains that disagree, few independent draws."""
     import arviz
 
