@@ -10,8 +10,9 @@ from ..errors import InputError, nearest
 from ..features.measurement import doubts
 from ..fit.start import ringing, shared_rig
 from ..force.begin import begin
-from ..force.knots import Knots, Scales, knots, scales, too_coarse
+from ..force.knots import Knots, knots
 from ..force.problem import Point, Problem
+from ..force.scales import Scales, scales, too_coarse
 from ..segment import Segmentation
 from ..trace import Trace
 

@@ -15,8 +15,9 @@ from ..errors import InputError
 from ..fit.parameters import Free, vector
 from ..segment import Segmentation
 from ..trace import Trace
-from .knots import Knots, Scales
+from .knots import Knots
 from .problem import PULL, Composition, Point, Problem
+from .scales import Scales
 
 ELEMENTS = 40
 REACH = (1 / 60.0, 30.0)  # yield displacements, over strength/stiffness of the whole contact

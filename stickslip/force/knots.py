@@ -9,19 +9,19 @@ kinks of onset and arrest are no trouble.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
-from scipy.optimize import isotonic_regression
-from scipy.signal import savgol_filter
 from scipy.sparse import coo_array, csr_array
 
 from ..segment import Event, Segmentation
 from ..trace import Trace
 from .along import turning
+from .kernels import kernels
+from .scales import Scales
+from .smoothing import Smoother, even, hum, onward, smoothed, unsteady
+from .windows import apart, edges_of, fast, hasty, thin
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -29,31 +29,7 @@ Index = NDArray[np.intp]
 CREEP, NUCLEATION, SLIP, RING = range(4)
 PHASES = ("creep", "nucleation", "slip", "ring-down")
 POINTS = ("at", "phase", "of", "rate", "acceleration", "place", "elapsed")
-TOWARDS, EVEN = 36, 16  # windows of a stick: spaced as the logarithm of the time to the onset, and evenly
-RINGS = 12.0  # periods after an arrest that are followed sample by sample
-BEFORE = 8.0  # half-widths of the test function before an onset from where every sample is followed
-SHARE = 0.25  # of a stick that the samples of either end may take
 UNSTEADY = 4.0  # levels of slow noise by which two windows must differ
-BACK = 5.0  # noise levels of one sample within which a step back is noise
-HASTE = 5.0  # noise levels that the block moves in a window of the nucleation
-HALF = 3.0  # samples, the least half-width of the test function
-COARSE = 0.15  # of a slip, the largest half-width that still resolves its inertia
-HUM = 50.0  # Hz, the mains
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Times that decide how a run is thinned, of the data themselves.
-
-    Attributes:
-        half: half-width of the test function (s).
-        ring: period of the ringing after an arrest (s); 0 where none is heard.
-        slip: usual duration of a slip (s).
-    """
-
-    half: float
-    ring: float
-    slip: float
 
 
 @dataclass(frozen=True)
@@ -114,49 +90,6 @@ class Knots:
         return int(self.of.max(initial=-1)) + 1
 
 
-def scales(segmentations: list[Segmentation], ring: float | None, rate: float) -> Scales:
-    """The times of a campaign: medians over its slips, and the period of the ringing (s) where one is heard."""
-    slip = float(np.median([e.duration for s in segmentations for e in s.events]))
-    half = min(ring, slip / 8.0) if ring else slip / 12.0
-    return Scales(max(half, HALF / rate), ring or 0.0, slip)
-
-
-def too_coarse(times: Scales, rate: float) -> str | None:
-    """A sentence where samples lie too far apart for the inertia of a slip (sampling rate in Hz), else None."""
-    if times.half <= COARSE * times.slip:
-        return None
-    return (
-        f"sampling at {rate:.4g} Hz is too coarse for inertia: the acceleration is a mean over {2e3 * times.half:.3g} "
-        f"ms of a slip of {1e3 * times.slip:.3g} ms, so mass, damping and what acts within a slip are told badly; "
-        f"{HALF / (COARSE * times.slip):.3g} Hz would do"
-    )
-
-
-def kernels(half: float, rate: float) -> tuple[Array, Array, Array]:
-    """The test function (1 - u^2)^5 and its derivatives as weights of samples, shape (2 h + 1,).
-
-    What the second gives of a polynomial up to the fourth power is what the first gives of its slope, and so for the
-    third and its second derivative (1/s, 1/s2): sampled at a few points, the derivatives themselves do not.
-    """
-    h = max(round(half * rate), 3)
-    u = np.arange(-h, h + 1) / (h + 1.0)
-    phi = (1.0 - u * u) ** 5
-    phi /= phi.sum()
-    first = _matched(u * (1.0 - u * u) ** 4, phi, u, 1)
-    second = _matched((1.0 - u * u) ** 3 * (9.0 * u * u - 1.0), phi, u, 2)
-    scale = (h + 1.0) / rate  # s in one unit of u
-    return phi, first / scale, second / scale**2
-
-
-def _matched(shape: Array, phi: Array, u: Array, order: int) -> Array:
-    """A derivative of ``phi`` by its shape, with polynomials times ``phi`` added that make its moments those of it."""
-    powers = [k for k in range(5) if k % 2 == order % 2]
-    moments = [np.prod(np.arange(k - order + 1, k + 1)) * (phi * u ** max(k - order, 0)).sum() for k in powers]
-    basis = np.stack([shape / np.abs(shape).sum(), *(phi * u**k for k in powers)])
-    found, *_ = np.linalg.lstsq(np.stack([u**k for k in powers]) @ basis.T, np.array(moments), rcond=None)
-    return np.asarray(found @ basis)
-
-
 def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None = None) -> Knots:
     """Thin a run.
 
@@ -167,18 +100,18 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
         extra: added to every sample once it is decided where the knots are (m).
     """
     assert trace.displacement is not None and trace.drive is not None
-    t, x = _even(trace.time, trace.displacement)
+    t, x = even(trace.time, trace.displacement)
     rate = 1.0 / (t[1] - t[0])
     noise = max(float(trace.noise or 0.0), 1e-13)
     d = np.asarray(trace.drive.position(t))
-    x = x - _hum(t, x, found.events, rate, times)
-    smoothed, speed, smoother = _smooth(x, noise, rate, times)
+    x = x - hum(t, x, found.events, rate, times)
+    followed, speed, smoother = smoothed(x, noise, rate, times)
     breaks = np.searchsorted(t, trace.drive.breakpoints)
     steady, raw = speed, x
-    step = max(trace.resolution or 0.0, 2.0 * noise, UNSTEADY * _unsteady(x, t, found.events, rate))
+    step = max(trace.resolution or 0.0, 2.0 * noise, UNSTEADY * unsteady(x, t, found.events, rate))
     if extra is not None:
         x = x + extra[: x.size]
-        smoothed, speed, smoother = _smooth(x, noise, rate, times)
+        followed, speed, smoother = smoothed(x, noise, rate, times)
     phi, first, second = kernels(times.half, rate)
     h = phi.size // 2
     pieces = _Pieces(step)
@@ -187,198 +120,20 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     n = t.size
     events = found.events
     for e, event in enumerate(events):
-        begin, end = _fast(events, e, times, rate, n, t, h)
+        begin, end = fast(events, e, times, rate, n, t, h)
         begin = max(begin, edge + 1)
-        pieces.windows(_apart(_edges(edge, begin, event.i_onset, breaks), raw, step, breaks), e, t, x, d)
+        pieces.windows(apart(edges_of(edge, begin, event.i_onset, breaks), raw, step, breaks), e, t, x, d)
         if end <= begin:
             continue
         onset = min(max(event.i_onset, begin), end)
-        pieces.windows(_hasty(begin, onset, steady, noise, rate, h), e, t, x, d, compared=False)
-        pieces.samples(_thin(onset, end, event, times, rate, h), t, smoothed, speed, d, events, e)
+        pieces.windows(hasty(begin, onset, steady, noise, rate, h), e, t, x, d, compared=False)
+        pieces.samples(thin(onset, end, event, times, rate, h), t, followed, speed, d, events, e)
         pieces.compare(begin + h, end - h, h, t, x, event, e, times, (phi, first, second), noise)
         edge = end
     if n - edge > 4 * h:
         last = len(events)
-        pieces.windows(_apart(_edges(edge, n, n, breaks), raw, step, breaks), last, t, x, d, compared=False)
+        pieces.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, compared=False)
     return pieces.made(trace, t, (phi, first, second), events, noise, times, smoother)
-
-
-def _even(t: Array, x: Array) -> tuple[Array, Array]:
-    """Equal steps of time; lost samples are filled in linearly."""
-    step = np.median(np.diff(t))
-    if np.ptp(np.diff(t)) < 1e-3 * step:
-        return np.asarray(t), np.asarray(x)
-    even = np.arange(t[0], t[-1], step)
-    return even, np.interp(even, t, x)
-
-
-def _hum(t: Array, x: Array, events: tuple[Event, ...], rate: float, times: Scales) -> Array:
-    """The sine at the mains frequency in the sticks, which is the sensor's (m)."""
-    width = round(rate / HUM)
-    if width < 8:
-        return np.zeros_like(x)
-    still = np.ones(x.size, bool)
-    for event in events:
-        a = np.searchsorted(t, event.t_onset - 2.0 * times.slip)
-        b = np.searchsorted(t, event.t_arrest + 3.0 * times.slip)
-        still[max(a, 0) : b] = False
-    still[: 2 * width] = still[-2 * width :] = False
-    if still.sum() < 20 * width:
-        return np.zeros_like(x)
-    total = np.cumsum(np.insert(x, 0, 0.0))
-    mean = np.zeros_like(x)
-    half = width // 2
-    i = np.arange(half, x.size - width + half)
-    mean[i] = (total[i - half + width] - total[i - half]) / width
-    basis = np.stack([np.sin(2 * np.pi * HUM * t), np.cos(2 * np.pi * HUM * t)], axis=1)
-    rest = (x - mean)[still]
-    rest = rest - np.median(rest)
-    keep = np.abs(rest) < 6.0 * max(np.median(np.abs(rest)) * 1.48, 1e-15)
-    found, *_ = np.linalg.lstsq(basis[still][keep], rest[keep], rcond=None)
-    spread = float(np.std(rest[keep])) * np.sqrt(2.0 / keep.sum()) * np.sqrt(width)
-    return basis @ found if np.hypot(*found) > 4.0 * spread else np.zeros_like(x)
-
-
-def _unsteady(x: Array, t: Array, events: tuple[Event, ...], rate: float) -> float:
-    """Slow noise of the reading (m): how far means over a hundredth of a stick stray from a line through two others."""
-    found = []
-    for before, event in pairwise(events):
-        a = int(np.searchsorted(t, before.t_arrest + 0.4 * (event.t_onset - before.t_arrest)))
-        b = int(np.searchsorted(t, before.t_arrest + 0.8 * (event.t_onset - before.t_arrest)))
-        width = (b - a) // 40
-        if width < 2:
-            continue
-        mean = x[a : a + 40 * width].reshape(40, width).mean(axis=1)
-        found.append(np.median(np.abs(np.diff(mean, 2))) / 0.6745 / np.sqrt(6.0))
-    return float(np.median(found)) if found else 0.0
-
-
-@dataclass(frozen=True)
-class Smoother:
-    """Weights of the samples around one in its smoothed displacement.
-
-    Attributes:
-        slow, fast: of slow motion and of what is added to it, shape (2 h + 1,) both.
-        gain: how much of that is added at every sample, shape (N,).
-    """
-
-    slow: Array
-    fast: Array
-    gain: Array
-
-    def matrix(self, index: Index) -> csr_array:
-        """From all samples to the smoothed displacement at some of them."""
-        h, n = self.slow.size // 2, self.gain.size
-        around = np.clip(index[:, None] + np.arange(-h, h + 1), 0, n - 1)
-        weights = self.slow + self.gain[index][:, None] * self.fast
-        rows = np.repeat(np.arange(index.size), 2 * h + 1)
-        return coo_array((weights.ravel(), (rows, around.ravel())), shape=(index.size, n)).tocsr()
-
-
-def _smooth(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, Array, Smoother]:
-    """Displacement and velocity where every sample counts, and how the former is made of the samples.
-
-    Slow motion by a parabola over a ringing period, on top of it what a parabola over a third of it adds, shrunk by as
-    much as noise adds to it in squares: the noise of one sample, taken for motion, would be a path that weakens the
-    contact and makes it young.
-    """
-    period = times.ring or times.half
-    wide, narrow = (max(round(width * rate) // 2 * 2 + 1, 3) for width in (period, period / 3.0))
-    if wide < 5:
-        return x, np.gradient(x) * rate, Smoother(np.ones(1), np.zeros(1), np.zeros(x.size))
-
-    def parabola(y: Array, length: int, derivative: int = 0) -> Array:
-        if length < 5:
-            return y if derivative == 0 else np.gradient(y) * rate
-        return savgol_filter(y, length, 2, deriv=derivative, delta=1.0 / rate)
-
-    slow = parabola(x, wide)
-    fast = parabola(x, narrow) - slow
-    pulse = np.zeros(2 * wide + 1)
-    pulse[wide] = 1.0
-    still = parabola(pulse, wide)
-    more = parabola(pulse, narrow) - still
-    level = noise**2 * float((more**2).sum())
-    seen = np.maximum(uniform_filter1d(fast**2, wide), 1e-300)
-    gain = np.sqrt(np.maximum(1.0 - level / seen, 0.0))
-    own = slice(wide - wide // 2, wide + wide // 2 + 1)
-    smoother = Smoother(still[own], more[own], gain)
-    return slow + gain * fast, parabola(x, wide, 1) + gain * (parabola(x, narrow, 1) - parabola(x, wide, 1)), smoother
-
-
-def _fast(events: tuple[Event, ...], e: int, times: Scales, rate: float, n: int, t: Array, h: int) -> tuple[int, int]:
-    """First and last sample around an event that are followed one by one."""
-    event = events[e]
-    before = event.t_onset - (events[e - 1].t_arrest if e else t[0])
-    after = (events[e + 1].t_onset if e + 1 < len(events) else t[-1]) - event.t_arrest
-    lead = min((BEFORE + 1.0) * times.half, SHARE * before + times.half)
-    ring = RINGS * times.ring if times.ring else 4.0 * times.half
-    tail = min(ring + times.half, SHARE * after + times.half, after)
-    begin = np.searchsorted(t, event.t_onset - lead)
-    end = np.searchsorted(t, event.t_arrest + tail)
-    return max(int(begin), 0), min(int(end), n)
-
-
-def _edges(low: int, high: int, onset: int, breaks: Index) -> Index:
-    """Edges of the windows between two samples, some evenly and some towards the onset, none shorter than two."""
-    if high - low < 4:
-        return np.array([low, high])
-    left = max(onset - high, 2)
-    towards = onset - np.geomspace(max(onset - low, left + 1), left, TOWARDS)
-    edges = np.concatenate([towards, np.linspace(low, high, EVEN), breaks[(breaks > low) & (breaks < high)]])
-    edges = np.unique(np.clip(np.round(edges), low, high).astype(int))
-    keep = [int(edges[0])]
-    for edge in edges[1:].tolist():
-        if edge - keep[-1] >= 2:
-            keep.append(edge)
-    keep[-1] = high
-    return np.array(keep)
-
-
-def _apart(edges: Index, x: Array, step: float, breaks: Index) -> Index:
-    """Windows joined until the block moves by ``step`` (m) from one to the next: less is the sensor's count.
-
-    The mean over a reading that stands still says nothing of where within the count the block is. The drive's
-    breakpoints remain.
-    """
-    if edges.size < 4:
-        return edges
-    total = np.cumsum(np.insert(x[edges[0] : edges[-1]], 0, 0.0))
-    kept = [edges[0]]
-    last: float | None = None
-    for k in range(1, edges.size):
-        a, b = kept[-1] - edges[0], edges[k] - edges[0]
-        mean = (total[b] - total[a]) / (b - a)
-        if last is None or abs(mean - last) >= step or edges[k] in breaks:
-            kept.append(edges[k])
-            last = mean
-    if kept[-1] != edges[-1]:
-        kept[-1] = edges[-1]
-    return np.array(kept)
-
-
-def _hasty(low: int, high: int, speed: Array, noise: float, rate: float, h: int) -> Index:
-    """Edges of the windows of the nucleation: so long that the block's way in one stands out of the noise of its mean.
-
-    A reading that goes back by a nanometre of noise unloads every element, as no block in nucleation does.
-    """
-    edges = [high]
-    while edges[-1] > low:
-        at = edges[-1]
-        slow = max(float(speed[max(at - 1, 0)]), 1e-12)
-        length = max(0.08 * (high - at), (HASTE * noise * rate / slow) ** (2.0 / 3.0), 1.0)
-        edges.append(max(int(at - min(round(length), h)), low))
-    return np.array(edges[::-1])
-
-
-def _thin(begin: int, end: int, event: Event, times: Scales, rate: float, h: int) -> Index:
-    """Samples that become knots: all where it rings, some of the slip."""
-    fine = max(1, round(times.ring * rate / 24.0)) if times.ring else 1
-    coarse = max(fine, h // 6, 1)
-    a, b = event.i_onset + 2 * h, event.i_arrest - 2 * h
-    if b - a < 4 * coarse:
-        return np.arange(begin, end, fine)
-    return np.concatenate([np.arange(begin, a, fine), np.arange(a, b, coarse), np.arange(b, end, fine)])
 
 
 class _Pieces:
@@ -466,7 +221,7 @@ class _Pieces:
     ) -> Knots:  # fmt: skip
         knot_t = np.concatenate(self.t)
         d = np.concatenate(self.d)
-        x = _onward(np.concatenate(self.x), np.concatenate(self.weight), np.concatenate(self.slow),
+        x = onward(np.concatenate(self.x), np.concatenate(self.weight), np.concatenate(self.slow),
                     np.concatenate(self.event), max(noise, 0.3 * self.step))  # fmt: skip
         v, slow = np.concatenate(self.v), np.concatenate(self.slow)
         slopes = np.gradient(x, knot_t)
@@ -551,25 +306,6 @@ class _Pieces:
             columns.append(part.coords[1])
             values.append(part.data)
         return _sparse(values, rows, columns, shape)
-
-
-def _onward(x: Array, weight: Array, slow: NDArray[np.bool_], event: Index, noise: float) -> Array:
-    """The windows of every stick without steps back that are the noise's: the block creeps one way.
-
-    A step back by a nanometre would unload every element, and the next one forward would not load them again at once:
-    noise would make the model weaker than the contact. Where the block does go back by more than noise, nothing is
-    changed.
-    """
-    out = x.copy()
-    edges = np.flatnonzero(np.diff(slow.astype(int)) | (np.diff(event) != 0)) + 1
-    for piece in np.split(np.arange(x.size), edges):
-        if piece.size < 3 or not slow[piece[0]]:
-            continue
-        rising = bool(x[piece[-1]] >= x[piece[0]])
-        found = isotonic_regression(x[piece], weights=weight[piece], increasing=rising).x
-        if np.abs(found - x[piece]).max() < BACK * noise:
-            out[piece] = found
-    return out
 
 
 def _sparse(values: list[Array], rows: list[Index], columns: list[Index], shape: tuple[int, int]) -> csr_array:

@@ -13,8 +13,9 @@ from stickslip.challenge.generator import Run, make_campaign
 from stickslip.challenge.generator.forms import EFFECTS
 from stickslip.fit.resonance import ringing
 from stickslip.force.begin import begin
-from stickslip.force.knots import Knots, Scales, knots, scales
+from stickslip.force.knots import Knots, knots
 from stickslip.force.problem import Point, Problem
+from stickslip.force.scales import Scales, scales
 from stickslip.segment import Segmentation, segment
 from stickslip.trace import Trace
 

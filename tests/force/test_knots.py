@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.force.knots import CREEP, _hum, _onward, kernels, knots
+from stickslip.force.kernels import kernels
+from stickslip.force.knots import CREEP, knots
+from stickslip.force.smoothing import hum, onward
 
 RATE = 1e4
 
@@ -117,7 +119,7 @@ def test_no_point_belongs_to_a_stick_with_an_unknown_past(small, begun):
 def flat(x, **options):
     x = np.asarray(x, float)
     given = {"weight": np.ones(x.size), "slow": np.ones(x.size, bool), "event": np.zeros(x.size, int), "noise": 1e-9}
-    return _onward(x, **{**given, **options})
+    return onward(x, **{**given, **options})
 
 
 def test_a_way_that_goes_on_is_left_alone():
@@ -166,7 +168,7 @@ def test_the_hum_of_the_mains_is_found_between_slips(small):
     t, x, events, rate = staircase(small)
     sine = 4e-9 * np.sin(2.0 * np.pi * 50.0 * t + 0.8)
     noise = 3e-9 * np.random.default_rng(2).standard_normal(t.size)
-    found = _hum(t, x + sine + noise, events, rate, small.times)
+    found = hum(t, x + sine + noise, events, rate, small.times)
     assert np.sqrt(np.mean((found - sine) ** 2)) < 0.1 * np.sqrt(np.mean(sine**2))
 
 
@@ -175,5 +177,5 @@ def test_nothing_but_the_mains_is_taken_off(small, frequency):
     t, x, events, rate = staircase(small)
     wave = 4e-9 * np.sin(2.0 * np.pi * frequency * t + 0.8)
     noise = 3e-9 * np.random.default_rng(2).standard_normal(t.size)
-    assert np.abs(_hum(t, x + noise, events, rate, small.times)).max() == 0.0
-    assert np.abs(_hum(t, x + wave + noise, events, rate, small.times)).max() < 0.05 * 4e-9
+    assert np.abs(hum(t, x + noise, events, rate, small.times)).max() == 0.0
+    assert np.abs(hum(t, x + wave + noise, events, rate, small.times)).max() < 0.05 * 4e-9
