@@ -24,6 +24,7 @@ _PUBLIC = {
     "load_run": "scenario.fitted",
     "load_campaign": "objects",
     "Campaign": "objects",
+    "study": "objects.study",
     "Fit": "objects",
     "Diagnosis": "objects",
     "Trace": "trace",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
@@ -261,7 +261,8 @@ class Trace:
     @classmethod
     def from_arrays(
         cls, name: str = "run", *, time: Any, displacement: Any = None, velocity: Any = None, spring_force: Any = None,
-        drive_velocity: float | str | None = None, drive_position: Any = None, resolution: float | str | None = None,
+        drive_velocity: float | str | None = None, drive_position: Any = None,
+        drive: Sequence[tuple[float | str, float | str]] | None = None, resolution: float | str | None = None,
         noise: float | str | None = None, spring_stiffness: float | str | None = None, virgin: bool = False,
         role: str = "",
     ) -> Trace:  # fmt: skip
@@ -273,6 +274,7 @@ class Trace:
                 ``attrs["units"]``, all others are in SI.
             displacement, velocity, spring_force: of the block (m, m/s, N), shape (n,); at least one.
             drive_velocity: of the load point, a number in m/s or text such as ``"50 um/s"``; or
+            drive: until when and how fast, piece by piece: ``[("4.3 s", "100 um/s"), ("5.3 s", 0), ...]``; or
             drive_position: the measured load point (m), shape (n,).
             resolution, noise: one count, and the standard deviation of one sample, of the leading signal; default what
                 the record itself shows.
@@ -280,7 +282,7 @@ class Trace:
             virgin, role: as of the class.
 
         Raises:
-            InputError: no signal, lengths that differ, times that do not increase, values that are not finite, both
+            InputError: no signal, lengths that differ, times that do not increase, values that are not finite, two
                 ways of giving the drive, a unit that cannot be read.
         """
         given = {"displacement": displacement, "velocity": velocity, "spring_force": spring_force}
@@ -289,9 +291,10 @@ class Trace:
             key: _si_array(v, si[key], f"{name}: {key}") for key, v in given.items() if v is not None
         }
         t = _si_array(time, "s", f"{name}: time")
-        if drive_velocity is not None and drive_position is not None:
+        if sum(way is not None for way in (drive_velocity, drive_position, drive)) > 1:
             raise InputError(
-                f"trace '{name}': the drive is given more than once", hint="give drive_velocity or drive_position"
+                f"trace '{name}': the drive is given more than once",
+                hint="keep one of drive_velocity, drive_position, drive",
             )
         if not arrays:
             raise InputError(f"trace '{name}' has no signal", allowed="displacement, velocity or spring_force")
@@ -305,15 +308,18 @@ class Trace:
         level = known(noise, SIGNALS[leading], "noise")
         level = noise_level(arrays[leading], count) if level is None else level
         speed = known(drive_velocity, "m/s", "drive_velocity")
-        drive = None if speed is None else Drive.constant(speed, float(t[0]), float(t[-1]))
+        motion = None if speed is None else Drive.constant(speed, float(t[0]), float(t[-1]))
+        if drive is not None:
+            until = [to_si(end, "s", key=f"{name}: drive") for end, _ in drive]
+            motion = Drive.from_pieces(until, [to_si(v, "m/s", key=f"{name}: drive") for _, v in drive], float(t[0]))
         if drive_position is not None:
             arrays["drive_position"] = position = _si_array(drive_position, "m", f"{name}: drive_position")
-            drive = Drive.sampled(t, position)
+            motion = Drive.sampled(t, position)
         digest = hashlib.sha256(t.tobytes())
         for key, values in arrays.items():
             digest.update(key.encode() + values.tobytes())
         return cls(
-            name, t, **arrays, drive=drive, resolution=count, noise=level, virgin=virgin, role=role,
+            name, t, **arrays, drive=motion, resolution=count, noise=level, virgin=virgin, role=role,
             spring_stiffness=known(spring_stiffness, "N/m", "spring_stiffness"),
             provenance=Provenance("", digest.hexdigest(), "arrays"),
         )  # fmt: skip

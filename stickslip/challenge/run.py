@@ -13,11 +13,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..cluster import Workers, cluster
 from ..errors import InputError, RunFolderError, StickslipError
 from ..objects.diagnosis import check_counts, diagnose_campaign
 from ..objects.kept import code_digest
 from ..runstore import alone, json_text, versions, write_aside
-from .cluster import Workers, cluster
 from .one_case import REFUSED, Diagnosis, do_case, failures, is_done
 from .seal import CASES, RUNS, case_names, check_seal, digest
 
@@ -61,7 +61,7 @@ def run_challenge(
 
     Args:
         folder: of the challenge. Workers on other machines must see it under the same path.
-        scheduler, workers: see :func:`stickslip.challenge.cluster.cluster`.
+        scheduler, workers: see :func:`stickslip.cluster.cluster`.
         candidates, max_effects: of the diagnosis; fixed by the first run of this challenge.
         only: names of cases, done in this order, the others left open; default all.
         retry: try cases again that failed before.

@@ -18,13 +18,13 @@ import dask
 import pytest
 from invented import effect, make
 
-from stickslip.challenge.cluster import cluster
 from stickslip.challenge.one_case import failures
 from stickslip.challenge.run import PROTOCOL, UNRECORDED, Progress, code_digest, run_challenge, time_left
 from stickslip.challenge.score import score_challenge
 from stickslip.challenge.seal import RUNS
 from stickslip.challenge.table import score_text
 from stickslip.cli import run
+from stickslip.cluster import cluster
 from stickslip.errors import InputError
 
 NAMES = [f"case-{i:03d}" for i in range(1, 7)]
@@ -206,8 +206,8 @@ def test_the_time_left_counts_with_the_workers(workers: int, finished: int) -> N
 
 def test_a_scheduler_without_workers_is_told_and_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, log = challenge(tmp_path / "c", NAMES[:2]), tmp_path / "log"
-    monkeypatch.setattr("stickslip.challenge.cluster.LOOK", 0.1)
-    monkeypatch.setattr("stickslip.challenge.cluster.LONELY", 1.0)
+    monkeypatch.setattr("stickslip.cluster.LOOK", 0.1)
+    monkeypatch.setattr("stickslip.cluster.LONELY", 1.0)
     noted: list[str] = []
     with loopback_cluster(tmp_path, 0) as (address, _):
         come: list[subprocess.Popen] = []
@@ -299,7 +299,7 @@ def test_a_diagnosis_without_a_result_is_a_failure(tmp_path: Path) -> None:
 
 def test_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = challenge(tmp_path / "c", NAMES[:1])
-    monkeypatch.setattr("stickslip.challenge.cluster.PATIENCE", 1.0)
+    monkeypatch.setattr("stickslip.cluster.PATIENCE", 1.0)
     assert run(["challenge", "run", str(folder), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     assert "no scheduler answers" in capsys.readouterr().err
     assert run(["challenge", "run", str(tmp_path)]) == 2

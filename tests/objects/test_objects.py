@@ -217,3 +217,15 @@ def test_a_value_set_by_hand_costs_one_evaluation(base):
         patch.setattr(Problem, "evaluate", counted)
         _ = base.with_values({"weakening.drop": 0.2}).error
     assert len(calls) == 1
+
+
+def test_a_drive_in_pieces_is_that_of_the_file(campaign):
+    """The last run of the campaign was held twice."""
+    run = campaign["holds"]
+    ends = [*run.drive.breakpoints, run.time[-1]]
+    speeds = run.drive.velocity(np.array([run.time[0], *run.drive.breakpoints]))
+    made = ss.Trace.from_arrays(
+        "x", time=run.time, displacement=run.displacement,
+        drive=[(f"{end:.6f} s", f"{v * 1e6:.6f} um/s") for end, v in zip(ends, speeds, strict=True)],
+    )  # fmt: skip
+    assert np.abs(made.drive.position(run.time) - run.drive.position(run.time)).max() < 1e-9

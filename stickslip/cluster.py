@@ -1,4 +1,4 @@
-"""Where the cases are diagnosed: a cluster of dask.distributed, of one's own or on this machine."""
+"""Where work on many campaigns is done: a cluster of dask.distributed, of one's own or on this machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, StickslipError
+from .errors import InputError, StickslipError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -42,7 +42,7 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         from distributed import Client, LocalCluster
     except ImportError:
         raise StickslipError(
-            "running a challenge needs dask.distributed\n  to mend: pip install 'stickslip[challenge]'"
+            "work on many campaigns needs dask.distributed\n  to mend: pip install 'stickslip[distributed]'"
         ) from None
     if scheduler is not None:
         if workers is not None:

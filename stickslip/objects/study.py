@@ -1,0 +1,109 @@
+"""Many campaigns fitted side by side, on this machine or on a cluster, as one data set."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..cluster import cluster
+from ..errors import InputError, StickslipError
+from ..lifeline import end_with
+from .campaign import load_campaign
+from .run import Tell
+
+if TYPE_CHECKING:
+    import xarray
+
+WHOLE = ("error", "unseen_error", "cost", "cycles")
+
+
+def study(
+    campaigns: Mapping[str, str | Path] | Sequence[str | Path],
+    effects: Sequence[str] = (),
+    *,
+    files: Sequence[str | Path] = (),
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Tell | None = None,
+) -> xarray.Dataset:
+    """Fit the dynamic model to every campaign.
+
+    Args:
+        campaigns: campaign files, by a name of each or by their folders.
+        effects: added to the base in each, as of :meth:`Campaign.fit`.
+        files: Python files with effects of one's own; they must be there on every worker.
+        scheduler: address of a running dask scheduler, ``tcp://host:8786``; default a cluster on this machine.
+        workers: of the local cluster; default one a core.
+        progress: told which campaign is done and the share of all.
+
+    Returns:
+        Over ``campaign`` and ``parameter``: ``value`` and ``std`` (SI, unit in the coordinate ``unit``); over
+        ``campaign``: ``error`` and ``unseen_error`` (floors), ``cost``, ``cycles`` and ``note``, which says why a
+        campaign could not be fitted (its numbers are nan).
+
+    Raises:
+        InputError: no campaign, two of one name, or no scheduler at that address.
+        StickslipError: dask.distributed is missing.
+    """
+    named = dict(campaigns) if isinstance(campaigns, Mapping) else {_name(Path(p)): p for p in campaigns}
+    if not named or len(named) != len(campaigns):
+        raise InputError("campaigns must be there and have names of their own", value=len(campaigns))
+    found: dict[str, dict[str, Any]] = {}
+    with cluster(scheduler, workers) as client, client.as_current():
+        from distributed import as_completed
+
+        local = None if scheduler else os.getpid()
+        own = (tuple(effects), tuple(map(str, files)), local)
+        work = {
+            client.submit(_fitted, str(Path(path).resolve()), *own, pure=False): name for name, path in named.items()
+        }
+        for done in as_completed(work):
+            name = work[done]
+            found[name] = done.result()
+            if progress is not None:
+                progress(name, len(found) / len(named))
+    return _together({name: found[name] for name in named})
+
+
+def _name(path: Path) -> str:
+    return path.resolve().parent.name if path.name == "campaign.toml" else path.stem
+
+
+def _fitted(path: str, effects: tuple[str, ...], files: tuple[str, ...], parent: int | None) -> dict[str, Any]:
+    """One campaign, in a worker."""
+    from .. import cache
+
+    if parent is not None:
+        end_with(parent)
+    cache.enable()
+    try:
+        fit = load_campaign(path, files).fit(effects)
+    except StickslipError as error:
+        return {"note": str(error).split("\n")[0]}
+    frame = fit.parameters
+    cycles = sum(len(s.events) for s in fit.climbed.prepared.segmentations)
+    whole = {"error": fit.error, "unseen_error": fit.unseen_error, "cost": fit.climbed.fit.cost, "cycles": cycles}
+    return {"note": "", **whole, "parameters": {n: (r["value"], r["std"], r["unit"]) for n, r in frame.iterrows()}}
+
+
+def _together(found: Mapping[str, Mapping[str, Any]]) -> xarray.Dataset:
+    import xarray
+
+    units: dict[str, str] = {}
+    for one in found.values():
+        units |= {name: unit for name, (_, _, unit) in one.get("parameters", {}).items()}
+    table = np.full((2, len(found), len(units)), np.nan)
+    for i, one in enumerate(found.values()):
+        for j, name in enumerate(units):
+            table[:, i, j] = one.get("parameters", {}).get(name, (np.nan, np.nan))[:2]
+    both = ("campaign", "parameter")
+    whole = {k: ("campaign", np.array([float(one.get(k, np.nan)) for one in found.values()])) for k in WHOLE}
+    note = ("campaign", [one["note"] for one in found.values()])
+    return xarray.Dataset(
+        {"value": (both, table[0]), "std": (both, table[1]), **whole, "note": note},
+        coords={"campaign": list(found), "parameter": list(units), "unit": ("parameter", list(units.values()))},
+    )

@@ -1,0 +1,38 @@
+"""Many campaigns side by side: the same numbers as one by one, and a failure spoils nothing."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.errors import InputError
+
+SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
+
+
+def test_a_study_has_the_numbers_of_the_fits_and_says_what_failed(tmp_path):
+    broken = tmp_path / "broken.toml"
+    broken.write_text('schema = 1\n[[trace]]\nfile = "none.csv"\nsampling_rate = "1 kHz"\n')
+    told = []
+    found = ss.study(
+        {"shipped": SHIPPED, "broken": broken}, workers=1, progress=lambda text, share: told.append((text, share))
+    )
+    fit = ss.load_campaign(SHIPPED).fit()
+    for name, value in fit.values.items():
+        assert float(found.value.sel(campaign="shipped", parameter=name)) == pytest.approx(value, rel=1e-9)
+    assert float(found.unseen_error.sel(campaign="shipped")) == pytest.approx(fit.unseen_error, rel=1e-9)
+    assert float(found.cycles.sel(campaign="shipped")) == 38
+    assert np.isnan(found.value.sel(campaign="broken")).all()
+    assert "none.csv" in str(found.note.sel(campaign="broken").values) or "signal" in str(
+        found.note.sel(campaign="broken").values
+    )
+    assert str(found.note.sel(campaign="shipped").values) == ""
+    assert told[-1][1] == 1.0 and {t for t, _ in told} == {"shipped", "broken"}
+
+
+def test_campaigns_need_names_of_their_own():
+    with pytest.raises(InputError, match="names of their own"):
+        ss.study([SHIPPED, SHIPPED])
+    with pytest.raises(InputError):
+        ss.study([])
