@@ -12,6 +12,7 @@ from scipy.sparse import dia_array
 
 from ..errors import FitError
 from ..fit.parameters import Free
+from ..progress import breathe
 from .bank import placed, spacing
 from .problem import PULL, Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, covariance, estimate, misfit
@@ -384,6 +385,7 @@ def descend(
     """
     total, count = 0.0, 0
     for _ in range(most):
+        breathe()
         system = _System(problem, point, slopes, scatter, known, blocks)
         now = system.objective(point, slopes)
         change, events = system.step()
