@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,8 @@ class Promise:
         fall: of the cost (chi-square), to first order; no more than the bounds of the amplitude allow.
         amplitude, std: the size that promises it, and its standard deviation (SI, distance from the null).
         unit: of the amplitude.
-        force: what it would take off the residual force (N), shape (p,); None where it does nothing.
+        force: what it would take off the residual force (N), all other parameters fitted anew, shape (p,); None where
+            it does nothing.
     """
 
     tag: str
@@ -59,7 +60,7 @@ def promise(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> 
     share = np.where(sizes != 0.0, inside / np.where(sizes != 0.0, sizes, 1.0), 0.0)
     falls = falls * (1.0 - (1.0 - share) ** 2)
     best = int(np.argmax(falls))
-    force = -inside[best] * columns[best]
+    force = explained.left(-inside[best] * columns[best][:, None])[:, 0]
     return Promise(tag, form, float(falls[best]), float(inside[best]), float(errors[best]), spec.unit, force)
 
 
@@ -84,4 +85,4 @@ def _wave(base: Fit, explained: Explained, nothing: Promise, columns: Array) -> 
             amplitude = float(np.sqrt(np.mean(sizes**2) * 2.0))
             error = float(np.mean(explained.singly(explained.apart(columns[i : i + 2].T))[2]))
             best = Promise(nothing.tag, nothing.form, fall, amplitude, error, nothing.unit, -(split @ sizes))
-    return best
+    return best if best.force is None else replace(best, force=explained.left(best.force[:, None])[:, 0])

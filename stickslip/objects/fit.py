@@ -148,7 +148,7 @@ class Fit(Shown):
         import xarray
 
         found, problem = self._fit, self._fit.problem
-        where = coordinates(found)
+        where = self._where
         names = np.array([k.name for k in problem.runs])
         coords: dict[str, Any] = {
             "run": ("point", names[problem.run]),
@@ -256,7 +256,10 @@ class Fit(Shown):
             z[known[name]] = f.inward(number)
         found = self._fit
         moved = at(found.problem, replace(found.point, z=z, weights=weights), found.scatter, found.dropped, found.known)
-        return Fit(self.campaign, self._climbed, moved)
+        made = Fit(self.campaign, self._climbed, moved)
+        if "rig.spring_stiffness" not in values:
+            made.__dict__["_where"] = self._where
+        return made
 
     def refit(self, locked: Sequence[str] = ()) -> Fit:
         """Fitted anew from where it stands.
@@ -456,6 +459,10 @@ class Fit(Shown):
     @property
     def _first_weight(self) -> int:
         return len(self.free) + self._fit.point.phases.size
+
+    @cached_property
+    def _where(self) -> dict[str, np.ndarray]:
+        return coordinates(self._fit)
 
     @cached_property
     def _floor(self) -> np.ndarray:

@@ -33,6 +33,24 @@ class Spoken(JSComponent):
             self.heard(data)
 
 
+class Words(JSComponent):
+    """A line of text, shown as it is."""
+
+    text = param.String("")
+
+    _esm = """
+    export function render({ model }) {
+      const line = document.createElement("div")
+      line.className = "line"
+      const update = () => { line.textContent = model.text }
+      model.on("text", update)
+      update()
+      return line
+    }
+    """
+    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+
+
 class Frame(Spoken):
     """The head of the window: title, model, errors, what is going on, what must be read; and the keyboard."""
 

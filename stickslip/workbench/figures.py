@@ -86,12 +86,14 @@ def figure(title: str = "", x: str = "", y: str = "", height: int = 260, **more:
         title: above it.
         x, y: texts of the axes, with units (see :func:`label`).
         height: in pixels.
-        more: arguments of ``bokeh.plotting.figure``, such as ``x_range`` to link it with another.
+        more: arguments of ``bokeh.plotting.figure``, such as ``x_range`` to link it with another. For some hundred
+            points ``output_backend="canvas"`` is quicker than WebGL, which has to be copied into the page.
     """
     theme = look()
     more.setdefault("sizing_mode", "stretch_width")
+    more.setdefault("output_backend", "webgl")
     made: Any = bokeh_figure(
-        title=title, x_axis_label=x, y_axis_label=y, height=height, output_backend="webgl", toolbar_location="above",
+        title=title, x_axis_label=x, y_axis_label=y, height=height, toolbar_location="above",
         tools=[PanTool(), WheelZoomTool(), BoxZoomTool(), ResetTool(), SaveTool()], active_drag=None, **more,
     )  # fmt: skip
     made.toolbar.logo = None
@@ -132,7 +134,7 @@ def legend(made: Any, place: str = "above", **more: Any) -> None:
         found.label_text_color = theme.text
         found.inactive_fill_color = theme.surface
         found.label_text_font_size = "12px"
-        found.padding, found.margin, found.spacing = 2, 2, 12
+        found.update(padding=2, margin=2, spacing=12)
         found.update(**more)
         made.add_layout(found, place)
 

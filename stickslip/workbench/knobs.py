@@ -106,7 +106,7 @@ def knobs(fit: Fit) -> dict[str, Knob]:
     return out
 
 
-def rows(fit: Fit, made: dict[str, Knob], locked: Collection[str] = ()) -> list[dict[str, Any]]:
-    """What the sliders show of a model."""
-    values, std = fit.values, fit.std
+def rows(fit: Fit, fitted: Fit, made: dict[str, Knob], locked: Collection[str] = ()) -> list[dict[str, Any]]:
+    """What the sliders show of a model; deviations are those of the fit before it was moved by hand."""
+    values, std = fit.values, fitted.std
     return [k.row(values[n], std.get(n, 0.0), n in locked) for n, k in made.items() if n in values]

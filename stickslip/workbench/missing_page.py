@@ -11,7 +11,7 @@ from bokeh.models import BasicTicker, FixedTicker, HoverTool
 from bokeh.models.annotations import Span
 
 from ..objects.picture import AGAINST, PARTS, WIDEST
-from .controls import Catalogue, Message
+from .controls import Catalogue, Message, Words
 from .evidence import best_forms, bins, rows
 from .figures import figure, label, legend, look, source, unit_of
 from .session import Session, judged, watch
@@ -143,7 +143,7 @@ class _Listed:
             description="Fit every effect, judge each on unseen runs, add the best, repeat (minutes, beside)",
         )  # fmt: skip
         self._diagnose.on_click(lambda event: session.diagnose())
-        self._words = pn.pane.Str("", sizing_mode="stretch_width", styles={"font-size": "14px"}, margin=(6, 0, 0, 0))
+        self._words = Words(sizing_mode="stretch_width", margin=(6, 0, 0, 0))
         self.head = pn.Row(self._diagnose, self._words, sizing_mode="stretch_width", margin=(16, 0, 8, 0))
         self.part = Catalogue(heard=self._heard, sizing_mode="stretch_width")
         self.verdict = pn.pane.HTML("", sizing_mode="stretch_width", margin=(8, 0, 0, 0))
@@ -184,10 +184,10 @@ class _Listed:
             closed=bool(session.busy),
         )
         self._diagnose.disabled = bool(session.searching)
-        self._words.object = (
+        self._words.text = (
             f"looking at the effects ({100 * session.listed:.0f} %)"
             if session.listed < 1.0
-            else "effects by what they promise: fall of the cost; a click lays one over the residual"
+            else "by the fall of the cost that each promises; a click lays one over the residual"
         )
         self.verdict.object = _verdict(session.diagnosis)
 
@@ -210,7 +210,9 @@ class _Ladder:
         self._session = session
         theme = look()
         self._data = source(rung=[], fitted=[], unseen=[], step=[])
-        self.figure = figure("the ladder: error of every model on the way here", y="error / floors", height=230)
+        self.figure = figure(
+            "the ladder: error of every model on the way here", y="error / floors", height=230, output_backend="canvas"
+        )
         for name, colour, dash, mark in (
             ("fitted", theme.measured, "solid", "circle"),
             ("unseen", theme.model, "dashed", "square"),
@@ -269,7 +271,7 @@ class _Backbone:
         theme = look()
         self._data = source(u=[], force=[], low=[], high=[], law=[])
         self._of: Any = None
-        self.figure = figure("backbone of the contact", height=260)
+        self.figure = figure("backbone of the contact", height=260, output_backend="canvas")
         self.figure.varea(
             "u",
             "low",
@@ -285,7 +287,7 @@ class _Backbone:
             legend_label="rough contact: 1 - (1 - u/u_max)^p",
         )  # fmt: skip
         legend(self.figure)
-        self.words = pn.pane.Str("", styles={"font-size": "13px"}, sizing_mode="stretch_width")
+        self.words = Words(sizing_mode="stretch_width", margin=(0, 0, 0, 12))
         watch(session, ["steps", "at"], self.update)
         self.update()
 
@@ -308,7 +310,7 @@ class _Backbone:
         }  # fmt: skip
         self.figure.xaxis.axis_label = label("displacement from the force-free contact", length)
         self.figure.yaxis.axis_label = label("force", unit)
-        self.words.object = f"u_max = {u_max * m:.3g} {length}, p = {float(data.attrs['p']):.2f}"
+        self.words.text = f"u_max = {u_max * m:.3g} {length}, p = {float(data.attrs['p']):.2f}"
 
 
 __all__ = ["TITLE", "page"]

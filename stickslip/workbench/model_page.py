@@ -13,13 +13,14 @@ from bokeh.models import HoverTool
 
 from ..objects import Fit
 from ..objects.picture import balanced
-from .controls import Knobs, Message
+from .controls import Knobs, Message, Words
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .knobs import Knob, knobs, rows
 from .selection import choose, cycles, selected, worst
 from .session import Session, judged, watch
 
 TITLE = "Model against measurement"
+FEW = "canvas"  # what draws some hundred points quickest
 WORST = 2.0  # floors at which the heat map is at its darkest, at least
 
 
@@ -97,7 +98,7 @@ def _sliders(session: Session) -> Knobs:
             of[0] = fitted
             made.clear()
             made.update(knobs(fitted))
-        part.param.update(rows=rows(fit, made, session.locked), closed=bool(session.busy))
+        part.param.update(rows=rows(fit, fitted, made, session.locked), closed=bool(session.busy))
 
     watch(session, ["steps", "at", "locked", "busy"], update)
     update()
@@ -113,14 +114,15 @@ class _Cycle:
         self._run = pn.widgets.Select(name="", options=[], width=180, sizing_mode="fixed", margin=(0, 8, 0, 0))
         self._before = pn.widgets.Button(name="◀", description="Cycle before (←)", width=44, sizing_mode="fixed")
         self._after = pn.widgets.Button(name="▶", description="Next cycle (→)", width=44, sizing_mode="fixed")
-        self._where = pn.pane.Str("", sizing_mode="stretch_width", margin=(6, 0, 0, 8), styles={"font-size": "14px"})
+        self._where = Words(sizing_mode="stretch_width", margin=(6, 0, 0, 8))
         for button in (self._before, self._after):
             button.margin = (0, 4, 0, 0)
         self.chooser = pn.Row(self._run, self._before, self._after, self._where, sizing_mode="stretch_width")
         self._data = source(t=[], measured=[], model=[], residual=[], low=[], high=[])
+        self._data.name = "cycle"
         self._creep = source(t=[], measured=[], model=[])
 
-        self.force = figure(y="force of the contact", height=270)
+        self.force = figure(y="force of the contact", height=270, output_backend=FEW)
         self.force.line(
             "t", "measured", source=self._data, color=theme.measured, line_width=2.5, legend_label="measured"
         )
@@ -129,14 +131,14 @@ class _Cycle:
             legend_label="model",
         )  # fmt: skip
         self.force.xaxis.major_label_text_font_size = "0px"
-        self.residual = figure(y="measured - model", height=190, x_range=self.force.x_range)
+        self.residual = figure(y="measured - model", height=190, x_range=self.force.x_range, output_backend=FEW)
         self.residual.varea(
             "t", "low", "high", source=self._data, color=theme.band, fill_alpha=0.35,
             legend_label="two standard deviations of noise and scatter",
         )  # fmt: skip
         self.residual.line("t", "residual", source=self._data, color=theme.model, line_width=1.5)
         self.residual.scatter("t", "residual", source=self._data, color=theme.model, size=3)
-        self.creep = figure("creep before the onset", height=300)
+        self.creep = figure("creep before the onset", height=300, output_backend=FEW)
         self.creep.line(
             "t", "measured", source=self._creep, color=theme.measured, line_width=2.5, legend_label="measured"
         )
@@ -171,7 +173,7 @@ class _Cycle:
         name, event = selected(self._session)
         counts = cycles(self._session)
         self._run.param.update(options=list(counts), value=name)
-        self._where.object = f"cycle {event + 1} of {counts[name]}   (keys: ← → cycles, ↑ ↓ runs)"
+        self._where.text = f"cycle {event + 1} of {counts[name]}   (keys: ← → cycles, ↑ ↓ runs)"
         data = fit.force
         own = np.flatnonzero((data.run.values == name) & (data.event.values == event))
         own = own[np.argsort(data.time.values[own])]
@@ -215,7 +217,7 @@ class _Heat:
         )
         self._data = source(run=[], phase=[], error=[], text=[], colour=[], ink=[])
         self.figure = figure("error in floors; a click shows the worst cycle", height=264,
-                             x_range=["all"], y_range=["all"])  # fmt: skip
+                             x_range=["all"], y_range=["all"], output_backend=FEW)  # fmt: skip
         self.figure.rect(
             "run", "phase", 0.96, 0.94, source=self._data, fill_color="colour", line_color=None,
         )  # fmt: skip

@@ -26,6 +26,7 @@ from .work import Search, Worker, at_once
 
 BASE = "the base model"
 HAND = "by hand"
+STILL = 0.25  # s without a move, after which a model that was moved is judged and kept
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,7 @@ class Session(param.Parameterized):
 
     def later(self) -> None:
         """Keep what is selected when nothing else is to be done."""
-        self.worker("keep", self.keep)
+        self.worker("keep", self.keep, STILL)
 
     # steps
 
@@ -194,7 +195,7 @@ class Session(param.Parameterized):
 
     def _show(self, at: int) -> None:
         self.at = max(min(at, len(self.steps) - 1), min(0, len(self.steps) - 1))
-        self.later()
+        self.worker("judge", self._judge, STILL)
 
     def first(self, fit: Fit) -> None:
         """Begin the history with the base model."""
@@ -226,10 +227,16 @@ class Session(param.Parameterized):
             made = Step(text, fit.with_values(values), f"fit = fit.with_values({dict(every)!r})", "", every)
             self.take(made, over)
             self.said = ""
-            if not getattr(self.worker, "waits", False):
-                made.fit.unseen_errors  # noqa: B018
+        self.worker("judge", self._judge, STILL)
+
+    def _judge(self) -> None:
+        """What takes longer than a hand would wait, of the model as it stands."""
+        fit = self.fit
+        if fit is not None and not judged(fit):
+            with self._told():
+                fit.unseen_errors, fit.ladder  # noqa: B018
                 self.judged += 1
-                self.worker("keep", self.keep)
+        self.keep()
 
     def refit(self) -> None:
         """Fitted anew, locked parameters as they are."""

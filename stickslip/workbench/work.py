@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing import get_context
@@ -28,24 +29,35 @@ class Worker:
     """
 
     def __init__(self) -> None:
-        self._jobs: list[tuple[str, Callable[[], None]]] = []
+        self._jobs: list[tuple[float, str, Callable[[], None]]] = []
         self._changed = threading.Condition()
         self._cancel = False
         self._busy = False
         threading.Thread(target=self._run, name="worker", daemon=True).start()
 
-    def __call__(self, kind: str, job: Callable[[], None]) -> None:
-        """Have a job done; ``kind`` "" is never replaced."""
+    def __call__(self, kind: str, job: Callable[[], None], after: float = 0.0) -> None:
+        """Have a job done.
+
+        Args:
+            kind: "" is never replaced.
+            job: what to do.
+            after: seconds before which it is not begun; asked for again meanwhile, they begin anew.
+        """
         with self._changed:
-            if kind and self._jobs and self._jobs[-1][0] == kind:
+            if after > 0.0:
+                self._jobs = [j for j in self._jobs if j[1] != kind]
+            elif kind and self._jobs and self._jobs[-1][1] == kind:
                 self._jobs.pop()
-            self._jobs.append((kind, job))
+            self._jobs.append((time.monotonic() + after, kind, job))
             self._changed.notify()
 
-    @property
-    def waits(self) -> bool:
-        """Whether a job waits behind the one that is done now."""
-        return bool(self._jobs)
+    def _next(self) -> Callable[[], None] | None:
+        now = time.monotonic()
+        due = next((j for j in self._jobs if j[0] <= now), None)
+        if due is None:
+            return None
+        self._jobs.remove(due)
+        return due[2]
 
     def cancel(self) -> None:
         """End the job that is done now at its next step, and forget what waits."""
@@ -56,8 +68,9 @@ class Worker:
     def _run(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: bool(self._jobs))
-                _, job = self._jobs.pop(0)
+                while (job := self._next()) is None:
+                    first = min((j[0] for j in self._jobs), default=None)
+                    self._changed.wait(None if first is None else max(first - time.monotonic(), 0.0))
                 self._cancel, self._busy = False, True
             try:
                 with cancellable(lambda: self._cancel):
@@ -67,7 +80,7 @@ class Worker:
             self._busy = False
 
 
-def at_once(kind: str, job: Callable[[], None]) -> None:
+def at_once(kind: str, job: Callable[[], None], after: float = 0.0) -> None:
     """Does the job in the same thread, in place of a :class:`Worker`."""
     job()
 

@@ -26,7 +26,6 @@ export function render({ model }) {
       line.dataset.tag = row.tag
       const name = part("div", "tag", line)
       part("b", "", name, row.tag)
-      part("span", "words", name, row.words)
       if (row.alike) part("span", "words", name, row.alike)
       const evidence = part("div", "evidence", line)
       const bar = part("div", "strength", evidence)
@@ -43,12 +42,14 @@ export function render({ model }) {
         curve(picture, row.picture[1], "law")
       }
       line.append(picture)
+      line.title = row.words
       const button = part("button", row.on ? "off" : "switch", line, row.on ? "Switch off" : "Switch on")
       button.disabled = model.closed
       button.addEventListener("click", (event) => {
         event.stopPropagation()
         model.send_msg({ kind: row.on ? "off" : "on", tag: row.tag, form: row.form })
       })
+      part("div", "words whole", line, row.words)
       line.addEventListener("click", () => model.send_msg({ kind: "choose", tag: row.tag, form: row.form }))
     }
   }
