@@ -5,15 +5,16 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import logging
+from functools import partial
 from types import ModuleType
 from typing import Any
 
 import panel as pn
 
-from .controls import Frame, Message
+from .controls import BUTTON, Frame, Message
 from .figures import dark, look
 from .selection import follow
-from .session import Session, judged, watch
+from .session import Session, watch
 
 PAGES = ("data_page", "model_page", "missing_page", "simulate_page", "keep_page")
 STYLE = """
@@ -39,24 +40,58 @@ def modules() -> list[ModuleType]:
 
 def view(session: Session) -> Any:
     """The whole window of a session."""
-    head = frame(session)
+    head, body = frame(session), pn.Column(sizing_mode="stretch_width")
+
+    def show() -> None:
+        if session.campaign is None:
+            body[:] = [offers(session)]
+        elif not body.objects or not isinstance(body[0], pn.Tabs):
+            body[:] = [tabs(session)]
+
+    show()
+    if session.campaign is None:
+        watch(session, ["campaign"], show)
+    return pn.Column(head, body, sizing_mode="stretch_width")
+
+
+def offers(session: Session) -> Any:
+    """What can be opened, to choose from."""
+    if not session.offers:
+        return pn.pane.HTML(
+            "No campaign file is in this folder. Write one with <code>stickslip new campaign</code>, or name one: "
+            "<code>stickslip open campaign.toml</code>"
+        )
+    made = []
+    for i, path in enumerate(session.offers):
+        button = pn.widgets.Button(name=f"Open {path}", width=560, sizing_mode="fixed", stylesheets=[BUTTON])
+        button.on_click(partial(_opened, session, i))
+        made.append(button)
+    return pn.Column(*made, margin=(16, 0))
+
+
+def _opened(session: Session, number: int, event: Any) -> None:
+    session.open(number)
+
+
+def tabs(session: Session) -> pn.Tabs:
+    """The pages, each made when it is first looked at."""
     every = modules()
     places = [pn.Column(sizing_mode="stretch_width", min_height=500) for _ in every]
-    tabs = pn.Tabs(
+    made = pn.Tabs(
         *((module.TITLE, place) for module, place in zip(every, places, strict=True)),
         sizing_mode="stretch_width", stylesheets=[TABS],
     )  # fmt: skip
     if pn.state.location is not None:
-        pn.state.location.sync(tabs, {"active": "page"})
+        pn.state.location.sync(made, {"active": "page"})
 
     def show(*events: Any) -> None:
-        place = places[tabs.active]
+        place = places[made.active]
         if not place.objects:
-            place.append(_made(every[tabs.active], session))
+            place.append(_made(every[made.active], session))
 
     show()
-    tabs.param.watch(show, "active")
-    return pn.Column(head, tabs, sizing_mode="stretch_width")
+    made.param.watch(show, "active")
+    return made
 
 
 def _made(module: ModuleType, session: Session) -> Any:
@@ -99,12 +134,15 @@ def frame(session: Session) -> Frame:
         )
 
     def errors() -> None:
-        fit = session.fit
-        unseen = f"{fit.unseen_error:.3f}" if fit is not None and judged(fit) else "..."
-        made.errors = "" if fit is None else f"error {fit.error:.3f} fitted, {unseen} unseen"
+        fit, fitted = session.fit, session.fitted
+        if fit is None or fitted is None:
+            made.errors = ""
+            return
+        told = f"error {fitted.error:.3f} fitted, {fitted.unseen_error:.3f} unseen"
+        made.errors = f"error {fit.error:.3f} by hand (before: {told})" if fit.by_hand else told
 
     watch(session, ["campaign", "steps", "at", "busy", "share", "searching", "searched", "said"], update)
-    watch(session, ["steps", "at", "judged"], errors)
+    watch(session, ["steps", "at"], errors)
     update()
     errors()
     return made

@@ -10,6 +10,15 @@ import param
 from panel.custom import JSComponent
 
 _HERE = Path(__file__).parent / "static"
+BUTTON = """
+.bk-btn {
+  border: 1px solid var(--wb-accent); border-radius: 4px; background: var(--wb-surface); color: var(--wb-accent);
+  font-size: 14px;
+}
+.bk-btn:hover:not([disabled]) { background: var(--wb-accent); color: var(--wb-surface); }
+.bk-btn[disabled] { border-color: var(--wb-line); color: var(--wb-soft); opacity: 0.6; }
+.bk-btn.bk-active { background: var(--wb-accent); color: var(--wb-surface); }
+"""
 Message = dict[str, Any]
 
 

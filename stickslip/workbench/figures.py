@@ -50,7 +50,7 @@ class Look:
 
 LIGHT = Look(
     "#14213d", "#5b6577", "#dfe3e8", "#ffffff", "#f4f5f7", "#14213d", "#c8553d", "#8d99ae",
-    ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b58900", "#56b4e9", "#5b6577"), "#1d5fa8",
+    ("#0072b2", "#d55e00", "#009e73", "#b8578c", "#9a7400", "#3a93c9", "#5b6577"), "#1d5fa8",
     "#5e3c99", "#f7f7f7", "#b35806",
 )  # fmt: skip
 DARK = Look(
@@ -98,6 +98,7 @@ def figure(title: str = "", x: str = "", y: str = "", height: int = 260, **more:
     )  # fmt: skip
     made.toolbar.logo = None
     made.toolbar.autohide = True
+    made.toolbar_inner = True
     made.background_fill_color = theme.surface
     made.border_fill_color = theme.surface
     made.outline_line_color = None

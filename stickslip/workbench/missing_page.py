@@ -11,10 +11,10 @@ from bokeh.models import BasicTicker, FixedTicker, HoverTool
 from bokeh.models.annotations import Span
 
 from ..objects.picture import AGAINST, PARTS, WIDEST
-from .controls import Catalogue, Message, Words
+from .controls import BUTTON, Catalogue, Message, Words
 from .evidence import best_forms, bins, rows
 from .figures import figure, label, legend, look, source, unit_of
-from .session import Session, judged, watch
+from .session import Session, watch
 
 TITLE = "What is missing"
 WORDS = {"age": "time in contact", "place": "displacement", "event": "number of the event"}
@@ -139,7 +139,7 @@ class _Listed:
     def __init__(self, session: Session, residual: _Residual) -> None:
         self._session, self._residual = session, residual
         self._diagnose = pn.widgets.Button(
-            name="Diagnose", width=110, sizing_mode="fixed", margin=(0, 10, 0, 0),
+            name="Diagnose", stylesheets=[BUTTON], width=110, sizing_mode="fixed", margin=(0, 10, 0, 0),
             description="Fit every effect, judge each on unseen runs, add the best, repeat (minutes, beside)",
         )  # fmt: skip
         self._diagnose.on_click(lambda event: session.diagnose())
@@ -156,7 +156,7 @@ class _Listed:
 
     def _look(self) -> None:
         """Have the effects looked at again where the model was fitted anew."""
-        fitted = next((s.fit for s in reversed(self._session.taken) if not s.fit.by_hand), None)
+        fitted = self._session.fitted
         if fitted is not None and (fitted, self._session.loaded) != self._looked:
             self._looked = (fitted, self._session.loaded)
             self._session.list_promises()
@@ -175,8 +175,8 @@ class _Listed:
     def update(self) -> None:
         """Fill the list anew."""
         session = self._session
-        fit = session.fit
-        if fit is None or (fit.by_hand and not judged(fit)):
+        fit = session.fitted
+        if fit is None:
             return
         diagnosis = session.diagnosis if not fit.effects else None  # its gains are those on top of the base
         self.part.param.update(
@@ -209,6 +209,7 @@ class _Ladder:
     def __init__(self, session: Session) -> None:
         self._session = session
         theme = look()
+        self._of: Any = None
         self._data = source(rung=[], fitted=[], unseen=[], step=[])
         self.figure = figure(
             "the ladder: error of every model on the way here", y="error / floors", height=230, output_backend="canvas"
@@ -225,17 +226,18 @@ class _Ladder:
         self.figure.add_tools(
             HoverTool(tooltips=[("step", "@step"), ("fitted", "@fitted{0.000}"), ("unseen", "@unseen{0.000}")])
         )
-        self.figure.x_range.range_padding = 0.1
+        self.figure.x_range.range_padding = 0.4
         legend(self.figure)
         self.table = pn.pane.HTML("", sizing_mode="stretch_width")
-        watch(session, ["steps", "at", "judged"], self.update)
+        watch(session, ["steps", "at"], self.update)
         self.update()
 
     def update(self) -> None:
         """Draw it anew."""
-        fit = self._session.fit
-        if fit is None or (fit.by_hand and not judged(fit)):
+        fit = self._session.fitted
+        if fit is None or fit is self._of:
             return
+        self._of = fit
         every = fit.ladder
         shown = every.iloc[1:]  # the static model is far above all others, and would press them together
         at = [float(i) for i in range(len(shown))]
@@ -293,7 +295,7 @@ class _Backbone:
 
     def update(self) -> None:
         """Draw that of the last model that was fitted."""
-        fit = next((s.fit for s in reversed(self._session.taken) if not s.fit.by_hand), None)
+        fit = self._session.fitted
         if fit is None or fit is self._of:
             return
         self._of = fit

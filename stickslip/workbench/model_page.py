@@ -13,14 +13,15 @@ from bokeh.models import HoverTool
 
 from ..objects import Fit
 from ..objects.picture import balanced
-from .controls import Knobs, Message, Words
+from .controls import BUTTON, Knobs, Message, Words
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .knobs import Knob, knobs, rows
 from .selection import choose, cycles, selected, worst
-from .session import Session, judged, watch
+from .session import Session, watch
 
 TITLE = "Model against measurement"
 FEW = "canvas"  # what draws some hundred points quickest
+NOW = "as it stands"
 WORST = 2.0  # floors at which the heat map is at its darkest, at least
 
 
@@ -54,7 +55,9 @@ def _buttons(session: Session) -> Any:
     }
     found = {}
     for name, (call, words) in made.items():
-        button = pn.widgets.Button(name=name, description=words, width=76, sizing_mode="fixed", margin=(0, 6, 0, 0))
+        button = pn.widgets.Button(
+            name=name, description=words, stylesheets=[BUTTON], width=76, sizing_mode="fixed", margin=(0, 6, 0, 0)
+        )
         button.on_click(partial(_pressed, call))
         found[name] = button
 
@@ -93,7 +96,7 @@ def _sliders(session: Session) -> Knobs:
         fit = session.fit
         if fit is None:
             return
-        fitted = next((s.fit for s in reversed(session.taken) if not s.fit.by_hand), fit)
+        fitted = session.fitted or fit
         if fitted is not of[0]:
             of[0] = fitted
             made.clear()
@@ -112,8 +115,12 @@ class _Cycle:
         self._session = session
         theme = look()
         self._run = pn.widgets.Select(name="", options=[], width=180, sizing_mode="fixed", margin=(0, 8, 0, 0))
-        self._before = pn.widgets.Button(name="◀", description="Cycle before (←)", width=44, sizing_mode="fixed")
-        self._after = pn.widgets.Button(name="▶", description="Next cycle (→)", width=44, sizing_mode="fixed")
+        self._before = pn.widgets.Button(
+            name="◀", description="Cycle before (←)", width=44, sizing_mode="fixed", stylesheets=[BUTTON]
+        )
+        self._after = pn.widgets.Button(
+            name="▶", description="Next cycle (→)", width=44, sizing_mode="fixed", stylesheets=[BUTTON]
+        )
         self._where = Words(sizing_mode="stretch_width", margin=(6, 0, 0, 8))
         for button in (self._before, self._after):
             button.margin = (0, 4, 0, 0)
@@ -213,7 +220,12 @@ class _Heat:
     def __init__(self, session: Session) -> None:
         self._session = session
         self.kind = pn.widgets.RadioButtonGroup(
-            options=["fitted", "unseen runs"], value="fitted", width=220, sizing_mode="fixed", margin=(0, 0, 0, 70)
+            options=[NOW, "unseen runs"],
+            value=NOW,
+            stylesheets=[BUTTON],
+            width=220,
+            sizing_mode="fixed",
+            margin=(0, 0, 0, 70),
         )
         self._data = source(run=[], phase=[], error=[], text=[], colour=[], ink=[])
         self.figure = figure("error in floors; a click shows the worst cycle", height=264,
@@ -231,7 +243,7 @@ class _Heat:
         self.figure.toolbar_location = None
         self.figure.on_event(Tap, self._tapped)
         self.kind.param.watch(lambda event: self.update(), "value")
-        watch(session, ["steps", "at", "judged"], self.update)
+        watch(session, ["steps", "at"], self.update)
         self.update()
 
     def _tapped(self, event: Any) -> None:
@@ -247,10 +259,10 @@ class _Heat:
 
     def update(self) -> None:
         """Colour it anew."""
-        fit = self._session.fit
-        if fit is None or (self.kind.value != "fitted" and not judged(fit)):
+        fit, fitted = self._session.fit, self._session.fitted
+        if fit is None or fitted is None:
             return
-        table = fit.errors if self.kind.value == "fitted" else fit.unseen_errors
+        table = fit.errors if self.kind.value == NOW else fitted.unseen_errors
         runs, phases = list(table.columns), list(table.index)[::-1]
         if list(self.figure.x_range.factors) != runs or list(self.figure.y_range.factors) != phases:
             self.figure.x_range.factors, self.figure.y_range.factors = runs, phases

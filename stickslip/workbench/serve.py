@@ -8,8 +8,7 @@ import secrets
 import signal
 import socket
 import webbrowser
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 from tornado.httputil import HTTPServerRequest
@@ -89,7 +88,8 @@ def serve(
     url = f"http://{address}:{port}/{token}/"
     tell(url)
     watcher = own.watch(session, session.effects) if session.effects else None
-    session.begin()
+    if session.campaign is not None:
+        session.begin()
     if browser:
         server.io_loop.add_callback(webbrowser.open, url)
     signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
@@ -114,15 +114,3 @@ def _free(address: str, port: int) -> int:
             f"the server cannot listen there ({getattr(error, 'strerror', None) or error})",
             key="--port", value=f"{address}:{port}", hint="leave --port out for any that is free",
         ) from None  # fmt: skip
-
-
-def session_of(path: Path, effects: Sequence[Path] = ()) -> Session:
-    """A session on a campaign file.
-
-    Raises:
-        InputError: as of :func:`stickslip.load_campaign`.
-    """
-    from ..objects import load_campaign
-
-    campaign = load_campaign(path, effects)
-    return Session(campaign=campaign, effects=tuple(p.resolve() for p in effects))

@@ -18,7 +18,7 @@ import param
 from ..conformance import load_effects
 from ..errors import StickslipError
 from ..force.promise import Promise
-from ..objects import Campaign, Diagnosis, Fit
+from ..objects import Campaign, Diagnosis, Fit, load_campaign
 from ..progress import Cancelled
 from . import searches
 from .journal import Journal
@@ -26,7 +26,7 @@ from .work import Search, Worker, at_once
 
 BASE = "the base model"
 HAND = "by hand"
-STILL = 0.25  # s without a move, after which a model that was moved is judged and kept
+STILL = 0.25  # s without a move, after which a model that was moved is kept
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Session(param.Parameterized):
     """The state of one workbench.
 
     Attributes:
-        campaign: what is open.
+        campaign: what is open; None until one of ``offers`` (paths of campaign files) was chosen.
         steps, at: the history, and the number of the step that is shown (undo goes back, redo forth).
         diagnosis: of the present campaign, or None.
         run, event: what is selected: name of a run, number of a cycle in it.
@@ -62,11 +62,11 @@ class Session(param.Parameterized):
         locked: names of parameters that a fit leaves as they are.
         promises: what every effect promises on top of the model as it stands; ``listed`` is how many were looked at.
         effects: Python files with effects of one's own; ``loaded`` counts how often they were.
-        judged: counts how often the error on unseen runs was found for parameters that a hand moves.
         worker: does what takes longer than a hand would wait; the same thread unless a server gives another.
     """
 
     campaign = param.ClassSelector(class_=Campaign)
+    offers = param.Parameter(())
     steps = param.Parameter(())
     at = param.Integer(-1)
     diagnosis = param.Parameter(None)
@@ -82,7 +82,6 @@ class Session(param.Parameterized):
     listed = param.Number(1.0)
     effects = param.Parameter(())
     loaded = param.Integer(0)
-    judged = param.Integer(0)
     worker = param.Parameter(at_once)
 
     def __init__(self, **given: Any) -> None:
@@ -102,11 +101,28 @@ class Session(param.Parameterized):
         return self.steps[self.at].fit if 0 <= self.at < len(self.steps) else None
 
     @property
+    def fitted(self) -> Fit | None:
+        """The same before parameters were set by hand: what errors on unseen runs and deviations belong to."""
+        return next((s.fit for s in reversed(self.taken) if not s.fit.by_hand), None)
+
+    @property
     def taken(self) -> tuple[Step, ...]:
         """The steps up to the one that is shown."""
         return self.steps[: self.at + 1]
 
     # what is open
+
+    def open(self, number: int) -> None:
+        """Open one of what is offered."""
+
+        def job() -> None:
+            with self._long(f"reading {self.offers[number]}"):
+                self.campaign = load_campaign(self.offers[number], self.effects)
+                self.said = ""
+                self.begin()
+
+        if self.campaign is None and 0 <= number < len(self.offers):
+            self.worker("", job)
 
     def begin(self, keep: bool = True) -> None:
         """Fit the base model, or go on where the same campaign was left.
@@ -133,7 +149,7 @@ class Session(param.Parameterized):
         assert self._journal is not None
         try:
             rows, fits, more = self._journal.read()
-            self.diagnosis = self._journal.diagnosed()
+            self.diagnosis = self._journal.diagnosed() or self.diagnosis
         except (StickslipError, OSError, KeyError, ValueError, TypeError) as error:
             self.said = f"what was open before cannot be shown again ({error}); it begins anew"
             return False
@@ -195,7 +211,7 @@ class Session(param.Parameterized):
 
     def _show(self, at: int) -> None:
         self.at = max(min(at, len(self.steps) - 1), min(0, len(self.steps) - 1))
-        self.worker("judge", self._judge, STILL)
+        self.worker("keep", self.keep, STILL)
 
     def first(self, fit: Fit) -> None:
         """Begin the history with the base model."""
@@ -227,16 +243,7 @@ class Session(param.Parameterized):
             made = Step(text, fit.with_values(values), f"fit = fit.with_values({dict(every)!r})", "", every)
             self.take(made, over)
             self.said = ""
-        self.worker("judge", self._judge, STILL)
-
-    def _judge(self) -> None:
-        """What takes longer than a hand would wait, of the model as it stands."""
-        fit = self.fit
-        if fit is not None and not judged(fit):
-            with self._told():
-                fit.unseen_errors, fit.ladder  # noqa: B018
-                self.judged += 1
-        self.keep()
+        self.worker("keep", self.keep, STILL)
 
     def refit(self) -> None:
         """Fitted anew, locked parameters as they are."""
@@ -304,7 +311,7 @@ class Session(param.Parameterized):
 
     def list_promises(self) -> None:
         """Look at every effect on top of the model as it stands, in a process beside."""
-        fit = next((s.fit for s in reversed(self.taken) if not s.fit.by_hand), None)
+        fit = self.fitted
         if fit is None:
             return
         if self._listing is not None:
@@ -421,11 +428,6 @@ class _Long:
         if isinstance(error, Exception):
             self._session.said = f"a fault of the program, the model is as it was: {type(error).__name__}: {error}"
         return False
-
-
-def judged(fit: Fit) -> bool:
-    """Whether the error on unseen runs is known already, or has to be found (which takes as long as a redraw)."""
-    return "unseen_errors" in vars(fit)
 
 
 def _complete(fit: Fit) -> Fit:

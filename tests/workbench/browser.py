@@ -82,14 +82,15 @@ class Browser:
         """Go to another page."""
         self.wait(
             lambda: self.js(
-                "const t = seen('.bk-tab').find((e) => e.textContent.includes(arguments[0])); if (t) t.click(); return !!t",
+                "const t = seen('.bk-tab').find((e) => e.textContent.includes(arguments[0]));"
+                "if (t) t.click(); return !!t",
                 page,
             ),
             60,
         )
 
     def js(self, code: str, *arguments: Any) -> Any:
-        """Run JavaScript that knows ``all`` and ``seen`` (which look into shadow roots) and ``named`` (Bokeh models)."""
+        """Run JavaScript that knows ``all`` and ``seen`` (they look into shadow roots) and ``named``, a Bokeh model."""
         return self.driver.execute_script(DEEP + code, *arguments)
 
     def text(self, selector: str) -> str:
@@ -123,10 +124,12 @@ class Browser:
 
     def idle(self, seconds: float = 120.0) -> None:
         """Until no fit is going on and there is a model."""
-        self.wait(
-            lambda: self.text(".errors") and self.js("return seen('.bar').length == 0") and "..." not in self.text(".errors"),
-            seconds,
-        )  # fmt: skip
+
+        def still() -> bool:
+            errors = self.text(".errors")
+            return bool(errors) and "..." not in errors and bool(self.js("return seen('.bar').length == 0"))
+
+        self.wait(still, seconds)
 
     def unseen_error(self) -> float:
         """As the head of the window says."""
