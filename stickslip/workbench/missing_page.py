@@ -200,7 +200,9 @@ def _verdict(diagnosis: Any) -> str:
     lines = [f"<b>{escape(str(told['kind']))}</b>: {escape(str(told['text']))}"]
     if proposed is not None:
         lines.append(f"<b>next experiment</b>: {escape(str(proposed['text']))}")
-    return f'<div style="{CARD} color: var(--wb-text); font-size: 14px">' + "<br>".join(lines) + "</div>"
+    return (
+        f'<div class="verdict" style="{CARD} color: var(--wb-text); font-size: 14px">' + "<br>".join(lines) + "</div>"
+    )
 
 
 class _Ladder:

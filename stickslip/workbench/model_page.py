@@ -228,6 +228,7 @@ class _Heat:
             margin=(0, 0, 0, 70),
         )
         self._data = source(run=[], phase=[], error=[], text=[], colour=[], ink=[])
+        self._data.name = "heat"
         self.figure = figure("error in floors; a click shows the worst cycle", height=264,
                              x_range=["all"], y_range=["all"], output_backend=FEW)  # fmt: skip
         self.figure.rect(
@@ -238,6 +239,7 @@ class _Heat:
             text_font_size="12px", source=self._data,
         )  # fmt: skip
         self.figure.add_tools(HoverTool(tooltips=[("run", "@run"), ("phase", "@phase"), ("error", "@text floors")]))
+        self.figure.name = "heat figure"
         self.figure.grid.grid_line_color = None
         self.figure.xaxis.major_label_orientation = 0.6
         self.figure.toolbar_location = None
