@@ -15,6 +15,7 @@ from .controls import BUTTON, Frame, Message
 from .figures import dark, look
 from .selection import follow
 from .session import Session, watch
+from .watching import Place, placed
 
 PAGES = ("data_page", "model_page", "missing_page", "simulate_page", "keep_page")
 STYLE = """
@@ -84,10 +85,16 @@ def tabs(session: Session) -> pn.Tabs:
     if pn.state.location is not None:
         pn.state.location.sync(made, {"active": "page"})
 
+    seen = [Place() for _ in every]
+
     def show(*events: Any) -> None:
-        place = places[made.active]
-        if not place.objects:
-            place.append(_made(every[made.active], session))
+        for i, place in enumerate(seen):
+            if i != made.active:
+                place.hide()
+        seen[made.active].show()
+        if not places[made.active].objects:
+            with placed(seen[made.active]):
+                places[made.active].append(_made(every[made.active], session))
 
     show()
     made.param.watch(show, "active")

@@ -18,6 +18,7 @@ from .session import Session, watch
 
 TITLE = "What is missing"
 WORDS = {"age": "time in contact", "place": "displacement", "event": "number of the event"}
+MANY = 4  # models of a ladder, above which their names are written aslant
 FOLDED = ("age", "velocity")  # variables whose small values matter as much as their large ones
 CARD = "background: var(--wb-surface); border: 1px solid var(--wb-line); border-radius: 4px; padding: 8px 12px;"
 
@@ -249,6 +250,7 @@ class _Ladder:
             "step": steps,
         }  # fmt: skip
         self.figure.xaxis.ticker = FixedTicker(ticks=at)
+        self.figure.xaxis.major_label_orientation = 0.3 if len(at) > MANY else 0.0
         self.figure.xaxis.major_label_overrides = {
             i: f"+ {step}" if not step.startswith("without") else step for i, step in zip(at, steps, strict=True)
         }

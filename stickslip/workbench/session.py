@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -22,10 +21,14 @@ from ..objects import Campaign, Diagnosis, Fit, load_campaign
 from ..progress import Cancelled
 from . import searches
 from .journal import Journal
+from .watching import watch
 from .work import Search, Worker, at_once
+
+__all__ = ["BASE", "HAND", "Session", "Step", "watch"]
 
 BASE = "the base model"
 HAND = "by hand"
+MOST = 60  # steps that are kept
 STILL = 0.25  # s without a move, after which a model that was moved is kept
 
 
@@ -191,7 +194,7 @@ class Session(param.Parameterized):
             step: what was done.
             over: take the place of the last step instead, as a slider does while it is being dragged.
         """
-        kept = self.taken[:-1] if over and self.taken else self.taken
+        kept = _fewer(self.taken[:-1] if over and self.taken else self.taken)
         with param.parameterized.batch_call_watchers(self):
             self.steps = (*kept, step)
             self.at = len(self.steps) - 1
@@ -392,6 +395,7 @@ class Session(param.Parameterized):
                         with self._long(f"fitting with the new {tag}"):
                             fit = fit.remove(tag).add(tag)
                             self.take(Step(f"new {tag}", fit, f"fit = fit.remove({tag!r}).add({tag!r})"))
+                self._promised = []
                 self.loaded += 1
 
         self.worker("", job)
@@ -430,39 +434,15 @@ class _Long:
         return False
 
 
+def _fewer(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+    """The steps, without the first of those by hand where they are too many: each holds a model of some 10 MB."""
+    drop = len(steps) - MOST
+    first = [i for i, step in enumerate(steps) if step.changed][: max(drop, 0)]
+    return tuple(step for i, step in enumerate(steps) if i not in first)
+
+
 def _complete(fit: Fit) -> Fit:
     """The fit with all that pages ask for, found while the bar still runs."""
     for name in ("force", "errors", "unseen_errors", "ladder", "backbone", "std"):
         getattr(fit, name)
     return fit
-
-
-def watch(session: Session, names: Sequence[str], call: Callable[[], Any]) -> None:
-    """Call a function whenever some of these parameters of a session change.
-
-    In a window it is called in its document, once for all changes since the last call; else at once.
-    """
-    import panel as pn
-
-    doc = pn.state.curdoc
-    if doc is None or doc.session_context is None:
-        session.param.watch(lambda *events: call(), list(names))
-        return
-    waiting = threading.Event()
-
-    def run() -> None:
-        waiting.clear()
-        call()
-
-    def changed(*events: Any) -> None:
-        if not waiting.is_set():
-            waiting.set()
-            doc.add_next_tick_callback(run)
-
-    watcher = session.param.watch(changed, list(names))
-
-    def gone(context: Any) -> None:
-        with suppress(Exception):
-            session.param.unwatch(watcher)
-
-    doc.on_session_destroyed(gone)

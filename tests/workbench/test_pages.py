@@ -15,6 +15,7 @@ from stickslip.workbench.figures import DARK, LIGHT
 from stickslip.workbench.knobs import knobs
 from stickslip.workbench.knobs import rows as knob_rows
 from stickslip.workbench.session import Session
+from stickslip.workbench.watching import Place
 
 LISTED = ("contact-ageing", "drive-ripple", "sensor-drift", "viscous-drag")
 
@@ -153,3 +154,40 @@ def test_text_can_be_read_on_what_is_behind_it(theme):
         assert contrast(theme.soft, behind) > 4.5
         assert contrast(theme.accent, behind) > 4.5
         assert min(contrast(c, behind) for c in (*theme.runs, theme.model, theme.measured)) > 2.2
+
+
+def test_a_page_behind_another_follows_when_it_is_seen():
+    done: list[str] = []
+    place = Place()
+
+    def update():
+        done.append("update")
+
+    place.call(update)
+    place.hide()
+    place.call(update)
+    place.call(update)
+    assert len(done) == 1
+    place.show()
+    assert len(done) == 2
+    place.show()
+    assert len(done) == 2
+
+
+def test_a_notebook_shows_the_same_pages(campaign, base, monkeypatch):
+    import panel
+
+    import stickslip as ss
+
+    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+    monkeypatch.setattr(Session, "list_promises", lambda self: None)
+    shown = ss.workbench(campaign)
+    assert isinstance(shown, panel.Column)
+
+
+def test_of_many_steps_the_first_by_hand_are_forgotten(session, base, monkeypatch):
+    monkeypatch.setattr("stickslip.workbench.session.MOST", 3)
+    for share in (1.01, 1.02, 1.03, 1.04, 1.05):
+        session.by_hand({"weakening.drop": base.values["weakening.drop"] * share})
+    assert len(session.steps) == 4 and session.steps[0].fit is base
+    assert session.fit.values["weakening.drop"] == pytest.approx(1.05 * base.values["weakening.drop"])
