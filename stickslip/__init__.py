@@ -27,6 +27,7 @@ _PUBLIC = {
     "study": "objects.study",
     "Fit": "objects",
     "Diagnosis": "objects",
+    "workbench": "workbench",
     "Trace": "trace",
     "find_events": "segment:segment",
     "Model": "model",
@@ -50,7 +51,8 @@ def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'stickslip' has no attribute '{name}'")
     module, _, attribute = _PUBLIC[name].partition(":")
-    value = getattr(importlib.import_module(f"{__name__}.{module}"), attribute or name)
+    found = importlib.import_module(f"{__name__}.{module}")
+    value = found if name == module else getattr(found, attribute or name)
     globals()[name] = value
     return value
 

@@ -6,6 +6,9 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
+
+from .errors import StickslipError
 
 PATIENCE = 1.0  # s before anything is shown
 LEAST = 0.05  # share of a stage that tells how long the rest takes
@@ -97,3 +100,31 @@ def _lines(title: str) -> Tell:
         print(f"{title}: {text} ({spent:.0f} s{left})", file=sys.stderr, flush=True)
 
     return tell
+
+
+class Cancelled(StickslipError):
+    """Long work was told to end."""
+
+
+_asked: ContextVar[Callable[[], bool] | None] = ContextVar("asked", default=None)
+
+
+@contextmanager
+def cancellable(asked: Callable[[], bool]) -> Iterator[None]:
+    """Within it :func:`breathe` raises :class:`Cancelled` once ``asked`` is true."""
+    before = _asked.set(asked)
+    try:
+        yield
+    finally:
+        _asked.reset(before)
+
+
+def breathe() -> None:
+    """Called between the steps of long work, which ends here if that was asked for.
+
+    Raises:
+        Cancelled: it was.
+    """
+    asked = _asked.get()
+    if asked is not None and asked():
+        raise Cancelled("cancelled")

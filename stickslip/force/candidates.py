@@ -233,7 +233,7 @@ def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]
     spec = specs(effect)[name]
     if getattr(effect, "form", None) == "trend":
         return _plain(base, explained, effect, form)
-    frequencies = _frequencies(base, variable, spec, name)
+    frequencies = resolved(base, variable, spec, name)
     if frequencies.size == 0:
         return Candidate(effect.tag, form, 0.0, None, "the records are too short for a period")
     values = frequencies if name == "frequency" else 1.0 / frequencies
@@ -263,7 +263,7 @@ def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]
     return Candidate(effect.tag, form, best, found, "", int(values.size), 5.0 * float(np.mean(seen)), start)
 
 
-def _frequencies(base: Fit, variable: str, spec: Spec, name: str) -> Array:
+def resolved(base: Fit, variable: str, spec: Spec, name: str) -> Array:
     """Frequencies that the records resolve, within the bounds of the parameter."""
     runs = base.problem.runs
     way = {"time": "t", "load point": "drive", "displacement": "x"}[variable]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from scipy.sparse import dia_array
 
 from ..errors import FitError
 from ..fit.parameters import Free
+from ..progress import breathe
 from .bank import placed, spacing
 from .problem import PULL, Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, covariance, estimate, misfit
@@ -41,9 +43,6 @@ class Fit:
         dropped: points left out, for they lie beyond what else is random (a jump of the sensor), shape (p,).
         known: what the covariance is made of.
         blocks: points by event.
-        likelihood: twice the negative logarithm of the marginal likelihood of each event, shape (E,).
-        prior: of the shared parameters (chi-square).
-        covariance: of shared parameters, phases and weights, events marginalised.
         strength: force of the contact at full strength (N).
         evaluations: of the model.
     """
@@ -55,11 +54,29 @@ class Fit:
     dropped: NDArray[np.bool_]
     known: Known
     blocks: Blocks
-    likelihood: Array
-    prior: float
-    covariance: Array
     strength: float
     evaluations: int
+
+    @cached_property
+    def _judged(self) -> tuple[Array, float, Array]:
+        """Found when asked for: a model that a hand moves is drawn, and judged when it stands still."""
+        system = _System(self.problem, self.point, self.slopes, self.scatter, self.known, self.blocks)
+        return system.likelihood(), float((system.target**2).sum()), system.covariance()
+
+    @property
+    def likelihood(self) -> Array:
+        """Twice the negative logarithm of the marginal likelihood of each event, shape (E,)."""
+        return self._judged[0]
+
+    @property
+    def prior(self) -> float:
+        """Of the shared parameters (chi-square)."""
+        return self._judged[1]
+
+    @property
+    def covariance(self) -> Array:
+        """Of shared parameters, phases and weights, events marginalised."""
+        return self._judged[2]
 
     @property
     def cost(self) -> float:
@@ -374,6 +391,7 @@ def descend(
     """
     total, count = 0.0, 0
     for _ in range(most):
+        breathe()
         system = _System(problem, point, slopes, scatter, known, blocks)
         now = system.objective(point, slopes)
         change, events = system.step()
@@ -407,11 +425,9 @@ def _found(
     evaluations: int,
 ) -> Fit:  # fmt: skip
     blocks = Blocks.of(problem.of, problem.events)
-    system = _System(problem, point, slopes, scatter, known, blocks)
     return Fit(
         problem, point, slopes, scatter, dropped, known.with_local(blocks(slopes.local)), blocks,
-        system.likelihood(), float((system.target**2).sum()), system.covariance(), float(point.weights.sum()),
-        evaluations,
+        float(point.weights.sum()), evaluations,
     )  # fmt: skip
 
 

@@ -140,7 +140,8 @@ class Explained:
         free = (low < 0.0) & (high > 0.0)
         prior, target = prior_rows(fit.problem, fit.point)
         self.extra = len(prior)
-        self.basis, _ = np.linalg.qr(np.vstack([rows[:, free], prior[:, free]]))
+        self.basis, self._corner = np.linalg.qr(np.vstack([rows[:, free], prior[:, free]]))
+        self._shared = fit.slopes.shared[:, free]
         rest = np.concatenate([self._white(fit.marginal[:, None])[:, 0], target])
         self.rest = rest - self.basis @ (self.basis.T @ rest)
         e, n = fit.blocks.index.shape
@@ -154,6 +155,12 @@ class Explained:
         """Columns (p, m) whitened and freed of what the model can do itself."""
         white = np.vstack([self._white(columns), np.zeros((self.extra, columns.shape[1]))])
         return white - self.basis @ (self.basis.T @ white)
+
+    def left(self, columns: Array) -> Array:
+        """Forces (p, m) less what the model's own parameters would take of them (N)."""
+        white = np.vstack([self._white(columns), np.zeros((self.extra, columns.shape[1]))])
+        own, *_ = np.linalg.lstsq(self._corner, self.basis.T @ white, rcond=1e-10)
+        return columns - self._shared @ own
 
     def gain(self, columns: Array) -> tuple[float, Array]:
         """Fall of the cost (chi-square) with the columns, and their coefficients."""

@@ -38,12 +38,14 @@ class Diagnosis(Shown):
 
     Attributes:
         campaign: what was diagnosed.
-        found: the search and where it ended.
+        found: the search and where it ended; None where only its result was kept.
         result: plain data, as in ``result.json``.
         variables: arrays behind the pictures, as ``(dimension, values, attributes)``.
     """
 
-    def __init__(self, campaign: Campaign, found: Found, result: dict[str, Any], variables: dict[str, Any]) -> None:
+    def __init__(
+        self, campaign: Campaign, found: Found | None, result: dict[str, Any], variables: dict[str, Any]
+    ) -> None:
         self.campaign, self.found, self.result, self.variables = campaign, found, result, variables
 
     @property
@@ -59,7 +61,13 @@ class Diagnosis(Shown):
 
     @property
     def best(self) -> Fit:
-        """The last model."""
+        """The last model.
+
+        Raises:
+            InputError: only the result of the diagnosis was kept.
+        """
+        if self.found is None:
+            raise InputError("of this diagnosis only the result was kept, not its models")
         gains = {tag: done.close[0].gain for tag, done in self.found.named.items() if done.close}
         made = Fit(self.campaign, Climbed(self.found.prepared, self.found.ladder, gains))
         made._confirmation = self.found.confirmation

@@ -57,24 +57,34 @@ class Fit(Shown):
     Args:
         campaign: what was fitted.
         climbed: the models, the last of which is the model as it stands.
-        by_hand: whether parameters were set by hand after the last fit.
+        moved: the last model with parameters set by hand after its fit; None as it was fitted.
 
     Attributes:
-        campaign, climbed, by_hand: as given.
+        campaign: as given.
         plot: pictures.
     """
 
-    def __init__(self, campaign: Campaign, climbed: Climbed, by_hand: bool = False) -> None:
-        self.campaign, self.climbed, self.by_hand = campaign, climbed, by_hand
+    def __init__(self, campaign: Campaign, climbed: Climbed, moved: ForceFit | None = None) -> None:
+        self.campaign, self._climbed, self._moved = campaign, climbed, moved
         self.plot = FitPlots(self)
         self._confirmation: Confirmation | None = None
 
     # what it is
 
     @property
+    def by_hand(self) -> bool:
+        """Whether parameters were set by hand after the last fit."""
+        return self._moved is not None
+
+    @cached_property
+    def climbed(self) -> Climbed:
+        """The models on the way here, the last of which is the model as it stands."""
+        return self._climbed if self._moved is None else replaced(self._climbed, self._moved)
+
+    @property
     def parts(self) -> tuple[str, ...]:
         """Tags of what is in the model."""
-        return self.climbed.ladder[-1].model
+        return self._climbed.ladder[-1].model
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -139,7 +149,7 @@ class Fit(Shown):
         import xarray
 
         found, problem = self._fit, self._fit.problem
-        where = coordinates(found)
+        where = self._where
         names = np.array([k.name for k in problem.runs])
         coords: dict[str, Any] = {
             "run": ("point", names[problem.run]),
@@ -247,7 +257,10 @@ class Fit(Shown):
             z[known[name]] = f.inward(number)
         found = self._fit
         moved = at(found.problem, replace(found.point, z=z, weights=weights), found.scatter, found.dropped, found.known)
-        return Fit(self.campaign, replaced(self.climbed, moved), by_hand=True)
+        made = Fit(self.campaign, self._climbed, moved)
+        if "rig.spring_stiffness" not in values:
+            made.__dict__["_where"] = self._where
+        return made
 
     def refit(self, locked: Sequence[str] = ()) -> Fit:
         """Fitted anew from where it stands.
@@ -453,8 +466,13 @@ class Fit(Shown):
         return save(self, folder, force, **more)
 
     @property
+    def force_fit(self) -> ForceFit:
+        """The numbers behind it: an optimum, or where parameters were set by hand."""
+        return self._fit
+
+    @property
     def _fit(self) -> ForceFit:
-        return self.climbed.fit
+        return self._climbed.fit if self._moved is None else self._moved
 
     @property
     def _contacts(self) -> int:
@@ -463,6 +481,10 @@ class Fit(Shown):
     @property
     def _first_weight(self) -> int:
         return len(self.free) + self._fit.point.phases.size
+
+    @cached_property
+    def _where(self) -> dict[str, np.ndarray]:
+        return coordinates(self._fit)
 
     @cached_property
     def _floor(self) -> np.ndarray:

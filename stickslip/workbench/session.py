@@ -1,20 +1,35 @@
 """What is open in a workbench: the campaign, the model as it stands, the steps that led to it, what is selected.
 
-Pages watch its parameters and call its methods; none of them changes another page.
+Pages watch its parameters and call its methods; none of them changes another page. All windows of a server share one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import param
 
+from ..conformance import load_effects
 from ..errors import StickslipError
-from ..objects import Campaign, Fit
+from ..force.promise import Promise
+from ..objects import Campaign, Diagnosis, Fit, load_campaign
+from ..progress import Cancelled
+from . import searches
+from .journal import Journal
+from .watching import watch
+from .work import Search, Worker, at_once
+
+__all__ = ["BASE", "HAND", "Session", "Step", "watch"]
 
 BASE = "the base model"
+HAND = "by hand"
+MOST = 60  # steps that are kept
+STILL = 0.25  # s without a move, after which a model that was moved is kept
 
 
 @dataclass(frozen=True)
@@ -26,27 +41,35 @@ class Step:
         fit: the model after it.
         code: the line of Python that does the same.
         command: the command that does the same, or "" where there is none.
+        changed: parameters that were set by hand in it, with their values (SI).
     """
 
     text: str
     fit: Fit
     code: str
     command: str = ""
+    changed: Mapping[str, float | str] = field(default_factory=dict)
 
 
 class Session(param.Parameterized):
     """The state of one workbench.
 
     Attributes:
-        campaign: what is open.
+        campaign: what is open; None until one of ``offers`` (paths of campaign files) was chosen.
         steps, at: the history, and the number of the step that is shown (undo goes back, redo forth).
         diagnosis: of the present campaign, or None.
         run, event: what is selected: name of a run, number of a cycle in it.
         busy, share: what long work is going on ("" for none), and how much of it is done.
+        searching, searched: the same of the diagnosis, which goes on beside all else.
         said: what the user must read: an error in words or a note ("" for nothing).
+        locked: names of parameters that a fit leaves as they are.
+        promises: what every effect promises on top of the model as it stands; ``listed`` is how many were looked at.
+        effects: Python files with effects of one's own; ``loaded`` counts how often they were.
+        worker: does what takes longer than a hand would wait; the same thread unless a server gives another.
     """
 
     campaign = param.ClassSelector(class_=Campaign)
+    offers = param.Parameter(())
     steps = param.Parameter(())
     at = param.Integer(-1)
     diagnosis = param.Parameter(None)
@@ -54,8 +77,26 @@ class Session(param.Parameterized):
     event = param.Integer(0)
     busy = param.String("")
     share = param.Number(0.0)
+    searching = param.String("")
+    searched = param.Number(0.0)
     said = param.String("")
     locked = param.Parameter(frozenset())
+    promises = param.Parameter(())
+    listed = param.Number(1.0)
+    effects = param.Parameter(())
+    loaded = param.Integer(0)
+    worker = param.Parameter(at_once)
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        self._journal: Journal | None = None
+        self._search: Search | None = None
+        self._listing: Search | None = None
+        self._moves: dict[str, float | str] = {}
+        self._guard = threading.Lock()
+        self._kept: tuple[Any, ...] = ()
+        self._anew = False
+        self._promised: list[tuple[Fit, tuple[Promise, ...]]] = []
 
     @property
     def fit(self) -> Fit | None:
@@ -63,9 +104,88 @@ class Session(param.Parameterized):
         return self.steps[self.at].fit if 0 <= self.at < len(self.steps) else None
 
     @property
+    def fitted(self) -> Fit | None:
+        """The same before parameters were set by hand: what errors on unseen runs and deviations belong to."""
+        return next((s.fit for s in reversed(self.taken) if not s.fit.by_hand), None)
+
+    @property
     def taken(self) -> tuple[Step, ...]:
         """The steps up to the one that is shown."""
         return self.steps[: self.at + 1]
+
+    # what is open
+
+    def open(self, number: int) -> None:
+        """Open one of what is offered."""
+
+        def job() -> None:
+            with self._long(f"reading {self.offers[number]}"):
+                self.campaign = load_campaign(self.offers[number], self.effects)
+                self.said = ""
+                self.begin()
+
+        if self.campaign is None and 0 <= number < len(self.offers):
+            self.worker("", job)
+
+    def begin(self, keep: bool = True) -> None:
+        """Fit the base model, or go on where the same campaign was left.
+
+        Args:
+            keep: keep the history beside the campaign's file.
+        """
+        campaign = self.campaign
+        assert campaign is not None
+        if keep and campaign.description.filed:
+            self._journal = Journal(campaign)
+        self.worker("", partial(self._begin, campaign))
+
+    def _begin(self, campaign: Campaign) -> None:
+        with self._long("looking at the data"):
+            if self._journal is not None and self._again():
+                return
+            self.busy = "fitting the base model"
+            self.first(_complete(campaign.fit()))
+            self.keep()
+
+    def _again(self) -> bool:
+        """Where it was left; whether there was anything."""
+        assert self._journal is not None
+        try:
+            rows, fits, more = self._journal.read()
+            self.diagnosis = self._journal.diagnosed() or self.diagnosis
+        except (StickslipError, OSError, KeyError, ValueError, TypeError) as error:
+            self.said = f"what was open before cannot be shown again ({error}); it begins anew"
+            return False
+        if not rows:
+            return False
+        _complete(fits[-1])
+        steps = [Step(**row, fit=fit) for row, fit in zip(rows, fits, strict=True)]
+        with param.parameterized.batch_call_watchers(self):
+            self.steps = tuple(steps)
+            self.at = min(int(more.get("at", len(steps) - 1)), len(steps) - 1)
+            self.locked = frozenset(more.get("locked", ()))
+            self.run, self.event = str(more.get("run", "")), int(more.get("event", 0))
+        return True
+
+    def keep(self) -> None:
+        """Write the history beside the campaign, if it changed."""
+        now = (self.steps, self.at, self.run, self.event, self.locked)
+        if self._journal is None or now == self._kept:
+            return
+        self._kept = now
+        rows = [{"text": s.text, "code": s.code, "command": s.command, "changed": dict(s.changed)} for s in self.steps]
+        more = {"at": self.at, "run": self.run, "event": self.event, "locked": sorted(self.locked)}
+        try:
+            self._journal.write(rows, [s.fit for s in self.steps], more)
+        except OSError as error:
+            self._journal = None
+            self.said = f"the history cannot be kept beside the campaign ({error.strerror or error})"
+
+    def later(self) -> None:
+        """Keep what is selected when nothing else is to be done."""
+        self.worker("keep", self.keep, STILL)
+
+    # steps
 
     def take(self, step: Step, over: bool = False) -> None:
         """Put a step behind the one that is shown; what came after it is forgotten.
@@ -74,7 +194,7 @@ class Session(param.Parameterized):
             step: what was done.
             over: take the place of the last step instead, as a slider does while it is being dragged.
         """
-        kept = self.taken[:-1] if over and self.taken else self.taken
+        kept = _fewer(self.taken[:-1] if over and self.taken else self.taken)
         with param.parameterized.batch_call_watchers(self):
             self.steps = (*kept, step)
             self.at = len(self.steps) - 1
@@ -82,63 +202,247 @@ class Session(param.Parameterized):
 
     def undo(self) -> None:
         """Show the step before."""
-        self.at = max(self.at - 1, min(0, len(self.steps) - 1))
+        self._show(self.at - 1)
 
     def redo(self) -> None:
         """Show the step after."""
-        self.at = min(self.at + 1, len(self.steps) - 1)
+        self._show(self.at + 1)
+
+    def back(self) -> None:
+        """Show the base model again; the steps after it can be had again."""
+        self._show(0)
+
+    def _show(self, at: int) -> None:
+        self.at = max(min(at, len(self.steps) - 1), min(0, len(self.steps) - 1))
+        self.worker("keep", self.keep, STILL)
 
     def first(self, fit: Fit) -> None:
         """Begin the history with the base model."""
         self.take(Step(BASE, fit, "fit = campaign.fit()", "stickslip fit campaign.toml"))
 
-    def by_hand(self, values: dict[str, float | str], over: bool = False) -> None:
-        """Parameters set by hand."""
+    def by_hand(self, values: Mapping[str, float | str], over: bool = False) -> None:
+        """Parameters set by hand.
+
+        Args:
+            values: name -> value in SI, or text with a unit.
+            over: in place of the last step, if that was done by hand too.
+        """
+        with self._guard:
+            self._moves.update(values)
+            self._anew |= not over
+        self.worker("hand", self._move)
+
+    def _move(self) -> None:
+        with self._guard:
+            values, self._moves = self._moves, {}
+            over, self._anew = not self._anew, False
         fit = self.fit
-        if fit is None:
+        if fit is None or not values:
             return
-        self._try(
-            lambda: Step(
-                f"by hand: {', '.join(values)}", fit.with_values(values), f"fit = fit.with_values({values!r})"
-            ),
-            over,
-        )
+        over = over and bool(self.taken) and bool(self.taken[-1].changed)
+        every = {**(self.taken[-1].changed if over else {}), **values}
+        with self._told():
+            text = f"{HAND}: {', '.join(n.rpartition('.')[2].replace('_', ' ') for n in every)}"
+            made = Step(text, fit.with_values(values), f"fit = fit.with_values({dict(every)!r})", "", every)
+            self.take(made, over)
+            self.said = ""
+        self.worker("keep", self.keep, STILL)
 
     def refit(self) -> None:
         """Fitted anew, locked parameters as they are."""
-        fit, locked = self.fit, sorted(self.locked)
-        if fit is not None:
-            self._try(lambda: Step("fit", fit.refit(locked), f"fit = fit.refit({locked!r})"))
+        locked = sorted(self.locked)
+        self._change(
+            "fitting", lambda fit: fit.refit([n for n in locked if n in fit.values]), "fit",
+            f"fit = fit.refit({locked!r})",
+        )  # fmt: skip
 
     def add(self, effect: str) -> None:
         """An effect more, fitted."""
-        fit = self.fit
-        if fit is not None:
-            command = "stickslip fit campaign.toml " + " ".join(f"--add {e}" for e in (*fit.effects, effect))
-            self._try(lambda: Step(f"with {effect}", fit.add(effect), f"fit = fit.add({effect!r})", command))
+
+        def command(fit: Fit) -> str:
+            every = (*fit.effects, effect)
+            return "stickslip fit campaign.toml " + " ".join(f"--add {e}" for e in every)
+
+        self._change(
+            f"fitting with {effect}", lambda fit: fit.add(effect), f"with {effect}", f"fit = fit.add({effect!r})",
+            command,
+        )  # fmt: skip
 
     def remove(self, effect: str) -> None:
         """An effect less, fitted anew."""
-        fit = self.fit
-        if fit is not None:
-            self._try(lambda: Step(f"without {effect}", fit.remove(effect), f"fit = fit.remove({effect!r})"))
+        self._change(
+            f"fitting without {effect}", lambda fit: fit.remove(effect), f"without {effect}",
+            f"fit = fit.remove({effect!r})",
+        )  # fmt: skip
+
+    def _change(
+        self, busy: str, make: Callable[[Fit], Fit], text: str, code: str,
+        command: Callable[[Fit], str] = lambda fit: "",
+    ) -> None:  # fmt: skip
+        def job() -> None:
+            fit = self.fit
+            if fit is None:
+                return
+            with self._long(busy):
+                made = make(fit)
+                _complete(made)
+                self.take(Step(text, made, code, command(fit)))
+                self.said = ""
+            self.keep()
+
+        self.worker("", job)
+
+    def lock(self, name: str, on: bool) -> None:
+        """Leave a parameter as it is in the next fit, or not."""
+        self.locked = self.locked | {name} if on else self.locked - {name}
+        self.later()
+
+    def cancel(self) -> None:
+        """End the fit that is going on."""
+        if isinstance(self.worker, Worker):
+            self.worker.cancel()
 
     def code(self) -> str:
         """The lines of Python that lead to the model as it stands."""
         assert self.campaign is not None
         path = self.campaign.description.path.name
-        first: Sequence[str] = ("import stickslip as ss", f"campaign = ss.load_campaign({path!r})")
+        own = f", effects={[p.name for p in self.effects]!r}" if self.effects else ""
+        first: Sequence[str] = ("import stickslip as ss", f"campaign = ss.load_campaign({path!r}{own})")
         return "\n".join([*first, *(s.code for s in self.taken)])
 
-    def _try(self, make: Callable[[], Step], over: bool = False) -> None:
-        """Take the step, or say why it cannot be taken."""
-        try:
-            self.take(make(), over)
-            self.said = ""
-        except StickslipError as error:
-            self.said = str(error)
+    # what is missing
+
+    def list_promises(self) -> None:
+        """Look at every effect on top of the model as it stands, in a process beside."""
+        fit = self.fitted
+        if fit is None:
+            return
+        if self._listing is not None:
+            self._listing.cancel()
+            self._listing = None
+        for known, found_before in self._promised:
+            if known is fit:
+                self.param.update(promises=found_before, listed=1.0)
+                return
+        self.param.update(promises=(), listed=0.0)
+        own: list[Search] = []
+
+        def current() -> bool:
+            return bool(own) and self._listing is own[0]
+
+        def found(part: Sequence[Promise], share: float) -> None:
+            if current():
+                self.param.update(promises=(*self.promises, *part), listed=share)
+                if share >= 1.0:
+                    self._promised = [*self._promised[-7:], (fit, self.promises)]
+
+        def failed(text: str) -> None:
+            if current():
+                self.listed, self.said = 1.0, f"the effects could not be looked at: {text}"
+
+        own.append(searches.promises(fit, self.effects, found, failed))
+        self._listing = own[0]
+
+    def diagnose(self) -> None:
+        """The whole search, in a process of its own; finished pieces are kept and used again."""
+        if self.searching or self.campaign is None:
+            return
+        self.searching, self.searched = "beginning", 0.0
+
+        def tell(text: str, share: float) -> None:
+            with param.parameterized.batch_call_watchers(self):
+                self.searching, self.searched = text.splitlines()[0], share
+
+        def done(found: Diagnosis) -> None:
+            self._search = None
+            with param.parameterized.batch_call_watchers(self):
+                self.diagnosis, self.searching = found, ""
+
+        def failed(text: str) -> None:
+            self._search = None
+            with param.parameterized.batch_call_watchers(self):
+                self.searching, self.said = "", f"the diagnosis ended: {text}"
+
+        out = None if self._journal is None else self._journal.diagnosis
+        self._search = searches.diagnosis(self.campaign, self.effects, out, tell, done, failed)
+
+    def stop(self) -> None:
+        """End the diagnosis; what it has finished is used when it is begun again."""
+        if self._search is not None:
+            self._search.cancel()
+            self._search = None
+        self.searching = ""
+
+    def close(self) -> None:
+        """End all that goes on beside."""
+        self.stop()
+        if self._listing is not None:
+            self._listing.cancel()
+
+    # effects of one's own
+
+    def reload(self, path: Path) -> None:
+        """A file with effects was saved: load it anew, and fit the model anew if it has one of them."""
+
+        def job() -> None:
+            with self._told():
+                classes = load_effects([path])
+                tags = [cls.tag for cls in classes]
+                self.said = f"{path.name} was loaded anew: {', '.join(tags)}"
+                fit = self.fit
+                for tag in tags:
+                    if fit is not None and tag in fit.effects:
+                        with self._long(f"fitting with the new {tag}"):
+                            fit = fit.remove(tag).add(tag)
+                            self.take(Step(f"new {tag}", fit, f"fit = fit.remove({tag!r}).add({tag!r})"))
+                self._promised = []
+                self.loaded += 1
+
+        self.worker("", job)
+
+    # how it is told
+
+    def _long(self, text: str) -> _Long:
+        return _Long(self, text)
+
+    def _told(self) -> _Long:
+        return _Long(self, "")
 
 
-def watch(session: Session, names: Sequence[str], call: Callable[[], Any]) -> None:
-    """Call a function whenever one of these parameters of a session changes, once a change."""
-    session.param.watch(lambda *events: call(), list(names))
+class _Long:
+    """While it lasts the session is busy; errors that are made on purpose are said, others go on."""
+
+    def __init__(self, session: Session, text: str) -> None:
+        self._session, self._text = session, text
+
+    def __enter__(self) -> None:
+        if self._text:
+            with param.parameterized.batch_call_watchers(self._session):
+                self._session.busy, self._session.share = self._text, 0.0
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> bool:
+        if self._text:
+            self._session.busy = ""
+        if isinstance(error, Cancelled):
+            self._session.said = "cancelled; the model is as it was"
+            return True
+        if isinstance(error, StickslipError):
+            self._session.said = str(error)
+            return True
+        if isinstance(error, Exception):
+            self._session.said = f"a fault of the program, the model is as it was: {type(error).__name__}: {error}"
+        return False
+
+
+def _fewer(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+    """The steps, without the first of those by hand where they are too many: each holds a model of some 10 MB."""
+    drop = len(steps) - MOST
+    first = [i for i, step in enumerate(steps) if step.changed][: max(drop, 0)]
+    return tuple(step for i, step in enumerate(steps) if i not in first)
+
+
+def _complete(fit: Fit) -> Fit:
+    """The fit with all that pages ask for, found while the bar still runs."""
+    for name in ("force", "errors", "unseen_errors", "ladder", "backbone", "std"):
+        getattr(fit, name)
+    return fit

@@ -1,0 +1,94 @@
+"""``stickslip open``: the workbench in the browser."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..errors import InputError
+
+NEEDED = ("panel", "bokeh", "watchfiles")
+LOOPBACK = "127.0.0.1"
+
+
+def open(
+    campaign: Path | None = None,
+    *,
+    port: int = 0,
+    browser: bool = True,
+    effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
+    address: str = LOOPBACK,
+) -> int:
+    """Open the workbench in the browser: compare, see where the model fails, add an effect, watch the error fall.
+
+    The server runs on this machine until Ctrl-C. Only those who have the printed address, with its random token, reach
+    it. What was done is kept in a folder .stickslip-workbench beside the campaign's file, and comes back when the same
+    campaign is opened again.
+
+    Parameters
+    ----------
+    campaign:
+        TOML file that describes the rig and its measured runs; or the run folder that a command made of one; or a
+        scenario, which is simulated first, into NAME-simulated in this folder. Default: a page to choose from what lies
+        in this folder.
+    port:
+        Of the server; 0 for any that is free.
+    browser:
+        Open the browser; --no-browser only prints the address.
+    effect:
+        A Python file with an effect of your own. Its code is run, and run again whenever the file is saved.
+    address:
+        Another address of this machine under which the server is reached, from other machines as well.
+    """
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"the workbench needs {', '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} not installed",
+            hint="pip install 'stickslip[workbench]'",
+        )
+    from ..workbench.opening import offered, opened
+    from ..workbench.serve import serve
+    from ..workbench.session import Session
+
+    def tell(url: str) -> None:
+        print(f"stickslip workbench: {url}", flush=True)
+
+    if campaign is None:
+        if effect:
+            raise InputError(
+                "an effect of your own is tried on a campaign", key="--effect", hint="name the campaign too"
+            )
+        session = Session(offers=tuple(offered(Path())))
+    else:
+        session = opened(_simulated(campaign) if _is_scenario(campaign) else campaign, effect)
+    if address != LOOPBACK:
+        print(f"stickslip: the workbench is reached from other machines under {address}", flush=True)
+    serve(session, port=port, address=address, browser=browser, tell=tell)
+    return 0
+
+
+def _is_scenario(path: Path) -> bool:
+    """Whether a file describes a rig to simulate, and no measured runs."""
+    from ..workbench.opening import is_campaign
+
+    if path.suffix != ".toml" or not path.is_file() or is_campaign(path):
+        return False
+    text = path.read_text(encoding="utf-8", errors="replace")
+    return any(line.strip() in ("[block]", "[drive]", "[contact]") for line in text.splitlines())
+
+
+def _simulated(scenario: Path) -> Path:
+    """The run folder with the measurement that a scenario gives; simulated only where it is not there yet."""
+    from ..runstore import RESULT, file_record, read_result
+    from .simulate import simulate
+
+    folder = Path(f"{scenario.stem}-simulated")
+    if (folder / RESULT).is_file():
+        known = {record.get("sha256") for record in read_result(folder).get("inputs", ())}
+        if file_record(scenario)["sha256"] in known:
+            return folder
+    simulate(str(scenario), out=folder, force=True)
+    return folder

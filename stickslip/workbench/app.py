@@ -1,0 +1,155 @@
+"""What one window shows: the head with what is going on, and the pages under it, each made when first looked at."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import logging
+from functools import partial
+from types import ModuleType
+from typing import Any
+
+import panel as pn
+
+from .controls import BUTTON, Frame, Message
+from .figures import dark, look
+from .selection import follow
+from .session import Session, watch
+from .watching import Place, placed
+
+PAGES = ("data_page", "model_page", "missing_page", "simulate_page", "keep_page")
+STYLE = """
+body { margin: 0; padding: 12px 18px; font-family: system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
+"""
+TABS = """
+:host { --tab: var(--wb-text); }
+.bk-tab { color: var(--wb-text); font-size: 15px; padding: 6px 14px; }
+.bk-tab.bk-active { color: var(--wb-accent); background: var(--wb-surface); border-color: var(--wb-line); }
+"""
+
+
+def ready() -> None:
+    """Panel as the workbench needs it: nothing from the network, one design."""
+    pn.extension(design="native", notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
+
+
+def modules() -> list[ModuleType]:
+    """The pages there are."""
+    found = (f"{__package__}.{name}" for name in PAGES)
+    return [importlib.import_module(name) for name in found if importlib.util.find_spec(name) is not None]
+
+
+def view(session: Session) -> Any:
+    """The whole window of a session."""
+    head, body = frame(session), pn.Column(sizing_mode="stretch_width")
+
+    def show() -> None:
+        if session.campaign is None:
+            body[:] = [offers(session)]
+        elif not body.objects or not isinstance(body[0], pn.Tabs):
+            body[:] = [tabs(session)]
+
+    show()
+    if session.campaign is None:
+        watch(session, ["campaign"], show)
+    return pn.Column(head, body, sizing_mode="stretch_width")
+
+
+def offers(session: Session) -> Any:
+    """What can be opened, to choose from."""
+    if not session.offers:
+        return pn.pane.HTML(
+            "No campaign file is in this folder. Write one with <code>stickslip new campaign</code>, or name one: "
+            "<code>stickslip open campaign.toml</code>"
+        )
+    made = []
+    for i, path in enumerate(session.offers):
+        button = pn.widgets.Button(name=f"Open {path}", width=560, sizing_mode="fixed", stylesheets=[BUTTON])
+        button.on_click(partial(_opened, session, i))
+        made.append(button)
+    return pn.Column(*made, margin=(16, 0))
+
+
+def _opened(session: Session, number: int, event: Any) -> None:
+    session.open(number)
+
+
+def tabs(session: Session) -> pn.Tabs:
+    """The pages, each made when it is first looked at."""
+    every = modules()
+    places = [pn.Column(sizing_mode="stretch_width", min_height=500) for _ in every]
+    made = pn.Tabs(
+        *((module.TITLE, place) for module, place in zip(every, places, strict=True)),
+        sizing_mode="stretch_width", stylesheets=[TABS],
+    )  # fmt: skip
+    if pn.state.location is not None:
+        pn.state.location.sync(made, {"active": "page"})
+
+    seen = [Place() for _ in every]
+
+    def show(*events: Any) -> None:
+        for i, place in enumerate(seen):
+            if i != made.active:
+                place.hide()
+        seen[made.active].show()
+        if not places[made.active].objects:
+            with placed(seen[made.active]):
+                places[made.active].append(_made(every[made.active], session))
+
+    show()
+    made.param.watch(show, "active")
+    return made
+
+
+def _made(module: ModuleType, session: Session) -> Any:
+    try:
+        return module.page(session)
+    except Exception as error:  # a page that fails leaves the others alive
+        logging.getLogger(__name__).exception("a page")
+        return pn.pane.Str(f"this page cannot be shown: {type(error).__name__}: {error}")
+
+
+def frame(session: Session) -> Frame:
+    """The head of the window."""
+
+    def heard(message: Message) -> None:
+        kind = message.get("kind")
+        if kind == "cancel":
+            session.cancel()
+        elif kind == "stop":
+            session.stop()
+        elif kind == "dismiss":
+            session.said = ""
+        elif kind == "key":
+            follow(session, str(message.get("key")))
+
+    theme = look()
+    colours = {name: getattr(theme, name) for name in ("text", "soft", "line", "surface", "page", "band", "model")}
+    made = Frame(heard=heard, dark=dark(), colours={**colours, "accent": theme.accent}, sizing_mode="stretch_width")
+
+    def update() -> None:
+        fit, campaign = session.fit, session.campaign
+        step = f"   ({session.at + 1} of {len(session.steps)}: {session.taken[-1].text})" if session.taken else ""
+        made.param.update(
+            title=campaign.title if campaign is not None else "",
+            model="" if fit is None else " + ".join(fit.parts) + step,
+            busy=session.busy,
+            share=session.share,
+            searching=f"Diagnose: {session.searching}" if session.searching else "",
+            searched=session.searched,
+            said=session.said,
+        )
+
+    def errors() -> None:
+        fit, fitted = session.fit, session.fitted
+        if fit is None or fitted is None:
+            made.errors = ""
+            return
+        told = f"error {fitted.error:.3f} fitted, {fitted.unseen_error:.3f} unseen"
+        made.errors = f"error {fit.error:.3f} by hand (before: {told})" if fit.by_hand else told
+
+    watch(session, ["campaign", "steps", "at", "busy", "share", "searching", "searched", "said"], update)
+    watch(session, ["steps", "at"], errors)
+    update()
+    errors()
+    return made

@@ -1,0 +1,110 @@
+"""Parts of the pages that Panel has not: the frame, the sliders of a model, the catalogue. Each is drawn from rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import param
+from panel.custom import JSComponent
+
+_HERE = Path(__file__).parent / "static"
+BUTTON = """
+.bk-btn {
+  border: 1px solid var(--wb-accent); border-radius: 4px; background: var(--wb-surface); color: var(--wb-accent);
+  font-size: 14px;
+}
+.bk-btn:hover:not([disabled]) { background: var(--wb-accent); color: var(--wb-surface); }
+.bk-btn[disabled] { border-color: var(--wb-line); color: var(--wb-soft); opacity: 0.6; }
+.bk-btn.bk-active { background: var(--wb-accent); color: var(--wb-surface); }
+"""
+Message = dict[str, Any]
+
+
+class Spoken(JSComponent):
+    """A part that tells what was done with it.
+
+    Attributes:
+        heard: is given every message.
+    """
+
+    heard = param.Parameter(None, precedence=-1)
+    _rename = {"heard": None}
+
+    def __init__(self, heard: Callable[[Message], None] | None = None, **given: Any) -> None:
+        super().__init__(**given)
+        self.heard = heard
+
+    def _handle_msg(self, data: Any) -> None:
+        """What a window tells; anything that is not a table of the expected form is left alone."""
+        if self.heard is not None and isinstance(data, dict):
+            self.heard(data)
+
+
+class Words(JSComponent):
+    """A line of text, shown as it is."""
+
+    text = param.String("")
+
+    _esm = """
+    export function render({ model }) {
+      const line = document.createElement("div")
+      line.className = "line"
+      const update = () => { line.textContent = model.text }
+      model.on("text", update)
+      update()
+      return line
+    }
+    """
+    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+
+
+class Frame(Spoken):
+    """The head of the window: title, model, errors, what is going on, what must be read; and the keyboard."""
+
+    title = param.String("")
+    model = param.String("")
+    errors = param.String("")
+    busy = param.String("")
+    share = param.Number(0.0)
+    searching = param.String("")
+    searched = param.Number(0.0)
+    said = param.String("")
+    dark = param.Boolean(False)
+    colours = param.Dict({})
+
+    _esm = (_HERE / "frame.js").read_text(encoding="utf-8")
+    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+
+
+class Knobs(Spoken):
+    """A slider for every parameter.
+
+    Attributes:
+        rows: tables with ``name``, ``label``, ``group``, ``text``, ``std``, ``prior``, ``place`` (0 to 1), ``band``,
+            ``low``, ``high`` and ``locked``.
+        closed: whether none can be moved at present.
+    """
+
+    rows = param.List([])
+    closed = param.Boolean(False)
+
+    _esm = (_HERE / "knobs.js").read_text(encoding="utf-8")
+    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+
+
+class Catalogue(Spoken):
+    """Effects by their evidence, each with its signature, what it gains, and a switch.
+
+    Attributes:
+        rows: tables with ``tag``, ``words``, ``share`` (0 to 1), ``gain``, ``unseen``, ``amplitude``, ``alike``,
+            ``picture`` (two lists of points, 0 to 1), ``on`` and ``chosen``.
+        closed: whether none can be switched at present.
+    """
+
+    rows = param.List([])
+    closed = param.Boolean(False)
+
+    _esm = (_HERE / "catalogue.js").read_text(encoding="utf-8")
+    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]

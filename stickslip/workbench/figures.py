@@ -1,0 +1,150 @@
+"""Figures of the workbench: one look, light and dark, with units on every axis and colours that all can tell apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from bokeh.models import (
+    BoxZoomTool,
+    ColumnDataSource,
+    CrosshairTool,
+    PanTool,
+    ResetTool,
+    SaveTool,
+    WheelZoomTool,
+)
+from bokeh.models.annotations import Legend, Span
+from bokeh.plotting import figure as bokeh_figure
+
+from ..plots.style import scaled
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours of a theme.
+
+    Attributes:
+        text, soft, line, surface, page: of the page: text, its softer form, lines, cards, what is behind them.
+        measured, model, band: of the two curves and of what noise and scatter allow.
+        runs: of the runs, after Okabe and Ito: to be told apart by the colour-blind.
+        accent: of what can be pressed.
+        low, middle, high: of the heat map: better than the data can tell, as good, worse.
+    """
+
+    text: str
+    soft: str
+    line: str
+    surface: str
+    page: str
+    measured: str
+    model: str
+    band: str
+    runs: tuple[str, ...]
+    accent: str
+    low: str
+    middle: str
+    high: str
+
+
+LIGHT = Look(
+    "#14213d", "#5b6577", "#dfe3e8", "#ffffff", "#f4f5f7", "#14213d", "#c8553d", "#8d99ae",
+    ("#0072b2", "#d55e00", "#009e73", "#b8578c", "#9a7400", "#3a93c9", "#5b6577"), "#1d5fa8",
+    "#5e3c99", "#f7f7f7", "#b35806",
+)  # fmt: skip
+DARK = Look(
+    "#e6e9ef", "#a3adbd", "#39424f", "#1d232c", "#14181f", "#e6e9ef", "#ff8f70", "#6c7a92",
+    ("#56b4e9", "#ff9a3c", "#2dc59a", "#e39ac4", "#f0e442", "#9ad0ff", "#a3adbd"), "#6db3f2",
+    "#9a7fd1", "#2b323c", "#e08214",
+)  # fmt: skip
+
+
+def dark() -> bool:
+    """Whether this window asked for the dark theme."""
+    import panel as pn
+
+    return pn.config.theme == "dark"
+
+
+def look() -> Look:
+    """Colours of this window."""
+    return DARK if dark() else LIGHT
+
+
+def label(text: str, unit: str = "") -> str:
+    """Text of an axis: quantity over unit."""
+    if unit in ("", "1"):
+        return text
+    return f"{text} / ({unit})" if "/" in unit else f"{text} / {unit}"
+
+
+def figure(title: str = "", x: str = "", y: str = "", height: int = 260, **more: Any) -> Any:
+    """A figure of this window's look, as wide as its place.
+
+    Args:
+        title: above it.
+        x, y: texts of the axes, with units (see :func:`label`).
+        height: in pixels.
+        more: arguments of ``bokeh.plotting.figure``, such as ``x_range`` to link it with another. For some hundred
+            points ``output_backend="canvas"`` is quicker than WebGL, which has to be copied into the page.
+    """
+    theme = look()
+    more.setdefault("sizing_mode", "stretch_width")
+    more.setdefault("output_backend", "webgl")
+    made: Any = bokeh_figure(
+        title=title, x_axis_label=x, y_axis_label=y, height=height, toolbar_location="above",
+        tools=[PanTool(), WheelZoomTool(), BoxZoomTool(), ResetTool(), SaveTool()], active_drag=None, **more,
+    )  # fmt: skip
+    made.toolbar.logo = None
+    made.toolbar.autohide = True
+    made.toolbar_inner = True
+    made.background_fill_color = theme.surface
+    made.border_fill_color = theme.surface
+    made.outline_line_color = None
+    made.min_border_right = 14
+    for axis in made.axis:
+        axis.axis_label_text_font_style = "normal"
+        axis.axis_label_text_color = axis.major_label_text_color = theme.text
+        axis.axis_label_text_font_size = "13px"
+        axis.major_label_text_font_size = "12px"
+        axis.axis_line_color = axis.major_tick_line_color = theme.soft
+        axis.minor_tick_line_color = None
+    made.grid.grid_line_color = theme.line
+    made.title.text_color = theme.text
+    made.title.text_font_size = "13px"
+    return made
+
+
+def crosshair(*figures: Any) -> None:
+    """One vertical line under the pointer in figures that share an axis."""
+    line = Span(dimension="height", line_color=look().soft, line_width=1, line_dash="dotted")
+    for each in figures:
+        each.add_tools(CrosshairTool(overlay=line))
+
+
+def legend(made: Any, place: str = "above", **more: Any) -> None:
+    """The legend of a figure, which lies beside it, so that it hides nothing; a click on an entry hides a curve."""
+    theme = look()
+    for item in list(made.legend):
+        found: Legend = item
+        found.orientation = "horizontal"
+        found.click_policy = "hide"
+        found.background_fill_color = theme.surface
+        found.border_line_color = None
+        found.label_text_color = theme.text
+        found.inactive_fill_color = theme.surface
+        found.label_text_font_size = "12px"
+        found.update(padding=2, margin=2, spacing=12)
+        found.update(**more)
+        made.add_layout(found, place)
+
+
+def source(**columns: Any) -> ColumnDataSource:
+    """A source of columns, empty unless given."""
+    return ColumnDataSource({name: list(values) for name, values in columns.items()})
+
+
+def unit_of(values: Any, unit: str) -> tuple[float, str]:
+    """Factor and unit that show values (SI) as numbers that can be read."""
+    return scaled(np.asarray(values, float), unit)

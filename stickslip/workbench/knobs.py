@@ -1,0 +1,112 @@
+"""A slider for every parameter: over which range it goes, and what stands beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..objects import Fit
+from ..objects.fit import MEANINGS, STRENGTH
+from ..units import shown
+
+DEVIATIONS = 12.0  # of a parameter that a slider reaches to either side
+LEAST, MOST = 0.3, 3.5  # e-folds to either side on a logarithmic scale
+BASE = ("contact", "weakening", "rig", "start")
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One slider.
+
+    Attributes:
+        name, unit: of the parameter.
+        low, high: ends on the search scale.
+        scale: "log", or the linear unit of the search scale (SI).
+        std: standard deviation on the search scale.
+        doc, prior: in words.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    scale: str | float
+    std: float
+    doc: str
+    prior: str
+
+    def inward(self, value: float) -> float:
+        """SI -> search scale."""
+        return float(np.log(value)) if self.scale == "log" else value / float(self.scale)
+
+    def outward(self, z: float) -> float:
+        """Search scale -> SI."""
+        return float(np.exp(z)) if self.scale == "log" else z * float(self.scale)
+
+    def place(self, value: float) -> float:
+        """Where a value (SI) is on the slider, 0 to 1."""
+        return float(np.clip((self.inward(value) - self.low) / (self.high - self.low), 0.0, 1.0))
+
+    def value(self, place: float) -> float:
+        """The value (SI) at a place of the slider."""
+        return self.outward(self.low + float(np.clip(place, 0.0, 1.0)) * (self.high - self.low))
+
+    def row(self, value: float, std: float, locked: bool) -> dict[str, Any]:
+        """What the slider shows; ``std`` in SI."""
+        tag, _, own = self.name.rpartition(".")
+        z, width = self.inward(value), self.high - self.low
+        deviation = std / (value if self.scale == "log" else float(self.scale))
+        ends = [float(np.clip((z + s * deviation - self.low) / width, 0.0, 1.0)) for s in (-1.0, 1.0)]
+        return {
+            "name": self.name,
+            "label": own.replace("_", " "),
+            "group": "" if tag in BASE else tag,
+            "text": shown(value, self.unit),
+            "std": f"± {shown(std, self.unit, 2)}" if std > 0.0 else "",
+            "prior": self.prior,
+            "doc": self.doc,
+            "place": self.place(value),
+            "band": ends if std > 0.0 and np.isfinite(ends).all() else [0.0, 0.0],
+            "low": shown(self.outward(self.low), self.unit, 2),
+            "high": shown(self.outward(self.high), self.unit, 2),
+            "locked": locked,
+        }
+
+
+def knobs(fit: Fit) -> dict[str, Knob]:
+    """Name -> slider of every parameter of a model that was fitted; the contact's strength first."""
+    std, values = fit.std, fit.values
+    relative = std[STRENGTH] / values[STRENGTH]
+    half = float(np.clip(DEVIATIONS * relative, 0.1, 1.0))
+    centre = float(np.log(values[STRENGTH]))
+    out = {
+        STRENGTH: Knob(
+            STRENGTH, "N", centre - half, centre + half, "log", relative, MEANINGS[STRENGTH], "measured"
+        )
+    }  # fmt: skip
+    for f in fit.free:
+        z = f.inward(values[f.name])
+        deviation = std.get(f.name, 0.0) / max(abs(f.slope(z)), 1e-300)
+        deviation = deviation if np.isfinite(deviation) else 0.0
+        least, most = f.bounds
+        if f.scale == "log":
+            half = float(np.clip(DEVIATIONS * deviation, LEAST, MOST))
+            low, high = z - half, z + half
+        elif f.amplitude:
+            half = max(DEVIATIONS * deviation, abs(z), 0.02 * (most - least))
+            low, high = min(z - half, 0.0), max(z + half, 0.0)
+        else:
+            half = max(DEVIATIONS * deviation, 0.1 * (most - least))
+            low, high = z - half, z + half
+        low, high = max(low, least), min(high, most)
+        out[f.name] = Knob(f.name, f.unit, low, high, f.scale, deviation, f.doc, f.known)
+    return out
+
+
+def rows(fit: Fit, fitted: Fit, made: dict[str, Knob], locked: Collection[str] = ()) -> list[dict[str, Any]]:
+    """What the sliders show of a model; deviations are those of the fit before it was moved by hand."""
+    values, std = fit.values, fitted.std
+    return [k.row(values[n], std.get(n, 0.0), n in locked) for n, k in made.items() if n in values]

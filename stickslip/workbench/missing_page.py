@@ -1,0 +1,322 @@
+"""*What is missing*: the residual against a variable, the catalogue by its evidence, the ladder, the backbone."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import numpy as np
+import panel as pn
+from bokeh.models import BasicTicker, FixedTicker, HoverTool
+from bokeh.models.annotations import Span
+
+from ..objects.picture import AGAINST, PARTS, WIDEST
+from .controls import BUTTON, Catalogue, Message, Words
+from .evidence import best_forms, bins, rows
+from .figures import figure, label, legend, look, source, unit_of
+from .session import Session, watch
+
+TITLE = "What is missing"
+WORDS = {"age": "time in contact", "place": "displacement", "event": "number of the event"}
+MANY = 4  # models of a ladder, above which their names are written aslant
+FOLDED = ("age", "velocity")  # variables whose small values matter as much as their large ones
+CARD = "background: var(--wb-surface); border: 1px solid var(--wb-line); border-radius: 4px; padding: 8px 12px;"
+
+
+def page(session: Session) -> Any:
+    """The page of a session."""
+    residual, ladder, bone = _Residual(session), _Ladder(session), _Backbone(session)
+    listed = _Listed(session, residual)
+    left = pn.Column(
+        residual.against,
+        pn.pane.Bokeh(residual.figure, sizing_mode="stretch_width"),
+        pn.pane.Bokeh(ladder.figure, sizing_mode="stretch_width"),
+        ladder.table,
+        pn.pane.Bokeh(bone.figure, sizing_mode="stretch_width"),
+        bone.words,
+        sizing_mode="stretch_width", margin=(8, 12, 0, 0),
+    )  # fmt: skip
+    right = pn.Column(listed.head, listed.part, listed.verdict, sizing_mode="stretch_width", margin=(8, 0, 0, 0))
+    return pn.Row(left, right, sizing_mode="stretch_width")
+
+
+class _Residual:
+    """Residual force over its floor against a variable, by run, with running medians and the chosen effect's law."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.chosen = ""
+        theme = look()
+        self.against = pn.widgets.Select(
+            name="residual force against", options={WORDS.get(a, a): a for a in AGAINST}, value="age", width=220,
+            sizing_mode="fixed",
+        )  # fmt: skip
+        self.figure = figure(y="residual force / floor", height=330)
+        self._points: dict[str, Any] = {}
+        self._medians: dict[str, Any] = {}
+        self._law = source(x=[], y=[])
+        self.figure.add_layout(Span(location=0.0, dimension="width", line_color=theme.soft, line_width=1))
+        names = list(session.campaign.names) if session.campaign is not None else []
+        for i, name in enumerate(names):
+            colour = theme.runs[i % len(theme.runs)]
+            self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])
+            self.figure.scatter(
+                "x", "y", source=self._points[name], size=3, color=colour, alpha=0.35, legend_label=name[:24]
+            )
+            self.figure.line("x", "y", source=self._medians[name], color=colour, line_width=2.5, legend_label=name[:24])
+        self.figure.line(
+            "x", "y", source=self._law, color=theme.model, line_width=4, alpha=0.8, line_dash="dashed",
+            legend_label="the chosen effect",
+        )  # fmt: skip
+        self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
+        legend(self.figure, "below")
+        self.against.param.watch(lambda event: self.update(), "value")
+        watch(session, ["steps", "at", "promises"], self.update)
+        self.update()
+
+    def update(self) -> None:
+        """Draw it anew; only numbers change."""
+        fit = self._session.fit
+        if fit is None:
+            return
+        against = self.against.value
+        data = fit.force
+        name = AGAINST[against]
+        x = np.asarray(data[name].values, float)
+        floor, use = data.floor.values, ~data.left_out.values
+        z = data.residual.values / floor
+        k, unit = (1.0, "") if name == "event" else unit_of(x, str(data[name].attrs["units"]))
+        x = x * k + (1.0 if name == "event" else 0.0)
+        axis, text = (_folded(x), unit) if against in FOLDED else (x, unit)
+        for run in self._points:
+            own = np.flatnonzero((data.run.values == run) & use)
+            own = own[np.argsort(x[own], kind="stable")]
+            parts = [p for p in np.array_split(own, PARTS) if p.size]
+            self._points[run].data = {"x": axis[own], "y": np.clip(z[own], -1.5 * WIDEST, 1.5 * WIDEST)}
+            self._medians[run].data = {
+                "x": np.array([np.median(axis[p]) for p in parts]), "y": np.array([np.median(z[p]) for p in parts]),
+            }  # fmt: skip
+        words = WORDS.get(against, against)
+        self.figure.xaxis.axis_label = label(words, text)
+        if against in FOLDED:
+            ticks, labels = _ticks(x)
+            self.figure.xaxis.ticker = FixedTicker(ticks=ticks)
+            self.figure.xaxis.major_label_overrides = labels
+        else:
+            self.figure.xaxis.ticker = BasicTicker()
+            self.figure.xaxis.major_label_overrides = {}
+        law = next((p.force for p in best_forms(self._session.promises) if p.tag == self.chosen), None)
+        if law is None or law.size != z.size:
+            self._law.data = {"x": [], "y": []}
+        else:
+            parts = bins(fit, against)
+            self._law.data = {
+                "x": [float(np.median(axis[p])) for p in parts],
+                "y": [float(np.median(law[p] / floor[p])) for p in parts],
+            }
+
+
+def _knee(x: np.ndarray) -> float:
+    return max(0.002 * float(np.abs(x).max(initial=0.0)), 1e-300)
+
+
+def _folded(x: np.ndarray) -> np.ndarray:
+    """On a scale that is linear around zero and logarithmic beyond."""
+    return np.asarray(np.arcsinh(x / _knee(x)))
+
+
+def _ticks(x: np.ndarray) -> tuple[list[float], dict[float, str]]:
+    """Places and texts of powers of ten on that scale."""
+    knee, top = _knee(x), float(np.abs(x).max(initial=0.0))
+    powers = [10.0**p for p in range(int(np.ceil(np.log10(knee))), int(np.floor(np.log10(max(top, knee)))) + 1)]
+    values = [0.0, *powers, *(-p for p in powers if x.min(initial=0.0) < -p)]
+    at = [float(np.arcsinh(v / knee)) for v in values]
+    return at, {a: f"{v:g}" for a, v in zip(at, values, strict=True)}
+
+
+class _Listed:
+    """The catalogue, and the diagnosis that fills it."""
+
+    def __init__(self, session: Session, residual: _Residual) -> None:
+        self._session, self._residual = session, residual
+        self._diagnose = pn.widgets.Button(
+            name="Diagnose", stylesheets=[BUTTON], width=110, sizing_mode="fixed", margin=(0, 10, 0, 0),
+            description="Fit every effect, judge each on unseen runs, add the best, repeat (minutes, beside)",
+        )  # fmt: skip
+        self._diagnose.on_click(lambda event: session.diagnose())
+        self._words = Words(sizing_mode="stretch_width", margin=(6, 0, 0, 0))
+        self.head = pn.Row(self._diagnose, self._words, sizing_mode="stretch_width", margin=(16, 0, 8, 0))
+        self.part = Catalogue(heard=self._heard, sizing_mode="stretch_width")
+        self.verdict = pn.pane.HTML("", sizing_mode="stretch_width", margin=(8, 0, 0, 0))
+        residual.against.param.watch(lambda event: self.update(), "value")
+        watch(session, ["steps", "at", "promises", "listed", "diagnosis", "busy", "searching", "loaded"], self.update)
+        watch(session, ["steps", "at", "loaded"], self._look)
+        self._looked: Any = None
+        self._look()
+        self.update()
+
+    def _look(self) -> None:
+        """Have the effects looked at again where the model was fitted anew."""
+        fitted = self._session.fitted
+        if fitted is not None and (fitted, self._session.loaded) != self._looked:
+            self._looked = (fitted, self._session.loaded)
+            self._session.list_promises()
+
+    def _heard(self, message: Message) -> None:
+        kind, tag, form = message.get("kind"), str(message.get("tag")), str(message.get("form"))
+        if kind == "on":
+            self._session.add(form)
+        elif kind == "off":
+            self._session.remove(tag)
+        elif kind == "choose":
+            self._residual.chosen = "" if self._residual.chosen == tag else tag
+            self._residual.update()
+            self.update()
+
+    def update(self) -> None:
+        """Fill the list anew."""
+        session = self._session
+        fit = session.fitted
+        if fit is None:
+            return
+        diagnosis = session.diagnosis if not fit.effects else None  # its gains are those on top of the base
+        self.part.param.update(
+            rows=rows(fit, session.promises, diagnosis, self._residual.against.value, self._residual.chosen),
+            closed=bool(session.busy),
+        )
+        self._diagnose.disabled = bool(session.searching)
+        self._words.text = (
+            f"looking at the effects ({100 * session.listed:.0f} %)"
+            if session.listed < 1.0
+            else "by the fall of the cost that each promises; a click lays one over the residual"
+        )
+        self.verdict.object = _verdict(session.diagnosis)
+
+
+def _verdict(diagnosis: Any) -> str:
+    """The verdict of a diagnosis and the next experiment, as HTML."""
+    if diagnosis is None:
+        return ""
+    told, proposed = diagnosis.verdict, diagnosis.next_experiment
+    lines = [f"<b>{escape(str(told['kind']))}</b>: {escape(str(told['text']))}"]
+    if proposed is not None:
+        lines.append(f"<b>next experiment</b>: {escape(str(proposed['text']))}")
+    return (
+        f'<div class="verdict" style="{CARD} color: var(--wb-text); font-size: 14px">' + "<br>".join(lines) + "</div>"
+    )
+
+
+class _Ladder:
+    """Fitted and unseen error of every model on the way here."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        theme = look()
+        self._of: Any = None
+        self._data = source(rung=[], fitted=[], unseen=[], step=[])
+        self.figure = figure(
+            "the ladder: error of every model on the way here", y="error / floors", height=230, output_backend="canvas"
+        )
+        for name, colour, dash, mark in (
+            ("fitted", theme.measured, "solid", "circle"),
+            ("unseen", theme.model, "dashed", "square"),
+        ):
+            self.figure.line(
+                "rung", name, source=self._data, color=colour, line_dash=dash, line_width=2, legend_label=name
+            )
+            self.figure.scatter("rung", name, source=self._data, color=colour, size=8, marker=mark, legend_label=name)
+        self.figure.add_layout(Span(location=1.0, dimension="width", line_color=theme.soft, line_dash="dotted"))
+        self.figure.add_tools(
+            HoverTool(tooltips=[("step", "@step"), ("fitted", "@fitted{0.000}"), ("unseen", "@unseen{0.000}")])
+        )
+        self.figure.x_range.range_padding = 0.4
+        legend(self.figure)
+        self.table = pn.pane.HTML("", sizing_mode="stretch_width")
+        watch(session, ["steps", "at"], self.update)
+        self.update()
+
+    def update(self) -> None:
+        """Draw it anew."""
+        fit = self._session.fitted
+        if fit is None or fit is self._of:
+            return
+        self._of = fit
+        every = fit.ladder
+        shown = every.iloc[1:]  # the static model is far above all others, and would press them together
+        at = [float(i) for i in range(len(shown))]
+        steps = [str(s).removeprefix("+ ") for s in shown["step"]]
+        self._data.data = {
+            "rung": at, "fitted": shown["error"].to_numpy(float), "unseen": shown["unseen error"].to_numpy(float),
+            "step": steps,
+        }  # fmt: skip
+        self.figure.xaxis.ticker = FixedTicker(ticks=at)
+        self.figure.xaxis.major_label_orientation = 0.3 if len(at) > MANY else 0.0
+        self.figure.xaxis.major_label_overrides = {
+            i: f"+ {step}" if not step.startswith("without") else step for i, step in zip(at, steps, strict=True)
+        }
+        self.table.object = _table(every)
+
+
+def _table(every: Any) -> str:
+    cell = "padding: 2px 14px 2px 0; text-align: right; font-variant-numeric: tabular-nums"
+    head = "".join(f'<th style="{cell}">{name}</th>' for name in ("fitted", "unseen", "gain"))
+    lines = [f'<tr><th style="text-align: left">model</th>{head}</tr>']
+    for _, row in every.iterrows():
+        values = (row["error"], row["unseen error"], row["gain"])
+        texts = ["" if not np.isfinite(v) else f"{v:.3f}" if i < 2 else f"{v:.0f}" for i, v in enumerate(values)]
+        numbers = "".join(f'<td style="{cell}">{t}</td>' for t in texts)
+        lines.append(f'<tr><td style="padding-right: 14px">{escape(str(row["step"]))}</td>{numbers}</tr>')
+    return f'<div style="{CARD} color: var(--wb-text); font-size: 13px"><table>{"".join(lines)}</table></div>'
+
+
+class _Backbone:
+    """The contact's backbone as measured, with its band, and the rough contact's law."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        theme = look()
+        self._data = source(u=[], force=[], low=[], high=[], law=[])
+        self._of: Any = None
+        self.figure = figure("backbone of the contact", height=260, output_backend="canvas")
+        self.figure.varea(
+            "u",
+            "low",
+            "high",
+            source=self._data,
+            color=theme.band,
+            fill_alpha=0.45,
+            legend_label="two standard deviations",
+        )
+        self.figure.line("u", "force", source=self._data, color=theme.measured, line_width=2.5, legend_label="measured")
+        self.figure.line(
+            "u", "law", source=self._data, color=theme.model, line_width=2, line_dash="dashed",
+            legend_label="rough contact: 1 - (1 - u/u_max)^p",
+        )  # fmt: skip
+        legend(self.figure)
+        self.words = Words(sizing_mode="stretch_width", margin=(0, 0, 0, 12))
+        watch(session, ["steps", "at"], self.update)
+        self.update()
+
+    def update(self) -> None:
+        """Draw that of the last model that was fitted."""
+        fit = self._session.fitted
+        if fit is None or fit is self._of:
+            return
+        self._of = fit
+        data = fit.backbone
+        u_max = float(data.attrs["u_max"])
+        use = data.displacement.values <= 1.6 * u_max
+        u, force, std, law = (
+            a[use] for a in (data.displacement.values, data.force.values, data["std"].values, data.law.values)
+        )
+        k, unit = unit_of(force, "N")
+        m, length = unit_of(u, "m")
+        self._data.data = {
+            "u": u * m, "force": force * k, "low": (force - 2 * std) * k, "high": (force + 2 * std) * k, "law": law * k,
+        }  # fmt: skip
+        self.figure.xaxis.axis_label = label("displacement from the force-free contact", length)
+        self.figure.yaxis.axis_label = label("force", unit)
+        self.words.text = f"u_max = {u_max * m:.3g} {length}, p = {float(data.attrs['p']):.2f}"
+
+
+__all__ = ["TITLE", "page"]

@@ -1,0 +1,303 @@
+"""*Model against measurement*: sliders of every parameter, one cycle measured and modelled, where the error lies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import panel as pn
+from bokeh.events import Tap
+from bokeh.models import HoverTool
+
+from ..objects import Fit
+from ..objects.picture import balanced
+from .controls import BUTTON, Knobs, Message, Words
+from .figures import crosshair, figure, label, legend, look, source, unit_of
+from .knobs import Knob, knobs, rows
+from .selection import choose, cycles, selected, worst
+from .session import Session, watch
+
+TITLE = "Model against measurement"
+FEW = "canvas"  # what draws some hundred points quickest
+NOW = "as it stands"
+WORST = 2.0  # floors at which the heat map is at its darkest, at least
+
+
+def page(session: Session) -> Any:
+    """The page of a session."""
+    sliders, buttons = _sliders(session), _buttons(session)
+    cycle = _Cycle(session)
+    heat = _Heat(session)
+    left = pn.Column(buttons, sliders, width=350, sizing_mode="fixed", margin=(8, 12, 0, 0))
+    right = pn.Column(
+        cycle.chooser,
+        pn.pane.Bokeh(cycle.force, sizing_mode="stretch_width"),
+        pn.pane.Bokeh(cycle.residual, sizing_mode="stretch_width"),
+        pn.Row(
+            pn.pane.Bokeh(cycle.creep, sizing_mode="stretch_width"),
+            pn.Column(heat.kind, pn.pane.Bokeh(heat.figure, sizing_mode="stretch_width"), sizing_mode="stretch_width"),
+            sizing_mode="stretch_width",
+        ),
+        sizing_mode="stretch_width",
+        margin=(8, 0, 0, 0),
+    )
+    return pn.Row(left, right, sizing_mode="stretch_width")
+
+
+def _buttons(session: Session) -> Any:
+    made = {
+        "Fit": (session.refit, "Fit all parameters that are not locked, from where they stand"),
+        "Undo": (session.undo, "Show the step before"),
+        "Redo": (session.redo, "Show the step after"),
+        "Base": (session.back, "Show the base model again"),
+    }
+    found = {}
+    for name, (call, words) in made.items():
+        button = pn.widgets.Button(
+            name=name, description=words, stylesheets=[BUTTON], width=76, sizing_mode="fixed", margin=(0, 6, 0, 0)
+        )
+        button.on_click(partial(_pressed, call))
+        found[name] = button
+
+    def update() -> None:
+        found["Fit"].disabled = bool(session.busy) or session.fit is None
+        found["Undo"].disabled = session.at <= 0
+        found["Redo"].disabled = session.at >= len(session.steps) - 1
+        found["Base"].disabled = session.at <= 0
+
+    watch(session, ["steps", "at", "busy"], update)
+    update()
+    return pn.Row(*found.values(), sizing_mode="fixed")
+
+
+def _pressed(call: Callable[[], None], event: Any) -> None:
+    call()
+
+
+def _sliders(session: Session) -> Knobs:
+    made: dict[str, Knob] = {}
+    of: list[Fit | None] = [None]
+
+    def heard(message: Message) -> None:
+        name, kind = str(message.get("name")), message.get("kind")
+        if name not in made:
+            return
+        place = message.get("place")
+        if kind == "move" and isinstance(place, (int, float)) and np.isfinite(place):
+            session.by_hand({name: made[name].value(float(place))}, over=not message.get("first"))
+        elif kind == "lock":
+            session.lock(name, bool(message.get("on")))
+
+    part = Knobs(heard=heard, sizing_mode="stretch_width", margin=(8, 0, 0, 0))
+
+    def update() -> None:
+        fit = session.fit
+        if fit is None:
+            return
+        fitted = session.fitted or fit
+        if fitted is not of[0]:
+            of[0] = fitted
+            made.clear()
+            made.update(knobs(fitted))
+        part.param.update(rows=rows(fit, fitted, made, session.locked), closed=bool(session.busy))
+
+    watch(session, ["steps", "at", "locked", "busy"], update)
+    update()
+    return part
+
+
+class _Cycle:
+    """One cycle: force with the residual under it, and the creep before the onset."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        theme = look()
+        self._run = pn.widgets.Select(name="", options=[], width=180, sizing_mode="fixed", margin=(0, 8, 0, 0))
+        self._before = pn.widgets.Button(
+            name="◀", description="Cycle before (←)", width=44, sizing_mode="fixed", stylesheets=[BUTTON]
+        )
+        self._after = pn.widgets.Button(
+            name="▶", description="Next cycle (→)", width=44, sizing_mode="fixed", stylesheets=[BUTTON]
+        )
+        self._where = Words(sizing_mode="stretch_width", margin=(6, 0, 0, 8))
+        for button in (self._before, self._after):
+            button.margin = (0, 4, 0, 0)
+        self.chooser = pn.Row(self._run, self._before, self._after, self._where, sizing_mode="stretch_width")
+        self._data = source(t=[], measured=[], model=[], residual=[], low=[], high=[])
+        self._data.name = "cycle"
+        self._creep = source(t=[], measured=[], model=[])
+
+        self.force = figure(y="force of the contact", height=270, output_backend=FEW)
+        self.force.line(
+            "t", "measured", source=self._data, color=theme.measured, line_width=2.5, legend_label="measured"
+        )
+        self.force.line(
+            "t", "model", source=self._data, color=theme.model, line_width=2, line_dash="dashed",
+            legend_label="model",
+        )  # fmt: skip
+        self.force.xaxis.major_label_text_font_size = "0px"
+        self.residual = figure(y="measured - model", height=190, x_range=self.force.x_range, output_backend=FEW)
+        self.residual.varea(
+            "t", "low", "high", source=self._data, color=theme.band, fill_alpha=0.35,
+            legend_label="two standard deviations of noise and scatter",
+        )  # fmt: skip
+        self.residual.line("t", "residual", source=self._data, color=theme.model, line_width=1.5)
+        self.residual.scatter("t", "residual", source=self._data, color=theme.model, size=3)
+        self.creep = figure("creep before the onset", height=300, output_backend=FEW)
+        self.creep.line(
+            "t", "measured", source=self._creep, color=theme.measured, line_width=2.5, legend_label="measured"
+        )
+        self.creep.line(
+            "t", "model", source=self._creep, color=theme.model, line_width=2, line_dash="dashed",
+            legend_label="model in balance",
+        )  # fmt: skip
+        for made in (self.force, self.residual, self.creep):
+            legend(made)
+        self.force.min_border_left = self.residual.min_border_left = 72
+        crosshair(self.force, self.residual)
+
+        self._run.param.watch(self._chosen, "value")
+        self._before.on_click(lambda event: self._go(-1))
+        self._after.on_click(lambda event: self._go(1))
+        watch(session, ["steps", "at", "run", "event"], self.update)
+        self.update()
+
+    def _chosen(self, event: Any) -> None:
+        if event.new and event.new != selected(self._session)[0]:
+            choose(self._session, event.new, self._session.event)
+
+    def _go(self, step: int) -> None:
+        name, event = selected(self._session)
+        choose(self._session, name, event + step)
+
+    def update(self) -> None:
+        """Draw the selected cycle; only numbers change."""
+        fit = self._session.fit
+        if fit is None:
+            return
+        name, event = selected(self._session)
+        counts = cycles(self._session)
+        self._run.param.update(options=list(counts), value=name)
+        self._where.text = f"cycle {event + 1} of {counts[name]}   (keys: ← → cycles, ↑ ↓ runs)"
+        data = fit.force
+        own = np.flatnonzero((data.run.values == name) & (data.event.values == event))
+        own = own[np.argsort(data.time.values[own])]
+        part = data.isel(point=own)
+        t = part.time.values - part.time.values[0]
+        k, force = unit_of(part.measured.values, "N")
+        r, small = unit_of(np.concatenate([part.residual.values, 2 * part.floor.values]), "N")
+        band = 2.0 * part.floor.values * r
+        self._data.data = {
+            "t": t, "measured": part.measured.values * k, "model": part.model.values * k,
+            "residual": part.residual.values * r, "low": -band, "high": band,
+        }  # fmt: skip
+        self.force.yaxis.axis_label = label("force of the contact", force)
+        self.residual.yaxis.axis_label = label("measured - model", small)
+        self.residual.xaxis.axis_label = label("time in the cycle", "s")
+        self._draw_creep(fit, part, name)
+
+    def _draw_creep(self, fit: Fit, part: Any, name: str) -> None:
+        own = part.isel(point=np.flatnonzero(part.phase.values == "creep"))
+        if own.sizes["point"] < 2:
+            self._creep.data = {"t": [], "measured": [], "model": []}
+            return
+        runs = {k.name: k for k in fit.force_fit.problem.runs}
+        spring = runs[name].stiffness or fit.values["rig.spring_stiffness"]
+        x, t = own.displacement.values, own.time.values
+        k, unit = unit_of(x - x[0], "m")
+        self._creep.data = {
+            "t": t - t[-1], "measured": (x - x[0]) * k, "model": (balanced(own, spring) - x[0]) * k,
+        }  # fmt: skip
+        self.creep.xaxis.axis_label = label("time before the onset", "s")
+        self.creep.yaxis.axis_label = label("creep", unit)
+
+
+class _Heat:
+    """Error by phase of the cycle and run; a click selects the worst cycle there."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.kind = pn.widgets.RadioButtonGroup(
+            options=[NOW, "unseen runs"],
+            value=NOW,
+            stylesheets=[BUTTON],
+            width=220,
+            sizing_mode="fixed",
+            margin=(0, 0, 0, 70),
+        )
+        self._data = source(run=[], phase=[], error=[], text=[], colour=[], ink=[])
+        self._data.name = "heat"
+        self.figure = figure("error in floors; a click shows the worst cycle", height=264,
+                             x_range=["all"], y_range=["all"], output_backend=FEW)  # fmt: skip
+        self.figure.rect(
+            "run", "phase", 0.96, 0.94, source=self._data, fill_color="colour", line_color=None,
+        )  # fmt: skip
+        self.figure.text(
+            "run", "phase", text="text", text_color="ink", text_align="center", text_baseline="middle",
+            text_font_size="12px", source=self._data,
+        )  # fmt: skip
+        self.figure.add_tools(HoverTool(tooltips=[("run", "@run"), ("phase", "@phase"), ("error", "@text floors")]))
+        self.figure.name = "heat figure"
+        self.figure.grid.grid_line_color = None
+        self.figure.xaxis.major_label_orientation = 0.6
+        self.figure.toolbar_location = None
+        self.figure.on_event(Tap, self._tapped)
+        self.kind.param.watch(lambda event: self.update(), "value")
+        watch(session, ["steps", "at"], self.update)
+        self.update()
+
+    def _tapped(self, event: Any) -> None:
+        fit = self._session.fit
+        if fit is None or event.x is None or event.y is None:
+            return
+        runs, phases = list(self.figure.x_range.factors), list(self.figure.y_range.factors)
+        i, j = int(np.floor(event.x)), int(np.floor(event.y))
+        if 0 <= i < len(runs) and 0 <= j < len(phases):
+            found = worst(fit, runs[i], phases[j])
+            if found is not None:
+                choose(self._session, *found)
+
+    def update(self) -> None:
+        """Colour it anew."""
+        fit, fitted = self._session.fit, self._session.fitted
+        if fit is None or fitted is None:
+            return
+        table = fit.errors if self.kind.value == NOW else fitted.unseen_errors
+        runs, phases = list(table.columns), list(table.index)[::-1]
+        if list(self.figure.x_range.factors) != runs or list(self.figure.y_range.factors) != phases:
+            self.figure.x_range.factors, self.figure.y_range.factors = runs, phases
+        values = table.to_numpy(float)
+        top = max(float(np.nanmax(values)), WORST)
+        cells = [(r, p, float(table.loc[p, r])) for p in phases for r in runs]
+        colours = [heat(v, top) for _, _, v in cells]
+        self._data.data = {
+            "run": [c[0] for c in cells], "phase": [c[1] for c in cells], "error": [c[2] for c in cells],
+            "text": ["" if np.isnan(c[2]) else f"{c[2]:.2f}" for c in cells],
+            "colour": colours, "ink": [ink(c) for c in colours],
+        }  # fmt: skip
+
+
+def heat(value: float, top: float) -> str:
+    """Colour of an error: 1 is as good as the data allow, ``top`` the worst."""
+    theme = look()
+    if not np.isfinite(value):
+        return theme.surface
+    ends, share = (
+        ((theme.middle, theme.low), 1.0 - value)
+        if value < 1.0
+        else ((theme.middle, theme.high), (value - 1) / (top - 1))
+    )
+    one, other = (np.array([int(c[i : i + 2], 16) for i in (1, 3, 5)]) for c in ends)
+    mixed = one + (other - one) * float(np.clip(share, 0.0, 1.0))
+    return "#" + "".join(f"{round(v):02x}" for v in mixed)
+
+
+def ink(colour: str) -> str:
+    """Black or white, whichever can be read on a colour."""
+    r, g, b = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return "#101318" if 0.3 * r + 0.59 * g + 0.11 * b > 0.5 else "#ffffff"
+
+
+__all__ = ["TITLE", "page"]

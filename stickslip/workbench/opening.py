@@ -1,0 +1,71 @@
+"""What can be opened: a campaign file, a run folder made from one, and what lies in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..objects import Diagnosis, load_campaign
+from ..runstore import RESULT, read_result
+from .session import Session
+
+CAMPAIGN = "campaign.toml"
+TRACES = "[[trace]]"
+MOST = 40  # campaigns that are offered
+LARGEST = 1 << 20  # bytes of a campaign file
+EXAMPLE = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / CAMPAIGN  # of a clone
+
+
+def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
+    """A session on a campaign file or a run folder.
+
+    Raises:
+        InputError: as of :func:`stickslip.load_campaign`; a run folder whose campaign is not found.
+    """
+    files = tuple(p.resolve() for p in effects)
+    if not path.is_dir():
+        return Session(campaign=load_campaign(path, files), effects=files)
+    if (path / CAMPAIGN).is_file():
+        return Session(campaign=load_campaign(path / CAMPAIGN, files), effects=files)
+    result = read_result(path)
+    campaign = load_campaign(campaign_of(path, result), files)
+    session = Session(campaign=campaign, effects=files)
+    if result.get("kind") == "diagnose":
+        session.diagnosis = Diagnosis(campaign, None, result, {})
+    return session
+
+
+def campaign_of(folder: Path, result: dict[str, Any]) -> Path:
+    """The campaign file that a run folder was made from.
+
+    Raises:
+        InputError: there is none, or it is not there any more.
+    """
+    named = [Path(str(i.get("file", ""))) for i in result.get("inputs", ()) if isinstance(i, dict)]
+    files = [path for path in named if path.suffix == ".toml"]
+    for path in files:
+        for base in (Path(), folder, *folder.resolve().parents):
+            if (base / path).is_file() and is_campaign(base / path):
+                return base / path
+    raise InputError(
+        "the campaign that this run folder was made from is not found", file=folder / RESULT,
+        value=str(files[0]) if files else None, hint="open the campaign file itself: stickslip open campaign.toml",
+    )  # fmt: skip
+
+
+def is_campaign(path: Path) -> bool:
+    """Whether a TOML file describes measured runs."""
+    try:
+        return path.stat().st_size < LARGEST and TRACES in path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
+
+
+def offered(folder: Path) -> list[Path]:
+    """Campaigns in a folder and in those in it, and the example of a clone."""
+    near = sorted({*folder.glob("*.toml"), *folder.glob("*/*.toml"), *folder.glob("scenarios/*/*.toml")})
+    found = [path for path in near if is_campaign(path)][:MOST]
+    same = any(path.resolve() == EXAMPLE.resolve() for path in found)
+    return found if same or not EXAMPLE.is_file() else [*found, EXAMPLE]

@@ -1,0 +1,116 @@
+"""The server of the workbench: on this machine only unless told otherwise, and for those who have its address only."""
+
+from __future__ import annotations
+
+import hmac
+import logging
+import secrets
+import signal
+import socket
+import webbrowser
+from collections.abc import Callable
+from typing import Any
+
+from tornado.httputil import HTTPServerRequest
+from tornado.ioloop import IOLoop
+from tornado.routing import Router
+from tornado.web import Application, RequestHandler
+
+from ..errors import InputError
+from . import own
+from .app import ready, view
+from .session import Session
+from .work import Worker
+
+LOOPBACK = "127.0.0.1"
+NAMES = ("127.0.0.1", "localhost")
+
+
+class Refuse(RequestHandler):
+    """The answer to a request without the token."""
+
+    def prepare(self) -> None:
+        """Refuse whatever the method is."""
+        self.set_status(403)
+        self.finish("403: the address that the server printed has a token, and this request has none\n")
+
+
+class Door(Router):
+    """Lets a request through to the workbench if its path begins with the token.
+
+    Args:
+        inside: what answers then. token: of this server.
+    """
+
+    def __init__(self, inside: Application, token: str) -> None:
+        self._inside, self._token = inside, token
+        self._outside = Application([(r".*", Refuse)], log_function=lambda handler: None)
+
+    def find_handler(self, request: HTTPServerRequest, **kwargs: Any) -> Any:
+        """The workbench's own, or a refusal."""
+        first = request.path.split("/")[1] if "/" in request.path else ""
+        known = hmac.compare_digest(first.encode("utf-8", "replace"), self._token.encode())
+        return (self._inside if known else self._outside).find_handler(request, **kwargs)
+
+
+def serve(
+    session: Session, *, port: int = 0, address: str = LOOPBACK, browser: bool = True,
+    tell: Callable[[str], None] = print, token: str | None = None,
+) -> None:  # fmt: skip
+    """Serve a session until interrupted.
+
+    Args:
+        session: what all windows share.
+        port: 0 for any that is free.
+        address: of this machine, under which the server is reached.
+        browser: open it.
+        tell: told the address.
+        token: in the address; random unless given.
+
+    Raises:
+        InputError: the port is taken, or the address is none of this machine.
+    """
+    from panel.io.server import get_server
+
+    for name in ("bokeh", "panel", "tornado"):
+        logging.getLogger(name).setLevel(logging.ERROR)
+    ready()
+    token = token or secrets.token_urlsafe(16)
+    port = _free(address, port)
+    session.worker = Worker()
+    origins = ["*"] if address not in NAMES else [f"{name}:{port}" for name in NAMES]
+    server: Any = get_server(
+        {"/": lambda: view(session)}, port=port, address=address, prefix=f"/{token}", websocket_origin=origins,
+        title="stickslip", start=False, show=False, loop=IOLoop.current(),
+    )  # fmt: skip
+    server._http.request_callback = Door(server._tornado, token)
+    server.start()
+    url = f"http://{address}:{port}/{token}/"
+    tell(url)
+    watcher = own.watch(session, session.effects) if session.effects else None
+    if session.campaign is not None:
+        session.begin()
+    if browser:
+        server.io_loop.add_callback(webbrowser.open, url)
+    signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
+    try:
+        server.io_loop.start()
+    finally:
+        if watcher is not None:
+            watcher.set()
+        session.close()
+        server.stop()
+
+
+def _free(address: str, port: int) -> int:
+    """The port, or one that is free."""
+    try:
+        with socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET) as asked:
+            asked.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            asked.bind((address, port))
+            return int(asked.getsockname()[1])
+    except (OSError, OverflowError) as error:
+        raise InputError(
+            f"the server cannot listen there ({getattr(error, 'strerror', None) or error})",
+            key="--port", value=f"{address}:{port}", hint="leave --port out for any that is free",
+        ) from None  # fmt: skip

@@ -1,0 +1,77 @@
+// The head of the window. Everything from elsewhere is set as text, never as HTML.
+function part(kind, classes, parent, text) {
+  const made = document.createElement(kind)
+  made.className = classes
+  if (text) made.textContent = text
+  parent.append(made)
+  return made
+}
+
+export function render({ model }) {
+  const root = document.createElement("div")
+  root.className = "frame"
+  const top = part("div", "top", root)
+  part("span", "name", top, "stickslip")
+  const title = part("span", "title", top)
+  const shown = part("span", "model", top)
+  const errors = part("span", "errors", top)
+  const theme = part("button", "quiet", top)
+  const bars = []
+  for (const [what, share, stop] of [["busy", "share", "cancel"], ["searching", "searched", "stop"]]) {
+    const line = part("div", "bar", root)
+    const fill = part("div", "fill", line)
+    const text = part("span", "text", line)
+    const button = part("button", "stop", line, "Cancel")
+    button.addEventListener("click", () => model.send_msg({ kind: stop }))
+    bars.push(() => {
+      line.style.display = model[what] ? "flex" : "none"
+      const done = Math.round(100 * model[share])
+      text.textContent = model[what] + (done > 0 ? ` (${done} %)` : "")
+      fill.style.width = `${done}%`
+      line.classList.toggle("unknown", done <= 0)
+    })
+  }
+  const said = part("div", "said", root)
+  const words = part("span", "", said)
+  const dismiss = part("button", "quiet", said, "×")
+  dismiss.title = "hide"
+  dismiss.addEventListener("click", () => model.send_msg({ kind: "dismiss" }))
+
+  const update = () => {
+    title.textContent = model.title
+    shown.textContent = model.model
+    errors.textContent = model.errors
+    theme.textContent = model.dark ? "light" : "dark"
+    theme.title = "change the theme"
+    for (const bar of bars) bar()
+    said.style.display = model.said ? "flex" : "none"
+    words.textContent = model.said
+    const style = document.documentElement.style
+    for (const [name, value] of Object.entries(model.colours)) style.setProperty(`--wb-${name}`, value)
+    document.body.style.background = model.colours.page || ""
+  }
+  theme.addEventListener("click", () => {
+    const address = new URL(window.location.href)
+    address.searchParams.set("theme", model.dark ? "default" : "dark")
+    window.location.replace(address)
+  })
+  if (!new URL(window.location.href).searchParams.has("theme") && matchMedia("(prefers-color-scheme: dark)").matches) {
+    theme.click()
+  }
+  const typed = (event) => {
+    const at = event.composedPath()[0]
+    if (event.altKey || event.ctrlKey || event.metaKey) return
+    if (at && (at.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(at.tagName || ""))) return
+    if (["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"].includes(event.key)) {
+      event.preventDefault()
+      model.send_msg({ kind: "key", key: event.key })
+    }
+  }
+  document.addEventListener("keydown", typed)
+  for (const name of ["title", "model", "errors", "busy", "share", "searching", "searched", "said", "dark", "colours"]) {
+    model.on(name, update)
+  }
+  model.on("remove", () => document.removeEventListener("keydown", typed))
+  update()
+  return root
+}

@@ -1,0 +1,104 @@
+// Sliders. A hand sends at most ten places a second, the last one always, from the first touch on.
+const EVERY = 100 // ms
+
+function part(kind, classes, parent, text) {
+  const made = document.createElement(kind)
+  made.className = classes
+  if (text) made.textContent = text
+  parent.append(made)
+  return made
+}
+
+export function render({ model }) {
+  const root = document.createElement("div")
+  root.className = "knobs"
+  let known = new Map()
+  let held = ""
+
+  function knob(row) {
+    const box = part("div", "knob", root)
+    box.dataset.name = row.name
+    const head = part("div", "head", box)
+    const label = part("span", "label", head)
+    const value = part("span", "value", head)
+    const std = part("span", "std", head)
+    const way = part("div", "way", box)
+    const band = part("div", "band", way)
+    const slider = part("input", "slider", way)
+    slider.type = "range"
+    slider.min = 0
+    slider.max = 1
+    slider.step = 0.001
+    const foot = part("div", "foot", box)
+    const low = part("span", "", foot)
+    const prior = part("span", "prior", foot)
+    const high = part("span", "", foot)
+    const lock = part("label", "lock", head)
+    const tick = part("input", "", lock)
+    tick.type = "checkbox"
+    part("span", "", lock, "lock")
+
+    let sent = 0
+    let waiting = null
+    let first = true
+    const send = () => {
+      waiting = null
+      sent = performance.now()
+      model.send_msg({ kind: "move", name: row.name, place: Number(slider.value), first })
+      first = false
+    }
+    slider.addEventListener("input", () => {
+      held = row.name
+      if (waiting !== null) return
+      const left = EVERY - (performance.now() - sent)
+      if (left <= 0) send()
+      else waiting = setTimeout(send, left)
+    })
+    const release = () => {
+      if (waiting !== null) {
+        clearTimeout(waiting)
+        send()
+      }
+      first = true
+      held = ""
+    }
+    slider.addEventListener("change", release)
+    tick.addEventListener("change", () => model.send_msg({ kind: "lock", name: row.name, on: tick.checked }))
+    return (now) => {
+      label.textContent = now.label
+      label.title = now.doc
+      value.textContent = now.text
+      std.textContent = now.std
+      prior.textContent = now.prior
+      prior.title = now.prior
+      low.textContent = now.low
+      high.textContent = now.high
+      slider.setAttribute("aria-label", now.label)
+      slider.disabled = model.closed || now.locked
+      tick.checked = now.locked
+      box.classList.toggle("effect", now.group !== "")
+      if (held !== row.name) slider.value = now.place
+      band.style.left = `${100 * now.band[0]}%`
+      band.style.width = `${100 * Math.max(now.band[1] - now.band[0], 0)}%`
+    }
+  }
+
+  const update = () => {
+    const names = model.rows.map((r) => r.name)
+    if (names.join() !== [...known.keys()].join()) {
+      root.replaceChildren()
+      known = new Map()
+      let group = null
+      for (const row of model.rows) {
+        if (row.group !== group) part("div", "group", root, row.group || "base model")
+        group = row.group
+        known.set(row.name, knob(row))
+      }
+    }
+    for (const row of model.rows) known.get(row.name)(row)
+  }
+  model.on("rows", update)
+  model.on("closed", update)
+  update()
+  return root
+}

@@ -1,0 +1,85 @@
+"""How pages follow a session: in the document of their window, once for many changes, and only while they are seen."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from typing import Any
+
+import param
+
+
+class Place:
+    """Where a page is: seen, or behind another, where it need not follow until it is seen again."""
+
+    def __init__(self) -> None:
+        self._seen = True
+        self._late: dict[Callable[[], Any], None] = {}
+
+    def call(self, update: Callable[[], Any]) -> None:
+        """Call it now, or when the page is seen."""
+        if self._seen:
+            update()
+        else:
+            self._late[update] = None
+
+    def show(self) -> None:
+        """The page is seen."""
+        self._seen = True
+        late, self._late = list(self._late), {}
+        for update in late:
+            update()
+
+    def hide(self) -> None:
+        """Another page is seen."""
+        self._seen = False
+
+
+_place: ContextVar[Place | None] = ContextVar("place", default=None)
+
+
+@contextmanager
+def placed(place: Place) -> Iterator[None]:
+    """What is watched within it belongs to a page at this place."""
+    before = _place.set(place)
+    try:
+        yield
+    finally:
+        _place.reset(before)
+
+
+def watch(session: param.Parameterized, names: Sequence[str], call: Callable[[], Any]) -> None:
+    """Call a function whenever some of these parameters of a session change.
+
+    In a window it is called in its document, once for all changes since the last call, and later if its page is not
+    seen; else at once.
+    """
+    import panel as pn
+
+    doc, place = pn.state.curdoc, _place.get()
+    if doc is None or doc.session_context is None:
+        session.param.watch(lambda *events: call(), list(names))
+        return
+    waiting = threading.Event()
+
+    def run() -> None:
+        waiting.clear()
+        if place is None:
+            call()
+        else:
+            place.call(call)
+
+    def changed(*events: Any) -> None:
+        if not waiting.is_set():
+            waiting.set()
+            doc.add_next_tick_callback(run)
+
+    watcher = session.param.watch(changed, list(names))
+
+    def gone(context: Any) -> None:
+        with suppress(Exception):
+            session.param.unwatch(watcher)
+
+    doc.on_session_destroyed(gone)

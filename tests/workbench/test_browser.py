@@ -1,0 +1,235 @@
+"""The workbench as a person meets it: a real browser before a real server."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+
+from .browser import DEEP, Browser, Served
+from .conftest import SCENARIO
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver")
+CAUGHT = 1.05  # floors: the error on unseen runs with the hidden effect in the model
+QUICK = 1000.0  # ms in which a slider is answered on a machine that does other things too; what is said is 100 ms
+PAUSE = 0.3  # s between two moves
+
+
+def _campaign(folder: Path) -> Path:
+    for path in SCENARIO.iterdir():
+        if path.is_file():
+            shutil.copy(path, folder)
+    return folder / "campaign.toml"
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return _campaign(tmp_path_factory.mktemp("opened"))
+
+
+@pytest.fixture(scope="module")
+def served(path):
+    made = Served(path)
+    yield made
+    made.end()
+
+
+@pytest.fixture(scope="module")
+def browser(served):
+    made = Browser(str(CHROMIUM), str(DRIVER))
+    made.open(served.url, "Model")
+    made.idle()
+    yield made
+    made.close()
+
+
+def test_the_failing_phase_is_seen_and_a_click_shows_its_worst_cycle(browser):
+    browser.tab("Model")
+    browser.wait(lambda: browser.js("const m = named('heat'); return m && m.data.error.length"))
+    errors = browser.js("const d = named('heat').data; return [...d.error].map((e, i) => [e, d.phase[i], d.run[i]])")
+    worst = max((e for e in errors if e[2] == "all" and e[1] != "all"), key=lambda e: e[0])
+    assert worst[1] == "nucleation" and worst[0] > 1.5
+    before = browser.js("return [...named('cycle').data.t].length")
+    browser.js(
+        """
+        const figure = named('heat figure')
+        const [i, j] = [figure.x_range.factors.indexOf('holds'), figure.y_range.factors.indexOf('nucleation')]
+        const tap = new (Bokeh.require('core/bokeh_events').Tap)(0, 0, i + 0.5, j + 0.5, {})
+        figure.trigger_event(tap)
+        """
+    )
+    browser.wait(lambda: "of 10" in browser.text(".line"))  # the run of holds has ten cycles
+    assert before > 0
+
+
+def test_a_slider_is_followed_and_undone(browser):
+    browser.tab("Model")
+    browser.wait(lambda: browser.js("return seen('.knob').length"))
+    before = browser.text(".errors")
+    browser.redraw("weakening.drop", 0.55)
+    taken = []
+    for place in (0.6, 0.65, 0.7, 0.72, 0.75):
+        time.sleep(PAUSE)
+        taken.append(browser.redraw("weakening.drop", place))
+    print(f"slider to redraw: {min(taken):.0f} to {max(taken):.0f} ms")
+    assert min(taken) < QUICK
+    browser.wait(lambda: "by hand" in browser.text(".errors"))
+    browser.js("all('.knob[data-name=\"weakening.drop\"] .slider')[0].dispatchEvent(new Event('change'))")
+    browser.press("button", "Undo")
+    browser.wait(lambda: browser.text(".errors") == before)
+
+
+def test_a_hand_sends_at_most_ten_places_a_second_and_the_last_one(browser):
+    browser.tab("Model")
+    browser.wait(lambda: browser.js("return seen('.knob').length"))
+    count = browser.driver.execute_async_script(
+        DEEP
+        + """
+        const done = arguments[arguments.length - 1]
+        const slider = all('.knob[data-name="weakening.drop"] .slider')[0]
+        const sent = []
+        const send = WebSocket.prototype.send
+        WebSocket.prototype.send = function (data) {
+          if (String(data).includes('place')) sent.push(performance.now())
+          return send.call(this, data)
+        }
+        let i = 0
+        const drag = setInterval(() => {
+          slider.value = 0.5 + 0.2 * i / 100
+          slider.dispatchEvent(new Event('input'))
+          if (++i > 100) {
+            clearInterval(drag)
+            slider.dispatchEvent(new Event('change'))
+            setTimeout(() => { WebSocket.prototype.send = send; done(sent.length) }, 500)
+          }
+        }, 10)
+        """
+    )
+    assert 3 <= count <= 16
+    shown = browser.wait(lambda: browser.js("return all('.knob[data-name=\"weakening.drop\"] .slider')[0].value"))
+    assert float(shown) == pytest.approx(0.7, abs=0.002)
+    browser.press("button", "Base")
+
+
+def test_two_windows_agree(browser, served):
+    other = Browser(str(CHROMIUM), str(DRIVER), 1400, 900)
+    try:
+        other.open(served.url, "Model", theme="dark")
+        other.wait(lambda: other.js("return seen('.knob').length"))
+        browser.tab("Model")
+        browser.redraw("weakening.drop", 0.8)
+        value = browser.wait(lambda: "by hand" in browser.text(".errors") and browser.text(".errors"))
+        other.wait(lambda: other.text(".errors") == value)
+        assert float(other.js("return all('.knob[data-name=\"weakening.drop\"] .slider')[0].value")) == pytest.approx(
+            0.8
+        )
+        other.press("button", "Base")
+        browser.wait(lambda: "by hand" not in browser.text(".errors"))
+        assert not other.complaints()
+    finally:
+        other.close()
+
+
+def test_the_keyboard_goes_to_the_next_cycle(browser):
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    browser.tab("Model")
+    browser.js("document.activeElement && document.activeElement.blur()")
+    ActionChains(browser.driver).send_keys(Keys.ARROW_LEFT * 12).perform()
+    browser.wait(lambda: "cycle 1 of" in browser.text(".line"))
+    ActionChains(browser.driver).send_keys(Keys.ARROW_RIGHT).perform()
+    browser.wait(lambda: "cycle 2 of" in browser.text(".line"))
+    run = browser.js("return seen('select')[0].value")
+    ActionChains(browser.driver).send_keys(Keys.ARROW_DOWN).perform()
+    browser.wait(lambda: browser.js("return seen('select')[0].value") != run)
+
+
+@pytest.mark.slow
+def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_crash(tmp_path):
+    path = _campaign(tmp_path)
+    served = Served(path)
+    browser = Browser(str(CHROMIUM), str(DRIVER))
+    try:
+        began = time.monotonic()
+        browser.open(served.url)
+        print(f"server {served.started:.1f} s, first paint {time.monotonic() - began:.1f} s")
+        browser.idle()
+        base = browser.unseen_error()
+        assert base > 1.15
+        browser.tab("missing")
+        browser.wait(lambda: browser.js("return seen('.effect-row').length > 3"), 120)
+        assert browser.js("return seen('.effect-row')[0].dataset.tag") == "contact-ageing"
+        began = time.monotonic()
+        browser.press('.effect-row[data-tag="contact-ageing"] button', "Switch on")
+        browser.wait(lambda: "contact-ageing" in browser.text(".model"), 120)
+        print(f"effect added in {time.monotonic() - began:.1f} s")
+        browser.idle()
+        assert browser.unseen_error() < CAUGHT
+        assert browser.js("return all('table').some((t) => t.textContent.includes('contact-ageing'))")
+        browser.tab("Model")
+        browser.press("button", "Undo")
+        browser.wait(lambda: abs(browser.unseen_error() - base) < 1e-9)
+        browser.press("button", "Redo")
+        browser.wait(lambda: browser.unseen_error() < CAUGHT)
+
+        browser.open(served.url)  # a reload
+        browser.idle()
+        found = browser.unseen_error()
+        assert found < CAUGHT and "2 of 2" in browser.text(".model")
+        time.sleep(1.0)  # what was done is kept when nothing else is to be done
+        served.kill()
+        served = Served(path)
+        began = time.monotonic()
+        browser.open(served.url)
+        browser.wait(lambda: "2 of 2" in browser.text(".model"), 60)
+        print(f"back after {served.started + time.monotonic() - began:.1f} s")
+        browser.idle()
+        assert browser.unseen_error() == pytest.approx(found, abs=2e-3)
+        browser.tab("Model")
+        browser.press("button", "Base")
+        browser.wait(lambda: abs(browser.unseen_error() - base) < 2e-3)
+        assert not browser.complaints()
+        assert not browser.elsewhere()
+    finally:
+        browser.close()
+        served.end()
+
+
+@pytest.mark.slow
+def test_a_diagnosis_goes_on_beside_and_can_be_cancelled(tmp_path):
+    served = Served(_campaign(tmp_path))
+    browser = Browser(str(CHROMIUM), str(DRIVER))
+    try:
+        browser.open(served.url)
+        browser.idle()
+        browser.tab("missing")
+        browser.press("button", "Diagnose")
+        browser.wait(lambda: "Diagnose:" in browser.text(".bar"), 30)
+        browser.wait(lambda: "%" in browser.text(".bar .text"), 120)
+        browser.tab("Model")  # sliders are alive meanwhile
+        browser.wait(lambda: browser.js("return seen('.knob').length"))
+        browser.redraw("weakening.drop", 0.7)
+        browser.press(".bar .stop")
+        browser.wait(lambda: browser.js("return seen('.bar').length == 0"))
+        browser.press("button", "Base")
+        browser.tab("missing")
+        browser.press("button", "Diagnose")
+        browser.wait(lambda: verdict(browser), 500)
+        assert "contact-ageing" in verdict(browser)
+        assert "when fitted" in browser.js("return seen('.effect-row')[0].textContent")
+        browser.open(served.url, "missing")  # a reload
+        browser.wait(lambda: "contact-ageing" in verdict(browser))
+        assert not browser.complaints()
+    finally:
+        browser.close()
+        served.end()
+
+
+def verdict(browser: Browser) -> str:
+    """The verdict's sentence, or nothing."""
+    return str(browser.js("const e = all('.verdict')[0]; return e ? e.textContent : ''"))

@@ -1,0 +1,193 @@
+"""What the pages show, without a browser."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.force.candidates import every_form, try_effect
+from stickslip.force.promise import promise
+from stickslip.force.score import Explained
+from stickslip.objects import Diagnosis
+from stickslip.workbench import app, missing_page, model_page
+from stickslip.workbench.evidence import best_forms, rows, signature
+from stickslip.workbench.figures import DARK, LIGHT
+from stickslip.workbench.knobs import knobs
+from stickslip.workbench.knobs import rows as knob_rows
+from stickslip.workbench.session import Session
+from stickslip.workbench.watching import Place
+
+LISTED = ("contact-ageing", "drive-ripple", "sensor-drift", "viscous-drag")
+
+
+@pytest.fixture
+def session(campaign, base, monkeypatch):
+    made = Session(campaign=campaign)
+    monkeypatch.setattr(made, "list_promises", lambda: None)
+    made.first(base)
+    return made
+
+
+@pytest.fixture(scope="module")
+def promises(base):
+    explained = Explained(base.force_fit)
+    return [promise(base.force_fit, explained, tag, form) for tag, form in every_form(LISTED)]
+
+
+def test_a_slider_shows_and_gives_back_its_value(base):
+    made = knobs(base)
+    assert set(made) == {"contact.strength", *(f.name for f in base.free)}
+    for name, knob in made.items():
+        value = base.values[name]
+        assert knob.value(knob.place(value)) == pytest.approx(value, rel=1e-9)
+        assert knob.value(-1.0) == knob.value(0.0) < knob.value(0.5) < knob.value(1.0)
+        base.with_values({name: knob.value(0.0)}), base.with_values({name: knob.value(1.0)})
+    for row in knob_rows(base, base, made, {"weakening.drop"}):
+        assert row["band"][0] <= row["place"] <= row["band"][1]
+        assert row["locked"] == (row["name"] == "weakening.drop")
+        assert row["text"] and row["std"].startswith("±")
+
+
+def test_the_pages_are_made_and_follow(session, base):
+    model, missing = model_page.page(session), missing_page.page(session)
+    assert model is not None and missing is not None
+    session.by_hand({"weakening.drop": base.values["weakening.drop"] * 1.02})
+    session.undo()
+
+
+def test_the_pages_are_made_before_there_is_a_model(campaign):
+    session = Session(campaign=campaign)
+    for module in (model_page, missing_page):
+        assert module.page(session) is not None
+
+
+def test_a_page_that_fails_says_so_and_leaves_the_others(session):
+    class Broken:
+        @staticmethod
+        def page(session):
+            raise ValueError("<b>oh</b>")
+
+    assert "oh" in app._made(Broken, session).object  # type: ignore[arg-type]
+
+
+def test_a_slider_sends_only_what_can_be_used(session, base):
+    part = model_page._sliders(session)
+    for message in (
+        {"kind": "move", "name": "nothing", "place": 0.5},
+        {"kind": "move", "name": "weakening.drop", "place": "half"},
+        {"kind": "move", "name": "weakening.drop", "place": float("nan")},
+        {"kind": "move", "name": ["weakening.drop"], "place": 0.5},
+        {"kind": "dance"},
+        "move",
+        None,
+    ):
+        part._handle_msg(message)
+    assert session.fit is base
+    part._handle_msg({"kind": "move", "name": "weakening.drop", "place": 0.9, "first": True})
+    assert session.fit.by_hand
+
+
+def test_the_hidden_effect_promises_most(promises):
+    best = best_forms(promises)
+    assert best[0].tag == "contact-ageing" and best[0].fall > 3.0 * best[1].fall
+    assert {p.tag for p in best} == set(LISTED)
+
+
+def test_a_promise_is_what_the_trial_of_an_effect_begins_with(base, promises):
+    (found,) = try_effect(base.force_fit, Explained(base.force_fit), "viscous-drag", [{}])
+    quick = next(p for p in promises if p.tag == "viscous-drag")
+    assert quick.fall == pytest.approx(found.promise, rel=0.02)
+
+
+def test_what_a_promise_takes_off_brings_the_cost_down(base, promises):
+    from stickslip.force.scatter import covariance
+
+    fit = base.force_fit
+    found = next(p for p in promises if p.tag == "contact-ageing")
+    _, whole = covariance(fit.scatter.sizes, fit.known)
+    inverse = np.linalg.inv(np.asarray(whole))
+
+    def chi2(residual):
+        side = fit.blocks(residual)
+        return float(np.einsum("ei,eij,ej->", side, inverse, side))
+
+    fallen = chi2(fit.marginal) - chi2(fit.marginal - found.force)
+    assert fallen == pytest.approx(found.fall, rel=0.1)
+
+
+def test_the_catalogue_has_its_rows(base, promises):
+    made = rows(base, promises, None, "age", "drive-ripple")
+    assert made[0]["tag"] == "contact-ageing"
+    assert [r["tag"] for r in made if r["chosen"]] == ["drive-ripple"]
+    assert made[0]["share"] == 1.0 and all(0.0 <= r["share"] <= 1.0 for r in made)
+    assert "±" in made[0]["amplitude"] and "may be taken for" in made[0]["alike"]
+    assert all(0.0 <= y <= 1.0 for curve in made[0]["picture"] for _, y in curve)
+
+
+def test_the_catalogue_shows_what_a_diagnosis_found(campaign, base, promises):
+    ranked = {"effect": "contact-ageing", "gain": 955.0, "heldout_cost": 900.0, "heldout_cost_std": 30.0, "note": "",
+              "heldout_error": 0.96, "amplitude": {"value": 0.003, "std": 1e-4, "unit": "1"}}  # fmt: skip
+    found = Diagnosis(campaign, None, {"ranking": [ranked], "visible": {}}, {})
+    made = rows(base, promises, found, "age")
+    assert made[0]["gain"] == "gains 955 when fitted" and made[0]["unseen"] == "on unseen runs 900 ± 30"
+    assert rows(base, (), found, "age")[0]["tag"] == "contact-ageing"
+
+
+def test_a_signature_of_another_model_is_not_drawn(base):
+    assert signature(base, np.zeros(3), []) == []
+    assert signature(base, np.zeros(3), [np.arange(3)]) == []
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK])
+def test_text_can_be_read_on_what_is_behind_it(theme):
+    def luminance(colour):
+        parts = np.array([int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)])
+        linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+        return float(linear @ [0.2126, 0.7152, 0.0722])
+
+    def contrast(one, other):
+        high, low = sorted((luminance(one), luminance(other)), reverse=True)
+        return (high + 0.05) / (low + 0.05)
+
+    for behind in (theme.surface, theme.page):
+        assert contrast(theme.text, behind) > 7.0
+        assert contrast(theme.soft, behind) > 4.5
+        assert contrast(theme.accent, behind) > 4.5
+        assert min(contrast(c, behind) for c in (*theme.runs, theme.model, theme.measured)) > 2.2
+
+
+def test_a_page_behind_another_follows_when_it_is_seen():
+    done: list[str] = []
+    place = Place()
+
+    def update():
+        done.append("update")
+
+    place.call(update)
+    place.hide()
+    place.call(update)
+    place.call(update)
+    assert len(done) == 1
+    place.show()
+    assert len(done) == 2
+    place.show()
+    assert len(done) == 2
+
+
+def test_a_notebook_shows_the_same_pages(campaign, base, monkeypatch):
+    import panel
+
+    import stickslip as ss
+
+    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+    monkeypatch.setattr(Session, "list_promises", lambda self: None)
+    shown = ss.workbench(campaign)
+    assert isinstance(shown, panel.Column)
+
+
+def test_of_many_steps_the_first_by_hand_are_forgotten(session, base, monkeypatch):
+    monkeypatch.setattr("stickslip.workbench.session.MOST", 3)
+    for share in (1.01, 1.02, 1.03, 1.04, 1.05):
+        session.by_hand({"weakening.drop": base.values["weakening.drop"] * share})
+    assert len(session.steps) == 4 and session.steps[0].fit is base
+    assert session.fit.values["weakening.drop"] == pytest.approx(1.05 * base.values["weakening.drop"])

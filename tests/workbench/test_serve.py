@@ -1,0 +1,207 @@
+"""Who may come in, what can be opened, and effects of one's own that are saved while it runs."""
+
+from __future__ import annotations
+
+import http.client
+import socket
+import threading
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from stickslip.cli import run
+from stickslip.errors import InputError
+from stickslip.runstore import json_text
+from stickslip.workbench import own
+from stickslip.workbench.opening import campaign_of, offered, opened
+from stickslip.workbench.serve import _free
+from stickslip.workbench.session import Session
+
+from .browser import Served
+
+EFFECT = '''"""An effect of one's own."""
+
+from jax import Array
+
+from stickslip.effects import BodyForce
+from stickslip.params import parameter
+
+
+class Pull(BodyForce):
+    """A constant pull."""
+
+    tag = "own-pull"
+    summary = "a constant pull"
+    equation = "F = F_0"
+    amplitude = "pull"
+    family = "block"
+
+    pull: Array = parameter(0.0, unit="N", lower=-0.05, upper=0.05, null=0.0, doc="force on the block")
+
+    def force(self, state, motion, contact):
+        return self.pull
+'''
+
+
+@pytest.fixture(scope="module")
+def served(folder):
+    made = Served(folder / "campaign.toml")
+    yield made
+    assert made.end() == 0
+
+
+def _status(url: str, **headers: str) -> int:
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=20) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as error:
+        return int(error.code)
+
+
+def test_only_the_address_with_its_token_opens(served):
+    root, token = served.url.rstrip("/").rsplit("/", 1)
+    assert len(token) > 20
+    assert _status(served.url) == 200
+    for path in (
+        "",
+        "/",
+        f"/{token[:-1]}/",
+        "/static/js/bokeh.min.js",
+        "/ws",
+        f"/x/{token}/",
+        f"/{token}x/",
+        "//",
+        "/%00",
+    ):
+        assert _status(root + path) == 403, path
+
+
+def test_a_wrong_request_is_answered_and_the_server_lives(served):
+    root, token = served.url.rstrip("/").rsplit("/", 1)
+    for path in ("/ws", "/autoload.js", "/../../etc/passwd", "/static/../../../../etc/passwd", "/nothing", "/?page=99",
+                 "/?theme=%3Cscript%3E", "/static/%2e%2e/%2e%2e/serve.py"):  # fmt: skip
+        assert 200 <= _status(f"{root}/{token}{path}") < 500, path
+    assert _status(served.url) == 200
+
+
+def test_other_pages_cannot_talk_to_it(served):
+    host, path = served.url.removeprefix("http://").split("/", 1)
+
+    def asked(origin: str) -> int:
+        key = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Origin": origin}
+        connection = http.client.HTTPConnection(host, timeout=20)
+        try:
+            connection.request("GET", f"/{path}ws", headers={**key, "Sec-WebSocket-Key": "MDEyMzQ1Njc4OWFiY2RlZg=="})
+            return connection.getresponse().status
+        finally:
+            connection.close()
+
+    assert asked("http://example.org") == 403
+    assert asked(f"http://{host}") != 403
+
+
+def test_it_listens_on_this_machine_only(served):
+    port = int(served.url.split(":")[2].split("/")[0])
+    with socket.socket() as other:
+        other.settimeout(2.0)
+        with pytest.raises(OSError):
+            other.connect((_own_address(), port))
+
+
+def _own_address() -> str:
+    """Of this machine, other than the loopback; a documentation address where it has none."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+        try:
+            asked.connect(("192.0.2.1", 9))
+            return str(asked.getsockname()[0])
+        except OSError:
+            return "192.0.2.1"
+
+
+def test_a_port_that_is_taken_is_said():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(InputError, match="leave --port out"):
+            _free("127.0.0.1", taken.getsockname()[1])
+    with pytest.raises(InputError):
+        _free("127.0.0.1", 70000)
+    with pytest.raises(InputError):
+        _free("192.0.2.1", 0)
+
+
+def test_what_is_missing_to_run_it_is_said(monkeypatch, capsys):
+    import importlib.util
+
+    find = importlib.util.find_spec
+    monkeypatch.setattr("stickslip.cli.open.importlib.util.find_spec", lambda n: None if n == "panel" else find(n))
+    assert run(["open", "campaign.toml"]) == 2
+    assert "pip install 'stickslip[workbench]'" in capsys.readouterr().err
+
+
+def test_a_campaign_that_is_none_is_said(tmp_path, capsys):
+    assert run(["open", str(tmp_path / "none.toml")]) == 2
+    assert "none.toml" in capsys.readouterr().err
+
+
+def test_a_run_folder_opens_the_campaign_it_was_made_from(folder, tmp_path):
+    (tmp_path / "result.json").write_text(
+        json_text({"kind": "fit", "inputs": [{"file": str(folder / "campaign.toml"), "sha256": ""}]})
+    )
+    assert opened(tmp_path).campaign.description.path.name == "campaign.toml"
+    with pytest.raises(InputError, match="not found"):
+        campaign_of(tmp_path, {"inputs": [{"file": "gone.toml"}]})
+
+
+def test_what_lies_in_a_folder_is_offered(folder, tmp_path):
+    (tmp_path / "scenario.toml").write_text("[block]\n")
+    assert [p.name for p in offered(tmp_path)] in ([], ["campaign.toml"])
+    found = offered(folder)
+    assert folder / "campaign.toml" in found
+
+
+def test_one_of_what_is_offered_is_opened_and_nothing_else(folder, monkeypatch, base):
+    from stickslip.objects import Campaign
+
+    monkeypatch.setattr(Campaign, "fit", lambda self: base)
+    session = Session(offers=(folder / "campaign.toml",))
+    session.open(1)
+    session.open(-1)
+    assert session.campaign is None
+    session.open(0)
+    assert session.campaign is not None and session.fit is not None
+
+
+def _until(true, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_an_effect_that_is_saved_is_loaded_anew(tmp_path, campaign):
+    path = Path(tmp_path / "own_effect.py")
+    path.write_text(EFFECT)
+    session = Session(campaign=campaign, effects=(path,))
+    ended = own.watch(session, (path,))
+    try:
+        time.sleep(0.5)
+        path.write_text(EFFECT.replace("A constant pull", "Another pull"))
+        _until(lambda: session.loaded == 1)
+        assert "own-pull" in session.said
+        path.write_text(EFFECT + "\n1 / 0\n")
+        _until(lambda: "ZeroDivisionError" in session.said)
+        line = len((EFFECT + "\n1 / 0").splitlines())
+        assert f"line {line}" in session.said and "own_effect.py" in session.said
+        path.write_text("def (")
+        _until(lambda: "not valid Python" in session.said)
+        aside = tmp_path / "aside.py"  # as an editor does that writes aside and renames
+        aside.write_text(EFFECT)
+        aside.replace(path)
+        _until(lambda: session.loaded == 2)
+    finally:
+        ended.set()
+    assert threading.active_count() < 50

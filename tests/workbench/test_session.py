@@ -1,0 +1,159 @@
+"""The state of a workbench: steps, undo, what is kept, and what happens to mistakes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from stickslip.workbench.journal import FOLDER, Journal
+from stickslip.workbench.selection import choose, cycles, follow, selected, worst
+from stickslip.workbench.session import Session
+
+DROP = "weakening.drop"
+
+
+@pytest.fixture
+def session(campaign, base):
+    made = Session(campaign=campaign)
+    made.first(base)
+    return made
+
+
+def test_a_drag_is_one_step_and_undo_goes_before_it(session, base):
+    value = base.values[DROP]
+    session.by_hand({DROP: value * 1.01})
+    for share in (1.02, 1.03):
+        session.by_hand({DROP: value * share}, over=True)
+    assert len(session.steps) == 2
+    assert session.fit.values[DROP] == pytest.approx(1.03 * value)
+    session.by_hand({DROP: value * 1.04})  # another drag
+    assert [s.changed.get(DROP) for s in session.steps[1:]] == pytest.approx([1.03 * value, 1.04 * value])
+    session.undo()
+    assert session.fit.values[DROP] == pytest.approx(1.03 * value)
+    session.back()
+    assert session.fit is base
+    session.redo()
+    session.by_hand({DROP: value})
+    assert len(session.steps) == 3  # what came after is forgotten
+
+
+def test_the_first_move_of_a_drag_is_not_laid_over_a_fit(session, base):
+    session.by_hand({DROP: base.values[DROP] * 1.01}, over=True)
+    assert len(session.steps) == 2
+
+
+def test_a_step_says_how_it_is_done_in_python(session, base):
+    session.by_hand({DROP: "0.2"})
+    name = {"fit": base}
+    exec(session.taken[-1].code, name)  # noqa: S102
+    assert name["fit"].values[DROP] == pytest.approx(0.2)
+    assert session.code().splitlines()[:2] == [
+        "import stickslip as ss",
+        "campaign = ss.load_campaign('campaign.toml')",
+    ]
+
+
+@pytest.mark.parametrize("value", [5.0, "3 apples", float("nan")])
+def test_a_wrong_value_is_told_and_changes_nothing(session, base, value):
+    session.by_hand({DROP: value})
+    assert session.fit is base
+    assert DROP in session.said
+
+
+def test_an_effect_that_is_none_is_told(session, base):
+    session.add("contact-ageeing")
+    assert session.fit is base and "contact-ageing" in session.said
+    assert session.busy == ""
+
+
+def test_moved_by_hand_the_last_fit_is_still_at_hand(session, base):
+    session.by_hand({DROP: base.values[DROP] * 1.02})
+    assert session.fitted is base
+    assert session.fit.error > 2.0 * base.error
+
+
+def test_what_was_open_comes_back(campaign, base, session):
+    session._journal = Journal(campaign)
+    session.by_hand({DROP: base.values[DROP] * 1.02})
+    session.lock(DROP, True)
+    choose(session, "v200", 3)
+    again = Session(campaign=campaign)
+    again.begin()
+    assert [s.text for s in again.steps] == [s.text for s in session.steps]
+    assert again.locked == {DROP} and (again.run, again.event) == ("v200", 3)
+    assert again.fit.by_hand and again.fit.values[DROP] == pytest.approx(base.values[DROP] * 1.02)
+    np.testing.assert_allclose(again.fit.force.residual, session.fit.force.residual, rtol=1e-9)
+    assert again.fit.error == pytest.approx(session.fit.error, rel=1e-6)
+    assert again.fitted.unseen_error == pytest.approx(base.unseen_error, rel=1e-3)
+    again.undo()
+    assert again.fit.error == pytest.approx(base.error, rel=1e-6)
+    assert again.code() == session.code().rsplit("\n", 1)[0]
+
+
+def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, folder, monkeypatch):
+    session._journal = Journal(campaign)
+    session.by_hand({DROP: base.values[DROP] * 1.02})
+    path = folder / FOLDER / "campaign.json"
+    kept = json.loads(path.read_text())
+    kept["steps"][0]["fit"]["rungs"][0]["arrays"] = "../../etc/passwd"
+    path.write_text(json.dumps(kept))
+    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+    again = Session(campaign=campaign)
+    again.begin()
+    assert "begins anew" in again.said and again.fit is base
+
+
+def test_a_history_of_other_data_is_left_alone(campaign, base, session, folder, monkeypatch):
+    session._journal = Journal(campaign)
+    session.by_hand({DROP: base.values[DROP] * 1.02})
+    path = folder / FOLDER / "campaign.json"
+    kept = json.loads(path.read_text())
+    kept["inputs"][0]["sha256"] = "0"
+    path.write_text(json.dumps(kept))
+    assert Journal(campaign).read() == ([], [], {})
+
+
+def test_models_of_forgotten_steps_are_removed(campaign, base, session, folder):
+    session._journal = Journal(campaign)
+    for share in (1.01, 1.02, 1.03):
+        session.by_hand({DROP: base.values[DROP] * share})
+    count = len(list((folder / FOLDER).glob("*.npz")))
+    session.back()
+    session.by_hand({DROP: base.values[DROP] * 1.04})
+    assert len(list((folder / FOLDER).glob("*.npz"))) == count - 2
+
+
+def test_the_keyboard_goes_through_cycles_and_runs(session):
+    assert selected(session)[0] == "v050"
+    choose(session, "v050", 0)
+    follow(session, "ArrowLeft")
+    assert session.event == 0
+    follow(session, "ArrowRight")
+    assert selected(session) == ("v050", 1)
+    follow(session, "ArrowUp")
+    assert session.run == "holds"
+    choose(session, "holds", 99)
+    assert session.event == cycles(session)["holds"] - 1
+    follow(session, "x")
+
+
+def test_the_worst_cycle_of_a_phase(base):
+    name, event = worst(base, "v100", "nucleation")
+    assert name == "v100"
+    data = base.force
+    z = (data.residual / data.floor).values
+    use = (data.run.values == "v100") & (data.phase.values == "nucleation") & ~data.left_out.values
+    mean = {e: np.mean(z[use & (data.event.values == e)] ** 2) for e in np.unique(data.event.values[use])}
+    assert event == max(mean, key=mean.get)
+    assert worst(base, "nowhere", "all") is None
+
+
+def test_a_refit_leaves_what_is_locked(session, base):
+    moved = base.values[DROP] * 1.02
+    session.by_hand({DROP: moved})
+    session.lock(DROP, True)
+    session.refit()
+    assert session.fit.values[DROP] == pytest.approx(moved, rel=1e-3)
+    assert not session.fit.by_hand
