@@ -202,17 +202,18 @@ class Session(param.Parameterized):
 
     def undo(self) -> None:
         """Show the step before."""
-        self._show(self.at - 1)
+        self.show(self.at - 1)
 
     def redo(self) -> None:
         """Show the step after."""
-        self._show(self.at + 1)
+        self.show(self.at + 1)
 
     def back(self) -> None:
         """Show the base model again; the steps after it can be had again."""
-        self._show(0)
+        self.show(0)
 
-    def _show(self, at: int) -> None:
+    def show(self, at: int) -> None:
+        """Show a step of the history, by its number."""
         self.at = max(min(at, len(self.steps) - 1), min(0, len(self.steps) - 1))
         self.worker("keep", self.keep, STILL)
 
