@@ -23,7 +23,7 @@ from ..force.problem import Problem
 from ..motion import with_displacements
 from ..params import specs, variants
 from ..report.diagnosis_result import trace_sections
-from ..report.identifiability import effective, identifiability
+from ..report.identifiability import identifiability
 from ..segment import Segmentation
 from ..trace import Trace
 from . import show
@@ -52,18 +52,16 @@ def fit_inertial(
     prepared = prepare(loaded, traces, found, options.holdout)
     _check_names(options.profiles, prepared.problem, effects)
     with working("fitting") as tell:
-        done, gains = climb(prepared, effects, tell)
+        done, gains = climb(prepared, effects, loaded.rig, tell)
         profiles = [_profile(name, done.fit, tell) for name in options.profiles]
     sections, variables, fitted = fitted_sections(done, loaded.rig)
     described, pictured = trace_sections(traces, found)
-    line = effective(fitted, loaded.rig)
     result: dict[str, Any] = {
         "model_parts": list(done.ladder[-1].model),
         **sections,
         "gains": gains,
         "profiles": profiles,
-        "effective": line,
-        "identifiability": identifiability(fitted, loaded.rig, line),
+        "identifiability": identifiability(fitted, loaded.rig, sections["backbone"]["rough_line"]),
         **described,
         "fit": {
             "cost": done.fit.cost,

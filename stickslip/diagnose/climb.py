@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,18 +19,20 @@ from .confirm import confirm
 from .decide import DISPERSION
 from .engine import Diagnosis, Rung, Verdict, leading, settled, static_residual
 from .prepare import Prepared
+from .shape import shape_of
 from .trials import Tell
 
 Form = tuple[str, Mapping[str, str]]  # tag and variants of an effect
 PIN = 1e-3  # width of the prior that holds a profiled parameter, on the search scale
 
 
-def climb(prepared: Prepared, effects: Sequence[Form], tell: Tell) -> tuple[Diagnosis, dict[str, float]]:
+def climb(prepared: Prepared, effects: Sequence[Form], rig: Any, tell: Tell) -> tuple[Diagnosis, dict[str, float]]:
     """Fit the base along the measured motion, then each effect on top of the ones before it.
 
     Args:
         prepared: the data.
         effects: in this order.
+        rig: of the campaign.
         tell: told the stage and the share of it done.
 
     Returns:
@@ -63,7 +66,8 @@ def climb(prepared: Prepared, effects: Sequence[Form], tell: Tell) -> tuple[Diag
     confirmed = confirm(leading(ladder, {}), ladder[-1].model, prepared, tell=tell)
     verdict = Verdict("fitted", tuple(gains))
     found_all = Diagnosis(
-        verdict, tuple(ladder), (), {}, prepared, deviations(base), prepared.dropped, confirmation=confirmed
+        verdict, tuple(ladder), (), {}, prepared, deviations(base), shape_of(base, rig), prepared.dropped,
+        confirmation=confirmed,
     )  # fmt: skip
     return found_all, gains
 

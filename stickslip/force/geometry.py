@@ -1,7 +1,7 @@
 """Laws of geometry fitted to the measured backbone: the rough line, and what changes its shape besides.
 
-Along the motion the backbone is free, so an effect that only shapes it changes nothing there. What it does is asked here,
-of the measured curve: how far is it from that of rough lines (H, h_rms), and is it nearer with the effect on top?
+Along the motion the backbone is free, so an effect that only shapes it changes nothing there. What it does is asked
+here, of the measured curve: how far is it from that of rough lines (H, h_rms), and is it nearer with the effect on top?
 
 Curves are compared as the logarithm of the displacement at given shares of the full friction, for there most of what
 differs from one rig's contacts to another's is a constant. The covariance has three parts: that of the measured curve;
@@ -124,7 +124,7 @@ class Laws:
     shaped: tuple[Shaped, ...]
 
 
-def geometry_laws(curve: Backbone, rig: Any) -> Laws:
+def geometry_laws(curve: Backbone, rig: Any, tags: Sequence[str] | None = None) -> Laws:
     """Fit the rough line to a backbone, and every effect that shapes it on top, by generalised least squares.
 
     H and h_rms are free, or as the rig states them: a number is taken as it is, a guess with bounds as a prior. So are
@@ -133,6 +133,7 @@ def geometry_laws(curve: Backbone, rig: Any) -> Laws:
     Args:
         curve: measured, with its covariance.
         rig: ``[rig]`` of the campaign.
+        tags: of effects; default the whole catalogue. Those that do more than shape the backbone are passed over.
 
     Raises:
         InputError: load or friction are neither measured nor guessed.
@@ -143,11 +144,17 @@ def geometry_laws(curve: Backbone, rig: Any) -> Laws:
     if line.stated:
         unstated, _ = _Comparison(curve, rig.model_copy(update=dict.fromkeys(ROUGHNESS))).rough_line()
     shaped = []
-    for tag in catalogue.tags():
-        forms = [f for f in catalogue.forms(catalogue.get(tag)) if shapes_backbone(catalogue.get(tag)(**f))]
+    for tag in catalogue.tags() if tags is None else tags:
+        cls = catalogue.get(tag)
+        forms = [form for form in catalogue.forms(cls) if shapes_backbone(cls(**form))]
         if forms and not (tag == SEVERAL and comparison.contacts == 1):
             shaped.append(comparison.shaped(tag, forms, line, z))
     return Laws(line, unstated, tuple(shaped))
+
+
+def rough_line(curve: Backbone, rig: Any) -> RoughLine:
+    """The rough line alone; arguments and errors as of :func:`geometry_laws`."""
+    return _Comparison(curve, rig).rough_line()[0]
 
 
 @dataclass(frozen=True)
@@ -360,8 +367,8 @@ class _Comparison:
 def in_logarithms(curve: Backbone, tau: Array) -> tuple[Array, Array]:
     """ln(u) of a backbone at shares of its full strength, and the covariance by what it was measured to.
 
-    In it is, for each share, how far a smooth curve may lie from the polygon of the backbone: the height over a chord of
-    which the slope turns as the polygon does at its ends.
+    In it is, for each share, how far a smooth curve may lie from the polygon of the backbone: the height over a chord
+    of which the slope turns as the polygon does at its ends.
 
     Args:
         curve: straight between its displacements.

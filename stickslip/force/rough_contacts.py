@@ -1,10 +1,10 @@
 """Rough lines in parallel: the mean curve of such contacts, and how those of one rig differ from those of another.
 
-A block stands on a few contacts with a line of its own each. Their forces add at the same displacement, so the curve of
-the block is not the mean of the curves of single lines: where the displacements at full sliding differ, the end of the
-common curve is drawn out. Here blocks of as many lines as the rig has contacts are put together, and mean and covariance
-are those of the logarithm of the blocks' displacement at a given share of the full friction: most of what differs is a
-stretch of the whole curve. Like the mean line's curve they depend, in units of mu E*/G* h_rms, on H and on
+A block stands on a few contacts with a line of its own each. Their forces add at the same displacement, so the curve
+of the block is not the mean of the curves of single lines: where the displacements at full sliding differ, the end of
+the common curve is drawn out. Here blocks of as many lines as the rig has contacts are put together, and mean and
+covariance are those of the logarithm of the blocks' displacement at a given share of the full friction: most of what
+differs is a stretch of the whole curve. Like the mean line's curve they depend, in units of mu E*/G* h_rms, on H and on
 q = F_n / (E* L h_rms) only (:mod:`..fit.static_table`).
 """
 
