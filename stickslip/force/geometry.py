@@ -12,7 +12,7 @@ bank cannot follow of a smooth curve. The full strength is as measured.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -34,10 +34,11 @@ from .fit import Array
 from .rough_contacts import rough_contacts
 
 COMPARED = (0.02, 0.98)  # shares of the strength between which curves are compared
-ROUNDS = 3  # times that the covariance is taken at the line that was found
-HURSTS = (0.15, 0.4, 0.75)  # from which lines are sought
+ROUNDS = 2  # times that the covariance is taken at the line that was found
+BETWEEN = 0.04  # from one Hurst exponent to the next at which lines are sought
+HELD = 1e-6  # to either side of one that is held
 STARTS = (0.03, 0.3)  # of an amplitude, over its range
-STEP = 1e-4  # of derivatives, on the search scale
+STEP, WIDE = 1e-3, 0.5  # of derivatives, on the search scale: of the line and of an amplitude
 STIFF = 1e-4  # of the strength: what is measured better serves no purpose
 EDGE = 1e-6  # of the range of a parameter, within which no search begins
 HALVINGS = 12
@@ -139,7 +140,7 @@ def geometry_laws(curve: Backbone, rig: Any, tags: Sequence[str] | None = None) 
         InputError: load or friction are neither measured nor guessed.
     """
     comparison = _Comparison(curve, rig)
-    line, z = comparison.rough_line()
+    line, nearest = comparison.rough_line()
     unstated = None
     if line.stated:
         unstated, _ = _Comparison(curve, rig.model_copy(update=dict.fromkeys(ROUGHNESS))).rough_line()
@@ -148,7 +149,7 @@ def geometry_laws(curve: Backbone, rig: Any, tags: Sequence[str] | None = None) 
         cls = catalogue.get(tag)
         forms = [form for form in catalogue.forms(cls) if shapes_backbone(cls(**form))]
         if forms and not (tag == SEVERAL and comparison.contacts == 1):
-            shaped.append(comparison.shaped(tag, forms, line, z))
+            shaped.append(comparison.shaped(tag, forms, nearest))
     return Laws(line, unstated, tuple(shaped))
 
 
@@ -207,8 +208,10 @@ class _Comparison:
         self.strength = float(curve.force[-1])
         # up to its first yield displacement the backbone is straight because a bank is
         least = max(COMPARED[0], float(curve.force[0]) / self.strength)
-        self.at = np.flatnonzero((self.table.tau > least) & (self.table.tau < COMPARED[1]))
-        self.measured, self.own = in_logarithms(curve, self.table.tau[self.at])
+        sparse = self.table.tau[self.table.sparse]
+        self.at = np.flatnonzero((sparse > least) & (sparse < COMPARED[1]))
+        self.tau = sparse[self.at]
+        self.measured, self.own = in_logarithms(curve, self.tau)
         self.stated = tuple(name for name in ROUGHNESS if getattr(rig, name) is not None)
         self.free = _free(rig, start, self.strength)
         # load and friction that are both stated say nothing of each other: the strength is as measured
@@ -216,35 +219,70 @@ class _Comparison:
         self.strength_std = max(float(curve.std[-1]) / self.strength, STIFF) if loose else np.inf
         self.white = np.eye(self.at.size)
 
-    def rough_line(self) -> tuple[RoughLine, Array]:
-        """The line alone, and its parameters on the search scale. The covariance is from then on that at this line."""
-        begun = [np.where(self._is("H"), hurst, vector(self.free)) for hurst in HURSTS]
-        for _ in range(ROUNDS):
-            self._whiten(begun[0])
-            found = min((self._solve(self.free, z) for z in begun), key=lambda s: s.cost)
-            begun = [found.z]
-        (hurst, h_rms), deviations, correlation = self._roughness(found)
+    def rough_line(self) -> tuple[RoughLine, _Solution]:
+        """The line of largest likelihood, and the nearest one under the covariance at it, which stays from then on."""
+        z = self._likeliest()
+        self._whiten(z)
+        rows = self._slopes(self.free, z, None)
+        at = _Solution(z, _inverse(rows), self._chi_square(z), rows)
+        (hurst, h_rms), deviations, correlation = self._roughness(at)
         freedom = max(self.at.size - sum(not np.isfinite(f.width) for f in self.free), 1)
-        values = self._values(found.z)
+        values = self._values(z)
         made = RoughLine(
             hurst, h_rms, *deviations, correlation, self.stated, self.contacts, self.springs,
-            self._static(values).length, tuple(f.name for f in self.free if f.name in GUESSED), found.cost,
-            float(np.sqrt(found.cost / freedom)), self._edge(found.z), self._force(values, None, 0.0),
+            self._static(values).length, tuple(f.name for f in self.free if f.name in GUESSED), at.cost,
+            float(np.sqrt(at.cost / freedom)), self._edge(z), self._force(values, None, 0.0),
         )  # fmt: skip
-        return made, found.z
+        return made, min(self._solve(self.free, z), at, key=_cost)
 
-    def shaped(self, tag: str, forms: Sequence[dict[str, str]], line: RoughLine, z: Array) -> Shaped:
+    def _likeliest(self) -> Array:
+        """Parameters by maximum likelihood: contacts of another H differ by more or less, and so does their covariance.
+
+        Along H, where it is free, for the likelihood may have several maxima in it.
+        """
+        if not self._is("H").any():
+            return self._beneath(None)[1]
+        low, high = self.free[int(np.argmax(self._is("H")))].bounds
+        hursts = np.linspace(low, high, max(int(np.ceil((high - low) / BETWEEN)), 2) + 1)
+        found = [self._beneath(h) for h in hursts]
+        k = int(np.argmin([fall for fall, _ in found]))
+        if 0 < k < hursts.size - 1:
+            left, middle, right = (found[i][0] for i in (k - 1, k, k + 1))
+            step = 0.5 * (left - right) / (left - 2.0 * middle + right)
+            found.append(self._beneath(float(hursts[k] + step * (hursts[1] - hursts[0]))))
+        return min(found, key=lambda pair: pair[0])[1]
+
+    def _beneath(self, hurst: float | None) -> tuple[float, Array]:
+        """Twice the negative logarithm of the likelihood at a Hurst exponent, all else at its best, and where."""
+        free, z = self.free, vector(self.free)
+        if hurst is not None:
+            held = self._is("H")
+            z = np.where(held, hurst, z)
+            free = tuple(
+                replace(f, lower=hurst - HELD, upper=hurst + HELD) if there else f
+                for f, there in zip(free, held, strict=True)
+            )
+        for _ in range(ROUNDS):
+            self._whiten(z)
+            z = self._solve(free, z).z
+        self._whiten(z)
+        return self._chi_square(z) + 2.0 * float(np.log(np.diag(self.white)).sum()), z
+
+    def _chi_square(self, z: Array) -> float:
+        return float((self._residual(self.free, z, None) ** 2).sum())
+
+    def shaped(self, tag: str, forms: Sequence[dict[str, str]], line: _Solution) -> Shaped:
         """An effect on top, in its best form and member: each has one parameter more than the line."""
         cls = catalogue.get(tag)
         tried = [_Added(tag, form, inner) for form in forms for inner in grid(cls(**form))]
         found = []
         for added in tried:
             null, far = added.span
-            begun = (np.append(z, null + share * (far - null)) for share in STARTS)
+            begun = (np.append(line.z, null + share * (far - null)) for share in STARTS)
             found.append((min((self._solve((*self.free, added.free), b, added) for b in begun), key=_cost), added))
         best, added = min(found, key=lambda pair: pair[0].cost)
         free, value = added.free, float(best.z[-1])
-        seen = [v for v in (self._visible(z, a) for a in tried) if v is not None]
+        seen = [v for v in (self._visible(line.z, a) for a in tried) if v is not None]
         (hurst, h_rms), _, _ = self._roughness(best)
         std = np.sqrt(best.covariance[-1, -1]) * free.slope(value) if (best.rows[:, -1] != 0.0).any() else np.inf
         return Shaped(
@@ -274,23 +312,22 @@ class _Comparison:
         """Displacements (m) and the shares of the full strength reached there, and that strength (N)."""
         static = self._static(values)
         u = self.table.displacement(static, values["H"], values["h_rms"])
-        tau, strength = self.table.tau, static.friction_force
-        if added is None:
-            return u, tau, strength
-        slope = np.diff(strength * tau, prepend=0.0) / np.diff(u, prepend=0.0)
-        stiffness = np.maximum(slope - np.append(slope[1:], 0.0), 0.0)
-        bank = added.reshape(Bank(jnp.asarray(stiffness), jnp.asarray(stiffness * u)), added.free.outward(amplitude))
-        reach, k, cap = (np.asarray(a) for a in (bank.threshold, bank.stiffness, bank.strength))
+        slope = np.diff(static.friction_force * self.table.tau, prepend=0.0) / np.diff(u, prepend=0.0)
+        k = np.maximum(slope - np.append(slope[1:], 0.0), 0.0)
+        cap = k * u
+        if added is not None:
+            bank = added.reshape(Bank(jnp.asarray(k), jnp.asarray(cap)), added.free.outward(amplitude))
+            k, cap = np.asarray(bank.stiffness), np.asarray(bank.strength)
+        reach = cap[k > 0.0] / k[k > 0.0]
         order = np.argsort(reach)
-        order = order[k[order] > 0.0]
-        reach, k, cap = reach[order], k[order], cap[order]
+        reach, k, cap = reach[order], k[k > 0.0][order], cap[k > 0.0][order]
         force = np.cumsum(cap) + reach * (k.sum() - np.cumsum(k))
         return reach, force / force[-1], float(force[-1])
 
     def _residual(self, free: Sequence[Free], z: Array, added: _Added | None) -> Array:
         """Whitened: of the curve, the strength and the priors."""
         u, tau, strength = self._law(self._values(z), added, 0.0 if added is None else float(z[-1]))
-        law = np.log(np.interp(self.table.tau[self.at], np.append(0.0, tau), np.append(0.0, u)))
+        law = np.log(np.interp(self.tau, np.append(0.0, tau), np.append(0.0, u)))
         curve = solve_triangular(self.white, self.measured - law, lower=True)
         prior = [(x - f.inward(f.prior)) / f.width for f, x in zip(free, z, strict=True) if np.isfinite(f.width)]
         return np.concatenate([curve, [np.log(self.strength / strength) / self.strength_std], prior])
@@ -300,7 +337,8 @@ class _Comparison:
         here = self._residual(free, z, added)
         columns = []
         for k, f in enumerate(free):
-            step = STEP if z[k] + STEP < f.bounds[1] else -STEP
+            step = WIDE if f.amplitude else STEP
+            step = step if z[k] + step < f.bounds[1] else -step
             columns.append((self._residual(free, z + step * (np.arange(z.size) == k), added) - here) / step)
         return np.column_stack(columns) if columns else np.zeros((here.size, 0))
 
@@ -317,7 +355,7 @@ class _Comparison:
             ).x
         rows = self._slopes(free, z, added)
         cost = float((self._residual(free, z, added) ** 2).sum())
-        return _Solution(z, np.linalg.pinv(rows.T @ rows, hermitian=True), cost, rows)
+        return _Solution(z, _inverse(rows), cost, rows)
 
     def _visible(self, z: Array, added: _Added) -> float | None:
         """Amplitude (SI, from the null) whose curve no change of the line brings nearer than five deviations."""
@@ -391,6 +429,10 @@ def in_logarithms(curve: Backbone, tau: Array) -> tuple[Array, Array]:
     carried = mix[:, 1:] / (slope * at)[:, None]
     sag = width[k - 1] * turn[k - 1] / 8.0 / (slope * at)
     return np.log(at), carried @ curve.covariance @ carried.T + np.diag(sag**2)
+
+
+def _inverse(rows: Array) -> Array:
+    return np.asarray(np.linalg.pinv(rows.T @ rows, hermitian=True), float)
 
 
 def _cost(found: _Solution) -> float:

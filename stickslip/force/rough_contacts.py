@@ -19,9 +19,10 @@ from ..contact import default_edges, default_loads, rough_table
 from ..fit.static_table import HURST, LOAD_RANGE, Bicubic, StaticRig
 
 Array = NDArray[np.float64]
-LOADS = 96
+LOADS, EVERY = 384, 4  # shares of the friction, and of how many one has a covariance
 LINES = 300
-HURST_NODES, LOAD_NODES = 13, 12
+BLOCKS = 1000
+HURST_NODES, LOAD_NODES = 11, 10
 MOST = 16  # lines of a block; more of them scatter less, and their mean curve does not change any more
 GRID = 256  # displacements at which forces are added
 
@@ -35,26 +36,30 @@ class RoughContacts:
 
     Attributes:
         tau: shares of the full friction, shape (T,), above 0 and up to 1.
+        sparse: places among them that have a covariance, shape (S,).
     """
 
     def __init__(self, contacts: int, n_springs: int, lines: int = LINES, seed: int = 0) -> None:
         self.tau = default_loads(LOADS + 1)[1:]
-        self._hurst, self._load = np.linspace(*HURST, HURST_NODES), np.linspace(*np.log(LOAD_RANGE), LOAD_NODES)
+        self.sparse = np.arange(EVERY - 1, LOADS, EVERY)
+        self._hurst = np.linspace(*HURST, HURST_NODES)
+        self._load = np.linspace(np.log(LOAD_RANGE[0]), np.log(LOAD_RANGE[1]), LOAD_NODES)
         size = min(contacts, MOST)
-        # every line is in as many blocks as any other
-        order = np.random.default_rng([seed, size]).permutation(lines)
-        blocks = order[(np.arange(lines)[:, None] + np.arange(size)) % lines]
+        draws = np.random.default_rng([seed, size]).random((lines if size == 1 else BLOCKS, lines))
+        blocks = np.arange(lines)[:, None] if size == 1 else np.argpartition(draws, size, axis=1)[:, :size]
+        chosen = np.zeros((len(blocks), lines))
+        np.put_along_axis(chosen, blocks, 1.0 / size, axis=1)
         mean = np.empty((HURST_NODES, LOAD_NODES, LOADS))
-        self._covariance = np.empty((HURST_NODES, LOAD_NODES, LOADS, LOADS))
+        self._covariance = np.empty((HURST_NODES, LOAD_NODES, self.sparse.size, self.sparse.size))
         for i, hurst in enumerate(self._hurst):
             table = rough_table(float(hurst), 1.0, n_springs, lines, seed)
             gaps, sums = np.asarray(table.gaps), np.asarray(table.sums) / n_springs
             for j, load in enumerate(np.exp(self._load)):
-                logs = np.log(_displacements(gaps, sums, float(load), blocks, self.tau))
+                logs = np.log(_displacements(gaps, sums, float(load), chosen, self.tau))
                 mean[i, j] = logs.mean(axis=0)
-                differ = logs - mean[i, j]
+                differ = (logs - mean[i, j])[:, self.sparse]
                 # blocks share lines; fewer of them than the rig's contacts differ more; and the mean is of some lines
-                factor = size / contacts * (1.0 + contacts / lines) / (1.0 - size / lines) / (lines - 1)
+                factor = size / contacts * (1.0 + contacts / lines) / (1.0 - size / lines) / (len(chosen) - 1)
                 self._covariance[i, j] = factor * (differ.T @ differ)
         self._mean = Bicubic(self._hurst, self._load, mean)
 
@@ -63,7 +68,7 @@ class RoughContacts:
         return rig.reach * h_rms * np.exp(self._mean(hurst, float(np.log(rig.crowding(h_rms)))))
 
     def covariance(self, rig: StaticRig, hurst: float, h_rms: float) -> Array:
-        """Covariance of the logarithm of the displacement from one rig's contacts to another's, shape (T, T)."""
+        """Covariance of the logarithm of the displacement from one rig's contacts to another's, shape (S, S)."""
         (i, a), (j, b) = (
             _between(nodes, x) for nodes, x in ((self._hurst, hurst), (self._load, np.log(rig.crowding(h_rms))))
         )
@@ -78,20 +83,20 @@ def rough_contacts(contacts: int, n_springs: int) -> RoughContacts:
     return RoughContacts(contacts, n_springs)
 
 
-def _displacements(gaps: Array, sums: Array, load: float, blocks: NDArray[np.intp], tau: Array) -> Array:
+def _displacements(gaps: Array, sums: Array, load: float, chosen: Array, tau: Array) -> Array:
     """Displacement of each block at the loads ``tau``, in units of mu E*/G* h_rms, shape (blocks, T).
 
     Args:
         gaps, sums: of lines of unit rms height, ascending, and the load (F_n/(E* L h_rms)) at which each is reached,
             shape (lines, n).
         load: of every contact.
-        blocks: lines of each block, shape (blocks, contacts).
+        chosen: share of each line in the load of each block, shape (blocks, lines).
     """
     depth = np.array([_inverse(s, g, load) for g, s in zip(gaps, sums, strict=True)])
     u = np.concatenate([[0.0], default_edges(GRID) * depth.max()])
     left = np.array([np.interp(d - u, g, s, left=0.0) + np.maximum(d - u - g[-1], 0.0)
                      for d, g, s in zip(depth, gaps, sums, strict=True)])  # fmt: skip
-    force = (1.0 - left / load)[blocks].mean(axis=1)
+    force = chosen @ (1.0 - left / load)
     return np.array([np.interp(tau, f, u) for f in force])
 
 
