@@ -200,17 +200,19 @@ def _law(law: Law, shape: Shape) -> dict[str, Any]:
 
 def _reason(law: Law, shape: Shape) -> str:
     """Why an effect is named or not."""
-    seen = law.chance < CHANCE
+    s, seen = law.shaped, law.chance < CHANCE
     if not shape.stated:
         missing = " and ".join(name for name in ROUGHNESS if shape.line is None or name not in shape.line.stated)
         if seen:
             return f"nearer than any rough line, but with {missing} measured by nobody that is no proof of a cause"
         return f"{missing}, which nobody measured, take up what such a change of shape would do"
+    if not seen and s.gain > law.gain:
+        return "such an amplitude lies where such values do not"
     if not seen:
-        limit = law.shaped.visible
+        limit = s.visible
         if limit is None:
             return "not seen, and no amplitude of its range would be"
-        return f"not seen; from {shown(limit, law.shaped.free.unit, 2)} on it would be"
+        return f"not seen; from {shown(limit, s.free.unit, 2)} on it would be"
     if law not in shape.close:
         return f"{shape.close[0].tag} is nearer"
     others = [o.tag for o in shape.close if o is not law]

@@ -24,6 +24,7 @@ LINES = 300
 BLOCKS = 1000
 HURST_NODES, LOAD_NODES = 11, 10
 MOST = 16  # lines of a block; more of them scatter less, and their mean curve does not change any more
+ROUNDING = 1e-12
 GRID = 256  # displacements at which forces are added
 
 
@@ -97,7 +98,8 @@ def _displacements(gaps: Array, sums: Array, load: float, chosen: Array, tau: Ar
     left = np.array([np.interp(d - u, g, s, left=0.0) + np.maximum(d - u - g[-1], 0.0)
                      for d, g, s in zip(depth, gaps, sums, strict=True)])  # fmt: skip
     force = chosen @ (1.0 - left / load)
-    return np.array([np.interp(tau, f, u) for f in force])
+    last = np.argmax(force > 1.0 - ROUNDING, axis=1) + 1  # where all of a block slides
+    return np.array([np.interp(tau, f[:k], u[:k]) for f, k in zip(force, last, strict=True)])
 
 
 def _inverse(sums: Array, gaps: Array, load: float) -> float:

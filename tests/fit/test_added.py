@@ -76,7 +76,7 @@ def test_the_added_mass_is_fitted_and_kept():
     prepared = prepare(
         SimpleNamespace(rig=rig, rig_of=lambda name: rig, path=None), traces, [segment(t) for t in traces]
     )
-    done, gains = climb(prepared, chosen(("inertia",)), lambda *a: None)
+    done, gains = climb(prepared, chosen(("inertia",)), rig, lambda *a: None)
     assert [rung.added for rung in done.ladder] == [None, "inertia", "inertia"]
     share, std = done.fit.values["inertia.share"], done.fit.std()["inertia.share"]
     assert std < 0.01
