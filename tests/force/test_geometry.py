@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,7 +21,7 @@ from stickslip.errors import InputError
 from stickslip.fit.static_table import StaticRig
 from stickslip.force import geometry
 from stickslip.force.backbone import Backbone, power_law
-from stickslip.force.geometry import geometry_laws, in_logarithms
+from stickslip.force.geometry import Laws, geometry_laws, in_logarithms
 from stickslip.force.rough_contacts import RoughContacts, rough_contacts
 
 HURST, HEIGHT, LOAD, FRICTION, CONTACTS = 0.3, 2.46e-6, 0.31, 0.21, 4
@@ -159,6 +160,15 @@ def test_the_covariance_of_logarithms_is_that_of_curves_drawn_anew():
     assert np.abs((covariance - sag - wanted) / np.outer(scale, scale)).max() < 0.15
 
 
+def test_an_error_common_to_all_forces_is_none_of_the_shape():
+    curve = measured(independent(3), 3)
+    alike = Backbone(curve.displacement, curve.force, 0.01 * curve.force, 1e-4 * np.outer(curve.force, curve.force))
+    exact = Backbone(curve.displacement, curve.force, 0 * curve.std, 0 * curve.covariance)
+    tau = np.linspace(0.1, 0.9, 9)
+    (_, covariance), (_, sag) = (in_logarithms(c, tau) for c in (alike, exact))
+    assert np.abs(covariance - sag).max() < 1e-12
+
+
 def test_an_effect_at_its_null_is_the_line():
     comparison = geometry._Comparison(measured(independent(0), 0), Rig(**KNOWN, **STATED))
     values = comparison._values(np.zeros(0))
@@ -201,8 +211,14 @@ def test_an_effect_of_ten_deviations_is_told_where_the_roughness_is_known_and_on
     lines = rough_bank(HURST, HEIGHT, LOAD, FRICTION, contacts=CONTACTS, seed=200, n=400)
     compliance = 9e-7
     curve = measured(of_bank(make("machine-compliance", where="series", compliance=compliance).reshape(lines)), 1)
-    known = laws(curve, **STATED)
+    tags = ("adhesion", "curvature", "machine-compliance")
+    known = laws(curve, tags, **STATED)
     (named,) = known.close
+    # the same gain over lines of a roughness that nobody measured names nothing
+    unsure = replace(known.line, stated=("H",))
+    nothing = judged(curve, known.power, Laws(unsure, None, tuple(law.shaped for law in known.laws)))
+    assert nothing.close == () and not any(row["told"] for row in section(nothing)["laws"])
+    assert "h_rms measured by nobody" in section(nothing)["laws"][0]["text"]
     assert named.tag == "machine-compliance"
     assert abs(named.shaped.amplitude - compliance) < 3.0 * named.shaped.std < compliance
     assert named.shaped.gain > 50.0
@@ -211,7 +227,7 @@ def test_an_effect_of_ten_deviations_is_told_where_the_roughness_is_known_and_on
     assert "machine-compliance" in section(known)["text"]
     # some other roughness has the same curve
     assert known.unstated.cost < known.line.cost - 50.0
-    unknown = laws(curve)
+    unknown = laws(curve, tags)
     assert unknown.close == ()
     assert max(law.shaped.gain for law in unknown.laws) < 25.0
     assert not any(row["told"] for row in section(unknown)["laws"])
