@@ -19,17 +19,18 @@ from typing import Any
 import numpy as np
 import xarray
 from matplotlib.figure import Figure
-from scipy.optimize import least_squares
 from scipy.stats import binomtest
 
 from stickslip import __version__
+from stickslip.campaign import Rig
 from stickslip.campaign.template import campaign_text
 from stickslip.cli import run as command
 from stickslip.contact import default_loads, power_law_bank, rough_table, static_contact
 from stickslip.fit.creep_process import V_LIM, CreepProcess, creep_processes
-from stickslip.fit.effective import effective_line
 from stickslip.fit.static import CreepFit, StaticFit, fit_static
 from stickslip.fit.static_table import StaticRig, static_table, virtual_curve
+from stickslip.force.backbone import Backbone
+from stickslip.force.geometry import rough_line
 from stickslip.plots import save
 from stickslip.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, styled
 from stickslip.scenario import load_scenario, simulate, static_creep
@@ -366,8 +367,8 @@ def extended() -> dict[str, Any]:
             "u_half_nm": float(np.mean([half_way(d, v) for d, v in zip(runs, velocities, strict=True)]) * 1e9),
         },
         "dynamic": {
-            "hurst": dynamic["effective"]["H"],
-            "h_rms_um": dynamic["effective"]["h_rms"] * 1e6,
+            "hurst": dynamic["backbone"]["rough_line"]["H"],
+            "h_rms_um": dynamic["backbone"]["rough_line"]["h_rms"] * 1e6,
             "stiffness_N_um": float(np.asarray(bank.total_stiffness) * 1e-6),
             "u_half_nm": float(np.interp(0.5, force / values["contact.strength"], grid) * 1e9),
         },
@@ -382,14 +383,12 @@ def extended() -> dict[str, Any]:
 def own_line(data: xarray.Dataset, velocity: float, rig: StaticRig) -> dict[str, float]:
     """The rough line that the lines of a run behave like together: what a perfect fit would find."""
     u, t = data["static_displacement"].values, data["static_time"].values
-    tau = default_loads(400)[8:-8]
+    tau = default_loads(400)[1:]
     curve = np.interp(tau, 1000.0 * (velocity * t - u) / data.attrs["friction_force"], u)
-
-    def residual(x: np.ndarray) -> np.ndarray:
-        return (np.exp(x[0]) * (1.0 - (1.0 - tau) ** (1.0 / x[1])) - curve) / curve[-1]
-
-    u_max, p = least_squares(residual, [np.log(curve[-1]), 3.0]).x
-    line = effective_line(float(np.exp(u_max)), float(p), rig)
+    force = tau * rig.friction_force
+    known = Rig(normal_force=rig.normal_force, friction_coefficient=rig.friction, contacts=rig.contacts)
+    exact = Backbone(curve, force, np.zeros(tau.size), np.zeros((tau.size, tau.size)))
+    line = rough_line(exact, known)
     return {"hurst": line.hurst, "h_rms_um": line.h_rms * 1e6}
 
 

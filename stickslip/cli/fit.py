@@ -168,8 +168,8 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
             for name, p in result["parameters"].items()
         ]
         lines += ["", show.table(["parameter", "value", "", "std", ""], rows)]
-    if result.get("effective"):
-        lines += ["", result["effective"]["text"]]
+    if result.get("backbone"):
+        lines += ["", *_BETWEEN.split(result["backbone"]["text"])]
     lines += [f"- {text}" for text in result.get("identifiability", ())]
     lines += [p["text"] for p in result.get("profiles", ())]
     lines += ["", *show.told(result)]

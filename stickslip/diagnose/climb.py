@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from .confirm import Confirmation, confirm
 from .decide import DISPERSION
 from .engine import Diagnosis, Rung, Verdict, leading, settled, static_residual, without
 from .prepare import Prepared
+from .shape import shape_of
 from .trials import Tell
 
 Form = tuple[str, Mapping[str, str]]  # tag and variants of an effect
@@ -52,11 +54,11 @@ class Climbed:
         """Base and last model run freely through the measured cycles."""
         return confirm(leading(self.ladder, {}), self.ladder[-1].model, self.prepared, tell=tell)
 
-    def as_diagnosis(self, confirmation: Confirmation) -> Diagnosis:
-        """The same ladder without a search behind it."""
+    def as_diagnosis(self, confirmation: Confirmation, rig: Any) -> Diagnosis:
+        """The same ladder without a search behind it, with the laws of its backbone; ``rig`` of the campaign."""
         return Diagnosis(
             Verdict("fitted", tuple(self.gains)), self.ladder, (), {}, self.prepared, deviations(self.fit),
-            self.prepared.dropped, confirmation=confirmation,
+            shape_of(self.fit, rig), self.prepared.dropped, confirmation=confirmation,
         )  # fmt: skip
 
 

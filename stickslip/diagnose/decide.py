@@ -22,6 +22,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..effects import catalogue
+from ..fit.parameters import Free
 from ..force.candidates import Candidate
 from ..force.fit import Array, Fit
 from ..force.heldout import folds, halves, unseen
@@ -99,13 +100,23 @@ def odd(fit: Fit, tag: str) -> dict[str, float]:
     """Parameters of an effect beyond where such values lie: by how many quarters of that range."""
     out = {}
     for f, z in zip(fit.free, fit.point.z, strict=False):
-        if f.usual is None or not f.name.startswith(f"{tag}."):
-            continue
-        low, high = (f.inward(max(v, f.lower) if f.scale == "log" else v) for v in f.usual)
-        beyond = max(low - z, z - high, 0.0) / (0.25 * (high - low))
+        beyond = _beyond(f, float(z)) if f.name.startswith(f"{tag}.") else 0.0
         if beyond > 0.0:
-            out[f.name] = float(beyond)
+            out[f.name] = beyond
     return out
+
+
+def _beyond(f: Free, z: float) -> float:
+    """By how many quarters of the range where its values lie a parameter is beyond that range."""
+    if f.usual is None:
+        return 0.0
+    low, high = (f.inward(max(v, f.lower) if f.scale == "log" else v) for v in f.usual)
+    return max(low - z, z - high, 0.0) / (0.25 * (high - low))
+
+
+def price(f: Free, z: float) -> float:
+    """Of a parameter beyond where such values lie, at ``z`` on the search scale, in units of the cost."""
+    return _price({f.name: _beyond(f, z)})
 
 
 def _price(far: Mapping[str, float]) -> float:

@@ -26,6 +26,7 @@ from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named
 from .pieces import Store, kept, name_of
 from .prepare import Prepared, prepare
+from .shape import Shape, shape_of
 from .trials import Tell, trials
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
@@ -100,6 +101,7 @@ class Diagnosis:
         named: effects of the last model, each with the round in which it was last told from others.
         prepared: the data.
         floor: of the force at every point: noise and scatter of the last model (N), shape (p,).
+        shape: the backbone that the last model measured, and its laws.
         dropped: what was left out, and why.
         in_time: whether the time limit was not met.
         confirmation: the leading models run freely.
@@ -112,6 +114,7 @@ class Diagnosis:
     named: Mapping[str, Round]
     prepared: Prepared
     floor: Array
+    shape: Shape
     dropped: tuple[str, ...] = field(default=())
     in_time: bool = True
     confirmation: Confirmation = field(default_factory=Confirmation)
@@ -193,11 +196,14 @@ def diagnose(
             if len(search.named) >= max_effects:
                 verdict = _end(search.named, Round(search.base, (), (), ()))
     floor = deviations(search.base)
+    tell("the laws of the backbone", 1.0)
+    shape = shape_of(search.base, campaign.rig, tags)
+    verdict = verdict if wrong else with_shape(verdict, shape)
     complete = in_time()
     confirmed = confirm(leading(ladder, search.named), ladder[-1].model, prepared, store, tell, in_time)
     return Diagnosis(
-        verdict, tuple(ladder), tuple(search.rounds), dict(search.named), prepared, floor, tuple(dropped), complete,
-        confirmed, tuple(wrong),
+        verdict, tuple(ladder), tuple(search.rounds), dict(search.named), prepared, floor, shape, tuple(dropped),
+        complete, confirmed, tuple(wrong),
     )  # fmt: skip
 
 
@@ -339,6 +345,18 @@ def _end(named: Mapping[str, Round], last: Round) -> Verdict:
         every = tuple(dict.fromkeys([*taken, *(j.tag for c in sets for j in c)]))
         return Verdict("ambiguous", taken, every)
     return Verdict("missing" if taken else "complete", taken, taken)
+
+
+def with_shape(verdict: Verdict, shape: Shape) -> Verdict:
+    """The answer with what the backbone names: one effect more that is missing, alone or in a set."""
+    tags = tuple(law.tag for law in shape.close)
+    if not tags:
+        return verdict
+    kind = {"complete": "missing"}.get(verdict.kind, verdict.kind)
+    if kind == "missing" and len(tags) > 1:
+        kind = "ambiguous"
+    effects = (*verdict.effects, tags[0])
+    return replace(verdict, kind=kind, effects=effects, set=tuple(dict.fromkeys([*verdict.set, *tags])))
 
 
 def _rung(model: tuple[str, ...], added: str | None, found: Fit, removed: str | None = None) -> Rung:

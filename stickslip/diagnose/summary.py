@@ -11,7 +11,6 @@ from ..effects import catalogue
 from ..fit.composition import run_of
 from ..fit.record import KEY, Fitted, record
 from ..fit.solved import solved
-from ..force.backbone import Backbone, PowerLaw, backbone, power_law
 from ..force.fit import Array, Fit
 from ..force.heldout import unseen
 from ..force.knots import PHASES
@@ -23,6 +22,7 @@ from .engine import Diagnosis, Round, Rung
 from .fitted import fitted_model
 from .free_errors import errors
 from .free_words import cautions, free_variables, left_out
+from .shape import Law, named_text, section
 
 Variables = dict[str, Any]
 LISTED = 6  # effects whose smallest visible amplitude is said in the verdict
@@ -46,7 +46,8 @@ def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
             "text": verdict_text(d),
             "reasons": reasons(d),
             "confidence": None,
-            "forms": {tag: dict(r.close[0].candidate.form) for tag, r in d.named.items()},
+            "forms": {tag: dict(r.close[0].candidate.form) for tag, r in d.named.items()}
+            | {law.tag: dict(law.shaped.form) for law in _of_shape(d)[:1]},
         },
         "in_time": d.in_time,
         "ranking": _ranking(first, d.ladder[1], d),
@@ -76,9 +77,7 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
     Returns:
         Entries of the result, the variables of its arrays, and the last model to be simulated.
     """
-    curve = backbone(d.fit)
-    law = power_law(curve, int(rig.contacts or 1))
-    found = fitted_model(d.fit, law, d.prepared.traces, int(rig.contacts or 1), rig)
+    found = fitted_model(d.fit, d.shape.power, d.prepared.traces, int(rig.contacts or 1), rig)
     words = solved(found)
     result = {
         "caution": [
@@ -88,20 +87,13 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
         "ladder": [_rung(r, d) for r in d.ladder],
         "scatter": d.fit.scatter.named(),
         "parameters": parameters(d.fit, found),
-        "backbone": {
-            "u_max": law.u_max, "p": law.p, "spread": law.spread, "misfit": law.misfit,
-            "strength": float(curve.force[-1]), "stiffness": float((d.fit.point.weights / _reach(d)).sum()),
-        },
+        "backbone": section(d.shape),
         "held_out": "every run in turn; by halves where a run has parameters of its own",
         "dropped": [*d.dropped, *left_out(d.confirmation)],
         "equations": [{"text": words.text(), "latex": words.latex()}],
         KEY: record(found),
     }  # fmt: skip
-    return result, variables(d, curve, law), found
-
-
-def _reach(d: Diagnosis) -> Array:
-    return d.fit.problem.composition.reach
+    return result, variables(d), found
 
 
 def error(residual: Array, d: Diagnosis, where: np.ndarray | None = None) -> float:
@@ -223,6 +215,10 @@ def reasons(d: Diagnosis) -> list[str]:
                 f"{j.tag}: the cost falls by {j.gain:.0f} (probability by chance {j.chance:.1g}), on unseen runs by "
                 f"{float(j.unseen.sum()):.0f} +- {j.error:.0f}"
             )
+    out += [
+        f"{law.tag}: chi-square of the backbone falls by {law.gain:.0f} (probability by chance {law.chance:.1g})"
+        for law in _of_shape(d)[:1]
+    ]
     return out
 
 
@@ -236,6 +232,12 @@ def visible(d: Diagnosis) -> dict[str, dict[str, Any]]:
         known = out.get(c.tag)
         if known is None or c.visible < known["amplitude"]:
             out[c.tag] = {"amplitude": c.visible, "unit": unit, "form": dict(c.form)}
+    if d.shape.stated:
+        out |= {
+            law.tag: {"amplitude": law.shaped.visible, "unit": law.shaped.free.unit, "form": dict(law.shaped.form)}
+            for law in d.shape.laws
+            if law.shaped.visible is not None
+        }
     return out
 
 
@@ -250,20 +252,21 @@ def verdict_text(d: Diagnosis) -> str:
         return f"{found} No effect predicts unseen runs better than that.{alike}"
     before, after = (error(r.unseen, d) for r in (base, last) if r.unseen is not None)
     parts = []
-    if v.effects:
+    if d.named:
         amounts = []
-        for tag in v.effects:
+        for tag in d.named:
             name = f"{tag}.{catalogue.get(tag).amplitude}"
             unit = catalogue.amplitude(catalogue.get(tag)).unit
             value, std = d.fit.values[name], d.fit.std()[name]
             amounts.append(f"{name} = {shown(value, unit, 3)} +- {shown(std, unit, 2)}")
         parts.append(
-            f"Adding {' and '.join(v.effects)} takes the error on unseen runs from {before:.3g} to {after:.3g} floors "
+            f"Adding {' and '.join(d.named)} takes the error on unseen runs from {before:.3g} to {after:.3g} floors "
             f"({'; '.join(amounts)})."
         )
+    if _of_shape(d):
+        parts.append(named_text(d.shape))
     if v.kind == "ambiguous":
-        sets = [[j.tag for j in r.close] for r in d.named.values() if len(r.close) > 1]
-        parts.append("These data cannot tell " + "; nor ".join(" from ".join(s) for s in sets) + ".")
+        parts.append("These data cannot tell " + "; nor ".join(" from ".join(s) for s in _sets(d)) + ".")
     if v.kind == "unknown" and v.structure is not None:
         parts.append(
             f"Something is missing that no effect of the catalogue explains: the residual force depends on the "
@@ -280,17 +283,28 @@ def verdict_text(d: Diagnosis) -> str:
     return " ".join(parts)
 
 
+def _sets(d: Diagnosis) -> list[list[str]]:
+    """Tags of effects that these data cannot tell apart."""
+    every = [*([j.tag for j in r.close] for r in d.named.values()), [law.tag for law in _of_shape(d)]]
+    return [tags for tags in every if len(tags) > 1]
+
+
+def _of_shape(d: Diagnosis) -> tuple[Law, ...]:
+    """What the backbone names and what it cannot tell from it; nothing where the rig is as wrong as to name nothing."""
+    return () if d.wrong else d.shape.close
+
+
 def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
     """For effects that these data cannot tell apart: what the catalogue knows to separate them."""
-    sets = [r.close for r in d.named.values() if len(r.close) > 1]
+    sets = _sets(d)
     if not sets:
         return None
     made = []
     for close in sets:
-        a, b = close[0].tag, close[1].tag
+        a, b = close[:2]
         known = catalogue.alike(a).get(b)
         text = known or "add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s"
-        made.append({"text": text, "separates": [j.tag for j in close]})
+        made.append({"text": text, "separates": close})
     return {**made[0], "others": made[1:]} if len(made) > 1 else made[0]
 
 
@@ -329,7 +343,7 @@ def parameters(fit: Fit, found: Fitted) -> dict[str, dict[str, Any]]:
     return out
 
 
-def variables(d: Diagnosis, curve: Backbone, law: PowerLaw) -> Variables:
+def variables(d: Diagnosis) -> Variables:
     """Arrays of the pictures: measured and model force at the points of every run, the backbone."""
     out: Variables = {}
     problem = d.fit.problem
@@ -355,9 +369,10 @@ def variables(d: Diagnosis, curve: Backbone, law: PowerLaw) -> Variables:
             ("time_in_contact", where["time in contact"][own], "s"),
         ):
             out[f"force{r}_{name}"] = (dim, np.asarray(values), {"units": unit})
+    curve, line = d.shape.curve, d.shape.line
     for name, values, unit in (
         ("displacement", curve.displacement, "m"), ("force", curve.force, "N"), ("std", curve.std, "N"),
-        ("law", law.force, "N"),
+        ("law", d.shape.power.force, "N"), *([] if line is None else [("line", line.force, "N")]),
     ):  # fmt: skip
         out[f"backbone_{name}"] = ("backbone_point", values, {"units": unit})
     return out | free_variables(d.confirmation, d.prepared, d.ladder[1].model, d.ladder[-1].model)

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 HURST = (0.02, 0.98)
 LOADS = 200
 _HURST_NODES, _LOAD_NODES = 15, 14
-_LOAD_RANGE = (2e-4, 5e-1)  # of q: from a few springs in contact to lines pressed nearly flat
+LOAD_RANGE = (2e-4, 5e-1)  # of q: from a few springs in contact to lines pressed nearly flat
 _REFERENCE = (1.0, 1e-6)  # length and rms height (m) of the lines the table is made with; it does not depend on them
 
 
@@ -117,7 +117,7 @@ class StaticRig:
 
     def rms_range(self) -> tuple[float, float]:
         """Rms heights (m) the table covers for this rig."""
-        low, high = _LOAD_RANGE
+        low, high = LOAD_RANGE
         return self.crowding(1.0) / high, self.crowding(1.0) / low
 
 
@@ -134,7 +134,7 @@ class StaticTable:
     def __init__(self, n_springs: int, lines: int, seed: int) -> None:
         self.tau = default_loads(LOADS)
         self._hurst = np.linspace(*HURST, _HURST_NODES)
-        self._load = np.linspace(np.log(_LOAD_RANGE[0]), np.log(_LOAD_RANGE[1]), _LOAD_NODES)
+        self._load = np.linspace(np.log(LOAD_RANGE[0]), np.log(LOAD_RANGE[1]), _LOAD_NODES)
         normal, tangential = (float(np.asarray(m)) for m in equal_bodies())
         length, height = _REFERENCE
         force = np.exp(self._load) * normal * length * height
@@ -145,19 +145,34 @@ class StaticTable:
         shape = u.reshape(_HURST_NODES, _LOAD_NODES, LOADS) * (tangential / normal) / height
         # logarithms, the zero at no load left out: power laws become smooth
         columns = np.log(shape[..., 1:])
-        spline = make_interp_spline(self._hurst, columns, k=3, axis=0)
-        self._knots = (spline.t, make_interp_spline(self._load, columns[0], k=3, axis=0).t)
-        self._table = make_interp_spline(self._load, spline.c, k=3, axis=1).c.transpose(1, 0, 2)
+        self._logarithm = Bicubic(self._hurst, self._load, columns)
 
     def shape(self, hurst: float, crowding: float) -> Array:
         """u G* / (mu E* h_rms) at the loads ``tau``, shape (T,)."""
-        (i, wi), (j, wj) = (_weights(k, x) for k, x in zip(self._knots, (hurst, np.log(crowding)), strict=True))
-        part = self._table[i : i + 4, j : j + 4]
-        return np.concatenate([[0.0], np.exp(np.einsum("i,j,ijt->t", wi, wj, part))])
+        return np.concatenate([[0.0], np.exp(self._logarithm(hurst, float(np.log(crowding))))])
 
     def displacement(self, rig: StaticRig, hurst: float, h_rms: float) -> Array:
         """Displacement (m) at the loads ``tau``, shape (T,)."""
         return rig.reach * h_rms * self.shape(hurst, rig.crowding(h_rms))
+
+
+class Bicubic:
+    """Curves interpolated by a cubic spline in two variables, held at the ends of the table.
+
+    Args:
+        x, y: nodes, shape (I,) and (J,).
+        values: shape (I, J, T).
+    """
+
+    def __init__(self, x: Array, y: Array, values: Array) -> None:
+        spline = make_interp_spline(x, values, k=3, axis=0)
+        self._knots = (spline.t, make_interp_spline(y, values[0], k=3, axis=0).t)
+        self._table = make_interp_spline(y, spline.c, k=3, axis=1).c.transpose(1, 0, 2)
+
+    def __call__(self, x: float, y: float) -> Array:
+        """The curve there, shape (T,)."""
+        (i, wi), (j, wj) = (_weights(k, at) for k, at in zip(self._knots, (x, y), strict=True))
+        return np.asarray(np.einsum("i,j,ijt->t", wi, wj, self._table[i : i + 4, j : j + 4]))
 
 
 def _weights(knots: Array, x: float) -> tuple[int, Array]:

@@ -1,4 +1,4 @@
-"""What is known of a contact from its roughness: the effective contact that rough lines (H, h_rms) would make."""
+"""How the power law of a contact follows from the rough lines (H, h_rms) behind it."""
 
 from __future__ import annotations
 
@@ -9,37 +9,12 @@ from scipy.optimize import least_squares
 
 from ..campaign import Rig, Unmeasured
 from ..contact import check_saturation, rough_table, static_contact
-from ..errors import InputError
-from ..units import shown
 from .static_table import StaticRig
 
 LINES = 60
-GUESSES = ("H", "h_rms", "normal_force", "friction_coefficient", "youngs_modulus", "poisson_ratio", "line_length")
 OUTPUTS = ("contact.u_max", "contact.p", "contact.spread", "contact.strength")
 STEP = 0.05  # of a logarithm, for derivatives
 LOADS = np.linspace(0.02, 0.98, 49)
-
-
-class Guess(NamedTuple):
-    """Median and the standard deviation of the logarithm."""
-
-    value: float
-    width: float
-
-
-class SurfacePrior(NamedTuple):
-    """The power-law contact of a rig with rough lines.
-
-    Attributes:
-        u_max: displacement at full sliding of the typical contact (m). p: exponent of the backbone.
-        spread: rms of ln(u_max) over the contacts; None for a single one.
-        text: for a person.
-    """
-
-    u_max: Guess
-    p: Guess
-    spread: Guess | None
-    text: str
 
 
 class Sensitivity(NamedTuple):
@@ -63,51 +38,6 @@ class _Lines(NamedTuple):
     u: np.ndarray
     p: np.ndarray
     mismatch: float
-
-
-def surface_prior(rig: Rig) -> SurfacePrior | None:
-    """Prior of the contact from the roughness in ``[rig]``, or None where it is not stated.
-
-    One rig has a few lines of its own, so the widths are the scatter of single lines over the root of the number of
-    contacts, together with how badly a power law stands for a line, and with what the bounds of H, h_rms, load,
-    friction, elasticity and length leave open where these are guesses.
-
-    Raises:
-        InputError: H without h_rms or the reverse; load or friction are neither measured nor guessed; lines in contact
-            over their whole length.
-
-    Warns:
-        SaturationWarning: lines in contact over more than half of their length.
-    """
-    if rig.H is None and rig.h_rms is None:
-        return None
-    for name, other in (("H", "h_rms"), ("h_rms", "H")):
-        if getattr(rig, name) is None:
-            raise InputError(
-                f"'{other}' says nothing without '{name}'", key=f"rig.{name}", hint=f"give both, or remove '{other}'"
-            )
-    contacts = int(rig.contacts or 1)
-    middle = _lines(rig)
-    variance = np.array([v.var(ddof=1) / contacts + middle.mismatch**2 for v in (middle.u, middle.p)])
-    open_ones = [n for n in GUESSES if _open(getattr(rig, n))]
-    for name in open_ones:
-        value = getattr(rig, name)
-        low, high = (_lines(rig.model_copy(update={name: v})) for v in (value.lower, value.upper))
-        # bounds are taken for four standard deviations, as everywhere in a campaign
-        variance += (np.array([high.u.mean() - low.u.mean(), high.p.mean() - low.p.mean()]) / 4.0) ** 2
-    width = np.sqrt(variance)
-    u = Guess(float(np.exp(middle.u.mean())), float(width[0]))
-    p = Guess(float(np.exp(middle.p.mean())), float(width[1]))
-    spread = None
-    if contacts > 1:
-        share = np.sqrt((contacts - 1) / contacts)
-        spread = Guess(float(middle.u.std(ddof=1) * share), float(1.0 / np.sqrt(2.0 * (contacts - 1))))
-    guessed = " (guessed)" if {"H", "h_rms"} & set(open_ones) else ""
-    text = (
-        f"Prior of the contact from the rig's H and h_rms{guessed}: u_max = {shown(u.value, 'm', 3)} within a "
-        f"factor of {np.exp(u.width):.2f}, p = {p.value:.3g} within {np.exp(p.width):.2f}."
-    )
-    return SurfacePrior(u, p, spread, text)
 
 
 def sensitivity(rig: Rig) -> Sensitivity:
@@ -141,10 +71,6 @@ def sensitivity(rig: Rig) -> Sensitivity:
     keep = [0, 1, 2, 3] if contacts > 1 else [0, 1, 3]
     outputs = tuple(OUTPUTS[k] for k in keep)
     return Sensitivity(tuple(centre), outputs, np.column_stack(columns)[keep], scatter[np.ix_(keep, keep)])
-
-
-def _open(value: object) -> bool:
-    return isinstance(value, Unmeasured)
 
 
 def _known(value: float | Unmeasured) -> float:

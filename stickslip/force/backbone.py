@@ -10,7 +10,6 @@ from scipy.optimize import least_squares
 from ..contact import power_law_bank
 from .fit import Array, Fit
 
-POINTS = 60
 LEAST = 2e-3  # of the strength: what no law of a rough contact describes better
 BINS = 96
 
@@ -20,7 +19,8 @@ class Backbone:
     """Force on first loading from the force-free state.
 
     Attributes:
-        displacement: (m), shape (n,). force, std: (N), shape (n,).
+        displacement: yield displacements of the bank's elements (m), shape (n,); between them the curve is straight.
+        force, std: (N), shape (n,).
         covariance: of the force (N^2), shape (n, n).
     """
 
@@ -52,8 +52,8 @@ class PowerLaw:
 def backbone(found: Fit) -> Backbone:
     """The measured backbone with its band."""
     composition = found.problem.composition
-    u = np.geomspace(composition.reach[0], composition.reach[-1], POINTS)
-    basis = np.minimum(u[:, None] / composition.reach, 1.0)
+    u = composition.reach
+    basis = np.minimum(u[:, None] / u, 1.0)
     first = len(composition.shared) + found.point.phases.size
     k = found.point.weights.size
     part = found.covariance[first : first + k, first : first + k]

@@ -27,7 +27,7 @@ from ..force.heldout import unseen
 from ..force.knots import PHASES
 from ..force.residual import coordinates
 from ..report.diagnosis_result import trace_sections
-from ..report.identifiability import effective, identifiability
+from ..report.identifiability import identifiability
 from ..units import shown, to_si
 from .picture import FitPlots
 from .run import Tell, dataset, head, save
@@ -416,11 +416,10 @@ class Fit(Shown):
 
     @cached_property
     def _sections(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        found = self.climbed.as_diagnosis(self.confirm())
+        found = self.climbed.as_diagnosis(self.confirm(), self.campaign.rig)
         sections, variables, fitted = fitted_sections(found, self.campaign.rig)
         traces, segmentations = self.campaign.displaced[0], self.campaign.scaled[0]
         described, pictured = trace_sections(traces, segmentations)
-        line = effective(fitted, self.campaign.rig)
         result = {
             **head(self.campaign, "fit"),
             "model": "inertial",
@@ -428,8 +427,7 @@ class Fit(Shown):
             **sections,
             "gains": dict(self.climbed.gains),
             "profiles": [],
-            "effective": line,
-            "identifiability": identifiability(fitted, self.campaign.rig, line),
+            "identifiability": identifiability(fitted, self.campaign.rig, sections["backbone"]["rough_line"]),
             **described,
             "fit": {
                 "cost": self._fit.cost,

@@ -93,16 +93,19 @@ def residual_picture(data: xarray.Dataset, names: list[str]) -> Figure:
 
 @styled
 def backbone_picture(data: xarray.Dataset, law: dict[str, Any]) -> Figure:
-    """The measured backbone of the contact with its band, and the rough contact's law fitted to it."""
+    """The measured backbone of the contact with its band, the nearest rough lines, and the power law fitted to it."""
     u, force, std, fitted = (series(data, "backbone", n) for n in ("displacement", "force", "std", "law"))
     assert u is not None and force is not None and std is not None and fitted is not None
+    line = series(data, "backbone", "line")
     made, axes = figure(1, 2, width=9.0, height=3.6)
     k, unit = scaled(force, "N")
     for ax, scale in zip(axes[0], ("linear", "log"), strict=True):
         m, length = scaled(u, "m")
         ax.fill_between(u * m, (force - 2 * std) * k, (force + 2 * std) * k, color=LIGHT, alpha=0.5, lw=0)
         ax.plot(u * m, force * k, color=DARK, lw=1.6, label="measured, two standard deviations")
-        ax.plot(u * m, fitted * k, color=MIDDLE, ls="--", lw=1.2, label="rough contact: 1 - (1 - u/u_max)^p")
+        ax.plot(u * m, fitted * k, color=MIDDLE, ls="--", lw=1.2, label="power law 1 - (1 - u/u_max)^p")
+        if line is not None:
+            ax.plot(u * m, line * k, color=DARK, ls=":", lw=1.2, label="nearest rough lines (H, h_rms)")
         ax.set(xlabel=f"displacement from the force-free contact / {length}", ylabel=f"force / {unit}")
         if scale == "log":
             ax.set(xscale="log", yscale="log", ylim=(max(1e-4 * force[-1] * k, 1e-300), None))

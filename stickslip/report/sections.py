@@ -38,7 +38,7 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
         caption = "Residual force of the base model against what it may depend on; lines: running medians."
         yield "force", caption, residual_picture(data, names)
     if "backbone_force" in data and result.get("backbone"):
-        caption = "Backbone of the contact as the motion shows it, and the law of a rough contact."
+        caption = "Backbone of the contact as the motion shows it, and the laws of a rough contact."
         yield "force", caption, backbone_picture(data, result["backbone"])
     if "free_run_measured_time" in data and "free_recurrence_measured" in data:
         caption = (

@@ -11,7 +11,7 @@ from ..units import shown
 _KNOWN: dict[str, Any] = {
     "verdict": {}, "ladder": [], "ranking": [], "parameters": {}, "equations": [], "identifiability": [], "traces": [],
     "dropped": [], "inputs": [], "versions": {}, "static": None, "next_experiment": None, "can": [],
-    "cannot": [], "effective": None, "profiles": [], "ramps": None, "notes": [], "title": "", "kind": "run",
+    "cannot": [], "profiles": [], "ramps": None, "notes": [], "title": "", "kind": "run",
     "seconds": None, "summary": "", "caution": [], "ranking_base": None, "later_rounds": [],
     "visible": {}, "structure": None, "backbone": None,
 }  # fmt: skip

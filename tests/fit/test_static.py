@@ -10,7 +10,6 @@ import pytest
 from stickslip.contact import creep_curve, creep_displacements, default_loads
 from stickslip.errors import InputError
 from stickslip.fit.creep_process import CreepProcess, creep_processes
-from stickslip.fit.effective import effective_line
 from stickslip.fit.normalised import Ramp, break_away, fit_ramps
 from stickslip.fit.static import fit_static, tied_quantities
 from stickslip.fit.static_table import StaticRig, static_table, virtual_curve
@@ -170,49 +169,6 @@ def test_the_curve_holds_one_number_of_load_length_height_and_modulus():
     # the power law's exponents, 1/(1 + H) and H/(1 + H), which finitely many springs reach about
     power = float(text.split("h_rms^")[1].split(" ")[0])
     assert power == pytest.approx(1 / 1.3, abs=0.12)
-
-
-@pytest.mark.parametrize("hurst", [0.25, 0.6, 0.85])
-def test_effective_line_of_a_backbone_that_is_a_line_s(hurst):
-    table = static_table()
-    u = table.displacement(RIG, hurst, 2e-6)
-    part = (table.tau > 0.02) & (table.tau < 0.98)
-    # exponent of the power-law backbone nearest to this line's curve
-    p = min(
-        np.linspace(1.5, 6, 451), key=lambda p: np.sum((1 - (1 - table.tau[part]) ** (1 / p) - u[part] / u[-1]) ** 2)
-    )
-    line = effective_line(float(u[-1]), float(p), RIG)
-    # nearest line to the nearest power law: near the line it came from, and nearer to the power law than that one
-    assert line.hurst == pytest.approx(hurst, abs=0.12)
-    assert line.h_rms == pytest.approx(2e-6, rel=0.25)
-    backbone = u[-1] * (1 - (1 - table.tau[part]) ** (1 / p))
-    assert line.mismatch <= np.sqrt(np.mean((u[part] - backbone) ** 2)) / u[-1]
-    assert line.mismatch < 0.01
-
-
-def test_effective_line_is_of_the_curve_of_all_contacts():
-    u_max, p, spread = 6.6e-7, 3.0, 0.23
-    together = effective_line(u_max, p, RIG, spread)
-    # each contact stretched by its own factor, summed on a grid, compared with the mean line without the package's code
-    stretch = np.exp(spread * np.array([-1.3628, -0.3775, 0.3775, 1.3628]))
-    u = np.linspace(0.0, u_max * stretch.max(), 20001)
-    force = np.mean([1.0 - np.clip(1.0 - u / (u_max * s), 0.0, None) ** p for s in stretch], axis=0)
-    table = static_table()
-    part = (table.tau > 0.02) & (table.tau < 0.98)
-    wanted = np.interp(table.tau[part], force, u)
-    off = table.displacement(RIG, together.hurst, together.h_rms)[part] - wanted
-    assert np.sqrt(np.mean(off**2)) / u_max == pytest.approx(together.mismatch, rel=0.05)
-    alone = effective_line(u_max, p, RIG)
-    worse = table.displacement(RIG, alone.hurst, alone.h_rms)[part] - wanted
-    assert np.sqrt(np.mean(worse**2)) > 10 * np.sqrt(np.mean(off**2))
-    # unequal contacts slide one after the other, as the springs of a line of smaller H
-    assert together.hurst < alone.hurst
-    single = StaticRig(RIG.normal_force, RIG.friction, 1, RIG.spring_stiffness)
-    assert effective_line(u_max, p, single, spread).hurst == pytest.approx(alone.hurst, abs=1e-6)
-
-
-def test_effective_line_says_when_there_is_none():
-    assert "edge" in effective_line(1e-6, 20.0, RIG).note
 
 
 def ramp_trace(hurst=0.4, u_max=1e-4, force=12.0, rate=100.0):

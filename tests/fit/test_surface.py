@@ -1,12 +1,12 @@
-"""The prior of a contact that follows from the roughness of a rig."""
+"""How the power law of a contact follows from the rough lines behind it."""
 
 import numpy as np
 import pytest
 
 from stickslip.campaign import Rig
-from stickslip.challenge.generator.lines import Surface, press, rough_line
+from stickslip.contact import rough_table, static_contact
 from stickslip.errors import InputError
-from stickslip.fit.surface import nearest_exponent, sensitivity, surface_prior
+from stickslip.fit.surface import LINES, LOADS, nearest_exponent, sensitivity
 from stickslip.uncertainty import null_directions
 
 KNOWN = {"contacts": 4, "normal_force": 0.31, "friction_coefficient": 0.21, "H": 0.3, "h_rms": 2.46e-6}
@@ -21,59 +21,6 @@ def test_a_power_law_is_found_exactly():
     p, mismatch = nearest_exponent(tau, 1 - (1 - tau) ** (1 / 2.7))
     assert np.exp(p) == pytest.approx(2.7, rel=1e-6)
     assert mismatch < 1e-7
-
-
-def test_the_prior_is_what_real_lines_do():
-    """200 lines of the challenge's generator, pressed and pulled spring by spring, by code that shares nothing."""
-    surface, rng = Surface(hurst=0.3, h_rms=2.46e-6), np.random.default_rng(5)
-    tau = np.linspace(0.02, 0.98, 25)
-    found = []
-    for _ in range(200):
-        normal = press(surface, rough_line(surface, rng), 0.31)
-        slide = 0.21 * normal / surface.tangential_spring  # displacement at which each spring slides, ascending
-        force = np.array([np.minimum(surface.tangential_spring * u, 0.21 * normal).sum() for u in slide])
-        u = np.interp(tau, force / (0.21 * 0.31), slide)
-        found.append((np.log(slide[-1]), nearest_exponent(tau, u / slide[-1])[0]))
-    lines = np.array(found)
-    prior = surface_prior(rig())
-    for guess, ln in zip((prior.u_max, prior.p), lines.T, strict=True):
-        error = ln.std() * np.sqrt(1 / 200 + 1 / 60)
-        assert np.log(guess.value) == pytest.approx(ln.mean(), abs=4 * error)
-        # four contacts have half the scatter of one line, but a power law is not quite their curve
-        assert ln.std() / 2 * 0.7 < guess.width < ln.std()
-    assert prior.spread.value == pytest.approx(lines[:, 0].std() * np.sqrt(3 / 4), rel=0.35)
-
-
-def test_what_is_guessed_widens_it_and_contacts_narrow_it():
-    known = surface_prior(rig())
-    vague = surface_prior(rig(h_rms={"guess": 2.46e-6, "lower": 1e-6, "upper": 5e-6}))
-    assert vague.u_max.value == known.u_max.value
-    assert vague.u_max.width > 1.5 * known.u_max.width
-    assert "(guessed)" in vague.text
-    assert "(guessed)" not in known.text
-    single = surface_prior(rig(contacts=1))
-    assert single.u_max.width > 1.5 * known.u_max.width
-    assert single.spread is None
-    load = surface_prior(rig(normal_force={"guess": 0.31, "lower": 0.1, "upper": 0.9}))
-    assert load.u_max.width > known.u_max.width
-
-
-def test_no_roughness_no_prior():
-    assert surface_prior(rig(H=None, h_rms=None)) is None
-
-
-@pytest.mark.parametrize("missing", ["H", "h_rms", "normal_force", "friction_coefficient"])
-def test_half_of_it_is_refused(missing):
-    with pytest.raises(InputError) as error:
-        surface_prior(rig(**{missing: None}))
-    assert missing in str(error.value)
-    assert error.value.key == f"rig.{missing}"
-
-
-@pytest.mark.parametrize("more", [{"youngs_modulus": {"guess": 2e11, "lower": 5e10, "upper": 8e11}},
-                                  {"line_length": {"guess": 2e-5, "lower": 5e-6, "upper": 8e-5}}])  # fmt: skip
-def test_elasticity_and_length_that_are_guessed_widen_it(more):
-    assert surface_prior(rig(**more)).u_max.width > 1.1 * surface_prior(rig()).u_max.width
 
 
 GUESSED = {"normal_force": {"guess": 0.31, "lower": 0.1, "upper": 0.9},
@@ -109,17 +56,22 @@ def test_a_load_that_the_strength_tells_is_not_named():
     assert "normal_force * friction_coefficient is known to 2.9 %" in both.text
 
 
-def test_the_derivatives_are_those_of_the_prior():
-    """A load 20 % higher moves the prior as the derivatives say; the modulus acts as the length does."""
+def test_the_derivatives_are_those_of_lines():
+    """A load 20 % higher moves the mean u_max and p of lines as the derivatives say; the modulus acts as the length."""
     found = sensitivity(rig(normal_force=GUESSED["normal_force"]))
     column = {name: found.jacobian[:, k] for k, name in enumerate(found.names)}
-    low, high = (surface_prior(rig(normal_force=0.31 * f)) for f in (1.2**-0.5, 1.2**0.5))
-    change = [np.log(b.value / a.value) / np.log(1.2) for a, b in zip(low[:2], high[:2], strict=True)]
-    assert column["normal_force"][:2] == pytest.approx(change, rel=0.02, abs=1e-3)
+    change = []
+    for load in (0.31 * 1.2**-0.5, 0.31 * 1.2**0.5):
+        table = rough_table(0.3, 20e-6, 4096, LINES, 0).scaled(2.46e-6)
+        curves = np.asarray(static_contact(table, load, 0.21).displacement(np.append(LOADS, 1.0)[:, None])).T
+        shapes = [nearest_exponent(LOADS, u[:-1] / u[-1])[0] for u in curves]
+        change.append([np.mean(np.log(curves[:, -1])), np.mean(shapes)])
+    slope = (np.array(change[1]) - change[0]) / np.log(1.2)
+    assert column["normal_force"][:2] == pytest.approx(slope, rel=0.02, abs=1e-3)
     assert column["youngs_modulus"][:2] == pytest.approx(column["line_length"][:2], rel=1e-3, abs=1e-6)
     assert column["normal_force"][found.outputs.index("contact.strength")] == 1.0
 
 
-def test_lines_pressed_flat_are_no_prior():
+def test_lines_pressed_flat_have_no_power_law():
     with pytest.raises(InputError, match="touch over their whole length"):
-        surface_prior(rig(h_rms=1e-9))
+        sensitivity(rig(h_rms=1e-9))
