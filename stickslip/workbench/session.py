@@ -22,7 +22,7 @@ from ..progress import Cancelled
 from . import searches
 from .journal import Journal
 from .watching import watch
-from .work import Search, Worker, at_once
+from .work import Search, Worker, at_once, end_all
 
 __all__ = ["BASE", "HAND", "Session", "Step", "watch"]
 
@@ -376,8 +376,7 @@ class Session(param.Parameterized):
     def close(self) -> None:
         """End all that goes on beside."""
         self.stop()
-        if self._listing is not None:
-            self._listing.cancel()
+        end_all()
 
     # effects of one's own
 
