@@ -104,7 +104,10 @@ def test_a_hand_sends_at_most_ten_places_a_second_and_the_last_one(browser):
           if (++i > 100) {
             clearInterval(drag)
             slider.dispatchEvent(new Event('change'))
-            setTimeout(() => { WebSocket.prototype.send = send; done([sent.length, (sent[sent.length - 1] - sent[0]) / 1000]) }, 500)
+            setTimeout(() => {
+              WebSocket.prototype.send = send
+              done([sent.length, (sent[sent.length - 1] - sent[0]) / 1000])
+            }, 500)
           }
         }, 10)
         """
