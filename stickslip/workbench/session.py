@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -15,10 +16,11 @@ from typing import Any
 import param
 
 from ..conformance import load_effects
-from ..errors import StickslipError
+from ..errors import RunFolderError, StickslipError
 from ..force.promise import Promise
 from ..objects import Campaign, Diagnosis, Fit, load_campaign
 from ..progress import Cancelled
+from ..runstore import alone
 from . import searches
 from .journal import Journal
 from .watching import watch
@@ -94,6 +96,7 @@ class Session(param.Parameterized):
         self._listing: Search | None = None
         self._moves: dict[str, float | str] = {}
         self._guard = threading.Lock()
+        self._held = ExitStack()
         self._kept: tuple[Any, ...] = ()
         self._anew = False
         self._promised: list[tuple[Fit, tuple[Promise, ...]]] = []
@@ -136,7 +139,15 @@ class Session(param.Parameterized):
         campaign = self.campaign
         assert campaign is not None
         if keep and campaign.description.filed:
-            self._journal = Journal(campaign)
+            journal = Journal(campaign)
+            try:
+                self._held.enter_context(alone(journal.file))
+                self._journal = journal
+            except RunFolderError:
+                self.said = (
+                    "another workbench has this campaign open, or nothing can be written beside it: nothing done here "
+                    "is kept"
+                )
         self.worker("", partial(self._begin, campaign))
 
     def _begin(self, campaign: Campaign) -> None:
@@ -377,6 +388,7 @@ class Session(param.Parameterized):
         """End all that goes on beside."""
         self.stop()
         end_all()
+        self._held.close()
 
     # effects of one's own
 

@@ -75,7 +75,7 @@ def test_moved_by_hand_the_last_fit_is_still_at_hand(session, base):
     assert session.fit.error > 2.0 * base.error
 
 
-def test_what_was_open_comes_back(campaign, base, session):
+def test_what_was_open_comes_back(campaign, base, session, monkeypatch):
     session._journal = Journal(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
     session.lock(DROP, True)
@@ -88,6 +88,11 @@ def test_what_was_open_comes_back(campaign, base, session):
     np.testing.assert_allclose(again.fit.force.residual, session.fit.force.residual, rtol=1e-9)
     assert again.fit.error == pytest.approx(session.fit.error, rel=1e-6)
     assert again.fitted.unseen_error == pytest.approx(base.unseen_error, rel=1e-3)
+    third = Session(campaign=campaign)
+    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+    third.begin()
+    assert "another workbench" in third.said and len(third.steps) == 1
+    again.close()
     again.undo()
     assert again.fit.error == pytest.approx(base.error, rel=1e-6)
     assert again.code() == session.code().rsplit("\n", 1)[0]
@@ -110,6 +115,7 @@ def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, folde
     monkeypatch.setattr(type(campaign), "fit", lambda self: base)
     again = Session(campaign=campaign)
     again.begin()
+    again.close()
     assert "begins anew" in again.said and again.fit is base
 
 
