@@ -140,6 +140,8 @@ class Session(param.Parameterized):
         assert campaign is not None
         if keep and campaign.description.filed:
             journal = Journal(campaign)
+            self._held.close()  # of what was open before
+            self._kept = ()
             try:
                 self._held.enter_context(alone(journal.file))
                 self._journal = journal

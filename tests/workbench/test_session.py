@@ -171,3 +171,12 @@ def test_a_refit_leaves_what_is_locked(session, base):
     session.refit()
     assert session.fit.values[DROP] == pytest.approx(moved, rel=1e-3)
     assert not session.fit.by_hand
+
+
+def test_a_campaign_can_be_begun_again(campaign, base, monkeypatch):
+    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+    session = Session(campaign=campaign)
+    session.begin()
+    session.begin()
+    assert session._journal is not None and "another workbench" not in session.said
+    session.close()
