@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT))
 from tests.workbench.browser import Browser, Served
 
 IMAGES = ROOT / "docs" / "images"
-SIZE = 1280, 1180
+SIZE = 1280, 1100
 SETTLED = 1.5  # s after the last change until all is drawn
 
 

@@ -145,8 +145,8 @@ def frame(session: Session) -> Frame:
         if fit is None or fitted is None:
             made.errors = ""
             return
-        told = f"error {fitted.error:.3f} fitted, {fitted.unseen_error:.3f} unseen"
-        made.errors = f"error {fit.error:.3f} by hand (before: {told})" if fit.by_hand else told
+        told = f"{fitted.error:.3f} fitted, {fitted.unseen_error:.3f} unseen"
+        made.errors = f"error {fit.error:.3f} by hand (before: {told})" if fit.by_hand else f"error {told}"
 
     watch(session, ["campaign", "steps", "at", "busy", "share", "searching", "searched", "said"], update)
     watch(session, ["steps", "at"], errors)

@@ -11,13 +11,13 @@ from panel.custom import JSComponent
 
 _HERE = Path(__file__).parent / "static"
 BUTTON = """
-.bk-btn {
+:host(.solid) .bk-btn.bk-btn-default, .bk-btn.bk-btn-default {
   border: 1px solid var(--wb-accent); border-radius: 4px; background: var(--wb-surface); color: var(--wb-accent);
   font-size: 14px;
 }
-.bk-btn:hover:not([disabled]) { background: var(--wb-accent); color: var(--wb-surface); }
-.bk-btn[disabled] { border-color: var(--wb-line); color: var(--wb-soft); opacity: 0.6; }
-.bk-btn.bk-active { background: var(--wb-accent); color: var(--wb-surface); }
+:host(.solid) .bk-btn.bk-btn-default:hover:not([disabled]) { background: var(--wb-accent); color: var(--wb-surface); }
+:host(.solid) .bk-btn.bk-btn-default[disabled] { border-color: var(--wb-line); color: var(--wb-soft); opacity: 0.6; }
+:host(.solid) .bk-btn-group .bk-btn.bk-btn-default.bk-active { background: var(--wb-accent); color: var(--wb-surface); }
 """
 Message = dict[str, Any]
 

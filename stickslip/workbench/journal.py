@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +49,9 @@ class Journal:
         self.folder.mkdir(exist_ok=True)
         rows = [{**step, "fit": self._of(fit)} for step, fit in zip(steps, fits, strict=True)]
         self._packed = {id(fit): self._packed[id(fit)] for fit in fits}
-        write_aside(self.file, json_text({"schema": SCHEMA, "inputs": self.campaign.inputs(), "steps": rows, **more}))
+        write_aside(
+            self.file, json_text({"schema": SCHEMA, "inputs": _digests(self.campaign.inputs()), "steps": rows, **more})
+        )
         self._clean({name for row in rows for name in _named(row["fit"])})
 
     def read(self) -> tuple[list[dict[str, Any]], list[Fit], dict[str, Any]]:
@@ -61,7 +63,7 @@ class Journal:
         if not self.file.is_file():
             return [], [], {}
         kept = json.loads(self.file.read_text())
-        if kept.get("schema") != SCHEMA or kept.get("inputs") != self.campaign.inputs():
+        if kept.get("schema") != SCHEMA or kept.get("inputs") != _digests(self.campaign.inputs()):
             return [], [], {}
         steps, fits = [], []
         for row in kept.pop("steps"):
@@ -75,7 +77,7 @@ class Journal:
         if not (self.diagnosis / "result.json").is_file():
             return None
         result = read_result(self.diagnosis)
-        same = result.get("inputs") == json.loads(json_text(self.campaign.inputs()))
+        same = _digests(result.get("inputs", ())) == _digests(self.campaign.inputs())
         return Diagnosis(self.campaign, None, dict(result), {}) if same else None
 
     def _of(self, fit: Fit) -> dict[str, Any]:
@@ -117,6 +119,11 @@ class Journal:
             if name.isalnum() and len(name) == 20 and name not in used:
                 path.unlink(missing_ok=True)
         self._names = {key: value for key, value in self._names.items() if value[1] in used}
+
+
+def _digests(inputs: Iterable[Mapping[str, str]]) -> list[str]:
+    """Of the data, whatever the way to them was written like."""
+    return [str(record.get("sha256")) for record in inputs]
 
 
 def _named(row: Mapping[str, Any]) -> list[str]:

@@ -230,6 +230,7 @@ class _Ladder:
             HoverTool(tooltips=[("step", "@step"), ("fitted", "@fitted{0.000}"), ("unseen", "@unseen{0.000}")])
         )
         self.figure.x_range.range_padding = 0.4
+        self.figure.y_range.start = 0.0
         legend(self.figure)
         self.table = pn.pane.HTML("", sizing_mode="stretch_width")
         watch(session, ["steps", "at"], self.update)

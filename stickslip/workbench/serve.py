@@ -85,6 +85,7 @@ def serve(
     )  # fmt: skip
     server._http.request_callback = Door(server._tornado, token)
     server.start()
+    signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
     url = f"http://{address}:{port}/{token}/"
     tell(url)
     watcher = own.watch(session, session.effects) if session.effects else None
@@ -92,7 +93,6 @@ def serve(
         session.begin()
     if browser:
         server.io_loop.add_callback(webbrowser.open, url)
-    signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
     try:
         server.io_loop.start()
     finally:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -15,14 +16,15 @@ from typing import Any
 import param
 
 from ..conformance import load_effects
-from ..errors import StickslipError
+from ..errors import RunFolderError, StickslipError
 from ..force.promise import Promise
 from ..objects import Campaign, Diagnosis, Fit, load_campaign
 from ..progress import Cancelled
+from ..runstore import alone
 from . import searches
 from .journal import Journal
 from .watching import watch
-from .work import Search, Worker, at_once
+from .work import Search, Worker, at_once, end_all
 
 __all__ = ["BASE", "HAND", "Session", "Step", "watch"]
 
@@ -94,6 +96,7 @@ class Session(param.Parameterized):
         self._listing: Search | None = None
         self._moves: dict[str, float | str] = {}
         self._guard = threading.Lock()
+        self._held = ExitStack()
         self._kept: tuple[Any, ...] = ()
         self._anew = False
         self._promised: list[tuple[Fit, tuple[Promise, ...]]] = []
@@ -136,7 +139,17 @@ class Session(param.Parameterized):
         campaign = self.campaign
         assert campaign is not None
         if keep and campaign.description.filed:
-            self._journal = Journal(campaign)
+            journal = Journal(campaign)
+            self._held.close()  # of what was open before
+            self._kept = ()
+            try:
+                self._held.enter_context(alone(journal.file))
+                self._journal = journal
+            except RunFolderError:
+                self.said = (
+                    "another workbench has this campaign open, or nothing can be written beside it: nothing done here "
+                    "is kept"
+                )
         self.worker("", partial(self._begin, campaign))
 
     def _begin(self, campaign: Campaign) -> None:
@@ -377,8 +390,8 @@ class Session(param.Parameterized):
     def close(self) -> None:
         """End all that goes on beside."""
         self.stop()
-        if self._listing is not None:
-            self._listing.cancel()
+        end_all()
+        self._held.close()
 
     # effects of one's own
 

@@ -19,6 +19,8 @@ from ..errors import StickslipError
 from ..progress import Cancelled, cancellable
 
 Tell = Callable[[str, float], None]
+PATIENCE = 3.0  # s that a process has to end after it gave its answer; its own workers may wait for more work
+QUIET = "ignore::UserWarning:joblib.externals.loky.backend.resource_tracker"  # of workers that were ended
 
 
 class Worker:
@@ -107,12 +109,16 @@ class Search:
         )
         self._cancelled = False
         self._process.start()
+        _going.add(self)
         there.close()
         threading.Thread(target=self._listen, args=(here, tell, done, failed), name="search", daemon=True).start()
 
     def cancel(self) -> None:
         """End it; what it has finished so far is kept where it keeps pieces."""
         self._cancelled = True
+        self._end()
+
+    def _end(self) -> None:
         with suppress(OSError, ValueError):
             self._process.terminate()
 
@@ -141,11 +147,23 @@ class Search:
             _fault()
         finally:
             here.close()
-            self._process.join()
+            self._process.join(PATIENCE)
+            self._end()
+            _going.discard(self)
+
+
+_going: set[Search] = set()
+
+
+def end_all() -> None:
+    """End every search of this process, which would wait for them at its end."""
+    for search in list(_going):
+        search.cancel()
 
 
 def _child(there: Connection, work: bytes, files: Sequence[str], parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server's own; it ends this process
+    os.environ.setdefault("PYTHONWARNINGS", QUIET)
     from .. import cache, threads
     from ..lifeline import end_with
 

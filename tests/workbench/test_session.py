@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+import stickslip as ss
 from stickslip.workbench.journal import FOLDER, Journal
 from stickslip.workbench.selection import choose, cycles, follow, selected, worst
 from stickslip.workbench.session import Session
@@ -74,7 +75,7 @@ def test_moved_by_hand_the_last_fit_is_still_at_hand(session, base):
     assert session.fit.error > 2.0 * base.error
 
 
-def test_what_was_open_comes_back(campaign, base, session):
+def test_what_was_open_comes_back(campaign, base, session, monkeypatch):
     session._journal = Journal(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
     session.lock(DROP, True)
@@ -87,9 +88,21 @@ def test_what_was_open_comes_back(campaign, base, session):
     np.testing.assert_allclose(again.fit.force.residual, session.fit.force.residual, rtol=1e-9)
     assert again.fit.error == pytest.approx(session.fit.error, rel=1e-6)
     assert again.fitted.unseen_error == pytest.approx(base.unseen_error, rel=1e-3)
+    third = Session(campaign=campaign)
+    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+    third.begin()
+    assert "another workbench" in third.said and len(third.steps) == 1
+    again.close()
     again.undo()
     assert again.fit.error == pytest.approx(base.error, rel=1e-6)
     assert again.code() == session.code().rsplit("\n", 1)[0]
+
+
+def test_a_history_does_not_depend_on_how_its_path_is_written(campaign, base, session, folder, monkeypatch):
+    session._journal = Journal(campaign)
+    session.by_hand({DROP: base.values[DROP] * 1.02})
+    monkeypatch.chdir(folder)
+    assert len(Journal(ss.load_campaign("campaign.toml")).read()[0]) == 2
 
 
 def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, folder, monkeypatch):
@@ -102,6 +115,7 @@ def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, folde
     monkeypatch.setattr(type(campaign), "fit", lambda self: base)
     again = Session(campaign=campaign)
     again.begin()
+    again.close()
     assert "begins anew" in again.said and again.fit is base
 
 
@@ -110,7 +124,7 @@ def test_a_history_of_other_data_is_left_alone(campaign, base, session, folder, 
     session.by_hand({DROP: base.values[DROP] * 1.02})
     path = folder / FOLDER / "campaign.json"
     kept = json.loads(path.read_text())
-    kept["inputs"][0]["sha256"] = "0"
+    kept["inputs"][0] = "0"
     path.write_text(json.dumps(kept))
     assert Journal(campaign).read() == ([], [], {})
 
@@ -157,3 +171,12 @@ def test_a_refit_leaves_what_is_locked(session, base):
     session.refit()
     assert session.fit.values[DROP] == pytest.approx(moved, rel=1e-3)
     assert not session.fit.by_hand
+
+
+def test_a_campaign_can_be_begun_again(campaign, base, monkeypatch):
+    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+    session = Session(campaign=campaign)
+    session.begin()
+    session.begin()
+    assert session._journal is not None and "another workbench" not in session.said
+    session.close()

@@ -148,3 +148,15 @@ def _importable(monkeypatch):
     monkeypatch.setenv(
         "PYTHONPATH", os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
     )
+
+
+def _lingers(tell):
+    threading.Thread(target=time.sleep, args=(600,)).start()
+    return "done"
+
+
+def test_a_process_that_does_not_end_after_its_answer_is_ended():
+    found: list[str] = []
+    search = Search(_lingers, (), lambda *a: None, found.append, lambda text: None)
+    until(lambda: found, 60)
+    until(lambda: not search._process.is_alive(), 20)
