@@ -139,6 +139,14 @@ class Session(param.Parameterized):
             self._journal = Journal(campaign)
         self.worker("", partial(self._begin, campaign))
 
+    def reopen(self, campaign: Campaign) -> None:
+        """Another campaign in place of the open one, such as the same with a run more; the history begins anew."""
+        self.stop()
+        keep = self._journal is not None
+        with param.parameterized.batch_call_watchers(self):
+            self.param.update(campaign=campaign, steps=(), at=-1, diagnosis=None, locked=frozenset(), run="", event=0)
+        self.begin(keep=keep)
+
     def _begin(self, campaign: Campaign) -> None:
         with self._long("looking at the data"):
             if self._journal is not None and self._again():
