@@ -31,6 +31,7 @@ _NAMES = {
     "velocity": r"^v$|vel|speed",
     "spring_force": r"force|^f$|^ft$|kraft|load.?cell|friction",
 }
+_FIRST = ("time", "drive_position", "normal_load")  # whose names tell most
 _TOML = ".toml"
 
 
@@ -78,7 +79,8 @@ def guess(columns: Columns, campaign: Campaign | None = None) -> Choice:
     """What the columns are, by those of the campaign's other runs, by their names and by their units."""
     made = _as_before(columns, campaign)
     taken = set(made.columns.values())
-    for channel, si in CHANNELS.items():
+    for channel in (*_FIRST, *(c for c in CHANNELS if c not in _FIRST)):
+        si = CHANNELS[channel]
         if channel in made.columns or (channel == "time" and made.sampling_rate):
             continue
         scores = {n: _score(channel, n, columns.units.get(n), si) for n in columns.data if n not in taken}

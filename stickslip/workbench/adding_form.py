@@ -42,13 +42,13 @@ class Form:
             multiple=False, max_file_size=LARGEST, chunk_size=4_000_000, height=90, sizing_mode="stretch_width",
             margin=(4, 0),
         )  # fmt: skip
-        self.columns = {
+        self.columns: dict[str, Any] = {
             name: pn.widgets.Select(name=words, options=[NONE], width=230, **fixed) for name, words in WORDS.items()
         }
-        self.units = {
+        self.units: dict[str, Any] = {
             name: pn.widgets.TextInput(name="unit", placeholder=si, width=90, **fixed) for name, si in CHANNELS.items()
         }
-        text = partial(pn.widgets.TextInput, width=230, **fixed)
+        text: Any = partial(pn.widgets.TextInput, width=230, **fixed)
         self.rate = text(name="sampling rate, without a column of times", placeholder="10 kHz")
         self.velocity = text(name="velocity of the load point", placeholder="50 um/s")
         self.resolution = text(name="one count of the displacement, if known", placeholder="8 nm")

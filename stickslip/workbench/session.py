@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -42,6 +43,7 @@ class Step:
         code: the line of Python that does the same.
         command: the command that does the same, or "" where there is none.
         changed: parameters that were set by hand in it, with their values (SI).
+        when: it was taken: day and time of this machine.
     """
 
     text: str
@@ -49,6 +51,7 @@ class Step:
     code: str
     command: str = ""
     changed: Mapping[str, float | str] = field(default_factory=dict)
+    when: str = field(default_factory=lambda: datetime.now().strftime("%Y-%m-%d %H:%M:%S"))
 
 
 class Session(param.Parameterized):
@@ -181,7 +184,10 @@ class Session(param.Parameterized):
         if self._journal is None or now == self._kept:
             return
         self._kept = now
-        rows = [{"text": s.text, "code": s.code, "command": s.command, "changed": dict(s.changed)} for s in self.steps]
+        rows = [
+            {"text": s.text, "code": s.code, "command": s.command, "changed": dict(s.changed), "when": s.when}
+            for s in self.steps
+        ]
         more = {"at": self.at, "run": self.run, "event": self.event, "locked": sorted(self.locked)}
         try:
             self._journal.write(rows, [s.fit for s in self.steps], more)
@@ -219,6 +225,10 @@ class Session(param.Parameterized):
     def back(self) -> None:
         """Show the base model again; the steps after it can be had again."""
         self._show(0)
+
+    def go(self, number: int) -> None:
+        """Show the step of that number."""
+        self._show(number)
 
     def _show(self, at: int) -> None:
         self.at = max(min(at, len(self.steps) - 1), min(0, len(self.steps) - 1))

@@ -41,7 +41,7 @@ class Signals:
         self._factors: dict[str, float] = {}
         self._waiting = False
         self._document = pn.state.curdoc
-        self.range = Range1d(0.0, 1.0)
+        self.range: Any = Range1d(start=0.0, end=1.0)
         self._line = source(t=[], y=[])
         self._data = {name: source(t=[], y=[]) for name in CURVES}
         self._marks = {name: source(t=[], y=[]) for name in (DISPLACEMENT, GAP)}
@@ -56,7 +56,7 @@ class Signals:
 
     def _make_whole(self) -> Any:
         theme = look()
-        made = figure("the whole run", height=120, x_range=Range1d(0.0, 1.0))
+        made = figure("the whole run", height=120, x_range=Range1d(start=0.0, end=1.0))
         made.line("t", "y", source=self._line, color=theme.measured, line_join="round")
         made.toolbar_location = None
         made.min_border_left = LEFT
@@ -175,7 +175,7 @@ class Signals:
         """Select the event whose mark was hit."""
         if self._found is None or self._of is None or event.x is None or not self._found.events:
             return
-        of = self.whole.x_range if event.model is self.whole else self.range
+        of: Any = self.whole.x_range if event.model is self.whole else self.range
         onsets = np.array([e.t_onset for e in self._found.events])
         nearest = int(np.abs(onsets - event.x).argmin())
         if abs(onsets[nearest] - event.x) <= NEAR * (of.end - of.start):

@@ -1,0 +1,186 @@
+"""*Keep*: the history of steps, results as run folders, and the same as lines of Python and commands to copy."""
+
+from __future__ import annotations
+
+from html import escape
+from shlex import quote
+from typing import Any
+
+import panel as pn
+
+from ..errors import StickslipError
+from ..objects import Diagnosis, Fit
+from . import kept
+from .beside import Show, Tell, beside
+from .controls import BUTTON, Message, Words
+from .parts import Copy, Table, progress, row_of
+from .session import Session, watch
+
+TITLE = "Keep"
+MODEL, DIAGNOSIS = "the model as it stands", "the diagnosis"
+FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
+WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
+
+
+def page(session: Session) -> Any:
+    """The page of a session."""
+    left = pn.Column(*_history(session), *_lines(session), **WIDE)
+    right = pn.Column(_Folders(session).view, margin=(0, 0, 0, 24), **WIDE)
+    return pn.Row(left, right, margin=(8, 0, 24, 0), **WIDE)
+
+
+def _head(text: str) -> Words:
+    return Words(text=text, margin=(14, 0, 4, 0), **WIDE)
+
+
+def history(session: Session) -> list[list[str]]:
+    """A row for each step, those that were undone among them."""
+    rows = []
+    for i, step in enumerate(session.steps):
+        fit = step.fit
+        unseen = "" if fit.by_hand else f"{fit.unseen_error:.3f}"
+        undone = "undone" if i > session.at else "shown" if i == session.at else ""
+        rows.append([str(i + 1), step.text, step.when, f"{fit.error:.3f}", unseen, undone])
+    return rows
+
+
+def _history(session: Session) -> list[Any]:
+    def heard(message: Message) -> None:
+        number = row_of(message, len(session.steps))
+        if number is not None:
+            session.go(number)
+
+    columns = ["step", "what was done", "when", "error / floors", "on unseen runs", ""]
+    made = Table(columns=columns, heard=heard, tall=360, **WIDE)
+
+    def update() -> None:
+        made.param.update(rows=history(session), chosen=session.at)
+
+    watch(session, ["steps", "at"], update)
+    update()
+    return [_head("History: a click shows the model after a step; the steps behind it can be had again"), made]
+
+
+def commands(session: Session) -> str:
+    """Commands that come to the model as it stands, and to the diagnosis."""
+    campaign, fit = session.campaign, session.fit
+    if campaign is None:
+        return ""
+    file = quote(campaign.description.path.name)
+    own = "".join(f" --effect {quote(path.name)}" for path in session.effects)
+    lines = []
+    if fit is not None:
+        by_hand = any(step.changed for step in session.taken)
+        added = "".join(f" --add {tag}" for tag in fit.effects)
+        lines.append(f"stickslip fit {file}{added}{own} --out fit")
+        if by_hand:
+            lines.append("# what was set by hand has no command: the lines of Python have it")
+    lines.append(f"stickslip diagnose {file}{own} --out diagnosis")
+    return "\n".join(lines)
+
+
+def _lines(session: Session) -> list[Any]:
+    python, shell = Copy(**WIDE), Copy(**WIDE)
+
+    def update() -> None:
+        if session.campaign is not None:
+            python.text, shell.text = session.code(), commands(session)
+
+    watch(session, ["steps", "at", "campaign"], update)
+    update()
+    return [_head("The same in Python, in the campaign's folder"), python, _head("and as commands"), shell]
+
+
+def framed(content: str) -> str:
+    """A report within a page: nothing in it is run, and it reaches nothing."""
+    return (
+        f'<iframe sandbox srcdoc="{escape(content, quote=True)}" title="report" '
+        'style="width:100%;height:900px;border:1px solid var(--wb-line);background:white"></iframe>'
+    )
+
+
+class _Folders:
+    """Run folders beside the campaign."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._work = beside(session, "saving")
+        self._listed: list[kept.Kept] = []
+        self.what = pn.widgets.RadioButtonGroup(
+            options=[MODEL, DIAGNOSIS], value=MODEL, stylesheets=[BUTTON], width=300, margin=(20, 10, 0, 0), **FIXED
+        )
+        self.name: Any = pn.widgets.TextInput(name="name of the run folder", placeholder="first", width=200, **FIXED)
+        self._save = pn.widgets.Button(name="Save", width=90, stylesheets=[BUTTON], margin=(20, 0, 0, 10), **FIXED)
+        self._save.on_click(lambda event: self.save())
+        self._table = Table(
+            columns=["run folder", "of", "verdict or error", "when", "report"], heard=self._heard, tall=360, **WIDE
+        )
+        self._said = Words(**WIDE)
+        self._frame = pn.pane.HTML("", **WIDE)
+        self._tab = pn.widgets.Button(
+            name="Open it in a tab of its own", width=220, visible=False, stylesheets=[BUTTON], **FIXED
+        )
+        self._tab.js_on_click(args={"pane": self._frame}, code=_OPEN)
+        again = pn.widgets.Button(name="Look again", width=110, stylesheets=[BUTTON], **FIXED)
+        again.on_click(lambda event: self.update())
+        filed = session.campaign is not None and session.campaign.description.filed
+        self.view = pn.Column(
+            _head("Save as a run folder beside the campaign: result.json, arrays.nc and report.html"),
+            pn.FlexBox(self.what, self.name, self._save), progress(self._work),
+            pn.Row(_head("Run folders there; a click shows the report"), again, **WIDE),
+            self._table, self._said, self._tab, self._frame, visible=filed, **WIDE,
+        )  # fmt: skip
+        watch(self._work, ["doing"], self.update)
+        watch(session, ["campaign", "steps", "diagnosis"], self.update)
+        self.update()
+
+    def save(self) -> None:
+        """Save what is chosen."""
+        session, name, what = self._session, self.name.value_input or self.name.value, self.what.value
+        campaign = session.campaign
+        found: Fit | Diagnosis | None = session.fit if what == MODEL else session.diagnosis
+        if campaign is None:
+            return
+        if found is None:
+            self._work.said = f"{what} is not there yet"
+            return
+
+        def make(tell: Tell, show: Show) -> Any:
+            tell("saving", 0.0)
+            folder = kept.save(found, campaign, name, tell)
+            self._work.said = f"saved as {folder.name}"
+            return folder
+
+        self._work.do("saving", make)
+
+    def update(self) -> None:
+        """List what is there now."""
+        campaign = self._session.campaign
+        self._save.disabled = bool(self._work.doing)
+        if campaign is None or not campaign.description.filed:
+            return
+        self._listed = kept.listed(campaign.description.folder)
+        rows = [[k.name, k.kind, k.words, k.when, "show" if k.report else "-"] for k in self._listed]
+        self._table.param.update(rows=rows, chosen=-1)
+
+    def _heard(self, message: Message) -> None:
+        number = row_of(message, len(self._listed))
+        if number is None:
+            return
+        try:
+            self._frame.object = framed(kept.report(self._listed[number]))
+            self._said.text, self._tab.visible, self._table.chosen = "", True, number
+        except (StickslipError, OSError) as error:
+            self._said.text, self._tab.visible, self._frame.object = str(error), False, ""
+
+
+# a page of its own whose only content is the frame, in which nothing is run
+_OPEN = """
+const page = document.createElement("textarea")
+page.innerHTML = pane.text
+const frame = page.value.replace("height:900px", "height:97vh")
+const whole = new Blob(["<!doctype html><title>report</title><body style='margin:0'>" + frame], {type: "text/html"})
+window.open(URL.createObjectURL(whole), "_blank", "noopener")
+"""
+
+__all__ = ["TITLE", "page"]
