@@ -1,182 +1,186 @@
-"""*Keep*: what stands as a run folder, the steps that led to it, and the same in Python and as a command."""
+"""*Keep*: the history of steps, results as run folders, and the same as lines of Python and commands to copy."""
 
 from __future__ import annotations
 
-import re
-from functools import partial
 from html import escape
-from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import panel as pn
 
-from ..errors import InputError, RunFolderError
-from ..runstore import RESULT, read_result
-from .controls import BUTTON
+from ..errors import StickslipError
+from ..objects import Diagnosis, Fit
+from . import kept
+from .beside import Show, Tell, beside
+from .controls import BUTTON, Message, Words
+from .parts import Copy, Table, progress, row_of
 from .session import Session, watch
 
 TITLE = "Keep"
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}")
-MOST = 40  # run folders that are listed
+MODEL, DIAGNOSIS = "the model as it stands", "the diagnosis"
+FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
+WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
 
 
 def page(session: Session) -> Any:
     """The page of a session."""
-    return pn.Row(
-        pn.Column(_saving(session), _folders(session), sizing_mode="stretch_width", margin=(8, 24, 0, 0)),
-        pn.Column(_history(session), _lines(session), sizing_mode="stretch_width", margin=(8, 0, 0, 0)),
-        sizing_mode="stretch_width",
-    )
+    left = pn.Column(*_history(session), *_lines(session), **WIDE)
+    right = pn.Column(_Folders(session).view, margin=(0, 0, 0, 24), **WIDE)
+    return pn.Row(left, right, margin=(8, 0, 24, 0), **WIDE)
 
 
-def target(session: Session, name: str) -> Path:
-    """The run folder of this name beside the campaign's file.
-
-    Raises:
-        InputError: not a plain name, or the campaign has no folder.
-    """
-    if not NAME.fullmatch(name) or name.endswith((".", " ")):
-        raise InputError(
-            "not a name for a run folder",
-            value=name[:80],
-            allowed="letters, digits, blanks, points, - and _, no folders",
-        )
-    if session.campaign is None or not session.campaign.description.filed:
-        raise InputError("the campaign has no folder", hint="save it from Python: fit.save(folder)")
-    return Path(session.campaign.description.folder) / name
+def _head(text: str) -> Words:
+    return Words(text=text, margin=(14, 0, 4, 0), **WIDE)
 
 
-def save(session: Session, name: str, what: str, replace: bool) -> str:
-    """Write the model or the diagnosis as a run folder, as the command does; what to say of it.
-
-    Args:
-        session: of the workbench.
-        name: of the folder, which lies beside the campaign's file.
-        what: "model" or "diagnosis".
-        replace: an existing run folder.
-    """
-    found = session.diagnosis if what == "diagnosis" else session.fit
-    try:
-        folder = target(session, name)
-        if found is None:
-            raise InputError(f"there is no {what} yet")
-        if what == "model" and found.by_hand:
-            raise InputError("parameters were set by hand", hint="Fit first: what is kept has deviations of a fit")
-        found.save(folder, force=replace)
-    except (InputError, RunFolderError) as error:
-        return str(error)
-    return f"written to {folder.name}: report.html, result.json, arrays.nc"
-
-
-def kept(folder: Path) -> list[dict[str, Any]]:
-    """Run folders beside a campaign's file, the newest first: name, what, unseen error, report."""
+def history(session: Session) -> list[list[str]]:
+    """A row for each step, those that were undone among them."""
     rows = []
-    for path in folder.glob(f"*/{RESULT}"):
-        try:
-            result = read_result(path.parent)
-            ladder = result.get("ladder") or [{}]
-            verdict, model = result.get("verdict") or {}, " + ".join(ladder[-1].get("model", ()))
-            rows.append(
-                {
-                    "name": path.parent.name,
-                    "what": f"{result.get('kind', '')}: {verdict.get('kind') or model}",
-                    "unseen": ladder[-1].get("heldout_error"),
-                    "when": path.stat().st_mtime,
-                }
-            )
-        except (RunFolderError, OSError, AttributeError, TypeError, KeyError):
-            continue
-    return sorted(rows, key=lambda row: -row["when"])[:MOST]
+    for i, step in enumerate(session.steps):
+        fit = step.fit
+        unseen = "" if fit.by_hand else f"{fit.unseen_error:.3f}"
+        undone = "undone" if i > session.at else "shown" if i == session.at else ""
+        rows.append([str(i + 1), step.text, step.when, f"{fit.error:.3f}", unseen, undone])
+    return rows
 
 
-def _saving(session: Session) -> Any:
-    name = pn.widgets.TextInput(name="Name of the run folder, beside the campaign's file", value="kept", width=320)
-    what = pn.widgets.RadioButtonGroup(options=["model", "diagnosis"], value="model", width=200)
-    replace = pn.widgets.Checkbox(name="replace an existing run folder")
-    button = pn.widgets.Button(name="Save", stylesheets=[BUTTON], width=90, sizing_mode="fixed")
-    said = pn.pane.HTML("")
+def _history(session: Session) -> list[Any]:
+    def heard(message: Message) -> None:
+        number = row_of(message, len(session.steps))
+        if number is not None:
+            session.show(number)
 
-    def done(text: str) -> None:
-        said.object = f"<p>{escape(text)}</p>"
-        session.param.trigger("steps")
-
-    def press(event: Any) -> None:
-        said.object = "<p>simulating freely and writing ...</p>"
-        doc, chosen = pn.state.curdoc, (str(name.value), str(what.value), bool(replace.value))
-
-        def job() -> None:
-            text = save(session, *chosen)
-            if doc is None or doc.session_context is None:
-                done(text)
-            else:
-                doc.add_next_tick_callback(partial(done, text))
-
-        session.worker("", job)
-
-    button.on_click(press)
-    return pn.Column("### Save", name, what, replace, button, said)
-
-
-def _folders(session: Session) -> Any:
-    made = pn.pane.HTML("", sizing_mode="stretch_width")
+    columns = ["step", "what was done", "when", "error / floors", "on unseen runs", ""]
+    made = Table(columns=columns, heard=heard, tall=360, **WIDE)
 
     def update() -> None:
-        campaign = session.campaign
-        rows = [] if campaign is None or not campaign.description.filed else kept(Path(campaign.description.folder))
-        if not rows:
-            made.object = "<p>No run folder is beside the campaign's file yet.</p>"
-            return
-        cells = "".join(
-            f"<tr><td>{escape(row['name'])}</td><td>{escape(str(row['what']))}</td>"
-            f"<td style='text-align:right'>{'' if row['unseen'] is None else format(row['unseen'], '.3f')}</td></tr>"
-            for row in rows
-        )
-        made.object = (
-            "<table><thead><tr><th>run folder</th><th>what</th><th>unseen error / floor</th></tr></thead>"
-            f"<tbody>{cells}</tbody></table><p>Each holds <code>report.html</code>; two are compared by "
-            "<code>stickslip compare A B</code>.</p>"
-        )
-
-    watch(session, ["steps", "diagnosis", "campaign"], update)
-    update()
-    return pn.Column("### Run folders here", made)
-
-
-def _history(session: Session) -> Any:
-    place = pn.Column(sizing_mode="stretch_width")
-
-    def go(number: int, event: Any) -> None:
-        session.show(number)
-
-    def update() -> None:
-        rows: list[Any] = []
-        for i, step in enumerate(session.steps):
-            error = f"{step.fit.error:.3f}"
-            button = pn.widgets.Button(
-                name=f"{i + 1}. {step.text}: error {error}" + ("  ◀" if i == session.at else ""), stylesheets=[BUTTON],
-                width=460, sizing_mode="fixed", margin=(0, 0, 4, 0),
-            )  # fmt: skip
-            button.on_click(partial(go, i))
-            rows.append(button)
-        place[:] = rows or [pn.pane.Str("no step yet")]
+        made.param.update(rows=history(session), chosen=session.at)
 
     watch(session, ["steps", "at"], update)
     update()
-    return pn.Column("### Steps (a click goes there)", place)
+    return [_head("History: a click shows the model after a step; the steps behind it can be had again"), made]
 
 
-def _lines(session: Session) -> Any:
-    python = pn.widgets.TextAreaInput(
-        name="The same in Python", disabled=False, height=180, sizing_mode="stretch_width"
-    )
-    command = pn.widgets.TextInput(name="The same as a command", sizing_mode="stretch_width")
+def commands(session: Session) -> str:
+    """Commands that come to the model as it stands, and to the diagnosis."""
+    campaign, fit = session.campaign, session.fit
+    if campaign is None:
+        return ""
+    file = quote(campaign.description.path.name)
+    own = "".join(f" --effect {quote(path.name)}" for path in session.effects)
+    lines = []
+    if fit is not None:
+        by_hand = any(step.changed for step in session.taken)
+        added = "".join(f" --add {tag}" for tag in fit.effects)
+        lines.append(f"stickslip fit {file}{added}{own} --out fit")
+        if by_hand:
+            lines.append("# what was set by hand has no command: the lines of Python have it")
+    lines.append(f"stickslip diagnose {file}{own} --out diagnosis")
+    return "\n".join(lines)
+
+
+def _lines(session: Session) -> list[Any]:
+    python, shell = Copy(**WIDE), Copy(**WIDE)
 
     def update() -> None:
-        if session.campaign is None:
-            return
-        python.value = session.code()
-        command.value = next((s.command for s in reversed(session.taken) if s.command), "")
+        if session.campaign is not None:
+            python.text, shell.text = session.code(), commands(session)
 
     watch(session, ["steps", "at", "campaign"], update)
     update()
-    return pn.Column(python, command, sizing_mode="stretch_width")
+    return [_head("The same in Python, in the campaign's folder"), python, _head("and as commands"), shell]
+
+
+def framed(content: str) -> str:
+    """A report within a page: nothing in it is run, and it reaches nothing."""
+    return (
+        f'<iframe sandbox srcdoc="{escape(content, quote=True)}" title="report" '
+        'style="width:100%;height:900px;border:1px solid var(--wb-line);background:white"></iframe>'
+    )
+
+
+class _Folders:
+    """Run folders beside the campaign."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._work = beside(session, "saving")
+        self._listed: list[kept.Kept] = []
+        self.what = pn.widgets.RadioButtonGroup(
+            options=[MODEL, DIAGNOSIS], value=MODEL, stylesheets=[BUTTON], width=300, margin=(20, 10, 0, 0), **FIXED
+        )
+        self.name: Any = pn.widgets.TextInput(name="name of the run folder", placeholder="first", width=200, **FIXED)
+        self._save = pn.widgets.Button(name="Save", width=90, stylesheets=[BUTTON], margin=(20, 0, 0, 10), **FIXED)
+        self._save.on_click(lambda event: self.save())
+        self._table = Table(
+            columns=["run folder", "of", "verdict or error", "when", "report"], heard=self._heard, tall=360, **WIDE
+        )
+        self._said = Words(**WIDE)
+        self._frame = pn.pane.HTML("", **WIDE)
+        self._tab = pn.widgets.Button(
+            name="Open it in a tab of its own", width=220, visible=False, stylesheets=[BUTTON], **FIXED
+        )
+        self._tab.js_on_click(args={"pane": self._frame}, code=_OPEN)
+        again = pn.widgets.Button(name="Look again", width=110, stylesheets=[BUTTON], **FIXED)
+        again.on_click(lambda event: self.update())
+        filed = session.campaign is not None and session.campaign.description.filed
+        self.view = pn.Column(
+            _head("Save as a run folder beside the campaign: result.json, arrays.nc and report.html"),
+            pn.FlexBox(self.what, self.name, self._save), progress(self._work),
+            pn.Row(_head("Run folders there; a click shows the report"), again, **WIDE),
+            self._table, self._said, self._tab, self._frame, visible=filed, **WIDE,
+        )  # fmt: skip
+        watch(self._work, ["doing"], self.update)
+        watch(session, ["campaign", "steps", "diagnosis"], self.update)
+        self.update()
+
+    def save(self) -> None:
+        """Save what is chosen."""
+        session, name, what = self._session, self.name.value_input or self.name.value, self.what.value
+        campaign = session.campaign
+        found: Fit | Diagnosis | None = session.fit if what == MODEL else session.diagnosis
+        if campaign is None:
+            return
+        if found is None:
+            self._work.said = f"{what} is not there yet"
+            return
+
+        def make(tell: Tell, show: Show) -> Any:
+            tell("saving", 0.0)
+            folder = kept.save(found, campaign, name, tell)
+            self._work.said = f"saved as {folder.name}"
+            return folder
+
+        self._work.do("saving", make)
+
+    def update(self) -> None:
+        """List what is there now."""
+        campaign = self._session.campaign
+        self._save.disabled = bool(self._work.doing)
+        if campaign is None or not campaign.description.filed:
+            return
+        self._listed = kept.listed(campaign.description.folder)
+        rows = [[k.name, k.kind, k.words, k.when, "show" if k.report else "-"] for k in self._listed]
+        self._table.param.update(rows=rows, chosen=-1)
+
+    def _heard(self, message: Message) -> None:
+        number = row_of(message, len(self._listed))
+        if number is None:
+            return
+        try:
+            self._frame.object = framed(kept.report(self._listed[number]))
+            self._said.text, self._tab.visible, self._table.chosen = "", True, number
+        except (StickslipError, OSError) as error:
+            self._said.text, self._tab.visible, self._frame.object = str(error), False, ""
+
+
+# a page of its own whose only content is the frame, in which nothing is run
+_OPEN = """
+const page = document.createElement("textarea")
+page.innerHTML = pane.text
+const frame = page.value.replace("height:900px", "height:97vh")
+const whole = new Blob(["<!doctype html><title>report</title><body style='margin:0'>" + frame], {type: "text/html"})
+window.open(URL.createObjectURL(whole), "_blank", "noopener")
+"""
+
+__all__ = ["TITLE", "page"]

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ class Step:
         code: the line of Python that does the same.
         command: the command that does the same, or "" where there is none.
         changed: parameters that were set by hand in it, with their values (SI).
+        when: it was taken: day and time of this machine.
     """
 
     text: str
@@ -51,6 +53,7 @@ class Step:
     code: str
     command: str = ""
     changed: Mapping[str, float | str] = field(default_factory=dict)
+    when: str = field(default_factory=lambda: datetime.now().strftime("%Y-%m-%d %H:%M:%S"))
 
 
 class Session(param.Parameterized):
@@ -152,6 +155,14 @@ class Session(param.Parameterized):
                 )
         self.worker("", partial(self._begin, campaign))
 
+    def reopen(self, campaign: Campaign) -> None:
+        """Another campaign in place of the open one, such as the same with a run more; the history begins anew."""
+        self.stop()
+        keep = self._journal is not None
+        with param.parameterized.batch_call_watchers(self):
+            self.param.update(campaign=campaign, steps=(), at=-1, diagnosis=None, locked=frozenset(), run="", event=0)
+        self.begin(keep=keep)
+
     def _begin(self, campaign: Campaign) -> None:
         with self._long("looking at the data"):
             if self._journal is not None and self._again():
@@ -186,7 +197,10 @@ class Session(param.Parameterized):
         if self._journal is None or now == self._kept:
             return
         self._kept = now
-        rows = [{"text": s.text, "code": s.code, "command": s.command, "changed": dict(s.changed)} for s in self.steps]
+        rows = [
+            {"text": s.text, "code": s.code, "command": s.command, "changed": dict(s.changed), "when": s.when}
+            for s in self.steps
+        ]
         more = {"at": self.at, "run": self.run, "event": self.event, "locked": sorted(self.locked)}
         try:
             self._journal.write(rows, [s.fit for s in self.steps], more)

@@ -1,229 +1,449 @@
-"""*Simulate*: the model as it stands, run freely under another drive, or beside a run that was measured."""
+"""*Simulate*: the model run freely beside a measured run, over velocities, and rival effects in one experiment."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 import panel as pn
 
-from ..errors import InputError, StickslipError
+from ..errors import InputError
 from ..objects import Fit
-from ..scenario.writers import write_campaign
-from ..units import to_si
+from ..scenario.recording import Recording
+from ..units import shown
+from . import experiments
+from .beside import Show, Tell, beside
 from .controls import BUTTON, Words
-from .figures import figure, label, legend, look, source, unit_of
-from .keep_page import target
+from .experiments import MEASURES, Setting
+from .figures import crosshair, figure, label, legend, look, source, unit_of
+from .overview import record, reduced
+from .parts import Table, progress
+from .picked import chosen
 from .session import Session, watch
 
 TITLE = "Simulate"
-SETTINGS = {  # of the form: key of a scenario, unit, words
-    "velocity": ("drive.velocity", "m/s", "drive velocity"),
-    "mass": ("block.mass", "kg", "mass"),
-    "spring": ("block.spring_stiffness", "N/m", "spring stiffness"),
-}
-EVENTS = 6  # slips of a run
-LONGEST = 4000  # points of a curve
-SWEEP = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the velocity that is asked for
+POINTS = 4000  # that are drawn of a curve
+LEFT = 76
+DASHES = ("solid", "dashed", "dotdash", "dotted")
+FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
+WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """One simulated run, and what it was."""
+
+    fit: Fit
+    setting: Setting
+    recording: Recording
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """One experiment simulated for each of some effects."""
+
+    setting: Setting
+    recordings: dict[str, Recording]
 
 
 def page(session: Session) -> Any:
     """The page of a session."""
-    return _Simulated(session).view
+    asked = _Asked(session)
+    return pn.Column(
+        asked.view, _Beside(session, asked).view, _Sweep(session, asked).view, _Experiment(session, asked).view,
+        _Synthetic(session, asked).view, margin=(8, 0, 24, 0), **WIDE,
+    )  # fmt: skip
 
 
-def changes(values: dict[str, str]) -> list[str]:
-    """Settings of the form as changes of a scenario; what is left empty stays as it is.
-
-    Raises:
-        InputError: a text that is no such quantity, or not positive.
-    """
-    out = []
-    for name, text in values.items():
-        if not text.strip():
-            continue
-        key, unit, words = SETTINGS[name]
-        number = to_si(text.strip(), unit, key=words)
-        if not number > 0.0:
-            raise InputError("out of range", key=words, value=text, allowed="more than zero")
-        out.append(f"{key}={number:.9g}")
-    return out
+def _button(name: str, call: Any, width: int = 150) -> pn.widgets.Button:
+    made = pn.widgets.Button(name=name, width=width, stylesheets=[BUTTON], margin=(22, 8, 0, 0), **FIXED)
+    made.on_click(lambda event: call())
+    return made
 
 
-def freely(fit: Fit, asked: list[str], run: str | None) -> dict[str, np.ndarray]:
-    """The model under a drive: ``time``, ``recurrence`` (s), ``displacement``, ``load_point`` and ``slip`` (m)."""
-    made = fit.simulate(asked, run, EVENTS)
-    every = slice(None, None, max(made.sizes["time"] // LONGEST, 1))
-    names = {"time": "time", "displacement": "displacement", "load_point": "drive_position"}
-    kept = {name: made[own].values[every] for name, own in names.items()}
-    return {**kept, "recurrence": made.recurrence.values, "slip": made.slip.values}
+def _head(text: str) -> Words:
+    return Words(text=text, margin=(14, 0, 2, 0), **WIDE)
 
 
-def swept(fit: Fit, asked: list[str], velocities: np.ndarray, tell: Callable[[float], None]) -> dict[str, np.ndarray]:
-    """Recurrence (s) and slip (m) of the last slips at every velocity (m/s); nan where the block slides."""
-    rows = []
-    for i, velocity in enumerate(velocities):
-        found = freely(fit, [*asked, f"drive.velocity={velocity:.9g}"], None)
-        known = found["recurrence"].size > 1
-        rows.append((found["recurrence"][-1], found["slip"][-1]) if known else (np.nan, np.nan))
-        tell((i + 1) / len(velocities))
-    return {"velocity": velocities, "recurrence": np.array(rows)[:, 0], "slip": np.array(rows)[:, 1]}
-
-
-class _Simulated:
-    """The form, the run and the sweep."""
+class _Asked:
+    """What is to be simulated."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        theme = look()
-        self._fields = {
-            name: pn.widgets.TextInput(name=f"{words}", placeholder="as fitted", width=200)
-            for name, (_, _, words) in SETTINGS.items()
-        }
-        self._run = pn.widgets.Select(name="beside the measured run", options=[""], width=200)
-        buttons = {"Run": self._go, "Sweep of velocity": self._sweep, "Synthetic record": self._write}
-        made = []
-        for name, call in buttons.items():
-            button = pn.widgets.Button(name=name, stylesheets=[BUTTON], width=200, sizing_mode="fixed")
-            button.on_click(partial(self._pressed, call))
-            made.append(button)
-        self._words = Words(text="", sizing_mode="stretch_width")
-        self._motion = source(time=[], model=[], drive=[])
-        self._measured = source(time=[], measured=[])
-        self._points = source(velocity=[], recurrence=[], slip=[])
-        self._seen = source(velocity=[], recurrence=[], slip=[])
-        self.run = figure("", label("time", "s"), label("displacement", "µm"), height=340)
-        self.run.line(
-            "time", "drive", source=self._motion, color=theme.band, line_dash="dashed", legend_label="load point"
-        )
-        self.run.line("time", "measured", source=self._measured, color=theme.measured, legend_label="measured")
-        self.run.line("time", "model", source=self._motion, color=theme.model, legend_label="model, run freely")
-        legend(self.run)
-        self.recurrence = self._against(label("recurrence", "s"), "recurrence")
-        self.slip = self._against(label("slip", "µm"), "slip")
-        self.view = pn.Row(
-            pn.Column(*self._fields.values(), self._run, *made, width=230, sizing_mode="fixed", margin=(8, 16, 0, 0)),
-            pn.Column(
-                self._words,
-                pn.pane.Bokeh(self.run, sizing_mode="stretch_width"),
-                pn.Row(
-                    pn.pane.Bokeh(self.recurrence, sizing_mode="stretch_width"),
-                    pn.pane.Bokeh(self.slip, sizing_mode="stretch_width"),
-                    sizing_mode="stretch_width",
-                ),
-                sizing_mode="stretch_width",
-                margin=(8, 0, 0, 0),
-            ),
-            sizing_mode="stretch_width",
-        )
-        watch(session, ["steps", "at"], self._offer)
-        self._offer()
+        text: Any = partial(pn.widgets.TextInput, width=150, margin=(0, 10, 0, 0), **FIXED)
+        self.run: Any = pn.widgets.Select(name="beside the run", options=[], width=170, margin=(0, 10, 0, 0), **FIXED)
+        self.velocity = text(name="velocity of the drive")
+        self.hold = text(name="a hold of", placeholder="none, such as 10 s")
+        self.spring, self.mass = text(name="spring"), text(name="mass")
+        self.events = pn.widgets.IntInput(name="slips, if at a velocity", value=7, start=1, end=100, width=150, **FIXED)
+        asked = (self.run, self.velocity, self.hold, self.spring, self.mass, self.events)
+        self.row = pn.FlexBox(*asked, gap="6px 0")
+        self.view = pn.Column(_head("What is left empty is as in the measured run."), self.row, **WIDE)
+        self.run.param.watch(lambda event: self._placeholders(), "value")
+        watch(session, ["campaign", "run"], self._runs)
+        watch(session, ["steps", "at"], self._placeholders)
+        self._runs()
 
-    def _against(self, text: str, name: str) -> Any:
+    def _runs(self) -> None:
+        campaign, fit = self._session.campaign, self._session.fit
+        if campaign is None:
+            return
+        names = campaign.names if fit is None else [k.name for k in fit.climbed.prepared.runs]
+        run = chosen(self._session)[0]
+        self.run.param.update(options=names, value=run if run in names else names[0])
+        self._placeholders()
+
+    def _placeholders(self) -> None:
+        """What it is in the measured run."""
+        campaign, fit = self._session.campaign, self._session.fit
+        if campaign is None or self.run.value not in campaign.names:
+            return
+        trace = campaign[self.run.value]
+        holds = trace.drive is not None and trace.drive.breakpoints.size > 0
+        speed = trace.drive_velocity
+        self.velocity.placeholder = "as measured" if speed is None or holds else shown(speed, "m/s")
+        if fit is not None:
+            spring = trace.spring_stiffness or fit.values.get("rig.spring_stiffness")
+            self.spring.placeholder = "" if spring is None else shown(spring, "N/m")
+            mass = fit.values.get("rig.mass", campaign.rig.mass)
+            self.mass.placeholder = shown(mass, "kg") if isinstance(mass, float) else ""
+
+    def setting(self) -> Setting:
+        """As it is written now."""
+        return Setting(
+            str(self.run.value), self.velocity.value, self.hold.value, self.spring.value, self.mass.value,
+            int(self.events.value or 1),
+        )  # fmt: skip
+
+
+def needed(session: Session) -> Fit:
+    """The model as it stands.
+
+    Raises:
+        InputError: there is none yet.
+    """
+    if session.fit is None:
+        raise InputError("there is no model yet", hint="wait until the base model is fitted")
+    return session.fit
+
+
+class _Beside:
+    """One run of the model beside the measured one."""
+
+    def __init__(self, session: Session, asked: _Asked) -> None:
+        self._session, self._asked = session, asked
+        self._work = beside(session, "simulation")
         theme = look()
-        made = figure("", label("drive velocity", "µm/s"), text, height=260, x_axis_type="log", y_axis_type="log")
-        made.line("velocity", name, source=self._points, color=theme.model, legend_label="model")
-        made.scatter("velocity", name, source=self._points, color=theme.model, size=6, legend_label="model")
-        made.scatter(
-            "velocity", name, source=self._seen, color=theme.measured, marker="x", size=9, legend_label="measured runs"
+        self._measured = source(t=[], x=[], gap=[])
+        self._model = source(t=[], x=[], gap=[])
+        self._model.name = "simulated"
+        self.figures: dict[str, Any] = {}
+        for key in ("x", "gap"):
+            linked = {"x_range": self.figures["x"].x_range} if self.figures else {}
+            made = figure(height=230, window_axis="x", **linked)
+            for name, data, colour, dash in (
+                ("measured", self._measured, theme.measured, "solid"),
+                ("model, run freely", self._model, theme.model, "dashed"),
+            ):
+                made.line(
+                    "t", key, source=data, color=colour, line_width=2, line_dash=dash, legend_label=name,
+                    line_join="round",
+                )  # fmt: skip
+            made.min_border_left = LEFT
+            self.figures[key] = made
+        legend(self.figures["x"])
+        self.figures["gap"].legend.visible = False
+        crosshair(*self.figures.values())
+        self._table = Table(choosing=False, **WIDE)
+        self._button = _button("Simulate", self.start)
+        asked.row.append(self._button)
+        self.view = pn.Column(
+            progress(self._work), *(pn.pane.Bokeh(f, **WIDE) for f in self.figures.values()), self._table, **WIDE
         )
-        legend(made)
-        return made
+        asked.run.param.watch(lambda event: self.update(), "value")
+        watch(self._work, ["found", "doing"], self.update)
+        watch(session, ["campaign"], self.update)
+        self.update()
+
+    def start(self) -> None:
+        """Simulate what is asked for."""
+        setting = self._asked.setting()
+
+        def make(tell: Tell, show: Show) -> Simulated:
+            fit = needed(self._session)
+            tell("simulating", 0.0)
+            return Simulated(fit, setting, experiments.run(experiments.scenario(fit, setting), tell))
+
+        self._work.do("simulating", make)
+
+    def update(self) -> None:
+        """Draw both."""
+        self._button.disabled = bool(self._work.doing)
+        campaign, run = self._session.campaign, self._asked.run.value
+        if campaign is None or run not in campaign.names:
+            return
+        trace = campaign[run]
+        found: Simulated | None = self._work.found
+        if found is not None and found.setting.run != run:
+            found = None
+        t, x, gap = _motion(trace, campaign.events[campaign.names.index(run)])
+        k, unit = unit_of(x, "m")
+        g, small = unit_of(gap, "m")
+        self._measured.data = _thinned(t, x * k, gap * g)
+        self.figures["x"].yaxis.axis_label = label("displacement", unit)
+        self.figures["gap"].yaxis.axis_label = label("load point - block", small)
+        self.figures["gap"].xaxis.axis_label = label("time from the start", "s")
+        if found is None:
+            self._model.data = {"t": [], "x": [], "gap": []}
+        else:
+            r = found.recording
+            moved = r["displacement"].values
+            self._model.data = _thinned(r["time"].values, moved * k, (r["drive_position"].values - moved) * g)
+        columns, rows = event_rows(experiments.measured(campaign.events[campaign.names.index(run)]), found)
+        self._table.param.update(columns=columns, rows=rows)
+
+
+def _motion(trace: Any, events: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time from the start (s), way of the block (m), and how far the load point is ahead of it (m)."""
+    own = record(trace, events)
+    t = own.time - own.time[0]
+    if own.unit != "m" or trace.drive is None:
+        return t, np.full(t.size, np.nan), np.full(t.size, np.nan)
+    x = own.position - own.position[0]
+    drive = trace.drive.position(own.time)
+    return t, x, drive - drive[0] - x
+
+
+def _thinned(t: np.ndarray, x: np.ndarray, gap: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of a source: samples that keep the course of both."""
+    if not np.isfinite(x).any():
+        return {"t": np.array([]), "x": np.array([]), "gap": np.array([])}
+    begin, end = float(t[0]), float(t[-1])
+    kept = [np.searchsorted(t, reduced(t, np.ascontiguousarray(v), begin, end, POINTS)[0]) for v in (x, gap)]
+    own = np.unique(np.concatenate(kept))
+    return {"t": t[own], "x": x[own], "gap": gap[own]}
+
+
+def event_rows(
+    measured: dict[str, tuple[float, float, int]], found: Simulated | None
+) -> tuple[list[str], list[list[str]]]:  # fmt: skip
+    """Means over the slips after the first, measured and simulated."""
+    columns = ["means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)]
+    if found is None:
+        return columns, [["measured", *_cells(measured)]]
+    model = [f"model: {' + '.join(found.fit.parts)}", *_cells(experiments.simulated(found.recording))]
+    verdict = str(found.recording.attrs.get("verdict", ""))
+    return [*columns, "what happens"], [["measured", *_cells(measured), ""], [*model, verdict]]
+
+
+def _cells(values: dict[str, tuple[float, float, int]]) -> list[str]:
+    out = []
+    for key, unit in MEASURES.items():
+        mean, std, count = values.get(key, (np.nan, np.nan, 0))
+        out.append("-" if not count else f"{shown(mean, unit, 4)} ± {shown(std, unit, 2)}")
+    return out
+
+
+class _Sweep:
+    """Recurrence and slip over the velocity, measured and simulated."""
+
+    def __init__(self, session: Session, asked: _Asked) -> None:
+        self._session, self._asked = session, asked
+        self._work = beside(session, "sweep")
+        theme = look()
+        text: Any = partial(pn.widgets.TextInput, width=130, margin=(0, 10, 0, 0), **FIXED)
+        self.low, self.high = text(name="velocities from"), text(name="to")
+        self.points = pn.widgets.IntInput(name="how many", value=6, start=2, end=40, width=90, **FIXED)
+        self._button = _button("Sweep", self.start)
+        self._model = source(v=[], recurrence=[], slip=[])
+        self._model.name = "sweep"
+        self._measured = source(v=[], recurrence=[], slip=[], run=[])
+        self._bars = {key: source(xs=[], ys=[]) for key in ("recurrence", "slip")}
+        self.figures: dict[str, Any] = {}
+        for key in ("recurrence", "slip"):
+            made = figure(height=280, output_backend="canvas", x_axis_type="log", y_axis_type="log")
+            made.line("v", key, source=self._model, color=theme.model, line_width=2, line_dash="dashed")
+            made.scatter("v", key, source=self._model, color=theme.model, size=7, marker="square", legend_label="model")
+            made.multi_line("xs", "ys", source=self._bars[key], color=theme.measured, line_width=1.5)
+            made.scatter("v", key, source=self._measured, color=theme.measured, size=9, legend_label="measured")
+            legend(made)
+            self.figures[key] = made
+        self.view = pn.Column(
+            _head("A sweep of the velocity: means over the slips after the first, with their scatter"),
+            pn.FlexBox(self.low, self.high, self.points, self._button, gap="6px 0"),
+            progress(self._work),
+            pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in self.figures.values()), **WIDE),
+            **WIDE,
+        )
+        watch(self._work, ["found", "doing"], self.update)
+        watch(session, ["campaign"], self._prepare)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        campaign = self._session.campaign
+        if campaign is None:
+            return
+        self._steady = experiments.steady_runs(campaign)
+        speeds = [v for v, _ in self._steady.values()] or [t.drive_velocity or 1e-4 for t in campaign.traces]
+        self.low.value = shown(0.5 * min(speeds), "m/s", 3).replace("µ", "u")
+        self.high.value = shown(2.0 * max(speeds), "m/s", 3).replace("µ", "u")
+        self.update()
+
+    def start(self) -> None:
+        """Simulate one velocity after the other."""
+        setting, low, high, points = self._asked.setting(), self.low.value, self.high.value, int(self.points.value or 0)
+
+        def make(tell: Tell, show: Show) -> Any:
+            return experiments.sweep(needed(self._session), setting, low, high, points, tell, show)
+
+        self._work.do("sweeping the velocity", make)
+
+    def update(self) -> None:
+        """Draw what there is."""
+        self._button.disabled = bool(self._work.doing)
+        found = self._work.found
+        every = [v for v, _ in self._steady.values()]
+        velocities = np.array([*every, *([] if found is None else found["value"].values)])
+        k, unit = unit_of(velocities, "m/s")
+        model: dict[str, Any] = {"v": [] if found is None else found["value"].values * k}
+        measured: dict[str, Any] = {"v": np.array(every) * k, "run": list(self._steady)}
+        for key, si in (("recurrence", "s"), ("slip", "m")):
+            own = np.array([values[key][0] for _, values in self._steady.values()])
+            std = np.array([values[key][1] for _, values in self._steady.values()])
+            theirs = np.array([]) if found is None else found[key].values
+            f, written = unit_of(np.concatenate([own, theirs]), si)
+            model[key], measured[key] = theirs * f, own * f
+            self._bars[key].data = {
+                "xs": [[v * k, v * k] for v in every],
+                "ys": [[max(m - s, 1e-3 * m) * f, (m + s) * f] for m, s in zip(own, std, strict=True)],
+            }
+            self.figures[key].yaxis.axis_label = label(key, written)
+            self.figures[key].xaxis.axis_label = label("velocity of the drive", unit)
+        self._model.data, self._measured.data = model, measured
+
+
+class _Experiment:
+    """Effects that the data cannot tell apart, each in the experiment that would."""
+
+    def __init__(self, session: Session, asked: _Asked) -> None:
+        self._session, self._asked = session, asked
+        self._work = beside(session, "rivals")
+        self._sets: list[tuple[tuple[str, ...], str]] = []
+        self.which = pn.widgets.Select(name="effects that these data cannot tell apart", options=[], width=420, **FIXED)
+        self._button = _button("Simulate each", self.start)
+        self._said = Words(**WIDE)
+        self._words = Words(**WIDE)
+        self._place = pn.Column(**WIDE)
+        self.view = pn.Column(
+            _head("The experiment that would tell candidates apart"), self._said,
+            pn.FlexBox(self.which, self._button, gap="6px 10px"), progress(self._work), self._words, self._place,
+            **WIDE,
+        )  # fmt: skip
+        self.which.param.watch(lambda event: self._propose(), "value")
+        watch(session, ["diagnosis"], self._offer)
+        watch(self._work, ["found", "doing"], self.update)
+        self._offer()
+        self.update()
 
     def _offer(self) -> None:
-        fit = self._session.fit
-        if fit is None:
+        self._sets = experiments.undecided(self._session.diagnosis)
+        options = {" or ".join(tags): i for i, (tags, _) in enumerate(self._sets)}
+        self.which.param.update(options=options, value=0 if options else None)
+        self.which.visible = self._button.visible = bool(options)
+        self._propose()
+
+    def _propose(self) -> None:
+        if self._sets:
+            text = self._sets[int(self.which.value or 0)][1]
+            self._said.text = (
+                f"Proposed: {text}. The velocity and the hold above are what is simulated; without a hold, one of 10 s."
+            )
+        elif self._session.diagnosis is None:
+            self._said.text = "Diagnose first (What is missing): where it ends in a set of effects, they are run here."
+        else:
+            self._said.text = "The diagnosis left nothing undecided between effects."
+
+    def start(self) -> None:
+        """Fit each of them and simulate the experiment."""
+        if not self._sets or self._session.diagnosis is None:
             return
-        self._run.options = ["", *(d.name for d in fit.fitted.runs)]
-        rows = [
-            (1e6 * (t.drive_velocity or np.nan), float(np.median(gaps)), 1e6 * float(np.median(sizes)))
-            for t, s in zip(fit.campaign.traces, fit.campaign.events, strict=True)
-            if len(s.events) > 2
-            for gaps in [np.diff([e.t_onset for e in s.events[1:]])]
-            for sizes in [[e.slip for e in s.events[1:]]]
-        ]
-        v, r, x = (list(column) for column in zip(*rows, strict=True)) if rows else ([], [], [])
-        self._seen.data = {"velocity": v, "recurrence": r, "slip": x}
+        tags = self._sets[int(self.which.value or 0)][0]
+        forms = self._session.diagnosis.verdict.get("forms", {})
+        s = self._asked.setting()
+        velocity = s.velocity
+        if not velocity.strip() and self._session.campaign is not None:
+            velocity = f"{self._session.campaign[s.run].drive_velocity or 1e-4:.6g} m/s"
+        setting = Setting(s.run, velocity, s.hold if s.hold.strip() else "10 s", s.spring, s.mass, s.events)
 
-    def _pressed(self, call: Callable[[Fit, list[str]], Callable[[], None]], event: Any) -> None:
-        """Do long work off the thread that serves the window, and show what it gives there."""
-        session, fit, doc = self._session, self._session.fit, pn.state.curdoc
-        if fit is None:
-            self._words.text = "there is no model yet"
+        def make(tell: Tell, show: Show) -> Rivals:
+            fits = experiments.rivals(needed(self._session), tags, forms, tell)
+            return Rivals(setting, experiments.compare(fits, setting, tell))
+
+        self._work.do("fitting each of them", make)
+
+    def update(self) -> None:
+        """Draw them side by side."""
+        self._button.disabled = bool(self._work.doing)
+        found: Rivals | None = self._work.found
+        if found is None:
             return
-        try:
-            asked = changes({name: str(field.value) for name, field in self._fields.items()})
-        except InputError as error:
-            self._words.text = str(error)
-            return
-
-        def show(update: Callable[[], None]) -> None:
-            if doc is None or doc.session_context is None:
-                update()
-            else:
-                doc.add_next_tick_callback(update)
-
-        def job() -> None:
-            try:
-                update = call(fit, asked)
-            except StickslipError as error:
-                update = partial(setattr, self._words, "text", str(error))
-            finally:
-                session.busy = ""
-            show(update)
-
-        session.busy, session.share = "simulating", 0.0
-        session.worker("", job)
-
-    def _go(self, fit: Fit, asked: list[str]) -> Callable[[], None]:
-        name = str(self._run.value) or None
-        found = freely(fit, asked, name)
-
-        def update() -> None:
-            self._motion.data = {
-                "time": found["time"], "model": 1e6 * found["displacement"], "drive": 1e6 * found["load_point"],
+        theme = look()
+        made = [figure("displacement", height=280), figure("load point - block", height=280)]
+        moved = {tag: r["displacement"].values for tag, r in found.recordings.items()}
+        k, unit = unit_of(np.concatenate([*moved.values()]), "m")
+        for i, (tag, r) in enumerate(found.recordings.items()):
+            data = _thinned(r["time"].values, moved[tag] * k, (r["drive_position"].values - moved[tag]) * k)
+            look_of = {
+                "color": theme.runs[i % len(theme.runs)], "line_width": 2, "line_dash": DASHES[i % len(DASHES)],
+                "legend_label": tag, "line_join": "round",
             }  # fmt: skip
-            self._measured.data = {"time": [], "measured": []}
-            if name is not None:
-                trace = next(t for t in fit.climbed.prepared.traces if t.name == name)
-                every = slice(None, None, max(trace.time.size // LONGEST, 1))
-                assert trace.displacement is not None
-                start = trace.time[0]
-                self._measured.data = {"time": trace.time[every] - start, "measured": 1e6 * trace.displacement[every]}
-            slips = found["slip"][np.isfinite(found["slip"])]
-            k, unit = unit_of(slips, "m") if slips.size else (1.0, "m")
-            size = f", the last of {slips[-1] * k:.3g} {unit}" if slips.size else ""
-            self._words.text = f"{slips.size} slips{size}"
+            for name, own in zip(("x", "gap"), made, strict=True):
+                own.line(data["t"], data[name], **look_of)
+        for name, own in zip(("displacement", "load point - block"), made, strict=True):
+            own.xaxis.axis_label, own.yaxis.axis_label = label("time from the start", "s"), label(name, unit)
+            legend(own)
+        made[1].x_range = made[0].x_range
+        rows = [[tag, *_cells(experiments.simulated(r))] for tag, r in found.recordings.items()]
+        columns = ["means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)]
+        table = Table(columns=columns, rows=rows, choosing=False, **WIDE)
+        self._words.text = experiments.difference(found.recordings)
+        self._place[:] = [pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in made), **WIDE), table]
 
-        return update
 
-    def _sweep(self, fit: Fit, asked: list[str]) -> Callable[[], None]:
-        given = [a for a in asked if not a.startswith("drive.velocity")]
-        text = str(self._fields["velocity"].value)
-        middle = to_si(text, "m/s") if text.strip() else fit.fitted.runs[0].velocity
-        session = self._session
-        found = swept(fit, given, middle * np.array(SWEEP), lambda share: setattr(session, "share", share))
+class _Synthetic:
+    """A synthetic record of what is asked for, in a folder of its own."""
 
-        def update() -> None:
-            self._points.data = {
-                "velocity": 1e6 * found["velocity"], "recurrence": found["recurrence"], "slip": 1e6 * found["slip"],
-            }  # fmt: skip
-            still = int(np.isnan(found["slip"]).sum())
-            self._words.text = f"at {still} of {len(SWEEP)} velocities the block slides without slips" if still else ""
+    def __init__(self, session: Session, asked: _Asked) -> None:
+        self._session, self._asked = session, asked
+        self._work = beside(session, "synthetic")
+        self.name: Any = pn.widgets.TextInput(name="folder beside the campaign", value="synthetic", width=240, **FIXED)
+        self._button = _button("Write a record", self.start)
+        filed = session.campaign is not None and session.campaign.description.filed
+        words = "What is asked for above as a vibrometer would record it: record.csv and campaign.toml in a new folder"
+        self.view = pn.Column(
+            _head(words), pn.FlexBox(self.name, self._button, gap="6px 10px"), progress(self._work), visible=filed,
+            **WIDE,
+        )  # fmt: skip
+        watch(self._work, ["doing"], self.update)
 
-        return update
+    def start(self) -> None:
+        """Simulate and write it."""
+        setting, name, campaign = self._asked.setting(), self.name.value, self._session.campaign
+        if campaign is None:
+            return
 
-    def _write(self, fit: Fit, asked: list[str]) -> Callable[[], None]:
-        from ..scenario import record
+        def make(tell: Tell, show: Show) -> Any:
+            folder = experiments.write(needed(self._session), setting, campaign, name, tell)
+            self._work.said = f"written: stickslip open {folder.name}/campaign.toml"
+            return folder
 
-        number = 1
-        while (folder := target(self._session, f"simulated-{number}")).exists():
-            number += 1
-        made = fit.scenario(asked, None, EVENTS)
-        recording = record(made)
-        folder.mkdir()
-        write_campaign(folder, [made], [recording])
-        text = f"written to {folder.name}: a synthetic vibrometer file and its campaign.toml"
-        return partial(setattr, self._words, "text", text)
+        self._work.do("simulating the record", make)
+
+    def update(self) -> None:
+        """Whether it can be pressed."""
+        self._button.disabled = bool(self._work.doing)
+
+
+__all__ = ["TITLE", "page"]

@@ -1,0 +1,158 @@
+"""The form by which a run is added: a file is dropped, its columns are guessed, and whoever dropped it confirms."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import panel as pn
+
+from ..errors import InputError
+from ..objects import Campaign
+from ..readers import Columns
+from .adding import CHANNELS, NONE, Choice, add, entry_text, guess, look
+from .beside import Show, Tell, beside
+from .controls import BUTTON, Words
+from .parts import Table, progress
+from .session import Session, watch
+
+LARGEST = "500MB"
+ROWS = 5  # of the file that are shown
+WORDS = {
+    "time": "time", "displacement": "displacement of the block", "velocity": "velocity of the block",
+    "spring_force": "force of the spring", "drive_position": "position of the load point",
+    "normal_load": "normal load",
+}  # fmt: skip
+
+
+class Form:
+    """What is asked for of a file that was dropped.
+
+    Attributes:
+        view: to be shown.
+        dropped: name and content of the file, None before there is one.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session, self._work = session, beside(session, "adding")
+        self.dropped: tuple[str, bytes] | None = None
+        self._columns: Columns | None = None
+        fixed = {"sizing_mode": "fixed"}
+        self.drop = pn.widgets.FileDropper(
+            multiple=False, max_file_size=LARGEST, chunk_size=4_000_000, height=90, sizing_mode="stretch_width",
+            margin=(4, 0),
+        )  # fmt: skip
+        self.columns: dict[str, Any] = {
+            name: pn.widgets.Select(name=words, options=[NONE], width=230, **fixed) for name, words in WORDS.items()
+        }
+        self.units: dict[str, Any] = {
+            name: pn.widgets.TextInput(name="unit", placeholder=si, width=90, **fixed) for name, si in CHANNELS.items()
+        }
+        text: Any = partial(pn.widgets.TextInput, width=230, **fixed)
+        self.rate = text(name="sampling rate, without a column of times", placeholder="10 kHz")
+        self.velocity = text(name="velocity of the load point", placeholder="50 um/s")
+        self.resolution = text(name="one count of the displacement, if known", placeholder="8 nm")
+        self.run = text(name="name of the run")
+        self.virgin = pn.widgets.Checkbox(name="the contact was freshly set down", width=230, **fixed)
+        self.add = pn.widgets.Button(name="Add the run", width=140, stylesheets=[BUTTON], margin=(12, 0), **fixed)
+        self.said = Words(sizing_mode="stretch_width")
+        self._first = Table(choosing=False, sizing_mode="stretch_width")
+        rows = [pn.Row(self.columns[n], self.units[n], **fixed) for n in CHANNELS]
+        more = (self.rate, self.velocity, self.resolution, self.run, self.virgin, self.add)
+        self._asked = pn.Column(
+            self._first,
+            pn.FlexBox(pn.Column(*rows[:3]), pn.Column(*rows[3:]), pn.Column(*more), gap="0 20px"),
+            sizing_mode="stretch_width", visible=False,
+        )  # fmt: skip
+        head = Words(text="Add a run: drop its file here, or choose one", sizing_mode="stretch_width")
+        head.margin = (18, 0, 0, 0)
+        self.view = pn.Column(
+            head, self.drop, self.said, self._asked, progress(self._work, stopping=False), sizing_mode="stretch_width"
+        )
+        self.drop.param.watch(self._dropped, "value")
+        self.add.on_click(lambda event: self.send())
+        watch(self._work, ["doing", "found"], self._update)
+
+    def _dropped(self, event: Any) -> None:
+        files = dict(event.new or {})
+        if not files:
+            return
+        name, content = list(files.items())[-1]
+        self.take(str(name), content.encode() if isinstance(content, str) else bytes(content))
+
+    def take(self, name: str, content: bytes) -> None:
+        """Look into a file and show what its columns seem to be."""
+        self._asked.visible = False
+        self.dropped = None
+        try:
+            self._columns = look(name, content)
+        except InputError as error:
+            self.said.text = str(error)
+            return
+        self.dropped = (name, content)
+        self.fill(guess(self._columns, self._session.campaign))
+        made = self._columns
+        names = list(made.data)
+        written = [f"{n} [{made.units[n]}]" if n in made.units else n for n in names]
+        rows = [[f"{made.data[n][i]:.7g}" if i < made.data[n].size else "" for n in names] for i in range(ROWS)]
+        self._first.param.update(columns=written, rows=rows)
+        count = max((v.size for v in made.data.values()), default=0)
+        notes = "".join(f"; {text}" for text in (*made.notes, *(f"{n}: {why}" for n, why in made.ignored.items())))
+        self.said.text = f"{name}: {count} rows, read by {made.reader}{notes}. Are these the columns?"
+        self._asked.visible = True
+
+    def fill(self, choice: Choice) -> None:
+        """Show a choice, to be confirmed."""
+        assert self._columns is not None
+        options = [NONE, *self._columns.data]
+        for name in CHANNELS:
+            self.columns[name].param.update(options=options, value=choice.columns.get(name, NONE))
+            self.units[name].value = choice.units.get(name, "")
+        self.rate.value, self.velocity.value = choice.sampling_rate, choice.drive_velocity
+        self.resolution.value, self.run.value, self.virgin.value = choice.resolution, choice.name, choice.virgin
+
+    def choice(self) -> Choice:
+        """What was confirmed."""
+        columns = {n: str(w.value) for n, w in self.columns.items() if w.value not in (NONE, None)}
+        return Choice(
+            columns, {n: self.units[n].value.strip() for n in columns}, self.rate.value.strip(),
+            self.velocity.value.strip(), self.resolution.value.strip(), self.run.value.strip(), bool(self.virgin.value),
+        )  # fmt: skip
+
+    def send(self) -> None:
+        """Store the file and put its table into the campaign."""
+        campaign = self._session.campaign
+        if self.dropped is None or self._columns is None or campaign is None:
+            return
+        name, content = self.dropped
+        try:
+            text = entry_text(name.strip(), self.choice(), self._columns.units)
+        except InputError as error:
+            self.said.text = str(error)
+            return
+
+        def make(tell: Tell, show: Show) -> Campaign:
+            tell("adding the run", 0.0)
+            made = add(campaign, name, content, text)
+            self._session.reopen(made)
+            self._work.said = f"{name} is stored beside the campaign, which has {len(made)} runs now"
+            return made
+
+        self._work.do("adding the run", make)
+
+    def _update(self) -> None:
+        self.add.disabled = bool(self._work.doing)
+        if self._work.found is not None and self._work.found is self._session.campaign and self.dropped is not None:
+            self.dropped, self._asked.visible, self.said.text = None, False, ""
+
+
+def adding(session: Session) -> Any:
+    """The form of a session; a line of words where the campaign has no file."""
+    campaign = session.campaign
+    if campaign is None or not campaign.description.filed:
+        return Words(text="Runs can be added to a campaign that has a file.", sizing_mode="stretch_width")
+    made = Form(session)
+    return made.view
+
+
+__all__ = ["Form", "adding"]

@@ -1,0 +1,91 @@
+"""Work of the pages beside the fits, looks at the data and simulations, in threads of their own: sliders stay free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import param
+
+from ..errors import StickslipError
+from ..progress import Cancelled, breathe
+from .session import Session
+from .work import Worker, at_once
+
+Tell = Callable[[str, float], None]
+Show = Callable[[Any], None]
+
+
+class Beside(param.Parameterized):
+    """One piece of work at a time, which all windows of a session see alike.
+
+    Attributes:
+        doing, share: what is being done ("" for nothing), and how much of it is.
+        found: what it gave last, or so far.
+        said: an error in words, or what was done.
+    """
+
+    doing = param.String("")
+    share = param.Number(0.0)
+    found = param.Parameter(None)
+    said = param.String("")
+
+    def __init__(self, threaded: bool, **given: Any) -> None:
+        super().__init__(**given)
+        self._worker: Any = Worker() if threaded else at_once
+
+    def do(self, text: str, make: Callable[[Tell, Show], Any]) -> None:
+        """Begin it, unless something is going on.
+
+        Args:
+            text: what is done, in words.
+            make: is given a function that tells progress (and ends it when it was cancelled), and one that shows what
+                there is so far; returns what it found, None for what was shown already.
+        """
+        if self.doing:
+            return
+        self.param.update(doing=text, share=0.0, said="")
+
+        def tell(words: str, share: float) -> None:
+            breathe()
+            self.param.update(doing=words or text, share=min(max(share, 0.0), 1.0))
+
+        def show(found: Any) -> None:
+            self.found = found
+
+        def job() -> None:
+            said = ""
+            try:
+                found = make(tell, show)
+                if found is not None:
+                    self.found = found
+            except Cancelled:
+                said = "cancelled"
+            except StickslipError as error:
+                said = str(error)
+            except OSError as error:
+                said = f"it cannot be written or read ({error.strerror or error})"
+            except Exception as error:
+                said = f"a fault of the program: {type(error).__name__}: {error}"
+                raise
+            finally:
+                self.param.update(doing="", said=said or self.said)
+
+        self._worker("", job)
+
+    def cancel(self) -> None:
+        """End it at its next step."""
+        if isinstance(self._worker, Worker):
+            self._worker.cancel()
+
+
+_kept: WeakKeyDictionary[Session, dict[str, Beside]] = WeakKeyDictionary()
+
+
+def beside(session: Session, name: str) -> Beside:
+    """The work of that name of a session."""
+    own = _kept.setdefault(session, {})
+    if name not in own:
+        own[name] = Beside(isinstance(session.worker, Worker))
+    return own[name]

@@ -1,0 +1,195 @@
+"""*Data*: runs with their events, signals to pan and zoom, one event beside the others, and a run more by a drop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import panel as pn
+
+from ..objects import Campaign, Inspection
+from ..segment import Segmentation
+from ..units import shown
+from .adding_form import adding
+from .beside import Beside, Show, Tell, beside
+from .controls import Message
+from .event_view import EventView
+from .parts import Sentences, Table, progress, row_of
+from .picked import chosen, select
+from .session import Session, watch
+from .signals import Signals
+
+TITLE = "Data"
+MEASURES = {
+    "t_onset": "onset", "recurrence": "recurrence", "hold_time": "hold", "slip": "slip",
+    "peak_velocity": "peak velocity", "rise_time": "rise", "overshoot": "overshoot", "ring_frequency": "ringing",
+    "decay_time": "decay",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What was found in the data.
+
+    Attributes:
+        campaign: that was looked at.
+        events: of its runs.
+        inspection: the whole of it, None while it is being made.
+    """
+
+    campaign: Campaign
+    events: tuple[Segmentation, ...]
+    inspection: Inspection | None = None
+
+
+def page(session: Session) -> Any:
+    """The page of a session."""
+    work = beside(session, "inspection")
+    signals, event = Signals(session), EventView(session)
+    bar = progress(work, stopping=False)
+    wide = {"sizing_mode": "stretch_width"}
+
+    def look_at() -> None:
+        campaign = session.campaign
+        known = work.found is not None and work.found.campaign is campaign
+        if campaign is not None and not known and not session.busy:
+            work.do("looking at the data", lambda tell, show: looked(campaign, tell, show))
+
+    watch(session, ["campaign", "busy"], look_at)
+    watch(work, ["doing"], look_at)
+    look_at()
+    return pn.Column(
+        pn.Row(pn.Column(_runs(session), bar, **wide), _told(session, work), **wide),
+        *(pn.pane.Bokeh(f, **wide) for f in (signals.whole, *signals.figures.values())),
+        pn.Row(*(pn.pane.Bokeh(f, **wide) for f in event.figures.values()), **wide),
+        _events(session, work),
+        adding(session),
+        margin=(8, 0, 24, 0), **wide,
+    )  # fmt: skip
+
+
+def looked(campaign: Campaign, tell: Tell, show: Show) -> Looked:
+    """Events first, which are there soon, then what else there is to say."""
+    tell("finding the events", 0.0)
+    show(Looked(campaign, campaign.events))
+    tell("looking at the events", 0.3)
+    return Looked(campaign, campaign.events, campaign.inspect())
+
+
+def run_rows(campaign: Campaign) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows of the table of runs."""
+    columns = ["run", "slips", "drive", "length", "sampling", "signal", "contact at the start"]
+    rows = []
+    for name, row in campaign.summary.iterrows():
+        drive, virgin = row["drive (m/s)"], bool(row["virgin"])
+        known = drive is not None and np.isfinite(float(drive))
+        rows.append([
+            str(name), str(row["slips"]), shown(float(drive), "m/s", 3) if known else "not known",
+            shown(row["length (s)"], "s", 3), shown(row["sampling (Hz)"], "Hz", 3),
+            str(row["signal"]).replace("_", " "), "virgin" if virgin else "used",
+        ])  # fmt: skip
+    return columns, rows
+
+
+def event_rows(found: Looked, run: str) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows of the table of events of a run: what is known of them so far."""
+    number = found.campaign.names.index(run)
+    if found.inspection is None:
+        unit = found.events[number].settings.unit
+        units = {"t_onset": "s", "recurrence": "s", "hold_time": "s", "slip": unit, "peak_velocity": f"{unit}/s"}
+        events = [{key: getattr(e, key) for key in units} for e in found.events[number].events]
+    else:
+        trace = found.inspection.result["traces"][number]
+        units, events = trace["units"], trace["events"]
+    known = [key for key in MEASURES if key in units and any(_finite(e[key]) for e in events)]
+    rows = [[str(i + 1), *(_text(e[key], units[key]) for key in known)] for i, e in enumerate(events)]
+    return ["event", *(MEASURES[key] for key in known)], rows
+
+
+def _finite(value: Any) -> bool:
+    return value is not None and bool(np.isfinite(float(value)))
+
+
+def _text(value: Any, unit: str) -> str:
+    return shown(float(value), unit, 4) if _finite(value) else "-"
+
+
+def groups(found: Looked | None) -> list[dict[str, Any]]:
+    """What was mended, what these data can and cannot tell, as sentences under headings."""
+    if found is None or found.inspection is None:
+        return [{"head": "What these data can tell", "items": ["is being looked at"], "mark": ""}]
+    i = found.inspection
+    mended = list(i.result["dropped"])
+    notes = [f"{t['name']}: {text}" for t in i.result["traces"] for text in (*t["notes"], *t["warnings"])]
+    every = (
+        ("Contradicted by the motion", i.findings, "bad"),
+        ("Can tell", i.can, "good"),
+        ("Cannot tell", i.cannot, "bad"),
+        ("Mended or left out", mended or ["nothing"], ""),
+        ("Noticed", notes, ""),
+    )
+    return [{"head": head, "items": list(items), "mark": mark} for head, items, mark in every if items]
+
+
+def _told(session: Session, work: Beside) -> Any:
+    made = Sentences(tall=264, sizing_mode="stretch_width", margin=(0, 0, 0, 16))
+
+    def update() -> None:
+        found = work.found
+        made.groups = groups(found if found is not None and found.campaign is session.campaign else None)
+
+    watch(work, ["found"], update)
+    watch(session, ["campaign"], update)
+    update()
+    return made
+
+
+def _runs(session: Session) -> Table:
+    def heard(message: Message) -> None:
+        campaign = session.campaign
+        number = row_of(message, len(campaign) if campaign is not None else 0)
+        if campaign is not None and number is not None:
+            select(session, campaign.names[number], session.event)
+
+    made = Table(heard=heard, tall=230, sizing_mode="stretch_width")
+
+    def update() -> None:
+        if session.campaign is not None:
+            columns, rows = run_rows(session.campaign)
+            made.param.update(columns=columns, rows=rows)
+            mark()
+
+    def mark() -> None:
+        if session.campaign is not None:
+            made.chosen = session.campaign.names.index(chosen(session)[0])
+
+    watch(session, ["campaign"], update)
+    watch(session, ["run"], mark)
+    update()
+    return made
+
+
+def _events(session: Session, work: Beside) -> Table:
+    def heard(message: Message) -> None:
+        number = row_of(message, len(made.rows))
+        if number is not None:
+            select(session, chosen(session)[0], number)
+
+    made = Table(heard=heard, tall=260, sizing_mode="stretch_width", margin=(8, 0, 0, 0))
+
+    def update() -> None:
+        campaign = session.campaign
+        if campaign is None:
+            return
+        run, event = chosen(session)
+        found = work.found
+        if found is None or found.campaign is not campaign:
+            found = Looked(campaign, campaign.events)
+        columns, rows = event_rows(found, run)
+        made.param.update(columns=columns, rows=rows, chosen=event if rows else -1)
+
+    watch(session, ["run", "event", "campaign"], update)
+    watch(work, ["found"], update)
+    update()
+    return made

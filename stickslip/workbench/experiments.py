@@ -1,0 +1,271 @@
+"""What the model as it stands foretells: one run under another drive or rig, a sweep, and rivals in one experiment."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..objects import Campaign, Diagnosis, Fit
+from ..progress import breathe
+from ..scenario import Scenario
+from ..scenario.recording import Recording
+from ..scenario.schema import SweepTable
+from ..scenario.series import scenarios_of, summary
+from ..scenario.simulation import Progress, record
+from ..scenario.writers import write_campaign
+from ..segment import Segmentation
+from ..units import to_si
+from .places import new_place
+
+Tell = Callable[[str, float], None]
+MEASURES = {"recurrence": "s", "slip": "m", "peak_velocity": "m/s", "creep_before_slip": "m"}
+FEWEST, MOST = 2, 40  # runs of a sweep
+RATE = 10_000.0  # Hz at which a synthetic record is written
+COUNT = 7.91e-9  # m, where the campaign's runs have no count of their own
+STICKS = (1.6, 2.6)  # mean recurrences of drive before and after a hold, so that it begins and ends between slips
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is simulated, as it was written; "" leaves it as in the measured run.
+
+    Attributes:
+        run: the measured run that it is beside.
+        velocity: of the load point, such as "100 um/s".
+        hold: how long the load point halts once, such as "10 s".
+        spring: stiffness of the spring, such as "500 N/m".
+        mass: of the block, such as "100 g".
+        events: slips after which it ends, where a velocity is given; else it is as long as the measured run.
+    """
+
+    run: str
+    velocity: str = ""
+    hold: str = ""
+    spring: str = ""
+    mass: str = ""
+    events: int = 5
+
+    @property
+    def as_measured(self) -> bool:
+        """Whether the load point moves as in the measured run."""
+        return not self.velocity.strip() and not self.hold.strip()
+
+
+def scenario(fit: Fit, setting: Setting) -> Scenario:
+    """The model as a scenario of a setting.
+
+    Raises:
+        InputError: a quantity that cannot be read or is out of range.
+    """
+    made: Scenario = fit.scenario(run=setting.run, events=setting.events)
+    changes: list[tuple[str, Any]] = []
+    for key, text, unit, words in (
+        ("block.spring_stiffness", setting.spring, "N/m", "spring"),
+        ("block.mass", setting.mass, "kg", "mass"),
+    ):
+        if text.strip():
+            changes.append((key, to_si(text, unit, key=words)))
+    driven = next(run for run in fit.fitted.runs if run.name == setting.run)
+    if not setting.as_measured:
+        velocity = to_si(setting.velocity, "m/s", key="velocity") if setting.velocity.strip() else driven.velocity
+        if velocity == 0.0:
+            raise InputError("a load point that stands still brings no slip", key="velocity", value=setting.velocity)
+        changes = [("drive", {"velocity": velocity, "events": setting.events}), *changes]
+    made = made.with_changes(changes)
+    if not setting.hold.strip():
+        return made
+    hold = to_si(setting.hold, "s", key="hold")
+    if not hold > 0.0:
+        raise InputError("out of range", key="hold", value=setting.hold, allowed="more than 0 s")
+    return made.with_changes([("drive", {"piece": _pieces(made, hold)})])
+
+
+def _pieces(made: Scenario, hold: float) -> list[dict[str, float]]:
+    """Drive, a hold amid a stick, and drive again."""
+    file = made.file
+    velocity = float(file.drive.velocity or 0.0)
+    block, contact = file.block, file.contact
+    strength = contact.contacts * contact.of(0, "normal_force") * contact.of(0, "friction_coefficient")
+    rate = block.spring_stiffness * abs(velocity)
+    period = 2.0 * (1.0 - file.weakening.ratio) * strength / rate + np.pi * np.sqrt(block.mass / block.spring_stiffness)
+    first = strength / rate + STICKS[0] * period
+    return [
+        {"velocity": velocity, "duration": float(first)},
+        {"velocity": 0.0, "duration": hold},
+        {"velocity": velocity, "duration": float(STICKS[1] * period)},
+    ]
+
+
+def run(made: Scenario, tell: Tell | None = None, text: str = "simulating") -> Recording:
+    """A scenario, freely integrated; ends where it is cancelled."""
+
+    def progress(p: Progress) -> None:
+        breathe()
+        if tell is not None:
+            tell(f"{text}: {p.time:.3g} s, {p.events} slips", p.time / p.end if p.end > 0 else 0.0)
+
+    return record(made, progress)
+
+
+def spread(values: Any) -> tuple[float, float, int]:
+    """Mean, deviation and number of what is known of the events after the first, where there are more."""
+    found = np.asarray(values, float)
+    found = found[1:] if found.size > 1 else found
+    found = found[np.isfinite(found)]
+    return (float(found.mean()), float(found.std()), int(found.size)) if found.size else (np.nan, np.nan, 0)
+
+
+def measured(found: Segmentation) -> dict[str, tuple[float, float, int]]:
+    """Mean, deviation and number of the events of a run, for those of :data:`MEASURES` that a record gives."""
+    return {key: spread([getattr(e, key) for e in found.events]) for key in ("recurrence", "slip", "peak_velocity")}
+
+
+def simulated(recording: Recording) -> dict[str, tuple[float, float, int]]:
+    """The same of a simulated run."""
+    return {key: spread(recording[key].values) for key in MEASURES}
+
+
+def steady_runs(campaign: Campaign) -> dict[str, tuple[float, dict[str, tuple[float, float, int]]]]:
+    """Run -> its velocity (m/s) and :func:`measured`, for runs with slips and without a hold."""
+    out = {}
+    for trace, found in zip(campaign.traces, campaign.events, strict=True):
+        if trace.drive is None or found.settings.unit != "m" or len(found.events) < 2:
+            continue
+        speeds = np.diff(trace.drive.positions) / np.diff(trace.drive.times)
+        if np.ptp(speeds) <= 0.2 * np.abs(speeds).max():
+            out[trace.name] = (trace.drive.speed, measured(found))
+    return out
+
+
+def sweep(
+    fit: Fit, setting: Setting, low: str, high: str, points: int, tell: Tell, show: Callable[[Any], None]
+) -> Any:  # fmt: skip
+    """Events of the model over the velocity of the drive; shown as far as they are there.
+
+    Args:
+        fit: the model.
+        setting: its spring, mass and number of events.
+        low, high: ends of the velocities, with units.
+        points: how many.
+        tell, show: told the progress, and what there is so far.
+
+    Raises:
+        InputError: a velocity that cannot be read, or too many of them.
+    """
+    ends = [to_si(text, "m/s", key="velocities") for text in (low, high)]
+    if not 0.0 < ends[0] < ends[1]:
+        raise InputError("the velocities must increase", key="velocities", value=f"{low} to {high}")
+    if not FEWEST <= points <= MOST:
+        raise InputError("out of range", key="number of velocities", value=points, allowed=f"{FEWEST} to {MOST}")
+    base = scenario(fit, Setting(setting.run, low, "", setting.spring, setting.mass, setting.events))
+    series = SweepTable(key="drive.velocity", start=ends[0], stop=ends[1], points=points)
+    members = scenarios_of(base, series)
+    done: list[Any] = []
+    for i, (value, member) in enumerate(members):
+        words = f"{i + 1} of {points}: {1e6 * value:.4g} µm/s"
+
+        def within(text: str, share: float, i: int = i) -> None:
+            tell(text, (i + share) / points)
+
+        done.append(run(member, within, words).dataset())
+        show(summary(base, "drive.velocity", [v for v, _ in members], done))
+    return summary(base, "drive.velocity", [v for v, _ in members], done)
+
+
+def write(fit: Fit, setting: Setting, campaign: Campaign, name: str, tell: Tell) -> Path:
+    """A setting as a vibrometer would record it: a folder in that of the campaign with a record and a campaign file.
+
+    Raises:
+        InputError: the name cannot be used or is there already; as of :func:`scenario`.
+    """
+    if not campaign.description.filed:
+        raise InputError("this campaign has no folder", hint="only a campaign of a file has one")
+    folder = new_place(campaign.description.folder, name, "name of the folder")
+    counts = [t.resolution for t in campaign.traces if t.leading == "displacement" and t.resolution]
+    sensor = {"resolution": float(counts[0]) if counts else COUNT}
+    made = scenario(fit, setting).with_changes(
+        [("sensor", sensor), ("output", {"trace": "record.csv", "sampling_rate": RATE})]
+    )
+    recording = run(made, tell, "simulating the record")
+    aside = folder.with_name(f".{folder.name}.writing")
+    shutil.rmtree(aside, ignore_errors=True)
+    aside.mkdir()
+    try:
+        write_campaign(aside, [made], [recording])
+        aside.rename(folder)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+    return folder
+
+
+def undecided(diagnosis: Diagnosis | None) -> list[tuple[tuple[str, ...], str]]:
+    """Sets of effects that the data cannot tell apart, each with the experiment that would."""
+    proposed = None if diagnosis is None else diagnosis.next_experiment
+    if not proposed:
+        return []
+    every = [proposed, *proposed.get("others", ())]
+    return [(tuple(e["separates"]), str(e["text"])) for e in every if len(e.get("separates", ())) > 1]
+
+
+def rivals(
+    fit: Fit, tags: Sequence[str], forms: Mapping[str, Mapping[str, Any]], tell: Tell
+) -> dict[str, Fit]:  # fmt: skip
+    """The model with each of some effects in place of the others, fitted.
+
+    Args:
+        fit: the model, with one of them or none.
+        tags: of the effects.
+        forms: tag -> form of its law, where it is not the usual one.
+        tell: told the progress.
+    """
+    inside = [tag for tag in tags if tag in fit.effects]
+    base = fit
+    for tag in inside:
+        base = base.remove(tag)
+    out = {}
+    for i, tag in enumerate(tags):
+        tell(f"fitting with {tag}", 0.5 * i / len(tags))
+        form = ",".join(f"{k}={v}" for k, v in forms.get(tag, {}).items())
+        out[tag] = fit if inside == [tag] else base.add(f"{tag}:{form}" if form else tag)
+    return out
+
+
+def compare(fits: Mapping[str, Fit], setting: Setting, tell: Tell) -> dict[str, Recording]:
+    """One experiment simulated for each of some models."""
+    out = {}
+    for i, (tag, fit) in enumerate(fits.items()):
+
+        def within(text: str, share: float, i: int = i) -> None:
+            tell(text, 0.5 + 0.5 * (i + share) / len(fits))
+
+        out[tag] = run(scenario(fit, setting), within, f"with {tag}")
+    return out
+
+
+def difference(found: Mapping[str, Recording]) -> str:
+    """By which measure the models differ most, in words."""
+    best, words = 0.0, "They do not differ in any event of this experiment."
+    for key in MEASURES:
+        lists = [np.asarray(r[key].values, float) for r in found.values()]
+        count = min((v.size for v in lists), default=0)
+        for number in range(count):
+            values = np.array([v[number] for v in lists])
+            if not np.isfinite(values).all() or np.abs(values).max() == 0.0:
+                continue
+            apart = float(np.ptp(values) / np.abs(values).mean())
+            if apart > best:
+                best = apart
+                words = (
+                    f"They differ most in the {key.replace('_', ' ')} of slip {number + 1}: by {100 * apart:.2g} % of "
+                    f"its mean."
+                )
+    if len({r.sizes["event"] for r in found.values()}) > 1:
+        counts = ", ".join(f"{tag} {r.sizes['event']}" for tag, r in found.items())
+        words += f" The number of slips differs: {counts}."
+    return words

@@ -1,0 +1,120 @@
+"""Run folders beside a campaign: what lies there, and a result saved among them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, RunFolderError
+from ..objects import Campaign, Diagnosis, Fit
+from ..report.html import REPORT
+from ..runstore import RESULT, read_result
+from .places import new_place
+
+MOST = 100  # run folders that are listed
+LARGEST = 64 << 20  # bytes of a report that is shown
+DEEP = 2  # folders below the campaign's in which run folders are looked for
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A run folder.
+
+    Attributes:
+        name: relative to the campaign's folder.
+        folder: where it lies.
+        kind: fit, diagnose, inspect, ...
+        words: verdict or error.
+        when: it was written.
+        report: whether it has one.
+    """
+
+    name: str
+    folder: Path
+    kind: str
+    words: str
+    when: str
+    report: bool
+
+
+def listed(folder: Path) -> list[Kept]:
+    """Run folders in a folder and in those in it, the newest first; what leads elsewhere or is damaged is left out."""
+    home = folder.resolve()
+    paths = [p for deep in range(1, DEEP + 1) for p in folder.glob("/".join(["*"] * deep + [RESULT]))]
+    found = []
+    for path in paths:
+        own = path.parent
+        hidden = any(part.startswith(".") for part in own.relative_to(folder).parts)
+        if hidden or not path.resolve().is_relative_to(home):
+            continue
+        try:
+            result, written = read_result(own), path.stat().st_mtime
+        except (RunFolderError, OSError):
+            continue
+        when = datetime.fromtimestamp(written).strftime("%Y-%m-%d %H:%M")
+        report = (own / REPORT).is_file() and (own / REPORT).resolve().is_relative_to(home)
+        name = own.relative_to(folder).as_posix()
+        found.append((written, Kept(name, own, str(result.get("kind", "")), words(result), when, report)))
+    return [kept for _, kept in sorted(found, key=lambda pair: -pair[0])[:MOST]]
+
+
+def words(result: dict[str, Any]) -> str:
+    """The verdict or the errors of a result, on a line."""
+    try:
+        verdict = result.get("verdict")
+        if isinstance(verdict, dict):
+            of = ", ".join(map(str, verdict.get("effects") or verdict.get("set") or ()))
+            return f"{verdict.get('kind')}{': ' + of if of else ''}{_errors(result)}"
+        if result.get("ladder"):
+            return f"{' + '.join(map(str, result.get('model_parts', ())))}{_errors(result)}"
+        return str(verdict or result.get("title") or "")
+    except (TypeError, AttributeError, KeyError, ValueError):
+        return "of another form"
+
+
+def _errors(result: dict[str, Any]) -> str:
+    rung = (result.get("ladder") or [{}])[-1]
+    own, unseen = rung.get("train_error"), rung.get("heldout_error")
+    texts = [f"{name} {value:.3f}" for name, value in (("error", own), ("on unseen runs", unseen)) if value is not None]
+    return f" ({', '.join(texts)} floors)" if texts else ""
+
+
+def save(
+    found: Fit | Diagnosis, campaign: Campaign, name: str, tell: Callable[[str, float], None] | None = None
+) -> Path:
+    """Keep a fit or a diagnosis as a run folder beside the campaign, as the command does.
+
+    Args:
+        found: what to keep.
+        campaign: with a file.
+        name: of the folder.
+        tell: told the progress.
+
+    Raises:
+        InputError: the name cannot be used or is there already; the campaign has no folder; it cannot be written.
+    """
+    if not campaign.description.filed:
+        raise InputError("this campaign has no folder", hint="only a campaign of a file has one")
+    folder = new_place(campaign.description.folder, name, "name of the run folder")
+    if isinstance(found, Diagnosis) and not found.variables:
+        raise InputError("this diagnosis is in a run folder already", hint="it was opened from there")
+    if isinstance(found, Fit):
+        found.confirm(tell)
+    return found.save(folder)
+
+
+def report(kept: Kept) -> str:
+    """The report of a run folder.
+
+    Raises:
+        InputError: it has none, or one that is too large to be shown.
+    """
+    path = kept.folder / REPORT
+    if not kept.report or not path.is_file():
+        raise InputError("this run folder has no report", value=kept.name)
+    if path.stat().st_size > LARGEST:
+        raise InputError("the report is too large to be shown here", value=kept.name, hint=f"open {REPORT} itself")
+    return path.read_text(encoding="utf-8", errors="replace")

@@ -1,0 +1,95 @@
+"""Further parts of the pages: a table, sentences, work that goes on, lines to copy. All text is shown as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import param
+from panel.custom import JSComponent
+
+from .beside import Beside
+from .controls import Message, Spoken
+from .watching import watch
+
+_HERE = Path(__file__).parent / "static"
+_STYLE = [(_HERE / "table.css").read_text(encoding="utf-8")]
+
+
+class Table(Spoken):
+    """A table.
+
+    Attributes:
+        columns, rows: texts.
+        chosen: number of the row that is marked, -1 for none.
+        choosing: whether a row can be chosen; it is told as ``{"kind": "row", "row": number}``.
+        tall: pixels after which it scrolls, 0 for never.
+    """
+
+    columns = param.List([])
+    rows = param.List([])
+    chosen = param.Integer(-1)
+    choosing = param.Boolean(True)
+    tall = param.Integer(0)
+
+    _esm = (_HERE / "table.js").read_text(encoding="utf-8")
+    _stylesheets = _STYLE
+
+
+class Sentences(JSComponent):
+    """Sentences under headings.
+
+    Attributes:
+        groups: tables with ``head``, ``items`` and ``mark`` ("good", "bad" or "").
+        tall: pixels after which it scrolls, 0 for never.
+    """
+
+    groups = param.List([])
+    tall = param.Integer(0)
+
+    _esm = (_HERE / "list.js").read_text(encoding="utf-8")
+    _stylesheets = _STYLE
+
+
+class Progress(Spoken):
+    """What is being done, with a way to end it, and what came of it."""
+
+    doing = param.String("")
+    share = param.Number(0.0)
+    said = param.String("")
+    stopping = param.Boolean(True)
+
+    _esm = (_HERE / "work.js").read_text(encoding="utf-8")
+    _stylesheets = _STYLE
+
+
+class Copy(JSComponent):
+    """Lines with a button that copies them."""
+
+    text = param.String("")
+
+    _esm = (_HERE / "copy.js").read_text(encoding="utf-8")
+    _stylesheets = _STYLE
+
+
+def progress(work: Beside, stopping: bool = True) -> Progress:
+    """Of a piece of work."""
+
+    def heard(message: Message) -> None:
+        if message.get("kind") == "cancel":
+            work.cancel()
+
+    made = Progress(heard=heard, stopping=stopping, sizing_mode="stretch_width")
+
+    def update() -> None:
+        made.param.update(doing=work.doing, share=work.share, said=work.said)
+
+    watch(work, ["doing", "share", "said"], update)
+    update()
+    return made
+
+
+def row_of(message: Message, rows: int) -> int | None:
+    """Number of the row that was chosen, or None where the message is none."""
+    number = message.get("row")
+    whole = isinstance(number, int) and not isinstance(number, bool)
+    return int(number) if message.get("kind") == "row" and whole and 0 <= int(number) < rows else None  # type: ignore[arg-type]

@@ -1,0 +1,186 @@
+"""The page of simulations, without a browser."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.errors import InputError
+from stickslip.objects import Diagnosis
+from stickslip.progress import Cancelled, cancellable
+from stickslip.workbench import experiments, simulate_page
+from stickslip.workbench.beside import beside
+from stickslip.workbench.experiments import Setting
+from stickslip.workbench.session import Session
+
+RIVALS = ("contact-ageing", "viscous-drag")
+
+
+def _silent(text, share):
+    assert 0.0 <= share <= 1.0
+
+
+@pytest.fixture
+def session(campaign, base):
+    made = Session(campaign=campaign)
+    made.first(base)
+    return made
+
+
+@pytest.fixture(scope="module")
+def undecided(campaign):
+    proposed = {"text": "holds of 1 s and 10 s", "separates": list(RIVALS)}
+    verdict = {"kind": "set", "effects": [], "set": list(RIVALS), "forms": {}}
+    return Diagnosis(campaign, None, {"verdict": verdict, "next_experiment": proposed}, {})
+
+
+def test_what_is_left_empty_is_as_in_the_measured_run(base):
+    mine = experiments.run(experiments.scenario(base, Setting("v400")))
+    theirs = base.simulate(run="v400")
+    assert np.array_equal(mine["displacement"].values, theirs["displacement"].values)
+    other = experiments.run(experiments.scenario(base, Setting("v100", "400 um/s", events=3)))
+    assert other.sizes["event"] >= 3 and other["time"].values[-1] < mine["time"].values[-1]
+    holds = experiments.scenario(base, Setting("holds"))
+    assert [(p.velocity, p.duration) for p in holds.file.drive.piece] == [
+        (v, pytest.approx(dt)) for v, dt in next(r for r in base.fitted.runs if r.name == "holds").pieces
+    ]
+
+
+def test_velocity_spring_and_mass_are_taken_with_their_units(base):
+    made = experiments.scenario(base, Setting("v100", "0.3 mm/s", "", "0.5 N/mm", "100 g", 2))
+    file = made.file
+    assert (file.drive.velocity, file.block.spring_stiffness, file.block.mass) == pytest.approx((3e-4, 500.0, 0.1))
+    for wrong, key in (
+        (Setting("v100", "fast"), "velocity"),
+        (Setting("v100", "0.3"), "velocity"),
+        (Setting("v100", "0 m/s"), "velocity"),
+        (Setting("v100", hold="-1 s"), "hold"),
+        (Setting("v100", mass="3 N"), "mass"),
+    ):
+        with pytest.raises(InputError, match=key):
+            experiments.scenario(base, wrong)
+
+
+def test_a_hold_begins_amid_a_stick(base):
+    made = experiments.scenario(base, Setting("v100", "100 um/s", "5 s"))
+    first, hold, last = made.file.drive.piece
+    assert (hold.velocity, hold.duration) == (0.0, 5.0) and first.velocity == last.velocity == pytest.approx(1e-4)
+    done = experiments.run(made)
+    arrests, onsets = done["arrest"].values, done["onset"].values
+    begin, end = first.duration, first.duration + 5.0
+    assert np.sum(onsets < begin) >= 1 and np.sum(onsets > end) >= 1
+    assert not np.any((onsets < begin) & (arrests > begin)), "the load point halts while the block sticks"
+
+
+def test_a_simulation_is_shown_beside_the_measurement(session):
+    simulate_page.page(session)
+    asked = simulate_page._Asked(session)
+    made = simulate_page._Beside(session, asked)
+    asked.run.value, asked.velocity.value, asked.events.value = "v400", "400 um/s", 7
+    made.start()
+    assert beside(session, "simulation").said == ""
+    assert len(made._model.data["t"]) > 500 and len(made._measured.data["t"]) > 500
+    own, model = (float(np.max(d.data["x"])) for d in (made._measured, made._model))
+    assert model == pytest.approx(own, rel=0.15)
+    assert "/ µm" in made.figures["x"].yaxis.axis_label and made.figures["gap"].xaxis.axis_label.endswith("/ s")
+    columns, rows = made._table.columns, made._table.rows
+    assert len(rows) == 2 and all(len(r) == len(columns) for r in rows) and "±" in rows[1][1]
+
+
+def test_a_wrong_quantity_is_said_and_nothing_else_happens(session):
+    asked = simulate_page._Asked(session)
+    made = simulate_page._Beside(session, asked)
+    asked.mass.value = "heavy"
+    made.start()
+    work = beside(session, "simulation")
+    assert "mass" in work.said and work.found is None and work.doing == ""
+
+
+def test_without_a_model_it_is_said(campaign):
+    session = Session(campaign=campaign)
+    simulate_page.page(session)
+    asked = simulate_page._Asked(session)
+    simulate_page._Beside(session, asked).start()
+    assert "no model yet" in beside(session, "simulation").said
+
+
+def test_a_simulation_can_be_cancelled(base):
+    asked = []
+
+    def stop() -> bool:
+        asked.append(1)
+        return len(asked) > 1
+
+    with cancellable(stop), pytest.raises(Cancelled):
+        experiments.run(experiments.scenario(base, Setting("v050", events=60)))
+
+
+def test_a_sweep_comes_to_the_measured_recurrence(session, campaign, base):
+    shown = []
+    found = experiments.sweep(base, Setting("v100", events=3), "100 um/s", "400 um/s", 3, _silent, shown.append)
+    assert [d.sizes["run"] for d in shown] == [1, 2, 3]
+    speed, values = experiments.steady_runs(campaign)["v200"]
+    assert speed == pytest.approx(2e-4) and "holds" not in experiments.steady_runs(campaign)
+    assert found["value"].values[1] == pytest.approx(2e-4)
+    assert found["recurrence"].values[1] == pytest.approx(values["recurrence"][0], rel=0.1)
+    for low, high, points in (("2 um/s", "1 um/s", 3), ("1 um/s", "2 um/s", 400), ("x", "2 um/s", 3)):
+        with pytest.raises(InputError):
+            experiments.sweep(base, Setting("v100"), low, high, points, _silent, shown.append)
+
+
+def test_the_sweep_is_drawn_with_measured_points(session):
+    asked = simulate_page._Asked(session)
+    made = simulate_page._Sweep(session, asked)
+    assert list(made._measured.data["run"]) == ["v050", "v100", "v200", "v400"]
+    made.low.value, made.high.value, made.points.value, asked.events.value = "200 um/s", "400 um/s", 2, 3
+    made.start()
+    assert len(made._model.data["v"]) == 2 and np.isfinite(made._model.data["recurrence"]).all()
+
+
+def test_a_synthetic_record_can_be_opened(campaign, base, folder):
+    made = experiments.write(base, Setting("v400", "400 um/s", events=4), campaign, "synthetic run", _silent)
+    assert made == folder / "synthetic run" and not list(folder.glob(".synthetic*"))
+    read = ss.load_campaign(made / "campaign.toml")
+    assert len(read.events[0].events) >= 3 and read.traces[0].drive_velocity == pytest.approx(4e-4)
+    for name in ("synthetic run", "../elsewhere", "a/b", ".hidden", ""):
+        with pytest.raises(InputError):
+            experiments.write(base, Setting("v400"), campaign, name, _silent)
+
+
+def test_rivals_are_simulated_in_one_experiment(session, base, undecided):
+    session.diagnosis = undecided
+    assert experiments.undecided(undecided) == [(RIVALS, "holds of 1 s and 10 s")]
+    fits = experiments.rivals(base, RIVALS, {}, _silent)
+    assert {tag: fit.effects for tag, fit in fits.items()} == {tag: (tag,) for tag in RIVALS}
+    found = experiments.compare(fits, Setting("v200", "200 um/s", "10 s"), _silent)
+    assert set(found) == set(RIVALS)
+    text = experiments.difference(found)
+    assert "%" in text and "slip" in text
+    made = simulate_page._Experiment(session, simulate_page._Asked(session))
+    assert "holds of 1 s and 10 s" in made._said.text
+    beside(session, "rivals").found = simulate_page.Rivals(Setting("v200"), found)
+    assert made._words.text == text and made._place[1].rows[0][0] == "contact-ageing"
+
+
+def test_an_effect_that_is_in_the_model_stays_and_the_other_takes_its_place():
+    class Fake:
+        def __init__(self, *effects):
+            self.effects = effects
+
+        def add(self, name):
+            return Fake(*self.effects, name)
+
+        def remove(self, tag):
+            return Fake(*(e for e in self.effects if e != tag))
+
+    fit = Fake("wear", "contact-ageing")
+    found = experiments.rivals(fit, RIVALS, {"viscous-drag": {"law": "linear"}}, _silent)
+    assert found["contact-ageing"] is fit
+    assert found["viscous-drag"].effects == ("wear", "viscous-drag:law=linear")
+
+
+def test_nothing_is_proposed_where_nothing_is_undecided(session, campaign):
+    assert experiments.undecided(None) == []
+    found = Diagnosis(campaign, None, {"verdict": {"kind": "complete"}, "next_experiment": None}, {})
+    assert experiments.undecided(found) == []
