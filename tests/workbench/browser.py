@@ -94,8 +94,8 @@ class Browser:
         return self.driver.execute_script(DEEP + code, *arguments)
 
     def text(self, selector: str) -> str:
-        """Of the first element that is seen."""
-        return str(self.js("const e = seen(arguments[0])[0]; return e ? e.textContent : ''", selector))
+        """Of the elements that are seen, a line each."""
+        return str(self.js("return seen(arguments[0]).map((e) => e.textContent).join('\\n')", selector))
 
     def press(self, selector: str, text: str = "") -> None:
         """Click the first element that is seen, with a text in it."""
