@@ -154,29 +154,28 @@ def named_text(shape: Shape) -> str:
 
 
 def _free(line: RoughLine) -> str:
-    hurst, height = _with(line.hurst, line.hurst_std, "1", line.edge), _with(line.h_rms, line.h_rms_std, "m", line.edge)
+    hurst, height = _with(line.hurst, line.hurst_std, "1"), _with(line.h_rms, line.h_rms_std, "m")
     return (
         f"Were the roughness another, H = {hurst} and h_rms = {height} would be nearest (chi-square {line.cost:.0f})."
     )
 
 
-def _with(value: float, std: float, unit: str, edge: bool) -> str:
-    return shown(value, unit, 3) + ("" if edge or std == 0.0 else f" +- {shown(std, unit, 2)}")
+def _with(value: float, std: float, unit: str) -> str:
+    return shown(value, unit, 3) + ("" if std == 0.0 else f" +- {shown(std, unit, 2)}")
 
 
 def _line(line: RoughLine) -> dict[str, Any]:
     guessed = f"; guesses: {', '.join(line.guessed)}" if line.guessed else ""
-    edge = "; at the edge of what such lines can do, so deviations mean nothing" if line.edge else ""
+    edge = "; at the edge of what such lines can do" if line.edge else ""
     stated = f" ({' and '.join(line.stated)} as the rig states)" if line.stated else ""
     return {
-        "H": line.hurst, "H_std": None if line.edge else line.hurst_std,
-        "h_rms": line.h_rms, "h_rms_std": None if line.edge else line.h_rms_std,
-        "correlation": None if line.edge else line.correlation,
+        "H": line.hurst, "H_std": line.hurst_std, "h_rms": line.h_rms, "h_rms_std": line.h_rms_std,
+        "correlation": line.correlation, "edge": line.edge,
         "stated": list(line.stated), "guessed": list(line.guessed), "misfit": line.misfit, "cost": line.cost,
         "contacts": line.contacts, "N": line.springs, "L": line.length,
         "text": (
-            f"Nearest rough lines{stated}: H = {_with(line.hurst, line.hurst_std, '1', line.edge)}, h_rms = "
-            f"{_with(line.h_rms, line.h_rms_std, 'm', line.edge)}, for {line.contacts} "
+            f"Nearest rough lines{stated}: H = {_with(line.hurst, line.hurst_std, '1')}, h_rms = "
+            f"{_with(line.h_rms, line.h_rms_std, 'm')}, for {line.contacts} "
             f"contact{'s' if line.contacts > 1 else ''} of L = {shown(line.length, 'm')} and N = {line.springs}"
             f"{guessed}; effective parameters of the distribution of gaps, not a topography{edge}. The curve is off by "
             f"{line.misfit:.2g} of the deviations, which hold what was measured and how other lines of the same "

@@ -372,7 +372,9 @@ def variables(d: Diagnosis) -> Variables:
     curve, line = d.shape.curve, d.shape.line
     for name, values, unit in (
         ("displacement", curve.displacement, "m"), ("force", curve.force, "N"), ("std", curve.std, "N"),
-        ("law", d.shape.power.force, "N"), *([] if line is None else [("line", line.force, "N")]),
+        ("law", d.shape.power.force, "N"), *([] if line is None else [
+            ("line", line.force, "N"), ("line_later", line.scatter[0], "N"), ("line_sooner", line.scatter[1], "N"),
+        ]),
     ):  # fmt: skip
         out[f"backbone_{name}"] = ("backbone_point", values, {"units": unit})
     return out | free_variables(d.confirmation, d.prepared, d.ladder[1].model, d.ladder[-1].model)

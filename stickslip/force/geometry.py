@@ -36,6 +36,7 @@ from .rough_contacts import rough_contacts
 COMPARED = (0.02, 0.98)  # shares of the strength between which curves are compared
 ROUNDS = 2  # times that the covariance is taken at the line that was found
 BETWEEN = 0.04  # from one Hurst exponent to the next at which lines are sought
+FEWEST = 8  # of them
 HELD = 1e-6  # to either side of one that is held
 STARTS = (0.03, 0.3)  # of an amplitude, over its range
 STEP, WIDE = 1e-3, 0.5  # of derivatives, on the search scale: of the line and of an amplitude
@@ -50,19 +51,21 @@ SEVERAL = "unequal-contacts"  # means nothing where there is one
 
 @dataclass(frozen=True)
 class RoughLine:
-    """Contacts of rough lines whose curve comes nearest to a backbone.
+    """Contacts of rough lines that have a backbone.
 
     Attributes:
-        hurst, h_rms: Hurst exponent and rms height (m), effective numbers of the distribution of gaps.
-        hurst_std, h_rms_std, correlation: of the two, other lines of the same surface included; zero where a number
-            of the rig was taken as it is.
+        hurst, h_rms: Hurst exponent, its mean under the likelihood, and the rms height that goes with it (m); effective
+            numbers of the distribution of gaps.
+        hurst_std, h_rms_std, correlation: root mean square distances of the two from these under the likelihood, other
+            lines of the same surface included; zero where a number of the rig was taken as it is.
         stated: those of the two that the rig states.
         contacts, springs, length: of the contacts: number, springs of a line, its length (m).
         guessed: quantities of the rig that are guesses, whose priors are in the deviations.
         cost: chi-square, priors included.
         misfit: root of chi-square over the number of degrees of freedom.
-        edge: whether it is the last line that there is, so that deviations mean nothing.
+        edge: whether it is the last line that there is.
         force: of the law at the backbone's displacements (N), shape (n,).
+        scatter: how far other contacts of the same surface lie from it there, one deviation (N), shape (2, n).
     """
 
     hurst: float
@@ -79,6 +82,7 @@ class RoughLine:
     misfit: float
     edge: bool
     force: Array
+    scatter: Array
 
 
 @dataclass(frozen=True)
@@ -220,43 +224,46 @@ class _Comparison:
         self.white = np.eye(self.at.size)
 
     def rough_line(self) -> tuple[RoughLine, _Solution]:
-        """The line of largest likelihood, and the nearest one under the covariance at it, which stays from then on."""
-        z = self._likeliest()
+        """The line, and the nearest one under the covariance at it, which stays from then on."""
+        z, covariance = self._likely()
         self._whiten(z)
-        rows = self._slopes(self.free, z, None)
-        at = _Solution(z, _inverse(rows), self._chi_square(z), rows)
+        at = _Solution(z, covariance, self._chi_square(z), self._slopes(self.free, z, None))
         (hurst, h_rms), deviations, correlation = self._roughness(at)
         freedom = max(self.at.size - sum(not np.isfinite(f.width) for f in self.free), 1)
         values = self._values(z)
         made = RoughLine(
             hurst, h_rms, *deviations, correlation, self.stated, self.contacts, self.springs,
             self._static(values).length, tuple(f.name for f in self.free if f.name in GUESSED), at.cost,
-            float(np.sqrt(at.cost / freedom)), self._edge(z), self._force(values, None, 0.0),
+            float(np.sqrt(at.cost / freedom)), self._edge(z), self._force(values, None, 0.0), self._scatter(values),
         )  # fmt: skip
         return made, min(self._solve(self.free, z), at, key=_cost)
 
-    def _likeliest(self) -> Array:
-        """Parameters by maximum likelihood: contacts of another H differ by more or less, and so does their covariance.
+    def _likely(self) -> tuple[Array, Array]:
+        """Parameters at the mean H under the likelihood, and mean square distances from them.
 
-        Along H, where it is free, for the likelihood may have several maxima in it.
+        Contacts of another H differ by more or less, so their covariance depends on it, and the likelihood along H may
+        be flat on one side, or have several maxima: it is gone through on a grid.
         """
         if not self._is("H").any():
-            return self._beneath(None)[1]
+            _, z, covariance = self._beneath(None)
+            return z, covariance
         low, high = self.free[int(np.argmax(self._is("H")))].bounds
-        hursts = np.linspace(low, high, max(int(np.ceil((high - low) / BETWEEN)), 2) + 1)
+        hursts = np.linspace(low, high, max(int(np.ceil((high - low) / BETWEEN)), FEWEST) + 1)
         found = [self._beneath(h) for h in hursts]
-        k = int(np.argmin([fall for fall, _ in found]))
-        if 0 < k < hursts.size - 1:
-            left, middle, right = (found[i][0] for i in (k - 1, k, k + 1))
-            step = 0.5 * (left - right) / (left - 2.0 * middle + right)
-            found.append(self._beneath(float(hursts[k] + step * (hursts[1] - hursts[0]))))
-        return min(found, key=lambda pair: pair[0])[1]
+        weights = np.exp(-0.5 * (np.array([fall for fall, _, _ in found]) - min(fall for fall, _, _ in found)))
+        weights /= weights.sum()
+        _, z, _ = self._beneath(float(weights @ hursts))
+        spread = [covariance + np.outer(at - z, at - z) for _, at, covariance in found]
+        return z, np.asarray(np.tensordot(weights, spread, 1))
 
-    def _beneath(self, hurst: float | None) -> tuple[float, Array]:
-        """Twice the negative logarithm of the likelihood at a Hurst exponent, all else at its best, and where."""
+    def _beneath(self, hurst: float | None) -> tuple[float, Array, Array]:
+        """Twice the negative logarithm of the likelihood at a Hurst exponent, all else at its best, and where that is.
+
+        The covariance is that of all else.
+        """
         free, z = self.free, vector(self.free)
+        held = self._is("H") if hurst is not None else np.zeros(z.size, bool)
         if hurst is not None:
-            held = self._is("H")
             z = np.where(held, hurst, z)
             free = tuple(
                 replace(f, lower=hurst - HELD, upper=hurst + HELD) if there else f
@@ -264,9 +271,12 @@ class _Comparison:
             )
         for _ in range(ROUNDS):
             self._whiten(z)
-            z = self._solve(free, z).z
+            found = self._solve(free, z)
+            z = found.z
         self._whiten(z)
-        return self._chi_square(z) + 2.0 * float(np.log(np.diag(self.white)).sum()), z
+        covariance = np.zeros((z.size, z.size))
+        covariance[np.ix_(~held, ~held)] = _inverse(found.rows[:, ~held])
+        return self._chi_square(z) + 2.0 * float(np.log(np.diag(self.white)).sum()), z, covariance
 
     def _chi_square(self, z: Array) -> float:
         return float((self._residual(self.free, z, None) ** 2).sum())
@@ -400,6 +410,19 @@ class _Comparison:
         """Of the law at the curve's displacements, at the strength that was measured (N)."""
         u, tau, _ = self._law(values, added, amplitude)
         return self.strength * np.interp(self.curve.displacement, np.append(0.0, u), np.append(0.0, tau))
+
+    def _scatter(self, values: dict[str, float]) -> Array:
+        """Force of contacts that slide one deviation later and earlier (N), shape (2, n)."""
+        u, tau, _ = self._law(values, None, 0.0)
+        variance = np.diag(self.table.covariance(self._static(values), values["H"], values["h_rms"]))
+        std = np.sqrt(np.interp(tau, self.table.tau[self.table.sparse], variance))
+        return np.array(
+            [
+                self.strength
+                * np.interp(self.curve.displacement, np.append(0.0, np.maximum.accumulate(v)), np.append(0.0, tau))
+                for v in (u * np.exp(std), u * np.exp(-std))
+            ]
+        )
 
 
 def in_logarithms(curve: Backbone, tau: Array) -> tuple[Array, Array]:

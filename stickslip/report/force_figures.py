@@ -96,7 +96,7 @@ def backbone_picture(data: xarray.Dataset, law: dict[str, Any]) -> Figure:
     """The measured backbone of the contact with its band, the nearest rough lines, and the power law fitted to it."""
     u, force, std, fitted = (series(data, "backbone", n) for n in ("displacement", "force", "std", "law"))
     assert u is not None and force is not None and std is not None and fitted is not None
-    line = series(data, "backbone", "line")
+    line, later, sooner = (series(data, "backbone", n) for n in ("line", "line_later", "line_sooner"))
     made, axes = figure(1, 2, width=9.0, height=3.6)
     k, unit = scaled(force, "N")
     for ax, scale in zip(axes[0], ("linear", "log"), strict=True):
@@ -104,8 +104,12 @@ def backbone_picture(data: xarray.Dataset, law: dict[str, Any]) -> Figure:
         ax.fill_between(u * m, (force - 2 * std) * k, (force + 2 * std) * k, color=LIGHT, alpha=0.5, lw=0)
         ax.plot(u * m, force * k, color=DARK, lw=1.6, label="measured, two standard deviations")
         ax.plot(u * m, fitted * k, color=MIDDLE, ls="--", lw=1.2, label="power law 1 - (1 - u/u_max)^p")
-        if line is not None:
-            ax.plot(u * m, line * k, color=DARK, ls=":", lw=1.2, label="nearest rough lines (H, h_rms)")
+        if line is not None and later is not None and sooner is not None:
+            ax.plot(
+                u * m, line * k, color=DARK, ls=":", lw=1.2, label="nearest rough lines, and how such contacts differ"
+            )
+            for edge in (later, sooner):
+                ax.plot(u * m, edge * k, color=DARK, ls=":", lw=0.6, alpha=0.6)
         ax.set(xlabel=f"displacement from the force-free contact / {length}", ylabel=f"force / {unit}")
         if scale == "log":
             ax.set(xscale="log", yscale="log", ylim=(max(1e-4 * force[-1] * k, 1e-300), None))

@@ -273,9 +273,11 @@ def test_a_guessed_roughness_is_a_prior():
 def test_what_is_guessed_of_the_rig_widens_the_height():
     curve = measured(independent(6), 6)
     known = laws(curve, ()).line
-    length = laws(curve, (), line_length={"guess": 20e-6, "lower": 5e-6, "upper": 80e-6}).line
+    height = laws(curve, (), H=HURST).line
+    assert (height.hurst, height.hurst_std, height.stated) == (HURST, 0.0, ("H",))
+    length = laws(curve, (), H=HURST, line_length={"guess": 20e-6, "lower": 5e-6, "upper": 80e-6}).line
     assert length.guessed == ("line_length",)
-    assert length.h_rms_std / length.h_rms > 1.5 * known.h_rms_std / known.h_rms
+    assert length.h_rms_std / length.h_rms > 1.5 * height.h_rms_std / height.h_rms
     # a friction that is guessed is what the strength says, whatever the guess
     friction = laws(curve, (), friction_coefficient={"guess": 0.27, "lower": 0.1, "upper": 0.6}).line
     assert friction.hurst == pytest.approx(known.hurst, abs=0.02)
