@@ -173,6 +173,11 @@ class Past:
         ways = self.way[1:] if isinstance(self.way, np.ndarray) else self.way
         return np.concatenate([[0.0], np.cumsum(ways * np.diff(self.load_point))])
 
+    @cached_property
+    def way_gone(self) -> Array:
+        """As :attr:`travel`, without the trembling of a measured load point: it never decreases."""
+        return np.maximum.accumulate(self.travel)
+
     def arrival(self, i: int, further: Array, recent: float) -> Array:
         """Time (s) from sample ``i`` until the load point has gone further by so much.
 

@@ -124,7 +124,6 @@ class Forecaster:
         self._strength = float(np.mean(arrays["onset"][:n])), float(np.std(arrays["onset"][:n], ddof=1))
         self._gain = float(np.mean(gained)), float(np.std(gained, ddof=1))
         self.recurrence, self._waits = float(np.mean(waits)), np.sort(waits)
-        self._way = np.maximum.accumulate(past.travel)
 
     def at(self, i: int) -> dict[str, Array] | None:
         """Time to the next slip (s) at a sample, by every method: equally likely values.
@@ -147,11 +146,14 @@ class Forecaster:
         until = past.arrival(i, self.curves.travel, self.recurrence)
         mean, std = self._next(before, t + until)
         start = arrest + self._gain[0]
+        arrest_at = float(np.interp(arrays["time_arrest"][before], past.trace.time, past.way_gone))
+        missing = self.curves.missing_at(gone := float(past.way_gone[i]) - arrest_at)
+        at_onset = level + missing
         return {
-            "wandering strength": self._times(until, level, mean, std, self._seen(i, before)),
+            "wandering strength": times(until, at_onset, mean, std, self._seen(i, before, gone, missing)),
             "mean recurrence": waiting(self._waits, t - float(arrays["time_onset"][before])),
-            "constant strength": self._times(until, level, *self._strength),
-            "slip-predictable": self._times(until, level, start, self._gain[1]),
+            "constant strength": times(until, at_onset, *self._strength),
+            "slip-predictable": times(until, at_onset, start, self._gain[1]),
         }
 
     def _next(self, before: int, then: Array) -> tuple[Array, Array]:
@@ -161,27 +163,32 @@ class Forecaster:
         mean, std = self._own.predict({c: at[c] for c in self.law.coordinates or ("time",)}, ONSET)
         return np.broadcast_to(mean, then.shape), np.broadcast_to(std, then.shape)
 
-    def _seen(self, i: int, before: int) -> Array | None:
+    def _seen(self, i: int, before: int, gone: float, missing: Array) -> Array | None:
         """Likelihood of the rise of late at each travel to go; None where the stick is too young to tell."""
         past, lag = self.past, self.curves.lag
         begun = int(np.searchsorted(past.trace.time, past.known[before]))
-        if not self._rising or self.curves.sticks < 3 or self._way[i] - lag < self._way[begun]:
+        if not self._rising or past.way_gone[i] - lag < past.way_gone[begun]:
             return None
         part = slice(begun, i + 1)
-        return self.curves.seen(float(past.level[i] - np.interp(self._way[i] - lag, self._way[part], past.level[part])))
+        earlier = float(np.interp(past.way_gone[i] - lag, past.way_gone[part], past.level[part]))
+        return self.curves.seen(float(past.level[i]) - earlier, gone, missing)
 
-    def _times(
-        self, until: Array, level: float, mean: Array | float, std: Array | float, seen: Array | None = None
-    ) -> Array:
-        """Equally likely times for a level at onset of this mean and standard deviation."""
-        logs = -0.5 * ((level + self.curves.missing - mean) / std) ** 2 - np.log(std)
-        if seen is not None:
-            logs = logs + np.log(np.maximum(seen, 1e-300))
-        density = np.exp(logs - logs.max()).sum(axis=0)
-        steps = 0.5 * (density[1:] + density[:-1])
-        share = np.concatenate([[0.0], np.cumsum(steps)])
-        middle = (np.arange(MEMBERS) + 0.5) / MEMBERS * share[-1]
-        return np.interp(middle, share, until)
+
+def times(until: Array, level: Array, mean: Array | float, std: Array | float, seen: Array | None = None) -> Array:
+    """Equally likely times to a slip whose level at onset is normally distributed.
+
+    Args:
+        until: times (s) at which it could come, ascending, of even travel, shape (k,).
+        level: what the level at onset would be then, by every curve, shape (sticks, k).
+        mean, std: of that level, shape (k,).
+        seen: likelihood of what else was seen, shape (k,).
+    """
+    logs = -0.5 * ((level - mean) / std) ** 2 - np.log(std)
+    if seen is not None:
+        logs = logs + np.log(np.maximum(seen, 1e-300))
+    density = np.exp(logs - logs.max()).sum(axis=0)
+    share = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+    return np.interp((np.arange(MEMBERS) + 0.5) / MEMBERS * share[-1], share, until)
 
 
 def waiting(sorted_times: Array, elapsed: float) -> Array:
