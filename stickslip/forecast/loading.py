@@ -1,4 +1,4 @@
-"""How much level is missing while the load point still has some way to go to the slip, stick by stick: creep included."""
+"""How much level is missing while the load point has some way to go to the slip, stick by stick, creep included."""
 
 from __future__ import annotations
 

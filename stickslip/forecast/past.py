@@ -48,7 +48,7 @@ class Past:
             share: of its length that is for training.
 
         Raises:
-            InputError: a share that leaves nothing of either part.
+            InputError: a share that leaves nothing of either part, or neither load point nor force is known.
         """
         if not 0.0 < share < 1.0:
             raise InputError("the part for training must leave something to forecast", key="train", value=share,
@@ -59,6 +59,7 @@ class Past:
         gain = stick_gain(train, learned)
         if gain is not None and train.spring_stiffness is not None and gain_is_wrong(gain):
             learned = segment(train, spring_stiffness=train.spring_stiffness * gain["value"])
+        scale_of(train, learned)  # without a load point or a force nothing can be told
         return cls(trace, train, learned, split)
 
     @property
@@ -101,6 +102,7 @@ class Past:
         drive = self.trace.drive
         if self.trace.drive_position is None:
             return self._way if drive is None else directions(self.trace.time, self.load_point, drive)
+        assert self.train.drive_position is not None
         ways = directions(self.train.time, self.train.drive_position, self.train.drive)
         if not isinstance(ways, np.ndarray):
             return ways
@@ -152,6 +154,11 @@ class Past:
                 late += max(e.t_arrest - e.t_onset, 2 * self.settings.window) + 2 * self.step
             out.append(e.t_arrest + late)
         return np.array(out)
+
+    @cached_property
+    def visible(self) -> Array:
+        """Time (s) from which each onset can be seen, shape (n,): velocities are of half a window on both sides."""
+        return np.array([e.t_onset + (self.half + 2) * self.step for e in self.events])
 
     @cached_property
     def step(self) -> float:

@@ -36,14 +36,14 @@ def goes_back(direction: Array) -> bool:
     return bool((direction > 0).any() and (direction < 0).any())
 
 
-def candidates(arrays: Mapping[str, Array]) -> list[tuple[Component, ...]]:
-    """Laws that are compared: scatter alone, either kernel along every coordinate, and a smooth wander with a rough one.
+def candidates(direction: Array) -> list[tuple[Component, ...]]:
+    """Laws that are compared: scatter alone, either kernel along every coordinate, a smooth wander with a rough one.
 
     Place counts where the block goes back; else it is the slip path.
     """
     along: tuple[Coordinate, ...] = ("time", "slip path")
     out: list[tuple[Component, ...]] = [()]
-    for c in (*along, "place") if goes_back(arrays["direction"]) else along:
+    for c in (*along, "place") if goes_back(direction) else along:
         out += [(Component("ornstein-uhlenbeck", c),), (Component("matern-3/2", c),)]
     out += [(Component("matern-3/2", a), Component("ornstein-uhlenbeck", b)) for a in along for b in along]
     return out
@@ -76,7 +76,7 @@ def compare(arrays: Mapping[str, Array], training: int) -> list[Compared]:
         InputError: too few slips for training.
     """
     out = []
-    for components in candidates(arrays):
+    for components in candidates(arrays["direction"][:training]):
         law = fit(arrays, components, training)
         out.append(Compared(law, _unseen(arrays, law, training)))
     return sorted(out, key=lambda c: c.law.aic)
@@ -132,12 +132,13 @@ class Forecaster:
             i: sample; must not go back from call to call.
 
         Returns:
-            None while a slip goes on, or where it is not yet certain that it is over.
+            None where a slip is seen to go on, or where it is not yet certain that it is over. That one has begun is
+            seen half a window later, and until then nothing tells of it.
         """
         past, arrays = self.past, self.past.arrays
         t = float(past.trace.time[i])
-        before = int(np.searchsorted(arrays["time_onset"], t)) - 1
-        if before < 0 or past.known[before] > t:
+        before = int(np.searchsorted(past.known, t, side="right")) - 1
+        if before < 0 or int(np.searchsorted(past.visible, t, side="right")) - 1 > before:
             return None
         for j in range(self._taken, before + 1):
             take(self._own, arrays, j)

@@ -79,9 +79,7 @@ def moments(past: Past, recurrence: float, at: float | None) -> NDArray[np.intp]
     return np.unique(found[found < time.size])
 
 
-def roll(
-    past: Past, law: Wander, at: float | None = None, progress: Tell | None = None, rise: bool = True
-) -> Rolled:
+def roll(past: Past, law: Wander, at: float | None = None, progress: Tell | None = None, rise: bool = True) -> Rolled:
     """Forecasts at moments of the later part, and what came.
 
     A moment within a slip, or in a stick whose slip the record does not hold, is left out.
@@ -102,6 +100,8 @@ def roll(
             break
         if at is not None and following == last:
             continue  # a stick is counted once
+        if int(np.sum(past.known <= t)) != following:
+            continue  # a slip has begun, seen or not
         found = forecaster.at(i)
         if found is None:
             continue

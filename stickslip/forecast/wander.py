@@ -283,7 +283,9 @@ def _starts(number: int, first: float) -> list[list[float]]:
 def _errors(cost: Any, theta: Array) -> tuple[float, ...]:
     """Standard deviations from the curvature, by differences of the gradient; infinite where it is flat."""
     step = 1e-4
-    curvature = np.array([(cost(theta + step * e)[1] - cost(theta - step * e)[1]) / (2 * step) for e in np.eye(theta.size)])
+    curvature = np.array(
+        [(cost(theta + step * e)[1] - cost(theta - step * e)[1]) / (2 * step) for e in np.eye(theta.size)]
+    )
     values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
     flat = values <= 1e-6
     own = vectors[:, ~flat] ** 2 @ (1.0 / values[~flat])
@@ -355,9 +357,10 @@ class Filter:
         variance += np.einsum("ni,ij,nj->n", shown, self._cov - np.eye(place), shown)
         known = shown @ self._mean
         column = np.eye(2)[kind] - known[:, 1:]
-        middle = known[:, 0] + column @ (inverse @ right)
+        middle: Array = known[:, 0] + column @ (inverse @ right)
         variance += np.einsum("ni,ij,nj->n", column, inverse, column)
-        return middle.reshape(shape), np.sqrt(variance).reshape(shape)
+        std: Array = np.sqrt(variance)
+        return middle.reshape(shape), std.reshape(shape)
 
 
 def _means(products: Array) -> tuple[Array, Array]:

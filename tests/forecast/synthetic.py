@@ -44,7 +44,9 @@ def series(number: int, law: Wander, seed: int, means: tuple[float, float] = MEA
     return out
 
 
-def record(number: int, seed: int, rate: float = 100.0, law: Wander = LAW, creep: float = 0.1, noise: float = 1e-5) -> Trace:
+def record(
+    number: int, seed: int, rate: float = 100.0, law: Wander = LAW, creep: float = 0.1, noise: float = 1e-5
+) -> Trace:
     """A slider's force. Its strength wanders along the slip path, so that it waits for the load where it is.
 
     Args:
