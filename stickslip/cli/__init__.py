@@ -28,6 +28,7 @@ COMMANDS = {
     "fit": "Fit the static or the dynamic model to a campaign, and say where it fails.",
     "diagnose": "Find the physical effect the model lacks, add it, and see the error on unseen runs fall.",
     "open": "The workbench in the browser: compare, add an effect, watch the error fall.",
+    "forecast": "Forecast the next slip from how strength wanders and load rises, and score it on unseen slips.",
     "compare": "Two runs side by side: models, errors by phase, parameters and how far apart they are.",
     "challenge": "Test the diagnosis blindly on campaigns with a hidden effect: make, seal, run, score.",
     "effects": "List the catalogue of effects, explain one, or print a model's equations.",

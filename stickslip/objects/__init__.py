@@ -1,4 +1,5 @@
-"""What one works with in Python: a campaign, what an inspection says of it, a fit, a diagnosis.
+"""What one works with in Python: a campaign, what an inspection says of it, a fit, a diagnosis, a
+forecast.
 
 The command line and the workbench are skins over these.
 """
@@ -6,6 +7,7 @@ The command line and the workbench are skins over these.
 from .campaign import Campaign, load_campaign
 from .diagnosis import Diagnosis
 from .fit import Fit, StaticFit
+from .forecast import Forecast
 from .inspection import Inspection
 
-__all__ = ["Campaign", "Diagnosis", "Fit", "Inspection", "StaticFit", "load_campaign"]
+__all__ = ["Campaign", "Diagnosis", "Fit", "Forecast", "Inspection", "StaticFit", "load_campaign"]

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ..diagnose.prepare import Prepared
     from .diagnosis import Diagnosis
     from .fit import Fit, StaticFit
+    from .forecast import Forecast
     from .inspection import Inspection
     from .run import Tell
 
@@ -183,6 +184,45 @@ class Campaign(Shown):
         from .diagnosis import diagnose
 
         return diagnose(self, **options)
+
+    def levels(self, name: str | None = None) -> xarray.Dataset:
+        """Force of the spring at onset and arrest of every slip of a run, and when and where; no fit is needed.
+
+        Args:
+            name: of the run; default the first.
+
+        Returns:
+            See :func:`stickslip.forecast.levels`.
+
+        Raises:
+            InputError: no run of that name, no slip, or neither load point nor force is known.
+        """
+        from ..forecast import levels
+
+        trace = self.traces[0] if name is None else self[name]
+        try:
+            return levels(trace, self.scaled[0][self.names.index(trace.name)])
+        except InputError as error:
+            raise error.at(file=self._file) from None
+
+    def forecast(
+        self, run: str | None = None, train: float = 0.5, at: float | None = None, progress: Tell | None = None
+    ) -> Forecast:
+        """Forecast the slips of the later part of a run, each from what was measured before it, and score it.
+
+        Args:
+            run: its name; default the run with the most slips.
+            train: share of its length from which everything is learned.
+            at: mean recurrences after an arrest at which a forecast is made, once in each stick; default moments all
+                along, ten in a mean recurrence.
+            progress: told what is done and the share of it.
+
+        Raises:
+            InputError: no run of that name, too few slips, no load point or force, shares out of range.
+        """
+        from .forecast import forecast
+
+        return forecast(self, run, train, at, progress)
 
     def to_xarray(self, name: str) -> xarray.Dataset:
         """Signals of a run over time (s), SI units in the attributes."""

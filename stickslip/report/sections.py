@@ -13,6 +13,7 @@ from .fit_figures import (
     ramp_grid,
 )
 from .force_figures import backbone_picture, cycle_picture, residual_picture, runs_of
+from .forecast_figures import calibration_picture, levels_picture
 from .free_figures import free_picture
 
 if TYPE_CHECKING:
@@ -46,6 +47,17 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
             "errs most, one of its onsets, and every recurrence."
         )
         yield "free", caption, free_picture(data)
+    if result.get("methods") and "pit" in data:
+        yield (
+            "forecast",
+            "Level of every slip, and that at onset against that at the arrest before.",
+            levels_picture(data),
+        )
+        yield (
+            "forecast",
+            "Forecasts of the later slips against what came, and their calibration.",
+            calibration_picture(data),
+        )
     if result.get("static") and "creep0_time" in data:
         yield (
             "static",

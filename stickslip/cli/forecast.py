@@ -1,0 +1,93 @@
+"""``stickslip forecast``: when the next slip comes, as a distribution, scored on slips that were not seen."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from ..progress import working
+from ..runstore import json_text, refuse_existing
+from . import show
+
+
+def forecast(
+    campaign: Path,
+    *,
+    run: str | None = None,
+    train: float = 0.5,
+    at: float | None = None,
+    out: Path | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Forecast the next slip from how strength wanders and load rises, and score it on unseen slips.
+
+    Parameters
+    ----------
+    campaign:
+        TOML file that names the measurements.
+    run:
+        The run to be forecast. Default: the one with the most slips.
+    train:
+        Share of the run's length from which everything is learned; the rest is forecast.
+    at:
+        Forecast once in each stick, so many mean recurrences after the arrest (0.5: half of one). Default: moments
+        all along, ten in a mean recurrence.
+    out:
+        Folder for result.json, arrays.nc and report.html.
+    json:
+        Print the result as JSON.
+    force:
+        Replace an existing run folder.
+    """
+    from ..objects import load_campaign
+
+    if out is not None:
+        refuse_existing(out, force)
+    began = time.perf_counter()
+    loaded = load_campaign(campaign)
+    with working("forecasting") as tell:
+        found = loaded.forecast(run, train, at, tell)
+    seconds = {"seconds": round(time.perf_counter() - began, 3)}
+    if out is not None:
+        found.save(out, force, **seconds)
+    print(json_text({**found.result, **seconds}) if json else _text({**found.result, **seconds}, out))
+    return 0
+
+
+def _text(result: dict[str, Any], out: Path | None) -> str:
+    """What is printed."""
+    train, score, ties = result["train"], result["score"], result["levels"]
+    lines = [
+        f"{result['title']}: {result['run']}, {train['of']} slips, {train['slips']} of them for training",
+        f"level at onset: varies by {100 * ties['variation']:.2g} %; less a running mean over {ties['window']} slips "
+        f"{ties['carried_over']:.2f} of it is carried over to the next slip, correlation with the level at arrest "
+        f"{ties['with_arrest']:.2f}, with the time waited {ties['with_waiting']:.2f}",
+        result["coordinate"]["text"],
+        "",
+    ]
+    rows = [
+        [name, show.quantity(m["crps"], "s", 3), f"{100 * m['coverage_50']:.0f} %", f"{100 * m['coverage_90']:.0f} %",
+         show.quantity(m["mae"], "s", 3), f"{m['r2']:.3f}"]
+        for name, m in result["methods"].items()
+    ]  # fmt: skip
+    lines += [show.table(["time to the next slip by", "CRPS", "in 50 %", "in 90 %", "mean error", "R2"], rows), ""]
+    lines.append(f"{score['forecasts']} forecasts of {score['slips']} slips. {' '.join(result['notes'])}")
+    for name, g in result["gains"].items():
+        lines.append(f"CRPS below that of {name} by {100 * g['share']:.0f} % (+-{100 * g['std']:.0f} %)")
+    if result["next"] is not None:
+        q = {k: show.quantity(v, "s", 3) for k, v in result["next"].items()}
+        lines.append(
+            f"After the end of the record the next slip comes in {q['0.5']} (median; half of the forecast from "
+            f"{q['0.25']} to {q['0.75']}, nine tenths from {q['0.05']} to {q['0.95']})"
+        )
+    lines += [f"left out: {text}" for text in result["dropped"]]
+    lines.append(f"{result['seconds']:.1f} s")
+    if out is None:
+        lines.append("nothing was written: --out FOLDER keeps it, with a report of pictures")
+    else:
+        lines.append(f"written to {out}: report.html, result.json, arrays.nc")
+    return "\n".join(lines)

@@ -1,0 +1,72 @@
+"""What levels wander along, in words and numbers: time, slip path or place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .predict import Compared
+from .scoring import standard_error
+
+SURE = 0.95  # weight by which one coordinate is named
+
+SAME = (
+    "Place and slip path are one coordinate in a record that never goes back: a way back over the same track parts "
+    "them."
+)
+
+
+def told(compared: Sequence[Compared], back: bool) -> dict[str, Any]:
+    """What the levels follow.
+
+    Laws are weighed by Akaike's weights (Burnham & Anderson 2002). A coordinate is named if laws that have it hold 95 %
+    of the weight, and the best law predicts the later slips no worse than the best law without it.
+
+    Args:
+        compared: laws with the best first.
+        back: whether the block goes back over the same track.
+
+    Returns:
+        ``coordinate`` (names joined by " and ", "nothing" for scatter alone, or "" where it cannot be told),
+        ``weights`` of every coordinate and of "nothing", ``unseen`` (for every coordinate, nats a slip by which the
+        best law predicts the later slips better than the best law without it) with standard errors ``unseen_std``, and
+        ``text``.
+    """
+    aic = np.array([c.law.aic for c in compared])
+    share = np.exp(-0.5 * (aic - aic.min()))
+    share /= share.sum()
+    names = sorted({c for found in compared for c in found.law.coordinates})
+    weights = {c: float(sum(w for f, w in zip(compared, share, strict=True) if c in f.law.coordinates)) for c in names}
+    nothing = float(sum(w for f, w in zip(compared, share, strict=True) if not f.law.components))
+    gains, errors = {}, {}
+    for c in names:
+        without = next((f for f in compared if c not in f.law.coordinates and f.law.components), compared[0])
+        with_it = next(f for f in compared if c in f.law.coordinates)
+        difference = with_it.unseen - without.unseen
+        gains[c] = float(difference.mean()) if difference.size else float("nan")
+        errors[c] = standard_error(difference) if difference.size > 1 else float("nan")
+    named = [c for c in names if weights[c] >= SURE and not gains[c] < 0.0]
+    numbers = "; ".join(
+        f"{c}: weight {weights[c]:.2f}, the later slips predicted {abs(gains[c]):.3f} (+-{errors[c]:.3f}) nats a slip "
+        f"{'better' if gains[c] >= 0 else 'worse'} than without it"
+        for c in sorted(names, key=lambda c: -weights[c])
+    )
+    if nothing >= SURE:
+        coordinate, text = "nothing", f"The levels scatter, and no wander is seen in them ({numbers})."
+    elif named:
+        coordinate, text = " and ".join(named), f"The levels wander along {' and '.join(named)} ({numbers})."
+    elif nothing > 1.0 - SURE:
+        coordinate, text = "", f"Whether the levels wander or only scatter cannot be told ({numbers})."
+    else:
+        coordinate, text = "", f"The levels wander, but along which coordinate cannot be told ({numbers})."
+    if nothing < SURE and not back:
+        text += f" {SAME}"
+    return {
+        "coordinate": coordinate,
+        "weights": {**weights, "nothing": nothing},
+        "unseen": gains,
+        "unseen_std": errors,
+        "text": text,
+    }

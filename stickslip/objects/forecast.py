@@ -1,0 +1,236 @@
+"""A forecast of the next slip, from how levels wander and how the load rises, scored on slips it has not seen."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError, nearest
+from ..forecast.levels import levels, wandering
+from ..forecast.predict import METHODS, Compared, Forecaster, goes_back, training_slips
+from ..forecast.rolling import SHARES, Rolled, prepare, roll
+from ..forecast.telling import told
+from .run import Tell, dataset, head, save
+from .shown import Shown, facts, table
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+    from ..forecast.past import Past
+    from .campaign import Campaign
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+class Forecast(Shown):
+    """The outcome of :meth:`Campaign.forecast`.
+
+    Attributes:
+        campaign: what was forecast.
+        past: the run, its part for training and its slips.
+        laws: how levels may wander, the best first.
+        rolled: forecasts along the later part, and what came.
+        result: plain data, as in ``result.json``.
+    """
+
+    def __init__(
+        self, campaign: Campaign, past: Past, laws: list[Compared], rolled: Rolled, result: dict[str, Any]
+    ) -> None:
+        self.campaign, self.past, self.laws, self.rolled, self.result = campaign, past, laws, rolled, result
+
+    @property
+    def score(self) -> dict[str, float]:
+        """``crps``, ``coverage_50``, ``coverage_90``, ``mae``, ``r2`` and the CRPS of the plain forecasts (s)."""
+        return dict(self.result["score"])
+
+    @property
+    def next(self) -> dict[str, float] | None:
+        """Time (s) from the end of the record to the slip that it does not hold: quantiles by their share."""
+        found = self.result["next"]
+        return None if found is None else dict(found)
+
+    @cached_property
+    def table(self) -> pandas.DataFrame:
+        """A row for each method, with its scores."""
+        return table(self.result["methods"], "forecast")
+
+    @cached_property
+    def wanders(self) -> pandas.DataFrame:
+        """A row for each law of the wandering level: its likelihood, its criterion and how it predicts later slips."""
+        rows = {law["law"]: {k: law[k] for k in ("log_likelihood", "aic", "unseen")} for law in self.result["laws"]}
+        return table(rows, "law")
+
+    @cached_property
+    def levels(self) -> xarray.Dataset:
+        """Levels of every slip of the run, found with the settings of its first part; see :meth:`Campaign.levels`."""
+        return self.arrays[[name for name, v in self.arrays.data_vars.items() if v.dims == ("slip_number",)]]
+
+    @cached_property
+    def arrays(self) -> xarray.Dataset:
+        """Levels over ``slip_number``, forecasts over ``forecast``."""
+        past, rolled = self.past, self.rolled
+        length, level = past.settings.unit, past.scale.unit
+        units = {"onset": level, "arrest": level, "direction": "1", "recurrence": "s"}
+        data: dict[str, Any] = {
+            name: ("slip_number", values, {"units": units.get(name, "s" if name.startswith("time") else length)})
+            for name, values in past.arrays.items()
+        }
+        own = rolled.members[METHODS[0]]
+        pit = [[float(np.mean(m < t)) for m, t in zip(rolled.members[k], rolled.truth, strict=True)] for k in METHODS]
+        data |= {
+            "moment": ("forecast", past.trace.time[rolled.sample], {"units": "s"}),
+            "truth": ("forecast", rolled.truth, {"units": "s"}),
+            "next_slip": ("forecast", rolled.slip + 1, {"units": "1"}),
+            "quantile_times": (("forecast", "share"), np.quantile(own, QUANTILES, axis=1).T, {"units": "s"}),
+            "pit": (("forecaster", "forecast"), np.array(pit), {"units": "1"}),
+            "coordinates": {
+                "slip_number": np.arange(1, len(past.events) + 1),
+                "forecaster": list(METHODS), "share": list(QUANTILES),
+            },
+        }  # fmt: skip
+        found = dataset(data, past.trace.name)
+        return found.assign_attrs(split=past.split)
+
+    @property
+    def plot(self) -> ForecastPlots:
+        """Pictures: ``plot.levels()`` and ``plot.calibration()``."""
+        return ForecastPlots(self)
+
+    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
+        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
+
+        Args:
+            folder: where. force: replace an existing run folder. more: entries for ``result.json`` besides.
+
+        Raises:
+            RunFolderError: the folder exists or cannot be written.
+        """
+        return save(self, folder, force, **more)
+
+    def _parts(self) -> list[Any]:
+        r = self.result
+        what = {"run": r["run"], "training": f"{r['train']['slips']} slips", "forecasts": r["score"]["forecasts"]}
+        return [facts(what), r["coordinate"]["text"], self.table, self.wanders]
+
+
+class ForecastPlots:
+    """The pictures of a forecast."""
+
+    def __init__(self, found: Forecast) -> None:
+        self._data = found.arrays
+
+    def levels(self) -> Figure:
+        """Levels at onset and arrest against time, and the level at onset against that at the arrest before."""
+        from ..report.forecast_figures import levels_picture
+
+        return levels_picture(self._data)
+
+    def calibration(self) -> Figure:
+        """Forecast intervals against what came, and the calibration of every method."""
+        from ..report.forecast_figures import calibration_picture
+
+        return calibration_picture(self._data)
+
+
+def forecast(
+    campaign: Campaign, run: str | None = None, train: float = 0.5, at: float | None = None,
+    progress: Tell | None = None,
+) -> Forecast:  # fmt: skip
+    """See :meth:`Campaign.forecast`."""
+    number = _chosen(campaign, run)
+    trace = campaign.traces[number]
+    if at is not None and not at >= 0.0:
+        raise InputError("a moment before the stick begins", key="at", value=at, allowed="0 or more")
+    tell: Tell = progress if progress is not None else lambda text, share: None
+    try:
+        tell(f"levels of {trace.name}", 0.0)
+        past, laws = prepare(trace, train)
+        rolled = roll(past, laws[0].law, at, tell)
+    except InputError as error:
+        raise error.at(file=campaign.description.path if campaign.description.filed else None) from None
+    scores, gained = rolled.score(), rolled.gains()
+    own = scores[METHODS[0]]
+    others = {f"crps_{name.replace(' ', '_').replace('-', '_')}": scores[name]["crps"] for name in METHODS[1:]}
+    counts = {"forecasts": int(rolled.truth.size), "slips": int(np.unique(rolled.slip).size)}
+    result = {
+        **head(campaign, "forecast"),
+        "run": trace.name,
+        "train": {"share": train, "until": past.split, "slips": training_slips(past), "of": len(past.events)},
+        "at": at,
+        "level_unit": past.scale.unit,
+        "levels": _ties(campaign, number),
+        "laws": [_law(c) for c in laws],
+        "coordinate": told(laws, goes_back(past.arrays["direction"][: training_slips(past)])),
+        "score": {**counts, **own, **others},
+        "methods": scores,
+        "gains": gained,
+        "by_moment": _by_moment(past, laws[0], tell),
+        "next": _next(past, laws[0]),
+        "dropped": [str(d) for d in past.learned.dropped],
+        "notes": _notes(past, at),
+    }
+    return Forecast(campaign, past, laws, rolled, result)
+
+
+def _chosen(campaign: Campaign, run: str | None) -> int:
+    """Number of the run: the one asked for, or that with the most slips."""
+    if run is None:
+        return int(np.argmax([len(s.events) for s in campaign.events]))
+    if run not in campaign.names:
+        raise InputError(f"there is no trace '{run}'", key="run", hint=nearest(run, campaign.names))
+    return campaign.names.index(run)
+
+
+def _ties(campaign: Campaign, number: int) -> dict[str, Any]:
+    """How levels of the whole run hang together."""
+    found = wandering(levels(campaign.traces[number], campaign.scaled[0][number]))
+    return dict(vars(found))
+
+
+def _law(compared: Compared) -> dict[str, Any]:
+    law = compared.law
+    return {
+        "law": str(law),
+        "components": [dict(vars(c)) for c in law.components],
+        "scatter": law.scatter,
+        "std": law.std,
+        "log_likelihood": law.log_likelihood,
+        "aic": law.aic,
+        "unseen": float(compared.unseen.mean()) if compared.unseen.size else None,
+    }
+
+
+def _by_moment(past: Past, best: Compared, tell: Tell) -> list[dict[str, Any]]:
+    """Scores at moments so many mean recurrences after an arrest, once in each stick."""
+    out = []
+    for share in SHARES:
+        try:
+            rolled = roll(past, best.law, share, tell)
+        except InputError:
+            continue  # no stick lasts so long
+        scores = rolled.score()
+        out.append({"at": share, "slips": int(rolled.truth.size), **scores[METHODS[0]],
+                    "crps_mean_recurrence": scores["mean recurrence"]["crps"]})  # fmt: skip
+    return out
+
+
+def _next(past: Past, best: Compared) -> dict[str, float] | None:
+    """Time from the end of the record to the next slip; None where the record ends within one."""
+    found = Forecaster(past, best.law).at(past.trace.time.size - 1)
+    if found is None:
+        return None
+    return {f"{q:g}": float(v) for q, v in zip(QUANTILES, np.quantile(found[METHODS[0]], QUANTILES), strict=True)}
+
+
+def _notes(past: Past, at: float | None) -> list[str]:
+    """What should be known of how it was made."""
+    where = "all along, even in time" if at is None else f"{at:g} mean recurrences after each arrest"
+    said = [f"Forecasts are made {where}; each uses only what was measured by then."]
+    if past.trace.drive_position is not None:
+        said.append("The load point was measured, so it is taken to go on as fast as over the last mean recurrence.")
+    return said
