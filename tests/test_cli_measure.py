@@ -442,7 +442,7 @@ class Terminal(io.StringIO):
 
 
 def test_progress_of_long_work_shows_what_is_done_and_the_time_left(monkeypatch):
-    from stickslip.cli import working
+    from stickslip import progress as working
 
     monkeypatch.setattr(working, "PATIENCE", -1.0)
     monkeypatch.setenv("COLUMNS", "80")
@@ -472,7 +472,7 @@ def test_long_lines_of_a_fit_break_between_words_on_a_terminal(monkeypatch):
 
 
 def test_a_log_hears_of_long_work_now_and_then(capsys, monkeypatch):
-    from stickslip.cli import working
+    from stickslip import progress as working
 
     clock = iter([0.0, 10.0, 31.0, 40.0, 65.0])
     monkeypatch.setattr(working.time, "monotonic", lambda: next(clock))
