@@ -14,6 +14,7 @@ from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+NEAR = 1e-6  # of a step
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,9 @@ class Turns:
     def of(cls, t: Array, x: Array, v: Array, slow: NDArray[np.bool_]) -> Turns:
         """Between two knots that are samples (not ``slow``) and whose velocities have two signs; shape (n,) each."""
         both = ~slow[:-1] & ~slow[1:]
-        before = np.flatnonzero(both & (v[:-1] * v[1:] < 0.0))
+        along = v[:-1] / np.where(v[:-1] == v[1:], 1.0, v[:-1] - v[1:])
+        # at a knot itself there is no room for another
+        before = np.flatnonzero(both & (v[:-1] * v[1:] < 0.0) & (along > NEAR) & (along < 1.0 - NEAR))
         first, second = v[before], v[before + 1]
         share = first / (first - second)
         ahead = 0.5 * share * np.diff(t)[before] * first
