@@ -13,7 +13,7 @@ from ..readers import Columns
 from .adding import CHANNELS, NONE, Choice, add, entry_text, guess, look
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Words
-from .parts import Table, progress
+from .parts import Table, head, progress
 from .session import Session, watch
 
 LARGEST = "500MB"
@@ -64,10 +64,13 @@ class Form:
             pn.FlexBox(pn.Column(*rows[:3]), pn.Column(*rows[3:]), pn.Column(*more), gap="0 20px"),
             sizing_mode="stretch_width", visible=False,
         )  # fmt: skip
-        head = Words(text="Add a run: drop its file here, or choose one", sizing_mode="stretch_width")
-        head.margin = (18, 0, 0, 0)
         self.view = pn.Column(
-            head, self.drop, self.said, self._asked, progress(self._work, stopping=False), sizing_mode="stretch_width"
+            head("Add a run: drop its file here, or choose one"),
+            self.drop,
+            self.said,
+            self._asked,
+            progress(self._work, stopping=False),
+            sizing_mode="stretch_width",
         )
         self.drop.param.watch(self._dropped, "value")
         self.add.on_click(lambda event: self.send())

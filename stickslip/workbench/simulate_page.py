@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import panel as pn
+from bokeh.models import LogTicker
 
 from ..errors import InputError
 from ..objects import Fit
@@ -19,7 +20,7 @@ from .controls import BUTTON, Words
 from .experiments import MEASURES, Setting
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .overview import record, reduced
-from .parts import Table, progress
+from .parts import Table, head, progress
 from .picked import chosen
 from .session import Session, watch
 
@@ -63,10 +64,6 @@ def _button(name: str, call: Any, width: int = 150) -> pn.widgets.Button:
     return made
 
 
-def _head(text: str) -> Words:
-    return Words(text=text, margin=(14, 0, 2, 0), **WIDE)
-
-
 class _Asked:
     """What is to be simulated."""
 
@@ -77,10 +74,12 @@ class _Asked:
         self.velocity = text(name="velocity of the drive")
         self.hold = text(name="a hold of", placeholder="none, such as 10 s")
         self.spring, self.mass = text(name="spring"), text(name="mass")
-        self.events = pn.widgets.IntInput(name="slips, if at a velocity", value=7, start=1, end=100, width=150, **FIXED)
+        self.events = pn.widgets.IntInput(
+            name="slips, if at a velocity", value=7, start=1, end=100, width=150, margin=(0, 10, 0, 0), **FIXED
+        )
         asked = (self.run, self.velocity, self.hold, self.spring, self.mass, self.events)
         self.row = pn.FlexBox(*asked, gap="6px 0")
-        self.view = pn.Column(_head("What is left empty is as in the measured run."), self.row, **WIDE)
+        self.view = pn.Column(head("What is left empty is as in the measured run."), self.row, **WIDE)
         self.run.param.watch(lambda event: self._placeholders(), "value")
         watch(session, ["campaign", "run"], self._runs)
         watch(session, ["steps", "at"], self._placeholders)
@@ -142,14 +141,13 @@ class _Beside:
         self.figures: dict[str, Any] = {}
         for key in ("x", "gap"):
             linked = {"x_range": self.figures["x"].x_range} if self.figures else {}
-            made = figure(height=230, window_axis="x", **linked)
+            made = figure(height=230, window_axis="x", output_backend="canvas", **linked)
             for name, data, colour, dash in (
                 ("measured", self._measured, theme.measured, "solid"),
                 ("model, run freely", self._model, theme.model, "dashed"),
             ):
                 made.line(
                     "t", key, source=data, color=colour, line_width=2, line_dash=dash, legend_label=name,
-                    line_join="round",
                 )  # fmt: skip
             made.min_border_left = LEFT
             self.figures[key] = made
@@ -255,7 +253,9 @@ class _Sweep:
         theme = look()
         text: Any = partial(pn.widgets.TextInput, width=130, margin=(0, 10, 0, 0), **FIXED)
         self.low, self.high = text(name="velocities from"), text(name="to")
-        self.points = pn.widgets.IntInput(name="how many", value=6, start=2, end=40, width=90, **FIXED)
+        self.points = pn.widgets.IntInput(
+            name="how many", value=6, start=2, end=40, width=90, margin=(0, 10, 0, 0), **FIXED
+        )
         self._button = _button("Sweep", self.start)
         self._model = source(v=[], recurrence=[], slip=[])
         self._model.name = "sweep"
@@ -264,6 +264,8 @@ class _Sweep:
         self.figures: dict[str, Any] = {}
         for key in ("recurrence", "slip"):
             made = figure(height=280, output_backend="canvas", x_axis_type="log", y_axis_type="log")
+            for axis in made.axis:
+                axis.ticker = LogTicker(mantissas=[1, 2, 5], num_minor_ticks=0)
             made.line("v", key, source=self._model, color=theme.model, line_width=2, line_dash="dashed")
             made.scatter("v", key, source=self._model, color=theme.model, size=7, marker="square", legend_label="model")
             made.multi_line("xs", "ys", source=self._bars[key], color=theme.measured, line_width=1.5)
@@ -271,7 +273,7 @@ class _Sweep:
             legend(made)
             self.figures[key] = made
         self.view = pn.Column(
-            _head("A sweep of the velocity: means over the slips after the first, with their scatter"),
+            head("A sweep of the velocity: means over the slips after the first, with their scatter"),
             pn.FlexBox(self.low, self.high, self.points, self._button, gap="6px 0"),
             progress(self._work),
             pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in self.figures.values()), **WIDE),
@@ -331,13 +333,15 @@ class _Experiment:
         self._session, self._asked = session, asked
         self._work = beside(session, "rivals")
         self._sets: list[tuple[tuple[str, ...], str]] = []
-        self.which = pn.widgets.Select(name="effects that these data cannot tell apart", options=[], width=420, **FIXED)
+        self.which = pn.widgets.Select(
+            name="effects that these data cannot tell apart", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
+        )
         self._button = _button("Simulate each", self.start)
         self._said = Words(**WIDE)
         self._words = Words(**WIDE)
         self._place = pn.Column(**WIDE)
         self.view = pn.Column(
-            _head("The experiment that would tell candidates apart"), self._said,
+            head("The experiment that would tell candidates apart"), self._said,
             pn.FlexBox(self.which, self._button, gap="6px 10px"), progress(self._work), self._words, self._place,
             **WIDE,
         )  # fmt: skip
@@ -390,14 +394,14 @@ class _Experiment:
         if found is None:
             return
         theme = look()
-        made = [figure("displacement", height=280), figure("load point - block", height=280)]
+        made = [figure(name, height=280, output_backend="canvas") for name in ("displacement", "load point - block")]
         moved = {tag: r["displacement"].values for tag, r in found.recordings.items()}
         k, unit = unit_of(np.concatenate([*moved.values()]), "m")
         for i, (tag, r) in enumerate(found.recordings.items()):
             data = _thinned(r["time"].values, moved[tag] * k, (r["drive_position"].values - moved[tag]) * k)
             look_of = {
                 "color": theme.runs[i % len(theme.runs)], "line_width": 2, "line_dash": DASHES[i % len(DASHES)],
-                "legend_label": tag, "line_join": "round",
+                "legend_label": tag,
             }  # fmt: skip
             for name, own in zip(("x", "gap"), made, strict=True):
                 own.line(data["t"], data[name], **look_of)
@@ -418,12 +422,14 @@ class _Synthetic:
     def __init__(self, session: Session, asked: _Asked) -> None:
         self._session, self._asked = session, asked
         self._work = beside(session, "synthetic")
-        self.name: Any = pn.widgets.TextInput(name="folder beside the campaign", value="synthetic", width=240, **FIXED)
+        self.name: Any = pn.widgets.TextInput(
+            name="folder beside the campaign", value="synthetic", width=240, margin=(0, 10, 0, 0), **FIXED
+        )
         self._button = _button("Write a record", self.start)
         filed = session.campaign is not None and session.campaign.description.filed
         words = "What is asked for above as a vibrometer would record it: record.csv and campaign.toml in a new folder"
         self.view = pn.Column(
-            _head(words), pn.FlexBox(self.name, self._button, gap="6px 10px"), progress(self._work), visible=filed,
+            head(words), pn.FlexBox(self.name, self._button, gap="6px 10px"), progress(self._work), visible=filed,
             **WIDE,
         )  # fmt: skip
         watch(self._work, ["doing"], self.update)
