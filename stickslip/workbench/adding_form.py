@@ -14,6 +14,7 @@ from .adding import CHANNELS, NONE, Choice, add, entry_text, guess, look
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Words
 from .parts import Table, head, progress
+from .places import new_place
 from .session import Session, watch
 
 LARGEST = "500MB"
@@ -52,16 +53,18 @@ class Form:
         self.rate = text(name="sampling rate, without a column of times", placeholder="10 kHz")
         self.velocity = text(name="velocity of the load point", placeholder="50 um/s")
         self.resolution = text(name="one count of the displacement, if known", placeholder="8 nm")
-        self.run = text(name="name of the run")
+        self.stored = text(name="stored beside the campaign as")
+        self.run = text(name="name of the run, if another")
         self.virgin = pn.widgets.Checkbox(name="the contact was freshly set down", width=230, **fixed)
         self.add = pn.widgets.Button(name="Add the run", width=140, stylesheets=[BUTTON], margin=(12, 0), **fixed)
         self.said = Words(sizing_mode="stretch_width")
         self._first = Table(choosing=False, sizing_mode="stretch_width")
         rows = [pn.Row(self.columns[n], self.units[n], **fixed) for n in CHANNELS]
-        more = (self.rate, self.velocity, self.resolution, self.run, self.virgin, self.add)
+        more = (self.rate, self.velocity, self.resolution, self.virgin)
+        last = (self.stored, self.run, self.add)
         self._asked = pn.Column(
             self._first,
-            pn.FlexBox(pn.Column(*rows[:3]), pn.Column(*rows[3:]), pn.Column(*more), gap="0 20px"),
+            pn.FlexBox(pn.Column(*rows[:3]), pn.Column(*rows[3:]), pn.Column(*more), pn.Column(*last), gap="0 20px"),
             sizing_mode="stretch_width", visible=False,
         )  # fmt: skip
         self.view = pn.Column(
@@ -93,6 +96,7 @@ class Form:
             self.said.text = str(error)
             return
         self.dropped = (name, content)
+        self.stored.value = name
         self.fill(guess(self._columns, self._session.campaign))
         made = self._columns
         names = list(made.data)
@@ -127,9 +131,10 @@ class Form:
         campaign = self._session.campaign
         if self.dropped is None or self._columns is None or campaign is None:
             return
-        name, content = self.dropped
+        name, content = self.stored.value.strip(), self.dropped[1]
         try:
-            text = entry_text(name.strip(), self.choice(), self._columns.units)
+            new_place(campaign.description.folder, name, "stored as")
+            text = entry_text(name, self.choice(), self._columns.units)
         except InputError as error:
             self.said.text = str(error)
             return

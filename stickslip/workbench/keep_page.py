@@ -25,9 +25,10 @@ WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
 
 def page(session: Session) -> Any:
     """The page of a session."""
+    folders = _Folders(session)
     left = pn.Column(*_history(session), *_lines(session), **WIDE)
-    right = pn.Column(_Folders(session).view, margin=(0, 0, 0, 24), **WIDE)
-    return pn.Row(left, right, margin=(8, 0, 24, 0), **WIDE)
+    right = pn.Column(folders.view, margin=(0, 0, 0, 24), **WIDE)
+    return pn.Column(pn.Row(left, right, **WIDE), folders.shown, margin=(8, 0, 24, 0), **WIDE)
 
 
 def history(session: Session) -> list[list[str]]:
@@ -102,7 +103,12 @@ def framed(content: str) -> str:
 
 
 class _Folders:
-    """Run folders beside the campaign."""
+    """Run folders beside the campaign.
+
+    Attributes:
+        view: what can be saved, and what was.
+        shown: the report of one of them.
+    """
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -117,7 +123,7 @@ class _Folders:
         self._save = pn.widgets.Button(name="Save", width=80, stylesheets=[BUTTON], margin=(18, 0, 0, 0), **FIXED)
         self._save.on_click(lambda event: self.save())
         self._table = Table(
-            columns=["run folder", "of", "verdict or error", "when", "report"], heard=self._heard, tall=360, **WIDE
+            columns=["run folder", "of", "verdict or error", "when"], heard=self._heard, tall=360, **WIDE
         )
         self._said = Words(**WIDE)
         self._frame = pn.pane.HTML("", **WIDE)
@@ -132,8 +138,9 @@ class _Folders:
             head("Save as a run folder beside the campaign: result.json, arrays.nc and report.html"),
             pn.FlexBox(self.what, self.name, self._save), progress(self._work),
             pn.Row(head("Run folders there; a click shows the report"), again, **WIDE),
-            self._table, self._said, self._tab, self._frame, visible=filed, **WIDE,
+            self._table, self._said, visible=filed, **WIDE,
         )  # fmt: skip
+        self.shown = pn.Column(self._tab, self._frame, **WIDE)
         watch(self._work, ["doing"], self.update)
         watch(session, ["campaign", "steps", "diagnosis"], self.update)
         self.update()
@@ -164,7 +171,7 @@ class _Folders:
         if campaign is None or not campaign.description.filed:
             return
         self._listed = kept.listed(campaign.description.folder)
-        rows = [[k.name, k.kind, k.words, k.when, "show" if k.report else "-"] for k in self._listed]
+        rows = [[k.name, k.kind, k.words, _when(k.when)] for k in self._listed]
         self._table.param.update(rows=rows, chosen=-1)
 
     def _heard(self, message: Message) -> None:

@@ -184,7 +184,7 @@ class _Beside:
             return
         trace = campaign[run]
         found: Simulated | None = self._work.found
-        if found is not None and found.setting.run != run:
+        if found is not None and (found.setting.run != run or found.fit.campaign is not campaign):
             found = None
         t, x, gap = _motion(trace, campaign.events[campaign.names.index(run)])
         k, unit = unit_of(x, "m")
@@ -280,7 +280,11 @@ class _Sweep:
             **WIDE,
         )
         watch(self._work, ["found", "doing"], self.update)
-        watch(session, ["campaign"], self._prepare)
+        watch(session, ["campaign"], self._anew)
+        self._prepare()
+
+    def _anew(self) -> None:
+        self._work.found = None
         self._prepare()
 
     def _prepare(self) -> None:

@@ -77,7 +77,6 @@ def test_what_was_sent_serves_until_the_hand_leaves_it():
 
 def test_the_page_shows_the_runs_and_what_is_selected(campaign):
     session = Session(campaign=campaign)
-    assert data_page.page(session) is not None
     signals, event = Signals(session), EventView(session)
     assert not signals.figures["spring force"].visible and signals.figures[GAP].visible
     data_page.select(session, "holds", 4)
@@ -231,7 +230,7 @@ def test_a_table_more_leaves_the_file_byte_for_byte():
 
 def test_what_the_data_tell_is_said(campaign):
     session = Session(campaign=campaign)
-    data_page.page(session)
+    assert data_page.page(session) is not None
     found = data_page.beside(session, "inspection").found
     told = {g["head"]: g["items"] for g in data_page.groups(found)}
     assert told["Can tell"] == campaign.inspect().can and told["Mended or left out"] == ["nothing"]
