@@ -18,7 +18,11 @@ from .places import new_place
 from .session import Session, watch
 
 LARGEST = "500MB"
-ROWS = 5  # of the file that are shown
+ROWS = 3  # of the file that are shown
+DROP = """
+.filepond--panel-root { background-color: var(--wb-surface); }
+.filepond--drop-label, .filepond--drop-label label { color: var(--wb-text); }
+"""
 WORDS = {
     "time": "time", "displacement": "displacement of the block", "velocity": "velocity of the block",
     "spring_force": "force of the spring", "drive_position": "position of the load point",
@@ -41,21 +45,21 @@ class Form:
         fixed = {"sizing_mode": "fixed"}
         self.drop = pn.widgets.FileDropper(
             multiple=False, max_file_size=LARGEST, chunk_size=4_000_000, height=90, sizing_mode="stretch_width",
-            margin=(4, 0),
+            margin=(4, 0), stylesheets=[DROP],
         )  # fmt: skip
         self.columns: dict[str, Any] = {
-            name: pn.widgets.Select(name=words, options=[NONE], width=230, **fixed) for name, words in WORDS.items()
+            name: pn.widgets.Select(name=words, options=[NONE], width=190, **fixed) for name, words in WORDS.items()
         }
         self.units: dict[str, Any] = {
-            name: pn.widgets.TextInput(name="unit", placeholder=si, width=90, **fixed) for name, si in CHANNELS.items()
+            name: pn.widgets.TextInput(name="unit", placeholder=si, width=80, **fixed) for name, si in CHANNELS.items()
         }
-        text: Any = partial(pn.widgets.TextInput, width=230, **fixed)
+        text: Any = partial(pn.widgets.TextInput, width=210, **fixed)
         self.rate = text(name="sampling rate, without a column of times", placeholder="10 kHz")
-        self.velocity = text(name="velocity of the load point", placeholder="50 um/s")
+        self.velocity = text(name="velocity of the load point", placeholder="50 um/s, or 50 um/s until 5 s, ...")
         self.resolution = text(name="one count of the displacement, if known", placeholder="8 nm")
         self.stored = text(name="stored beside the campaign as")
         self.run = text(name="name of the run, if another")
-        self.virgin = pn.widgets.Checkbox(name="the contact was freshly set down", width=230, **fixed)
+        self.virgin = pn.widgets.Checkbox(name="the contact was freshly set down", width=210, **fixed)
         self.add = pn.widgets.Button(name="Add the run", width=140, stylesheets=[BUTTON], margin=(12, 0), **fixed)
         self.said = Words(sizing_mode="stretch_width")
         self._first = Table(choosing=False, sizing_mode="stretch_width")
@@ -64,7 +68,7 @@ class Form:
         last = (self.stored, self.run, self.add)
         self._asked = pn.Column(
             self._first,
-            pn.FlexBox(pn.Column(*rows[:3]), pn.Column(*rows[3:]), pn.Column(*more), pn.Column(*last), gap="0 20px"),
+            pn.FlexBox(*(pn.Column(*part, **fixed) for part in (rows[:3], rows[3:], more, last)), gap="0 12px"),
             sizing_mode="stretch_width", visible=False,
         )  # fmt: skip
         self.view = pn.Column(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import panel as pn
-from bokeh.models import LogTicker
+from bokeh.models import FixedTicker
 
 from ..errors import InputError
 from ..objects import Fit
@@ -244,6 +244,17 @@ def _cells(values: dict[str, tuple[float, float, int]]) -> list[str]:
     return out
 
 
+def ticks(values: np.ndarray) -> list[float]:
+    """Numbers 1, 2 and 5 of every decade, around some values, for a logarithmic axis."""
+    known = values[np.isfinite(values) & (values > 0)]
+    if not known.size:
+        return []
+    low, high = float(known.min()), float(known.max())
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    every = [float(f"{m}e{d}") for d in decades for m in (1, 2, 5)]
+    return [v for v in every if 0.4 * low <= v <= 2.5 * high]
+
+
 class _Sweep:
     """Recurrence and slip over the velocity, measured and simulated."""
 
@@ -263,9 +274,8 @@ class _Sweep:
         self._bars = {key: source(xs=[], ys=[]) for key in ("recurrence", "slip")}
         self.figures: dict[str, Any] = {}
         for key in ("recurrence", "slip"):
-            made = figure(height=280, output_backend="canvas", x_axis_type="log", y_axis_type="log")
-            for axis in made.axis:
-                axis.ticker = LogTicker(mantissas=[1, 2, 5], num_minor_ticks=0)
+            scales = {"x_axis_type": "log", "y_axis_type": "log" if key == "recurrence" else "linear"}
+            made = figure(height=280, output_backend="canvas", **scales)
             made.line("v", key, source=self._model, color=theme.model, line_width=2, line_dash="dashed")
             made.scatter("v", key, source=self._model, color=theme.model, size=7, marker="square", legend_label="model")
             made.multi_line("xs", "ys", source=self._bars[key], color=theme.measured, line_width=1.5)
@@ -327,6 +337,9 @@ class _Sweep:
             }
             self.figures[key].yaxis.axis_label = label(key, written)
             self.figures[key].xaxis.axis_label = label("velocity of the drive", unit)
+            self.figures[key].xaxis.ticker = FixedTicker(ticks=ticks(velocities * k))
+            if key == "recurrence":
+                self.figures[key].yaxis.ticker = FixedTicker(ticks=ticks(np.concatenate([own, theirs]) * f))
         self._model.data, self._measured.data = model, measured
 
 
@@ -366,7 +379,8 @@ class _Experiment:
         if self._sets:
             text = self._sets[int(self.which.value or 0)][1]
             self._said.text = (
-                f"Proposed: {text}. The velocity and the hold above are what is simulated; without a hold, one of 10 s."
+                f"Proposed: {text}. What is asked for above is simulated; without a hold there, one of "
+                f"{experiments.proposed_hold(text)}."
             )
         elif self._session.diagnosis is None:
             self._said.text = "Diagnose first (What is missing): where it ends in a set of effects, they are run here."
@@ -377,13 +391,15 @@ class _Experiment:
         """Fit each of them and simulate the experiment."""
         if not self._sets or self._session.diagnosis is None:
             return
-        tags = self._sets[int(self.which.value or 0)][0]
+        tags, text = self._sets[int(self.which.value or 0)]
         forms = self._session.diagnosis.verdict.get("forms", {})
         s = self._asked.setting()
         velocity = s.velocity
         if not velocity.strip() and self._session.campaign is not None:
             velocity = f"{self._session.campaign[s.run].drive_velocity or 1e-4:.6g} m/s"
-        setting = Setting(s.run, velocity, s.hold if s.hold.strip() else "10 s", s.spring, s.mass, s.events)
+        setting = Setting(
+            s.run, velocity, s.hold if s.hold.strip() else experiments.proposed_hold(text), s.spring, s.mass, s.events
+        )
 
         def make(tell: Tell, show: Show) -> Rivals:
             fits = experiments.rivals(needed(self._session), tags, forms, tell)
