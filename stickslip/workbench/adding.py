@@ -43,7 +43,8 @@ class Choice:
         columns: channel (see :data:`CHANNELS`) -> name of its column, for those there are.
         units: channel -> unit text; "" for the one that the file says.
         sampling_rate: such as "10 kHz", where no column is the time.
-        drive_velocity: such as "50 um/s", where the load point is not measured; "" where the force is.
+        drive_velocity: such as "50 um/s", or "50 um/s until 5 s, 0 um/s until 10 s", where the load point is not
+            measured; "" where the force is.
         resolution: of the displacement, such as "8 nm", or "".
         name: of the run; "" for that of the file.
         virgin: whether the contact was freshly set down.
@@ -175,10 +176,26 @@ def entry_text(file: str, choice: Choice, said: Mapping[str, str] | None = None)
             parts.append(f"resolution = {_text(choice.resolution.strip())}")
         lines.append(f"{channel} = {{ {', '.join(parts)} }}")
     if choice.drive_velocity.strip():
-        to_si(choice.drive_velocity, "m/s", key="drive velocity")
-        lines.append(f"drive_velocity = {_text(choice.drive_velocity.strip())}")
+        lines.append(_drive(choice.drive_velocity))
     lines.append(f"virgin = {'true' if choice.virgin else 'false'}")
     return "\n".join(lines) + "\n"
+
+
+def _drive(text: str) -> str:
+    """One velocity, or velocities with the times until which they last."""
+    key = "velocity of the load point"
+    if "until" not in text:
+        to_si(text.strip(), "m/s", key=key)
+        return f"drive_velocity = {_text(text.strip())}"
+    pieces = []
+    for piece in filter(None, (part.strip() for part in re.split(r"[,;]", text))):
+        velocity, until, end = (part.strip() for part in piece.partition("until"))
+        if not until or not end:
+            raise InputError("a velocity without its end", key=key, value=piece, allowed="such as 50 um/s until 5 s")
+        to_si(velocity, "m/s", key=key)
+        to_si(end, "s", key=key)
+        pieces.append(f"{{ until = {_text(end)}, velocity = {_text(velocity)} }}")
+    return f"drive = [{', '.join(pieces)}]"
 
 
 def _text(value: str) -> str:

@@ -13,11 +13,16 @@ from ..readers import Columns
 from .adding import CHANNELS, NONE, Choice, add, entry_text, guess, look
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Words
-from .parts import Table, progress
+from .parts import Table, head, progress
+from .places import new_place
 from .session import Session, watch
 
 LARGEST = "500MB"
-ROWS = 5  # of the file that are shown
+ROWS = 3  # of the file that are shown
+DROP = """
+.filepond--panel-root { background-color: var(--wb-surface); }
+.filepond--drop-label, .filepond--drop-label label { color: var(--wb-text); }
+"""
 WORDS = {
     "time": "time", "displacement": "displacement of the block", "velocity": "velocity of the block",
     "spring_force": "force of the spring", "drive_position": "position of the load point",
@@ -40,34 +45,39 @@ class Form:
         fixed = {"sizing_mode": "fixed"}
         self.drop = pn.widgets.FileDropper(
             multiple=False, max_file_size=LARGEST, chunk_size=4_000_000, height=90, sizing_mode="stretch_width",
-            margin=(4, 0),
+            margin=(4, 0), stylesheets=[DROP],
         )  # fmt: skip
         self.columns: dict[str, Any] = {
-            name: pn.widgets.Select(name=words, options=[NONE], width=230, **fixed) for name, words in WORDS.items()
+            name: pn.widgets.Select(name=words, options=[NONE], width=190, **fixed) for name, words in WORDS.items()
         }
         self.units: dict[str, Any] = {
-            name: pn.widgets.TextInput(name="unit", placeholder=si, width=90, **fixed) for name, si in CHANNELS.items()
+            name: pn.widgets.TextInput(name="unit", placeholder=si, width=80, **fixed) for name, si in CHANNELS.items()
         }
-        text: Any = partial(pn.widgets.TextInput, width=230, **fixed)
+        text: Any = partial(pn.widgets.TextInput, width=210, **fixed)
         self.rate = text(name="sampling rate, without a column of times", placeholder="10 kHz")
-        self.velocity = text(name="velocity of the load point", placeholder="50 um/s")
+        self.velocity = text(name="velocity of the load point", placeholder="50 um/s, or 50 um/s until 5 s, ...")
         self.resolution = text(name="one count of the displacement, if known", placeholder="8 nm")
-        self.run = text(name="name of the run")
-        self.virgin = pn.widgets.Checkbox(name="the contact was freshly set down", width=230, **fixed)
+        self.stored = text(name="stored beside the campaign as")
+        self.run = text(name="name of the run, if another")
+        self.virgin = pn.widgets.Checkbox(name="the contact was freshly set down", width=210, **fixed)
         self.add = pn.widgets.Button(name="Add the run", width=140, stylesheets=[BUTTON], margin=(12, 0), **fixed)
         self.said = Words(sizing_mode="stretch_width")
         self._first = Table(choosing=False, sizing_mode="stretch_width")
         rows = [pn.Row(self.columns[n], self.units[n], **fixed) for n in CHANNELS]
-        more = (self.rate, self.velocity, self.resolution, self.run, self.virgin, self.add)
+        more = (self.rate, self.velocity, self.resolution, self.virgin)
+        last = (self.stored, self.run, self.add)
         self._asked = pn.Column(
             self._first,
-            pn.FlexBox(pn.Column(*rows[:3]), pn.Column(*rows[3:]), pn.Column(*more), gap="0 20px"),
+            pn.FlexBox(*(pn.Column(*part, **fixed) for part in (rows[:3], rows[3:], more, last)), gap="0 12px"),
             sizing_mode="stretch_width", visible=False,
         )  # fmt: skip
-        head = Words(text="Add a run: drop its file here, or choose one", sizing_mode="stretch_width")
-        head.margin = (18, 0, 0, 0)
         self.view = pn.Column(
-            head, self.drop, self.said, self._asked, progress(self._work, stopping=False), sizing_mode="stretch_width"
+            head("Add a run: drop its file here, or choose one"),
+            self.drop,
+            self.said,
+            self._asked,
+            progress(self._work, stopping=False),
+            sizing_mode="stretch_width",
         )
         self.drop.param.watch(self._dropped, "value")
         self.add.on_click(lambda event: self.send())
@@ -90,6 +100,7 @@ class Form:
             self.said.text = str(error)
             return
         self.dropped = (name, content)
+        self.stored.value = name
         self.fill(guess(self._columns, self._session.campaign))
         made = self._columns
         names = list(made.data)
@@ -124,9 +135,10 @@ class Form:
         campaign = self._session.campaign
         if self.dropped is None or self._columns is None or campaign is None:
             return
-        name, content = self.dropped
+        name, content = self.stored.value.strip(), self.dropped[1]
         try:
-            text = entry_text(name.strip(), self.choice(), self._columns.units)
+            new_place(campaign.description.folder, name, "stored as")
+            text = entry_text(name, self.choice(), self._columns.units)
         except InputError as error:
             self.said.text = str(error)
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ MEASURES = {"recurrence": "s", "slip": "m", "peak_velocity": "m/s", "creep_befor
 FEWEST, MOST = 2, 40  # runs of a sweep
 RATE = 10_000.0  # Hz at which a synthetic record is written
 COUNT = 7.91e-9  # m, where the campaign's runs have no count of their own
+HOLD = "10 s"  # where a proposed experiment names none
 STICKS = (1.6, 2.6)  # mean recurrences of drive before and after a hold, so that it begins and ends between slips
 
 
@@ -211,6 +213,12 @@ def undecided(diagnosis: Diagnosis | None) -> list[tuple[tuple[str, ...], str]]:
         return []
     every = [proposed, *proposed.get("others", ())]
     return [(tuple(e["separates"]), str(e["text"])) for e in every if len(e.get("separates", ())) > 1]
+
+
+def proposed_hold(text: str) -> str:
+    """The longest hold that the words of a proposed experiment name, else one of 10 s."""
+    named = re.findall(r"\b(\d+(?:\.\d+)?) s\b", text)
+    return f"{max(map(float, named)):g} s" if named else HOLD
 
 
 def rivals(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from html import escape
 from shlex import quote
 from typing import Any
@@ -13,7 +14,7 @@ from ..objects import Diagnosis, Fit
 from . import kept
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Message, Words
-from .parts import Copy, Table, progress, row_of
+from .parts import Copy, Table, head, progress, row_of
 from .session import Session, watch
 
 TITLE = "Keep"
@@ -24,13 +25,10 @@ WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
 
 def page(session: Session) -> Any:
     """The page of a session."""
+    folders = _Folders(session)
     left = pn.Column(*_history(session), *_lines(session), **WIDE)
-    right = pn.Column(_Folders(session).view, margin=(0, 0, 0, 24), **WIDE)
-    return pn.Row(left, right, margin=(8, 0, 24, 0), **WIDE)
-
-
-def _head(text: str) -> Words:
-    return Words(text=text, margin=(14, 0, 4, 0), **WIDE)
+    right = pn.Column(folders.view, margin=(0, 0, 0, 24), **WIDE)
+    return pn.Column(pn.Row(left, right, **WIDE), folders.shown, margin=(8, 0, 24, 0), **WIDE)
 
 
 def history(session: Session) -> list[list[str]]:
@@ -40,8 +38,13 @@ def history(session: Session) -> list[list[str]]:
         fit = step.fit
         unseen = "" if fit.by_hand else f"{fit.unseen_error:.3f}"
         undone = "undone" if i > session.at else "shown" if i == session.at else ""
-        rows.append([str(i + 1), step.text, step.when, f"{fit.error:.3f}", unseen, undone])
+        rows.append([str(i + 1), step.text, _when(step.when), f"{fit.error:.3f}", unseen, undone])
     return rows
+
+
+def _when(text: str) -> str:
+    """Day and time, without the day if that is today."""
+    return text.removeprefix(datetime.now().strftime("%Y-%m-%d ")) if text else ""
 
 
 def _history(session: Session) -> list[Any]:
@@ -58,7 +61,7 @@ def _history(session: Session) -> list[Any]:
 
     watch(session, ["steps", "at"], update)
     update()
-    return [_head("History: a click shows the model after a step; the steps behind it can be had again"), made]
+    return [head("History: a click shows the model after a step; the steps behind it can be had again"), made]
 
 
 def commands(session: Session) -> str:
@@ -88,7 +91,7 @@ def _lines(session: Session) -> list[Any]:
 
     watch(session, ["steps", "at", "campaign"], update)
     update()
-    return [_head("The same in Python, in the campaign's folder"), python, _head("and as commands"), shell]
+    return [head("The same in Python, in the campaign's folder"), python, head("and as commands"), shell]
 
 
 def framed(content: str) -> str:
@@ -100,20 +103,27 @@ def framed(content: str) -> str:
 
 
 class _Folders:
-    """Run folders beside the campaign."""
+    """Run folders beside the campaign.
+
+    Attributes:
+        view: what can be saved, and what was.
+        shown: the report of one of them.
+    """
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._work = beside(session, "saving")
         self._listed: list[kept.Kept] = []
         self.what = pn.widgets.RadioButtonGroup(
-            options=[MODEL, DIAGNOSIS], value=MODEL, stylesheets=[BUTTON], width=300, margin=(20, 10, 0, 0), **FIXED
+            options=[MODEL, DIAGNOSIS], value=MODEL, stylesheets=[BUTTON], width=270, margin=(18, 10, 0, 0), **FIXED
         )
-        self.name: Any = pn.widgets.TextInput(name="name of the run folder", placeholder="first", width=200, **FIXED)
-        self._save = pn.widgets.Button(name="Save", width=90, stylesheets=[BUTTON], margin=(20, 0, 0, 10), **FIXED)
+        self.name: Any = pn.widgets.TextInput(
+            name="name of the run folder", placeholder="first", width=160, margin=(0, 10, 0, 0), **FIXED
+        )
+        self._save = pn.widgets.Button(name="Save", width=80, stylesheets=[BUTTON], margin=(18, 0, 0, 0), **FIXED)
         self._save.on_click(lambda event: self.save())
         self._table = Table(
-            columns=["run folder", "of", "verdict or error", "when", "report"], heard=self._heard, tall=360, **WIDE
+            columns=["run folder", "of", "verdict or error", "when"], heard=self._heard, tall=360, **WIDE
         )
         self._said = Words(**WIDE)
         self._frame = pn.pane.HTML("", **WIDE)
@@ -125,11 +135,12 @@ class _Folders:
         again.on_click(lambda event: self.update())
         filed = session.campaign is not None and session.campaign.description.filed
         self.view = pn.Column(
-            _head("Save as a run folder beside the campaign: result.json, arrays.nc and report.html"),
+            head("Save as a run folder beside the campaign: result.json, arrays.nc and report.html"),
             pn.FlexBox(self.what, self.name, self._save), progress(self._work),
-            pn.Row(_head("Run folders there; a click shows the report"), again, **WIDE),
-            self._table, self._said, self._tab, self._frame, visible=filed, **WIDE,
+            pn.Row(head("Run folders there; a click shows the report"), again, **WIDE),
+            self._table, self._said, visible=filed, **WIDE,
         )  # fmt: skip
+        self.shown = pn.Column(self._tab, self._frame, **WIDE)
         watch(self._work, ["doing"], self.update)
         watch(session, ["campaign", "steps", "diagnosis"], self.update)
         self.update()
@@ -160,7 +171,7 @@ class _Folders:
         if campaign is None or not campaign.description.filed:
             return
         self._listed = kept.listed(campaign.description.folder)
-        rows = [[k.name, k.kind, k.words, k.when, "show" if k.report else "-"] for k in self._listed]
+        rows = [[k.name, k.kind, k.words, _when(k.when)] for k in self._listed]
         self._table.param.update(rows=rows, chosen=-1)
 
     def _heard(self, message: Message) -> None:

@@ -79,7 +79,7 @@ def _errors(result: dict[str, Any]) -> str:
     rung = (result.get("ladder") or [{}])[-1]
     own, unseen = rung.get("train_error"), rung.get("heldout_error")
     texts = [f"{name} {value:.3f}" for name, value in (("error", own), ("on unseen runs", unseen)) if value is not None]
-    return f" ({', '.join(texts)} floors)" if texts else ""
+    return f": {', '.join(texts)}" if texts else ""
 
 
 def save(

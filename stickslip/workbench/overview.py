@@ -13,7 +13,7 @@ from ..segment import Segmentation, block_motion
 from ..trace import Trace
 
 Array = NDArray[np.float64]
-POINTS = 6000  # that are sent of a curve
+POINTS = 3000  # that are sent of a curve
 AROUND = 0.5  # of the window that are sent to either side of it, so that a pan shows no gap before the answer comes
 COARSER = 8  # by which each level of a long curve has fewer samples than the one before
 FINER = 1.6  # by which the window may shrink before the curve is sent anew

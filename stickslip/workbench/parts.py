@@ -50,6 +50,13 @@ class Sentences(JSComponent):
     _stylesheets = _STYLE
 
 
+def head(text: str) -> Sentences:
+    """The heading of a part of a page."""
+    return Sentences(
+        groups=[{"head": text, "items": [], "mark": ""}], sizing_mode="stretch_width", margin=(16, 0, 4, 0)
+    )
+
+
 class Progress(Spoken):
     """What is being done, with a way to end it, and what came of it."""
 

@@ -20,6 +20,7 @@ CURVES = (DISPLACEMENT, FORCE, GAP)
 WHOLE = 2500  # points of the overview
 PAUSE = 25  # ms between two answers to a hand that pans
 NEAR = 0.015  # of the window, within which a tap hits an event
+DRAWN = "canvas"  # some thousand points at 40 redraws a second; WebGL without a graphics processor: 4
 LEFT = 76  # pixels of the axes' labels, so that figures above one another agree
 
 
@@ -56,8 +57,8 @@ class Signals:
 
     def _make_whole(self) -> Any:
         theme = look()
-        made = figure("the whole run", height=120, x_range=Range1d(start=0.0, end=1.0))
-        made.line("t", "y", source=self._line, color=theme.measured, line_join="round")
+        made = figure("the whole run", height=120, output_backend=DRAWN, x_range=Range1d(start=0.0, end=1.0))
+        made.line("t", "y", source=self._line, color=theme.measured)
         made.toolbar_location = None
         made.min_border_left = LEFT
         made.yaxis.ticker.desired_num_ticks = 3
@@ -69,13 +70,13 @@ class Signals:
 
     def _make(self, name: str) -> Any:
         theme = look()
-        made = figure(height=190, x_range=self.range, window_axis="x")
+        made = figure(height=190, output_backend=DRAWN, x_range=self.range, window_axis="x")
         made.name = f"signal {name}"
         for tool in made.toolbar.tools[:2]:
             tool.dimensions = "width"
         made.toolbar.active_drag, made.toolbar.active_scroll = made.toolbar.tools[:2]
         self._data[name].name = f"data {name}"
-        made.line("t", "y", source=self._data[name], color=theme.measured, line_width=1.5, line_join="round")
+        made.line("t", "y", source=self._data[name], color=theme.measured, line_width=1.5)
         if name in self._marks:
             made.scatter(
                 "t", "y", source=self._marks[name], marker="inverted_triangle", size=9, color=theme.accent,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import panel as pn
+from bokeh.models import FixedTicker
 
 from ..errors import InputError
 from ..objects import Fit
@@ -19,7 +20,7 @@ from .controls import BUTTON, Words
 from .experiments import MEASURES, Setting
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .overview import record, reduced
-from .parts import Table, progress
+from .parts import Table, head, progress
 from .picked import chosen
 from .session import Session, watch
 
@@ -63,10 +64,6 @@ def _button(name: str, call: Any, width: int = 150) -> pn.widgets.Button:
     return made
 
 
-def _head(text: str) -> Words:
-    return Words(text=text, margin=(14, 0, 2, 0), **WIDE)
-
-
 class _Asked:
     """What is to be simulated."""
 
@@ -77,10 +74,12 @@ class _Asked:
         self.velocity = text(name="velocity of the drive")
         self.hold = text(name="a hold of", placeholder="none, such as 10 s")
         self.spring, self.mass = text(name="spring"), text(name="mass")
-        self.events = pn.widgets.IntInput(name="slips, if at a velocity", value=7, start=1, end=100, width=150, **FIXED)
+        self.events = pn.widgets.IntInput(
+            name="slips, if at a velocity", value=7, start=1, end=100, width=150, margin=(0, 10, 0, 0), **FIXED
+        )
         asked = (self.run, self.velocity, self.hold, self.spring, self.mass, self.events)
         self.row = pn.FlexBox(*asked, gap="6px 0")
-        self.view = pn.Column(_head("What is left empty is as in the measured run."), self.row, **WIDE)
+        self.view = pn.Column(head("What is left empty is as in the measured run."), self.row, **WIDE)
         self.run.param.watch(lambda event: self._placeholders(), "value")
         watch(session, ["campaign", "run"], self._runs)
         watch(session, ["steps", "at"], self._placeholders)
@@ -142,14 +141,13 @@ class _Beside:
         self.figures: dict[str, Any] = {}
         for key in ("x", "gap"):
             linked = {"x_range": self.figures["x"].x_range} if self.figures else {}
-            made = figure(height=230, window_axis="x", **linked)
+            made = figure(height=230, window_axis="x", output_backend="canvas", **linked)
             for name, data, colour, dash in (
                 ("measured", self._measured, theme.measured, "solid"),
                 ("model, run freely", self._model, theme.model, "dashed"),
             ):
                 made.line(
                     "t", key, source=data, color=colour, line_width=2, line_dash=dash, legend_label=name,
-                    line_join="round",
                 )  # fmt: skip
             made.min_border_left = LEFT
             self.figures[key] = made
@@ -186,7 +184,7 @@ class _Beside:
             return
         trace = campaign[run]
         found: Simulated | None = self._work.found
-        if found is not None and found.setting.run != run:
+        if found is not None and (found.setting.run != run or found.fit.campaign is not campaign):
             found = None
         t, x, gap = _motion(trace, campaign.events[campaign.names.index(run)])
         k, unit = unit_of(x, "m")
@@ -246,6 +244,17 @@ def _cells(values: dict[str, tuple[float, float, int]]) -> list[str]:
     return out
 
 
+def ticks(values: np.ndarray) -> list[float]:
+    """Numbers 1, 2 and 5 of every decade, around some values, for a logarithmic axis."""
+    known = values[np.isfinite(values) & (values > 0)]
+    if not known.size:
+        return []
+    low, high = float(known.min()), float(known.max())
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    every = [float(f"{m}e{d}") for d in decades for m in (1, 2, 5)]
+    return [v for v in every if 0.4 * low <= v <= 2.5 * high]
+
+
 class _Sweep:
     """Recurrence and slip over the velocity, measured and simulated."""
 
@@ -255,7 +264,9 @@ class _Sweep:
         theme = look()
         text: Any = partial(pn.widgets.TextInput, width=130, margin=(0, 10, 0, 0), **FIXED)
         self.low, self.high = text(name="velocities from"), text(name="to")
-        self.points = pn.widgets.IntInput(name="how many", value=6, start=2, end=40, width=90, **FIXED)
+        self.points = pn.widgets.IntInput(
+            name="how many", value=6, start=2, end=40, width=90, margin=(0, 10, 0, 0), **FIXED
+        )
         self._button = _button("Sweep", self.start)
         self._model = source(v=[], recurrence=[], slip=[])
         self._model.name = "sweep"
@@ -263,7 +274,8 @@ class _Sweep:
         self._bars = {key: source(xs=[], ys=[]) for key in ("recurrence", "slip")}
         self.figures: dict[str, Any] = {}
         for key in ("recurrence", "slip"):
-            made = figure(height=280, output_backend="canvas", x_axis_type="log", y_axis_type="log")
+            scales = {"x_axis_type": "log", "y_axis_type": "log" if key == "recurrence" else "linear"}
+            made = figure(height=280, output_backend="canvas", **scales)
             made.line("v", key, source=self._model, color=theme.model, line_width=2, line_dash="dashed")
             made.scatter("v", key, source=self._model, color=theme.model, size=7, marker="square", legend_label="model")
             made.multi_line("xs", "ys", source=self._bars[key], color=theme.measured, line_width=1.5)
@@ -271,14 +283,18 @@ class _Sweep:
             legend(made)
             self.figures[key] = made
         self.view = pn.Column(
-            _head("A sweep of the velocity: means over the slips after the first, with their scatter"),
+            head("A sweep of the velocity: means over the slips after the first, with their scatter"),
             pn.FlexBox(self.low, self.high, self.points, self._button, gap="6px 0"),
             progress(self._work),
             pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in self.figures.values()), **WIDE),
             **WIDE,
         )
         watch(self._work, ["found", "doing"], self.update)
-        watch(session, ["campaign"], self._prepare)
+        watch(session, ["campaign"], self._anew)
+        self._prepare()
+
+    def _anew(self) -> None:
+        self._work.found = None
         self._prepare()
 
     def _prepare(self) -> None:
@@ -321,6 +337,9 @@ class _Sweep:
             }
             self.figures[key].yaxis.axis_label = label(key, written)
             self.figures[key].xaxis.axis_label = label("velocity of the drive", unit)
+            self.figures[key].xaxis.ticker = FixedTicker(ticks=ticks(velocities * k))
+            if key == "recurrence":
+                self.figures[key].yaxis.ticker = FixedTicker(ticks=ticks(np.concatenate([own, theirs]) * f))
         self._model.data, self._measured.data = model, measured
 
 
@@ -331,13 +350,15 @@ class _Experiment:
         self._session, self._asked = session, asked
         self._work = beside(session, "rivals")
         self._sets: list[tuple[tuple[str, ...], str]] = []
-        self.which = pn.widgets.Select(name="effects that these data cannot tell apart", options=[], width=420, **FIXED)
+        self.which = pn.widgets.Select(
+            name="effects that these data cannot tell apart", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
+        )
         self._button = _button("Simulate each", self.start)
         self._said = Words(**WIDE)
         self._words = Words(**WIDE)
         self._place = pn.Column(**WIDE)
         self.view = pn.Column(
-            _head("The experiment that would tell candidates apart"), self._said,
+            head("The experiment that would tell candidates apart"), self._said,
             pn.FlexBox(self.which, self._button, gap="6px 10px"), progress(self._work), self._words, self._place,
             **WIDE,
         )  # fmt: skip
@@ -358,7 +379,8 @@ class _Experiment:
         if self._sets:
             text = self._sets[int(self.which.value or 0)][1]
             self._said.text = (
-                f"Proposed: {text}. The velocity and the hold above are what is simulated; without a hold, one of 10 s."
+                f"Proposed: {text}. What is asked for above is simulated; without a hold there, one of "
+                f"{experiments.proposed_hold(text)}."
             )
         elif self._session.diagnosis is None:
             self._said.text = "Diagnose first (What is missing): where it ends in a set of effects, they are run here."
@@ -369,13 +391,15 @@ class _Experiment:
         """Fit each of them and simulate the experiment."""
         if not self._sets or self._session.diagnosis is None:
             return
-        tags = self._sets[int(self.which.value or 0)][0]
+        tags, text = self._sets[int(self.which.value or 0)]
         forms = self._session.diagnosis.verdict.get("forms", {})
         s = self._asked.setting()
         velocity = s.velocity
         if not velocity.strip() and self._session.campaign is not None:
             velocity = f"{self._session.campaign[s.run].drive_velocity or 1e-4:.6g} m/s"
-        setting = Setting(s.run, velocity, s.hold if s.hold.strip() else "10 s", s.spring, s.mass, s.events)
+        setting = Setting(
+            s.run, velocity, s.hold if s.hold.strip() else experiments.proposed_hold(text), s.spring, s.mass, s.events
+        )
 
         def make(tell: Tell, show: Show) -> Rivals:
             fits = experiments.rivals(needed(self._session), tags, forms, tell)
@@ -390,14 +414,14 @@ class _Experiment:
         if found is None:
             return
         theme = look()
-        made = [figure("displacement", height=280), figure("load point - block", height=280)]
+        made = [figure(name, height=280, output_backend="canvas") for name in ("displacement", "load point - block")]
         moved = {tag: r["displacement"].values for tag, r in found.recordings.items()}
         k, unit = unit_of(np.concatenate([*moved.values()]), "m")
         for i, (tag, r) in enumerate(found.recordings.items()):
             data = _thinned(r["time"].values, moved[tag] * k, (r["drive_position"].values - moved[tag]) * k)
             look_of = {
                 "color": theme.runs[i % len(theme.runs)], "line_width": 2, "line_dash": DASHES[i % len(DASHES)],
-                "legend_label": tag, "line_join": "round",
+                "legend_label": tag,
             }  # fmt: skip
             for name, own in zip(("x", "gap"), made, strict=True):
                 own.line(data["t"], data[name], **look_of)
@@ -418,12 +442,14 @@ class _Synthetic:
     def __init__(self, session: Session, asked: _Asked) -> None:
         self._session, self._asked = session, asked
         self._work = beside(session, "synthetic")
-        self.name: Any = pn.widgets.TextInput(name="folder beside the campaign", value="synthetic", width=240, **FIXED)
+        self.name: Any = pn.widgets.TextInput(
+            name="folder beside the campaign", value="synthetic", width=240, margin=(0, 10, 0, 0), **FIXED
+        )
         self._button = _button("Write a record", self.start)
         filed = session.campaign is not None and session.campaign.description.filed
         words = "What is asked for above as a vibrometer would record it: record.csv and campaign.toml in a new folder"
         self.view = pn.Column(
-            _head(words), pn.FlexBox(self.name, self._button, gap="6px 10px"), progress(self._work), visible=filed,
+            head(words), pn.FlexBox(self.name, self._button, gap="6px 10px"), progress(self._work), visible=filed,
             **WIDE,
         )  # fmt: skip
         watch(self._work, ["doing"], self.update)

@@ -77,7 +77,6 @@ def test_what_was_sent_serves_until_the_hand_leaves_it():
 
 def test_the_page_shows_the_runs_and_what_is_selected(campaign):
     session = Session(campaign=campaign)
-    assert data_page.page(session) is not None
     signals, event = Signals(session), EventView(session)
     assert not signals.figures["spring force"].visible and signals.figures[GAP].visible
     data_page.select(session, "holds", 4)
@@ -203,11 +202,22 @@ def test_what_is_wrong_is_said_in_the_form(own):
     form.take("run.csv", _table())
     form.velocity.value = "fast"
     form.send()
-    assert "drive velocity" in form.said.text
+    assert "velocity of the load point" in form.said.text
     form.columns["time"].value = NONE
     form.velocity.value = "50 um/s"
     form.send()
     assert "sampling rate" in form.said.text
+
+
+def test_a_drive_with_holds_can_be_given(own, folder):
+    holds = "100 um/s until 4.3 s, 0 um/s until 5.3 s; 100 um/s until 7.6 s, 0 m/s until 12.6 s, 100 um/s until 15.2 s"
+    choice = Choice({"displacement": "counts"}, {"displacement": "7.91 nm"}, "10 kHz", holds, virgin=True)
+    grown = add(own, "holds.csv", (folder / "holds.csv").read_bytes(), entry_text("holds.csv", choice))
+    assert grown["holds"].drive.breakpoints == pytest.approx([4.3, 5.3, 7.6, 12.6])
+    assert len(grown.events[1].events) == 10
+    for wrong in ("100 um/s until", "100 um/s until 4 um", "until 3 s", "1 um/s until 2 s, 3 um/s"):
+        with pytest.raises(InputError, match="load point"):
+            entry_text("x.csv", Choice({"displacement": "x"}, {"displacement": "um"}, "10 kHz", wrong))
 
 
 def test_names_with_markup_are_quoted_in_the_file_and_shown_as_text(own):
@@ -231,7 +241,7 @@ def test_a_table_more_leaves_the_file_byte_for_byte():
 
 def test_what_the_data_tell_is_said(campaign):
     session = Session(campaign=campaign)
-    data_page.page(session)
+    assert data_page.page(session) is not None
     found = data_page.beside(session, "inspection").found
     told = {g["head"]: g["items"] for g in data_page.groups(found)}
     assert told["Can tell"] == campaign.inspect().can and told["Mended or left out"] == ["nothing"]

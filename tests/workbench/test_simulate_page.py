@@ -180,6 +180,16 @@ def test_an_effect_that_is_in_the_model_stays_and_the_other_takes_its_place():
     assert found["viscous-drag"].effects == ("wear", "viscous-drag:law=linear")
 
 
+def test_the_longest_hold_that_is_proposed_is_simulated():
+    assert experiments.proposed_hold("holds of 1 s and 25 s: only ageing remembers them") == "25 s"
+    assert experiments.proposed_hold("holds at one elongation of the spring") == "10 s"
+
+
+def test_the_ticks_of_a_logarithmic_axis_are_plain_numbers():
+    assert simulate_page.ticks(np.array([25.0, 800.0, np.nan])) == [10, 20, 50, 100, 200, 500, 1000, 2000]
+    assert simulate_page.ticks(np.array([])) == []
+
+
 def test_nothing_is_proposed_where_nothing_is_undecided(session, campaign):
     assert experiments.undecided(None) == []
     found = Diagnosis(campaign, None, {"verdict": {"kind": "complete"}, "next_experiment": None}, {})
