@@ -15,7 +15,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from .. import jax_settings  # noqa: F401  (before the first array)
 
@@ -357,17 +357,16 @@ class Filter:
         variance += np.einsum("ni,ij,nj->n", shown, self._cov - np.eye(place), shown)
         known = shown @ self._mean
         column = np.eye(2)[kind] - known[:, 1:]
-        middle: Array = known[:, 0] + column @ (inverse @ right)
+        middle = known[:, 0] + column @ (inverse @ right)
         variance += np.einsum("ni,ij,nj->n", column, inverse, column)
-        std: Array = np.sqrt(variance)
-        return middle.reshape(shape), std.reshape(shape)
+        return middle.reshape(shape), np.sqrt(variance).reshape(shape)
 
 
 def _means(products: Array) -> tuple[Array, Array]:
     """Covariance of the means, and what it is multiplied with to give them."""
     if not (np.diag(products)[1:] > 0).all():
         raise ValueError("no level of each kind yet")
-    return np.linalg.inv(products[1:, 1:]), products[1:, 0]
+    return cast(Array, np.linalg.inv(products[1:, 1:])), products[1:, 0]
 
 
 class Nearby:

@@ -1,6 +1,7 @@
 """Forecasts of the next slip: scored rightly, calibrated on a known law, and blind to what comes later."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def test_the_score_is_the_integral_of_the_squared_difference():
         def difference(x: float, members=members, truth=truth) -> float:
             return (np.mean(members <= x) - (truth <= x)) ** 2
 
-        whole = sum(quad(difference, a, b)[0] for a, b in zip(edges[:-1], edges[1:], strict=True))
+        whole = sum(quad(difference, a, b)[0] for a, b in pairwise(edges))
         assert crps(members, truth) == pytest.approx(whole, rel=1e-6)
 
 

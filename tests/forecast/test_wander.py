@@ -29,7 +29,9 @@ LAWS = {
     "ou": Wander((Component(OU, "time", (1.0, 0.6), 8.0),), (0.3, 0.2)),
     "matern": Wander((Component(MATERN, "slip path", (1.0, -0.6), 8e-4),), (0.3, 0.2)),
     "place": Wander((Component(MATERN, "place", (1.0, 0.8), 8e-4),), (0.3, 0.2)),
-    "two": Wander((Component(MATERN, "time", (1.0, 1.1), 40.0), Component(OU, "slip path", (0.5, 0.9), 2e-4)), (0.3, 0.2)),
+    "two": Wander(
+        (Component(MATERN, "time", (1.0, 1.1), 40.0), Component(OU, "slip path", (0.5, 0.9), 2e-4)), (0.3, 0.2)
+    ),
     "none": Wander((), (0.3, 0.2)),
 }  # fmt: skip
 
@@ -177,7 +179,7 @@ def test_what_cannot_be_fitted_is_refused():
     arrays = series(50, LAWS["ou"], 0)
     with pytest.raises(InputError, match="the same"):
         fit({**arrays, "onset": np.ones(50)}, ())
-    with pytest.raises(InputError, match="no order in common|another order"):
+    with pytest.raises(InputError, match="another order"):
         Series.of(arrays, ("place", "time"))
     with pytest.raises(ValueError, match="goes back"):
         own = Filter(LAWS["ou"])
