@@ -21,6 +21,7 @@ import pandas
 import stickslip as ss
 from stickslip.forecast.predict import METHODS, Forecaster
 from stickslip.forecast.rolling import prepare, roll
+from stickslip.forecast.wander import Wander
 from stickslip.objects import Forecast
 from stickslip.plots import save
 from stickslip.plots.style import DARK, LIGHT, MIDDLE, figure, styled
@@ -56,6 +57,12 @@ TRAIN = {"paper slider": 0.5, "laboratory fault": 0.7}  # the latter as those wh
 STEPS = 70  # samples at the end of the record that their score leaves out
 
 
+def chosen(found: Forecast) -> tuple[Wander, bool]:
+    """Law of a forecast, and whether it uses the rise of late."""
+    told = found.result["chosen"]
+    return next(c.law for c in found.laws if str(c.law) == told["law"]), told["rise"]
+
+
 def learners(found: Forecast, file: Path) -> dict[str, float]:
     """R2 of the time to the start of failure on the same samples and the same target as the published learners'.
 
@@ -71,7 +78,7 @@ def learners(found: Forecast, file: Path) -> dict[str, float]:
     next_onset = np.searchsorted(onsets, time[:first])
     sticks = (next_onset > 0) & (next_onset < onsets.size) & (target[:first] > 1.0)
     early = float(np.median(onsets[next_onset[sticks]] - time[:first][sticks] - target[:first][sticks]))
-    forecaster = Forecaster(past, found.laws[0].law)
+    forecaster = Forecaster(past, *chosen(found))
     means = {name: np.zeros(last - first) for name in METHODS[:2]}
     seen = []
     for row, i in enumerate(range(first, last)):
@@ -102,11 +109,12 @@ def learners(found: Forecast, file: Path) -> dict[str, float]:
 
 def own_scores(found: Forecast) -> dict[str, Any]:
     """What is kept of a forecast."""
-    kept = ("train", "levels", "laws", "coordinate", "score", "methods", "gains", "by_moment")
+    kept = ("train", "levels", "laws", "coordinate", "score", "methods", "gains", "by_moment", "chosen")
     out = {key: found.result[key] for key in kept}
-    out["growth"] = Forecaster(found.past, found.laws[0].law).curves.growth
-    plain = roll(found.past, found.laws[0].law, rise=False).score()[METHODS[0]]
-    out["without the rise of late"] = plain
+    law, _ = chosen(found)
+    out["growth"] = Forecaster(found.past, law).curves.growth
+    for name, rise in (("with the rise of late", True), ("without the rise of late", False)):
+        out[name] = roll(found.past, law, rise=rise).score()[METHODS[0]]
     return out
 
 
@@ -120,7 +128,7 @@ def picture(slider: Forecast, fault: Forecast) -> Any:
     ax.plot(data.time_arrest, 1e3 * data.arrest, ".-", color=MIDDLE, lw=0.8, ms=3.5, label="at arrest")
     ax.set(xlabel="time / s", ylabel="force of the spring / mN", title="paper slider, every slip")
     ax.legend(loc="best")
-    past, forecaster = fault.past, Forecaster(fault.past, fault.laws[0].law)
+    past, forecaster = fault.past, Forecaster(fault.past, *chosen(fault))
     t, onsets = past.trace.time, past.arrays["time_onset"]
     shown = np.arange(int(np.searchsorted(t, past.split)), int(np.searchsorted(t, past.split + 45.0)))
     rows = []
