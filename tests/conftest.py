@@ -6,6 +6,10 @@ import sys
 
 import pytest
 
+from stickslip.threads import one_for_linear_algebra
+
+one_for_linear_algebra()
+
 
 @pytest.fixture(autouse=True, scope="module")
 def _bounded_memory():

@@ -221,11 +221,12 @@ def test_the_table_of_rates_has_the_parts_that_are_measured(tables: ModuleType) 
 
 
 def test_every_picture_has_a_script() -> None:
-    scripts = "\n".join(path.read_text(encoding="utf-8") for path in DOCS.glob("*.py"))
+    files = [*DOCS.glob("*.py"), *ROOT.glob("tests/*/real.py")]
+    scripts = "\n".join(path.read_text(encoding="utf-8") for path in files)
     pictures = [p for folder in ("images", "paper", "figures", "verification") for p in (DOCS / folder).glob("*.png")]
     assert pictures
     for picture in pictures:
-        assert re.search(rf"\b{picture.stem}\b", scripts), f"nothing in docs/*.py makes {picture.name}"
+        assert re.search(rf"\b{picture.stem}\b", scripts), f"no script makes {picture.name}"
 
 
 @pytest.mark.slow

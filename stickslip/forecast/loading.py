@@ -121,11 +121,15 @@ class Curves:
             rest.append(risen - np.interp(to_come, self.travel, np.mean(each, axis=0)))
         every, at = np.concatenate(rest), np.concatenate([s[0] for s in seen])
         part = np.minimum((at / self.travel[-1] * PARTS).astype(int), PARTS - 1)
-        count = np.bincount(part, minlength=PARTS)
-        known = np.flatnonzero(count >= FEWEST)
-        if known.size == 0:
+        if every.size < FEWEST:
             return np.full(POINTS, np.inf)
-        square = np.bincount(part, every**2, minlength=PARTS)[known] / count[known]
+        whose = np.repeat(np.arange(len(rest)), [r.size for r in rest])
+        count = np.bincount(part, minlength=PARTS)
+        sticks = np.bincount(np.unique(part * len(rest) + whose) // len(rest), minlength=PARTS)
+        known = np.flatnonzero(count)
+        own = np.bincount(part, every**2, minlength=PARTS)[known] / count[known]
+        # what few sticks tell leans on what all of them do
+        square = (sticks[known] * own + FEWEST * float(np.mean(every**2))) / (sticks[known] + FEWEST)
         middle = (known + 0.5) / PARTS * self.travel[-1]
         n = self.length.size
         return np.sqrt(np.interp(self.travel, middle, square) * n / (n - 1))

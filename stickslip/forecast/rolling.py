@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +13,12 @@ from ..trace import Trace
 from .past import Past
 from .predict import METHODS, Compared, Forecaster, compare, training_slips
 from .scoring import gains, score
-from .wander import Wander
+from .wander import Wander, fit
 
 Array = NDArray[np.float64]
 MOMENTS = 10  # in a mean recurrence, where forecasts are made all along
 MOST = 4000  # moments
+INNER = 0.6  # of the part for training, from which laws learn that are tried on its rest
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 Tell = Callable[[str, float], None]
 
@@ -56,6 +57,31 @@ def prepare(trace: Trace, train: float) -> tuple[Past, list[Compared]]:
     """
     past = Past.of(trace, train)
     return past, compare(past.arrays, training_slips(past))
+
+
+def choose(past: Past, laws: Sequence[Compared], progress: Tell | None = None) -> tuple[Wander, bool]:
+    """Law and use of the rise of late that forecast best within the part for training.
+
+    The best law by its criterion and scatter alone, each with the rise of late and without it, learn from the first
+    part of the training and are scored on its rest. Where that holds too few slips the best law with the rise is taken.
+
+    Args:
+        past: the run. laws: compared, the best first. progress: told what is done.
+    """
+    if progress is not None:
+        progress(f"choosing a law for {past.trace.name}", 0.0)
+    scatter = next(c.law for c in laws if not c.law.components)
+    tried = [laws[0].law, scatter] if laws[0].law.components else [scatter]
+    found: list[tuple[float, int, bool]] = []
+    try:
+        inner = Past.of(past.train, INNER)
+        for k, law in enumerate(tried):
+            own = fit(inner.arrays, law.components, training_slips(inner))
+            found += [(roll(inner, own, rise=r).score()[METHODS[0]]["crps"], k, r) for r in (True, False)]
+    except InputError:
+        return tried[0], True
+    _, k, rise = min(found)
+    return tried[k], rise
 
 
 def moments(past: Past, recurrence: float, at: float | None) -> NDArray[np.intp]:

@@ -357,10 +357,9 @@ class Filter:
         variance += np.einsum("ni,ij,nj->n", shown, self._cov - np.eye(place), shown)
         known = shown @ self._mean
         column = np.eye(2)[kind] - known[:, 1:]
-        middle: Array = known[:, 0] + column @ (inverse @ right)
+        middle = known[:, 0] + column @ (inverse @ right)
         variance += np.einsum("ni,ij,nj->n", column, inverse, column)
-        std: Array = np.sqrt(variance)
-        return middle.reshape(shape), std.reshape(shape)
+        return middle.reshape(shape), np.sqrt(variance).reshape(shape)
 
 
 def _means(products: Array) -> tuple[Array, Array]:

@@ -11,8 +11,9 @@ import numpy as np
 from ..errors import InputError, nearest
 from ..forecast.levels import levels, wandering
 from ..forecast.predict import METHODS, Compared, Forecaster, goes_back, training_slips
-from ..forecast.rolling import SHARES, Rolled, prepare, roll
+from ..forecast.rolling import SHARES, Rolled, choose, prepare, roll
 from ..forecast.telling import told
+from ..forecast.wander import Wander
 from .run import Tell, dataset, head, save
 from .shown import Shown, facts, table
 
@@ -150,7 +151,8 @@ def forecast(
     try:
         tell(f"levels of {trace.name}", 0.0)
         past, laws = prepare(trace, train)
-        rolled = roll(past, laws[0].law, at, tell)
+        law, rise = choose(past, laws, tell)
+        rolled = roll(past, law, at, tell, rise)
     except InputError as error:
         raise error.at(file=campaign.description.path if campaign.description.filed else None) from None
     scores, gained = rolled.score(), rolled.gains()
@@ -165,14 +167,15 @@ def forecast(
         "level_unit": past.scale.unit,
         "levels": _ties(campaign, number),
         "laws": [_law(c) for c in laws],
+        "chosen": {"law": str(law), "rise": rise},
         "coordinate": told(laws, goes_back(past.arrays["direction"][: training_slips(past)])),
         "score": {**counts, **own, **others},
         "methods": scores,
         "gains": gained,
-        "by_moment": _by_moment(past, laws[0], tell),
-        "next": _next(past, laws[0]),
+        "by_moment": _by_moment(past, law, rise, tell),
+        "next": _next(past, law, rise),
         "dropped": [str(d) for d in past.learned.dropped],
-        "notes": _notes(past, at),
+        "notes": _notes(past, at, law, rise),
     }
     return Forecast(campaign, past, laws, rolled, result)
 
@@ -205,12 +208,12 @@ def _law(compared: Compared) -> dict[str, Any]:
     }
 
 
-def _by_moment(past: Past, best: Compared, tell: Tell) -> list[dict[str, Any]]:
+def _by_moment(past: Past, law: Wander, rise: bool, tell: Tell) -> list[dict[str, Any]]:
     """Scores at moments so many mean recurrences after an arrest, once in each stick."""
     out = []
     for share in SHARES:
         try:
-            rolled = roll(past, best.law, share, tell)
+            rolled = roll(past, law, share, tell, rise)
         except InputError:
             continue  # no stick lasts so long
         scores = rolled.score()
@@ -219,18 +222,24 @@ def _by_moment(past: Past, best: Compared, tell: Tell) -> list[dict[str, Any]]:
     return out
 
 
-def _next(past: Past, best: Compared) -> dict[str, float] | None:
+def _next(past: Past, law: Wander, rise: bool) -> dict[str, float] | None:
     """Time from the end of the record to the next slip; None where the record ends within one."""
-    found = Forecaster(past, best.law).at(past.trace.time.size - 1)
+    found = Forecaster(past, law, rise).at(past.trace.time.size - 1)
     if found is None:
         return None
     return {f"{q:g}": float(v) for q, v in zip(QUANTILES, np.quantile(found[METHODS[0]], QUANTILES), strict=True)}
 
 
-def _notes(past: Past, at: float | None) -> list[str]:
+def _notes(past: Past, at: float | None, law: Wander, rise: bool) -> list[str]:
     """What should be known of how it was made."""
     where = "all along, even in time" if at is None else f"{at:g} mean recurrences after each arrest"
-    said = [f"Forecasts are made {where}; each uses only what was measured by then."]
+    how = f"{law}, {'with' if rise else 'without'} the rise of the level of late"
+    said = [
+        f"Forecasts are made {where}; each uses only what was measured by then.",
+        f"Chosen within the part for training: {how}.",
+    ]
+    if goes_back(past.arrays["direction"]):
+        said.append("The block goes back: that the drive turns is not foretold, and no forecast looks beyond it.")
     if past.trace.drive_position is not None:
         said.append("The load point was measured, so it is taken to go on as fast as over the last mean recurrence.")
     return said

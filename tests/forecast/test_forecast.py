@@ -13,7 +13,7 @@ from stickslip.cli import run
 from stickslip.errors import InputError
 from stickslip.forecast.past import Past
 from stickslip.forecast.predict import MEMBERS, Forecaster, times, waiting
-from stickslip.forecast.rolling import moments, prepare, roll
+from stickslip.forecast.rolling import choose, moments, prepare, roll
 from stickslip.forecast.scoring import crps, score, standard_error
 from stickslip.runstore import read_result
 from stickslip.trace import Trace
@@ -166,6 +166,8 @@ def test_no_forecast_changes_when_the_future_does(kind):
         if number == 0:  # laws, too
             other, other_laws = prepare(changed, 0.5)
             assert other_laws[0].law == law
+            if kind == "force":
+                assert choose(other, other_laws) == choose(past, laws)
         other = Past.of(changed, 0.5)
         after = Forecaster(other, law).at(i)
         assert after is not None
