@@ -18,13 +18,13 @@ from pathlib import Path
 import numpy as np
 import xarray
 
-from stickslip.effects import catalogue
-from stickslip.effects.base import Effect
-from stickslip.effects.printed import pieces
-from stickslip.effects.symbols import BASE, found, of_parameters
-from stickslip.fit.parameters import priors
-from stickslip.params import Spec, specs, variants
-from stickslip.plots.style import scaled
+from stickslip.inference.fit.parameters import priors
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.base import Effect
+from stickslip.physics.effects.printed import pieces
+from stickslip.physics.effects.symbols import BASE, found, of_parameters
+from stickslip.physics.params import Spec, specs, variants
+from stickslip.show.plots.style import scaled
 
 # what a role does to the base model
 ACTS = {
@@ -66,7 +66,7 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         *_forms(cls),
         "## With and without",
         f"![The demonstration rig with and without {cls.tag}]({cls.tag}.png)",
-        "*A small rig (89.4 g, 1 N/mm, four contacts; `stickslip/scenario/demonstration.py`) with "
+        "*A small rig (89.4 g, 1 N/mm, four contacts; `stickslip/simulation/scenario/demonstration.py`) with "
         f"{_shown_amplitude(cls)} and everything else at its default: drawn at 200 µm/s, with a hold of 2 s; made by "
         "the program when these pages are built.*",
         *_numbers(numbers),
@@ -87,9 +87,9 @@ def index(classes: Sequence[type[Effect]]) -> str:
     """The list of all effects, by family."""
     parts = [
         "# The catalogue of effects",
-        "Every effect is one class in `stickslip/effects`; these pages are written from the classes. The base model is "
-        "in the [theory](../theory.md). An effect at its null value leaves the base model bit for bit as it is, which "
-        "the conformance suite checks together with bounds, energy and derivatives.",
+        "Every effect is one class in `stickslip/physics/effects`; these pages are written from the classes. "
+        "The base model is in the [theory](../theory.md). An effect at its null value leaves the base model bit for "
+        "bit as it is, which the conformance suite checks together with bounds, energy and derivatives.",
     ]
     for family, title in FAMILIES.items():
         members = [cls for cls in classes if cls.family == family]
@@ -215,7 +215,7 @@ def _numbers(numbers: Mapping[str, Sequence[float | None]] | None) -> Iterator[s
 
 
 def _amplitude(cls: type[Effect]) -> tuple[Spec, float]:
-    from stickslip.scenario.demonstration import typical_amplitude
+    from stickslip.simulation.scenario.demonstration import typical_amplitude
 
     return specs(cls)[cls.amplitude], float(f"{typical_amplitude(cls):.3g}")
 
@@ -261,9 +261,9 @@ def cell(text: str) -> str:
 
 def draw(classes: Sequence[type[Effect]], folder: Path) -> None:
     """Simulate the demonstration rig without and with every effect, draw both, and write ``numbers.json``."""
-    from stickslip.plots import effect_figure, save
-    from stickslip.scenario import make_scenario, simulate
-    from stickslip.scenario.demonstration import RIG
+    from stickslip.show.plots import effect_figure, save
+    from stickslip.simulation.scenario import make_scenario, simulate
+    from stickslip.simulation.scenario.demonstration import RIG
 
     without = simulate(make_scenario(RIG))
     numbers = {}

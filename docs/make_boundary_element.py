@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip.contact import Moduli, rough_table, static_contact
-from stickslip.plots import save
-from stickslip.plots.style import DARK, MIDDLE, figure, logarithmic, styled
+from stickslip.physics.contact import Moduli, rough_table, static_contact
+from stickslip.show.plots import save
+from stickslip.show.plots.style import DARK, MIDDLE, figure, logarithmic, styled
 
 OUT = Path(__file__).resolve().parent / "paper"
 N = 256

@@ -22,21 +22,21 @@ from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
 from stickslip import __version__
-from stickslip.campaign import Rig
-from stickslip.campaign.template import campaign_text
 from stickslip.cli import run as command
-from stickslip.contact import default_loads, power_law_bank, rough_table, static_contact
-from stickslip.fit.creep_process import V_LIM, CreepProcess, creep_processes
-from stickslip.fit.static import CreepFit, StaticFit, fit_static
-from stickslip.fit.static_table import StaticRig, static_table, virtual_curve
-from stickslip.force.backbone import Backbone
-from stickslip.force.geometry import rough_line
-from stickslip.plots import save
-from stickslip.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, styled
-from stickslip.scenario import load_scenario, simulate, static_creep
-from stickslip.scenario.load import Scenario
-from stickslip.segment import segment
-from stickslip.trace import Drive, Trace
+from stickslip.data.campaign import Rig
+from stickslip.data.campaign.template import campaign_text
+from stickslip.data.segment import segment
+from stickslip.data.trace import Drive, Trace
+from stickslip.inference.fit.creep_process import V_LIM, CreepProcess, creep_processes
+from stickslip.inference.fit.static import CreepFit, StaticFit, fit_static
+from stickslip.inference.fit.static_table import StaticRig, static_table, virtual_curve
+from stickslip.inference.force.backbone import Backbone
+from stickslip.inference.force.geometry import rough_line
+from stickslip.physics.contact import default_loads, power_law_bank, rough_table, static_contact
+from stickslip.show.plots import save
+from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, styled
+from stickslip.simulation.scenario import load_scenario, simulate, static_creep
+from stickslip.simulation.scenario.load import Scenario
 
 ROOT = Path(__file__).resolve().parents[1]
 RIGS = ROOT / "scenarios" / "grzemba2014"

@@ -25,13 +25,13 @@ import numpy as np
 import xarray
 
 from stickslip import __version__
-from stickslip.campaign import load_campaign, load_traces
 from stickslip.cli import run
-from stickslip.plots import save
-from stickslip.report.figures import ripple_picture, trace_picture
-from stickslip.report.fit_figures import ramp_grid
-from stickslip.report.ripple import stick_spectrum
-from stickslip.segment import segment
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.segment import segment
+from stickslip.show.plots import save
+from stickslip.show.report.figures import ripple_picture, trace_picture
+from stickslip.show.report.fit_figures import ramp_grid
+from stickslip.show.report.ripple import stick_spectrum
 
 DOCS = Path(__file__).resolve().parent
 DEFAULT = DOCS.parents[1] / "shared" / "data" / "real"

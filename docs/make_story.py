@@ -31,13 +31,13 @@ from matplotlib.ticker import FuncFormatter
 import stickslip as ss
 from stickslip.cli import diagnose as terminal
 from stickslip.cli import run as command
-from stickslip.fit.creep_process import creep_processes
-from stickslip.fit.static import CreepFit, fit_static
-from stickslip.fit.static_table import StaticRig, static_table, virtual_curve
-from stickslip.plots import save
-from stickslip.plots.style import DARK, LIGHT, MIDDLE, styled
-from stickslip.runstore import read_result
-from stickslip.segment import segment
+from stickslip.data.segment import segment
+from stickslip.inference.fit.creep_process import creep_processes
+from stickslip.inference.fit.static import CreepFit, fit_static
+from stickslip.inference.fit.static_table import StaticRig, static_table, virtual_curve
+from stickslip.show.plots import save
+from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, styled
+from stickslip.system.runstore import read_result
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images"

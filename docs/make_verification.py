@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT))
 import jax
 import jax.numpy as jnp
 
-from stickslip.contact import (
+from stickslip.physics.contact import (
     flat_punch,
     indentation,
     power_law,
@@ -28,8 +28,8 @@ from stickslip.contact import (
     sphere,
     static_contact,
 )
-from stickslip.plots.style import logarithmic
-from stickslip.solve import Tolerance, integrate
+from stickslip.show.plots.style import logarithmic
+from stickslip.simulation.solve import Tolerance, integrate
 from tests.contact import test_indentation, test_tangential
 from tests.solve import (
     books,

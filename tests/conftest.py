@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from stickslip.threads import one_for_linear_algebra
+from stickslip.system.threads import one_for_linear_algebra
 
 one_for_linear_algebra()
 

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from stickslip import cli
-from stickslip.cache import heal
 from stickslip.cli import COMMANDS, run
+from stickslip.system.cache import heal
 
 SCENARIO = """
 schema = 1
@@ -196,7 +196,7 @@ def test_a_failing_solver_is_exit_code_1(scenario, capsys, monkeypatch):
     def fail(*args, **kwargs):
         raise SolveError("the integration stopped at t = 1 s: loosen the tolerance")
 
-    monkeypatch.setattr("stickslip.scenario.simulation.integrate", fail)
+    monkeypatch.setattr("stickslip.simulation.scenario.simulation.integrate", fail)
     assert run(["simulate", scenario, "--out", "out"]) == 1
     assert "loosen the tolerance" in capsys.readouterr().err
     assert os.listdir() == ["rig.toml"]  # noqa: PTH208
@@ -206,14 +206,14 @@ def test_interrupting_a_run_leaves_nothing(scenario, capsys, monkeypatch):
     def interrupt(*args, **kwargs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("stickslip.scenario.simulation.integrate", interrupt)
+    monkeypatch.setattr("stickslip.simulation.scenario.simulation.integrate", interrupt)
     assert run(["simulate", scenario, "--out", "out"]) == 130
     assert "nothing was written" in capsys.readouterr().err
     assert os.listdir() == ["rig.toml"]  # noqa: PTH208
 
 
 def test_interrupting_a_series_keeps_what_is_finished(scenario, capsys, monkeypatch):
-    import stickslip.scenario.series as series
+    import stickslip.simulation.scenario.series as series
 
     real, calls = series.simulate, []
 
@@ -380,7 +380,7 @@ def test_equations_of_a_model(capsys):
 OWN = """
 from jax import Array
 from stickslip.effects.base import BodyForce
-from stickslip.params import parameter
+from stickslip.effects import parameter
 
 class Push(BodyForce):
     tag = "my-push"
@@ -471,7 +471,7 @@ def test_a_picture_of_an_effect(tmp_path, capsys):
 
 def test_values_of_an_effect_have_their_unit():
     from stickslip.cli.effects import _given
-    from stickslip.effects import catalogue
+    from stickslip.physics.effects import catalogue
 
     assert _given(catalogue.get("viscous-drag"), {"drag": 0.012, "exponent": 2.0}) == "drag = 12 mN, exponent = 2"
 
@@ -516,7 +516,7 @@ def test_compiled_code_is_kept_and_can_be_switched_off(scenario, tmp_path_factor
     kept = list((home / "stickslip" / "compiled").glob("*piece*"))
     assert kept, "the integrator itself must be in the cache"
     off = tmp_path_factory.mktemp("off")
-    code = "from stickslip import cache; assert cache.enable() is None; import os, equinox\n"
+    code = "from stickslip.system import cache; assert cache.enable() is None; import os, equinox\n"
     code += "assert equinox._config.EQX_ON_ERROR == 'nan'"  # else it would compile code with other last digits
     environment |= {"XDG_CACHE_HOME": str(off), "STICKSLIP_NO_CACHE": "1"}
     assert subprocess.run([sys.executable, "-c", code], env=environment, timeout=60).returncode == 0

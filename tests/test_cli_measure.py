@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import run
-from stickslip.contact import creep_curve, default_loads
+from stickslip.physics.contact import creep_curve, default_loads
 
 RIG = """schema = 1
 title = "rig"
@@ -231,7 +231,7 @@ def test_paper_s_alignment_is_an_option(capsys):
 
 
 def test_inertial_fit_of_a_generated_campaign(capsys):
-    from stickslip.challenge.generator import Run, make_campaign
+    from stickslip.blind.generator import Run, make_campaign
 
     runs = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4), Run("v400", 4e-4, 4))
     rig = make_campaign(Path("camp"), 11, (), runs=runs, spring_known=True)["rig"]
@@ -268,7 +268,7 @@ def test_inertial_fit_of_a_generated_campaign(capsys):
 
 
 def test_an_effect_that_only_shapes_the_backbone_is_not_added(capsys):
-    from stickslip.challenge.generator import Run, make_campaign
+    from stickslip.blind.generator import Run, make_campaign
 
     make_campaign(Path("camp"), 11, (), runs=(Run("v100", 1e-4, 3),))
     message = refused(capsys, "fit", "camp/campaign.toml", "--add", "machine-compliance:where=series")
@@ -372,9 +372,9 @@ def test_a_trace_with_one_event(capsys):
 
 
 def test_a_trace_of_one_event_among_others_is_named():
-    from stickslip.campaign import load_campaign, load_traces
-    from stickslip.features.measurement import measure
-    from stickslip.segment import segment
+    from stickslip.data.campaign import load_campaign, load_traces
+    from stickslip.data.segment import segment
+    from stickslip.inference.features.measurement import measure
 
     write(TRACE + TRACE.replace("a.csv", "b.csv"), rows=motion(slips=1))
     t, x = motion(slips=3)
@@ -442,7 +442,7 @@ class Terminal(io.StringIO):
 
 
 def test_progress_of_long_work_shows_what_is_done_and_the_time_left(monkeypatch):
-    from stickslip import progress as working
+    from stickslip.system import progress as working
 
     monkeypatch.setattr(working, "PATIENCE", -1.0)
     monkeypatch.setenv("COLUMNS", "80")
@@ -472,7 +472,7 @@ def test_long_lines_of_a_fit_break_between_words_on_a_terminal(monkeypatch):
 
 
 def test_a_log_hears_of_long_work_now_and_then(capsys, monkeypatch):
-    from stickslip import progress as working
+    from stickslip.system import progress as working
 
     clock = iter([0.0, 10.0, 31.0, 40.0, 65.0])
     monkeypatch.setattr(working.time, "monotonic", lambda: next(clock))

@@ -12,11 +12,11 @@ from types import ModuleType
 
 import pytest
 
-from stickslip.effects import catalogue
-from stickslip.effects.plain import plain
-from stickslip.fit.parameters import priors
-from stickslip.params import specs, variants
-from stickslip.scenario import load_scenario
+from stickslip.inference.fit.parameters import priors
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.plain import plain
+from stickslip.physics.params import specs, variants
+from stickslip.simulation.scenario import load_scenario
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.campaign import load_campaign, load_traces
-from stickslip.checks import rig_against_motion
-from stickslip.checks.slip_time import at_odds, slip_time
 from stickslip.cli import run
-from stickslip.motion import true_gains, with_displacements
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.checks import rig_against_motion
+from stickslip.data.checks.slip_time import at_odds, slip_time
+from stickslip.data.displacements import true_gains, with_displacements
+from stickslip.data.segment import segment
+from stickslip.data.trace import Drive, Trace
 from stickslip.objects import diagnosis
 from stickslip.objects.diagnosis import diagnose_campaign
-from stickslip.segment import segment
-from stickslip.trace import Drive, Trace
 
 STIFFNESS, SPEED = 168.0, 42e-6  # N/m, m/s
 

@@ -8,9 +8,9 @@ import pytest
 import xarray
 from matplotlib.colors import to_rgb
 
-from stickslip.plots import creep_figure, effect_figure, save, series_figure, static_against_inertial, trace_figure
-from stickslip.plots.style import scaled
-from stickslip.segment import thin
+from stickslip.data.segment import thin
+from stickslip.show.plots import creep_figure, effect_figure, save, series_figure, static_against_inertial, trace_figure
+from stickslip.show.plots.style import scaled
 
 
 @pytest.fixture(scope="module")

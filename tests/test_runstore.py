@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 
 from stickslip.errors import RunFolderError
-from stickslip.runstore import RESULT, alone, file_record, json_text, open_run, read_result, versions, write_aside
+from stickslip.system.runstore import (
+    RESULT,
+    alone,
+    file_record,
+    json_text,
+    open_run,
+    read_result,
+    versions,
+    write_aside,
+)
 
 
 def names(folder: Path) -> list[str]:
@@ -85,7 +94,7 @@ def test_two_runs_into_one_folder(tmp_path):
 
 KILLED = """
 import sys, time
-from stickslip.runstore import open_run
+from stickslip.system.runstore import open_run
 with open_run(sys.argv[1], resume=True) as run:
     run.json({"step": 1}, "step1.json")
     print("written", flush=True)

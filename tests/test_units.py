@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.units import _simple, shown, to_si, unit_registry
+from stickslip.system.units import _simple, shown, to_si, unit_registry
 
 UNITS = ("m", "s", "kg", "N", "Pa", "Hz", "m/s", "N/m", "N s/m", "m/Hz**0.5", "m/s**0.5", "1/m", "m**2", "kg/s", "K")
 PREFIXES = ("", "p", "n", "u", "m", "k", "M", "G", "d", "c", "µ", "T")
@@ -27,7 +27,7 @@ def test_plain_units_are_read_as_pint_reads_them(unit):
     assert (_simple(f"3 {unit}", unit) == 3.0) == unit[0].isalpha()
 
 
-ASK = "from stickslip.units import to_si; print(to_si('3 mm per minute', 'm/s'))"
+ASK = "from stickslip.system.units import to_si; print(to_si('3 mm per minute', 'm/s'))"
 
 
 @pytest.mark.parametrize("damage", ["whole", "another installation", "cut", "garbage"])
@@ -71,7 +71,8 @@ def test_a_pure_number_has_no_unit_in_messages_either():
 def test_a_scenario_of_plain_units_needs_neither_pint_nor_xarray():
     """What makes the command line start quickly."""
     code = (
-        "import sys; from stickslip.scenario import load_scenario; load_scenario('scenarios/grzemba2014.toml'); "
+        "import sys; from stickslip.simulation.scenario import load_scenario; "
+        "load_scenario('scenarios/grzemba2014.toml'); "
         "print(sorted({'pint', 'xarray', 'pandas', 'dask', 'scipy.ndimage', 'matplotlib'} & set(sys.modules)))"
     )
     root = __file__.rsplit("tests", 1)[0]

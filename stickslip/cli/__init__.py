@@ -16,8 +16,9 @@ from types import FrameType
 
 from cyclopts import App, CycloptsError, MissingArgumentError
 
-from .. import __version__, cache, threads
+from .. import __version__
 from ..errors import InputError, StickslipError, nearest
+from ..system import cache, threads
 
 # module and function in it -> what it does, in one line
 COMMANDS = {

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..units import PREFIXES, power_for, takes_prefix
+from ..system.units import PREFIXES, power_for, takes_prefix
 from . import show
 from ._sketch import sketch
 

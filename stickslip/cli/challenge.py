@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from ..progress import working
+from ..system.progress import working
 
 if TYPE_CHECKING:
-    from ..challenge.run import Progress
+    from ..blind.run import Progress
 
 UNRESOLVED = 3
 SCORE = ("score.json", "score.txt", "confusion.png", "confusion-by-amplitude.png", "amplitude.png")
@@ -44,7 +44,7 @@ def make(
     jobs:
         Parallel processes; default one a core.
     """
-    from ..challenge.make import make_challenge
+    from ..blind.make import make_challenge
 
     with working("making campaigns") as tell:
         seal = make_challenge(folder, cases, seed, grouped=grouped, jobs=jobs, tell=tell)
@@ -82,7 +82,7 @@ def run(
     retry:
         Try cases again that failed.
     """
-    from ..challenge.run import run_challenge
+    from ..blind.run import run_challenge
 
     chosen, some = _names(candidates), _names(only)
     try:
@@ -135,7 +135,7 @@ def seal(folder: Path) -> int:
     folder:
         Of the challenge. Its campaigns must be as sealed; the truth is not read.
     """
-    from ..challenge.seal import case_names, check_seal, digest
+    from ..blind.seal import case_names, check_seal, digest
 
     number = len(case_names(check_seal(folder, truth=False)))
     print(f"{number} campaigns in {folder}\nseal {digest(folder)}")
@@ -162,9 +162,9 @@ def score(
     force:
         Replace a score that is there already.
     """
-    from ..challenge.score import score_challenge
+    from ..blind.score import score_challenge
     from ..errors import RunFolderError
-    from ..runstore import json_text
+    from ..system.runstore import json_text
 
     out = folder / "score"
     there = {path.name for path in out.iterdir()} if out.is_dir() else {""} if out.exists() else set()
@@ -179,11 +179,11 @@ def score(
 
 
 def _write(out: Path, found: dict[str, Any]) -> str:
-    from ..challenge.pictures import amplitude_figure, confusion_by_amplitude_figure, confusion_figure
-    from ..challenge.table import score_text
+    from ..blind.pictures import amplitude_figure, confusion_by_amplitude_figure, confusion_figure
+    from ..blind.table import score_text
     from ..errors import RunFolderError
-    from ..plots import save
-    from ..runstore import json_text, write_aside
+    from ..show.plots import save
+    from ..system.runstore import json_text, write_aside
 
     text = score_text(found)
     aside = out.with_name(f".{out.name}.part")

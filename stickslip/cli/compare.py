@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from ..runstore import file_record, json_text, open_run, refuse_existing, versions
+from ..system.runstore import file_record, json_text, open_run, refuse_existing, versions
 from . import show
 
 
@@ -36,12 +36,12 @@ def compare(
     """
     if out is not None:
         refuse_existing(out, force)
-    from ..report.compare import comparison
+    from ..show.report.compare import comparison
 
     found = comparison(first, second)
     if out is not None:
-        from ..plots import save
-        from ..report.compare_figure import comparison_figure
+        from ..show.plots import save
+        from ..show.report.compare_figure import comparison_figure
 
         with open_run(out, force=force) as run:
             inputs = [file_record(folder / "result.json") for folder in (first, second)]

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..runstore import open_run, refuse_existing, versions
+from ..system.runstore import open_run, refuse_existing, versions
 from . import show
 
 
@@ -55,7 +55,7 @@ def creep(
         refuse_existing(out, force)
     import warnings
 
-    from ..scenario import load_scenario, static_creep
+    from ..simulation.scenario import load_scenario, static_creep
 
     loaded = load_scenario(path, changes)
     with warnings.catch_warnings(record=True) as caught:
@@ -89,7 +89,7 @@ def creep(
         "warnings": notes,
     }
     with open_run(out, force=force) as run:
-        from ..plots import creep_figure, save
+        from ..show.plots import creep_figure, save
 
         run.text(text, "creep.csv")
         save(creep_figure(*curve, loaded.title), run.path("creep.png"))

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from ..progress import EVERY, Stage
-from ..runstore import json_text
+from ..system.progress import EVERY, Stage
+from ..system.runstore import json_text
 
 UNRESOLVED = 3
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray
 
-    from ..effects.base import Effect
+    from ..physics.effects.base import Effect
 
 
 def effects(
@@ -56,8 +56,8 @@ def effects(
         raise InputError("--latex belongs to --model", key="--latex", hint=hint)
     if picture is not None:
         _check_picture(picture, force)
-    from ..conformance import load_effects
-    from ..effects import catalogue
+    from ..physics.effects import catalogue
+    from ..simulation.conformance import load_effects
 
     load_effects(effect)
     if model is not None:
@@ -80,15 +80,15 @@ def effects(
 
 
 def _equations(words: list[str], latex: bool) -> str:
-    from ..effects.equations import of_tags
-    from ..model import Block, Weakening
+    from ..physics.effects.equations import of_tags
+    from ..physics.model import Block, Weakening
 
     found = of_tags(words, block=Block(), weakening=Weakening())
     return found.latex() if latex else found.text()
 
 
 def _catalogue(known: dict[str, type[Effect]]) -> str:
-    from ..effects.catalogue import FAMILIES
+    from ..physics.effects.catalogue import FAMILIES
 
     width = max(map(len, known))
     lines = []
@@ -100,7 +100,7 @@ def _catalogue(known: dict[str, type[Effect]]) -> str:
 
 
 def _explained(cls: type[Effect]) -> str:
-    from ..effects.catalogue import alike, roles
+    from ..physics.effects.catalogue import alike, roles
 
     lines = [f"{cls.tag} ({cls.family}): {cls.summary}", "", *_formula(cls.equation), ""]
     lines += ["parameters:", *(f"  {line}" for line in _parameters(cls)), *_forms(cls)]
@@ -114,16 +114,16 @@ def _explained(cls: type[Effect]) -> str:
 
 
 def _formula(latex: str) -> list[str]:
-    from ..effects.plain import plain
-    from ..effects.printed import pieces
+    from ..physics.effects.plain import plain
+    from ..physics.effects.printed import pieces
 
     return [*(f"  {plain(part)}" for part in pieces(latex)), f"  LaTeX: {latex}"]
 
 
 def _forms(cls: type[Effect]) -> Iterator[str]:
     """The choices, and the equations of every form of a law that has several."""
-    from ..effects.catalogue import forms
-    from ..params import variants
+    from ..physics.effects.catalogue import forms
+    from ..physics.params import variants
 
     if not variants(cls):
         return
@@ -134,9 +134,9 @@ def _forms(cls: type[Effect]) -> Iterator[str]:
 
 
 def _parameters(cls: type[Effect]) -> Iterator[str]:
-    from ..effects.plain import plain
-    from ..fit.parameters import priors
-    from ..params import span, specs
+    from ..inference.fit.parameters import priors
+    from ..physics.effects.plain import plain
+    from ..physics.params import span, specs
 
     effect = cls()
     known = priors(effect)
@@ -162,7 +162,7 @@ def _check_picture(path: Path, force: bool) -> None:
 
 def _traces(cls: type[Effect]) -> tuple[xarray.Dataset, xarray.Dataset, dict[str, float]]:
     """Traces without and with an effect, and the amplitude it was given."""
-    from ..scenario.demonstration import with_and_without
+    from ..simulation.scenario.demonstration import with_and_without
 
     with show.progress_bar("both traces") as watch:
         return with_and_without(cls, watch)
@@ -173,7 +173,7 @@ def _sketched(cls: type[Effect]) -> list[str]:
 
     It is the one that the sensor's reading tells, so that an error of the sensor shows as well.
     """
-    from ..scenario.demonstration import RIG
+    from ..simulation.scenario.demonstration import RIG
     from ._sketch import sketch
 
     def told(data: xarray.Dataset) -> np.ndarray:
@@ -198,14 +198,14 @@ def _sketched(cls: type[Effect]) -> list[str]:
 
 def _given(cls: type[Effect], values: Mapping[str, float]) -> str:
     """Values of an effect's parameters in words."""
-    from ..params import specs
+    from ..physics.params import specs
 
     known = specs(cls)
     return ", ".join(f"{name} = {show.quantity(value, known[name].unit)}" for name, value in values.items())
 
 
 def _draw(cls: type[Effect], path: Path) -> None:
-    from ..plots import effect_figure, save
+    from ..show.plots import effect_figure, save
 
     without, with_it, values = _traces(cls)
     try:

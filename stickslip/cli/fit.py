@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..progress import working
-from ..runstore import json_text, refuse_existing
-from ..units import to_si
+from ..system.progress import working
+from ..system.runstore import json_text, refuse_existing
+from ..system.units import to_si
 from . import show
 
 if TYPE_CHECKING:

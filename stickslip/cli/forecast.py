@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from ..progress import working
-from ..runstore import json_text, refuse_existing
+from ..system.progress import working
+from ..system.runstore import json_text, refuse_existing
 from . import show
 
 

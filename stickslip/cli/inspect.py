@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..runstore import json_text, refuse_existing
+from ..system.runstore import json_text, refuse_existing
 
 
 def inspect(

@@ -28,11 +28,11 @@ def new(
         Replace an existing file.
     """
     if what == "scenario":
-        from ..scenario.template import scenario_template
+        from ..simulation.scenario.template import scenario_template
 
         text = scenario_template()
     else:
-        from ..campaign import campaign_template
+        from ..data.campaign import campaign_template
 
         text = campaign_template()
     path = file or Path(f"{what}.toml")
@@ -51,7 +51,7 @@ def _write(path: Path, text: str, force: bool) -> None:
     if path.exists() and (not force or not path.is_file()):
         hint = "choose another name, or replace it with --force" if path.is_file() else "choose another name"
         raise RunFolderError("the file exists already", file=path, hint=hint)
-    from ..runstore import write_aside
+    from ..system.runstore import write_aside
 
     try:
         write_aside(path, text)

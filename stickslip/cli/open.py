@@ -82,7 +82,7 @@ def _is_scenario(path: Path) -> bool:
 
 def _simulated(scenario: Path) -> Path:
     """The run folder with the measurement that a scenario gives; simulated only where it is not there yet."""
-    from ..runstore import RESULT, file_record, read_result
+    from ..system.runstore import RESULT, file_record, read_result
     from .simulate import simulate
 
     folder = Path(f"{scenario.stem}-simulated")

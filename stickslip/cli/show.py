@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from ..units import shown
+from ..system.units import shown
 
 if TYPE_CHECKING:
-    from ..scenario import Progress
+    from ..simulation.scenario import Progress
 
 PATIENCE = 1.0  # s before a progress bar appears
 

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..runstore import Run, file_record, json_text, open_run, refuse_existing, versions
+from ..system.runstore import Run, file_record, json_text, open_run, refuse_existing, versions
 from . import show
 
 if TYPE_CHECKING:
     import xarray
 
-    from ..scenario import Scenario
-    from ..scenario.schema import SweepTable
+    from ..simulation.scenario import Scenario
+    from ..simulation.scenario.schema import SweepTable
 
 
 def simulate(
@@ -79,10 +79,10 @@ def _load(
     path: str, changes: list[str], trace: str | None, files: tuple[Path, ...], sweep: str | None = None
 ) -> Scenario:
     """A scenario from its file, or the model of a run folder; with a series over it."""
-    from ..scenario.overrides import parse_sweep
+    from ..simulation.scenario.overrides import parse_sweep
 
     if Path(path).is_dir():
-        from ..scenario.fitted import load_run
+        from ..objects.fitted_run import load_run
 
         found = load_run(path, files)
         loaded = found.scenario(changes, trace)
@@ -93,10 +93,10 @@ def _load(
     if trace is not None:
         raise InputError("--trace names a run of a fit or a diagnosis", key="--trace", hint="give a run folder")
     if files:
-        from ..conformance import load_effects
+        from ..simulation.conformance import load_effects
 
         load_effects(files)
-    from ..scenario import load_scenario
+    from ..simulation.scenario import load_scenario
 
     loaded = load_scenario(path, changes)
     return loaded if sweep is None else loaded.with_changes([("sweep", parse_sweep(sweep))])
@@ -148,18 +148,18 @@ def outside(scenario: Scenario) -> list[str]:
 
 
 def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
-    from ..scenario import record
+    from ..simulation.scenario import record
 
     with show.progress_bar() as watch:
         recording = record(scenario, watch)
     if run is not None:
-        from ..plots import save, static_against_inertial, trace_figure
+        from ..show.plots import save, static_against_inertial, trace_figure
 
         run.arrays(recording)
         save(trace_figure(recording), run.path("trace.png"))
         save(static_against_inertial([recording], [scenario.title]), run.path("static_vs_inertial.png"))
         if scenario.file.output.trace:
-            from ..scenario.writers import write_campaign
+            from ..simulation.scenario.writers import write_campaign
 
             write_campaign(run.folder, [scenario], [recording])
     return _numbers(recording.variables, recording.attrs)
@@ -183,7 +183,7 @@ def _numbers(variables: Mapping[Any, Any], attributes: Mapping[Any, Any]) -> dic
 
 
 def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str, Any]:
-    from ..scenario.series import scenarios_of, simulate_series, summary
+    from ..simulation.scenario.series import scenarios_of, simulate_series, summary
 
     members = scenarios_of(scenario, sweep)
     done: list[xarray.Dataset] = []
@@ -228,7 +228,7 @@ def _write_series(
     table: xarray.Dataset,
     done: list[xarray.Dataset],
 ) -> None:
-    from ..plots import save, series_figure, static_against_inertial
+    from ..show.plots import save, series_figure, static_against_inertial
 
     run.arrays(table)
     run.text(_csv(table), "series.csv")
@@ -237,7 +237,7 @@ def _write_series(
     labels = [show.quantity(float(value), unit, 3) for value in table["value"].values]
     save(static_against_inertial(done, labels), run.path("static_vs_inertial.png"))
     if scenario.file.output.trace:
-        from ..scenario.writers import write_campaign
+        from ..simulation.scenario.writers import write_campaign
 
         write_campaign(run.folder, [member for _, member in members[: len(done)]], done)
 

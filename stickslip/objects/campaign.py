@@ -7,22 +7,22 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from .. import campaign as files
-from ..checks import Finding, refuse_impossible, rig_against_motion
-from ..conformance import load_effects
+from ..data import campaign as files
+from ..data.checks import Finding, refuse_impossible, rig_against_motion
+from ..data.displacements import true_gains, with_displacements
+from ..data.readers.repair import from_load_point
+from ..data.segment import Segmentation, segment
+from ..data.trace import Trace
 from ..errors import InputError, nearest
-from ..motion import true_gains, with_displacements
-from ..readers.repair import from_load_point
-from ..report.describe import left_out
-from ..segment import Segmentation, segment
-from ..trace import Trace
+from ..show.report.describe import left_out
+from ..simulation.conformance import load_effects
 from .shown import Shown, facts, table
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from ..diagnose.prepare import Prepared
+    from ..inference.diagnose.prepare import Prepared
     from .diagnosis import Diagnosis
     from .fit import Fit, StaticFit
     from .forecast import Forecast
@@ -34,7 +34,8 @@ class Campaign(Shown):
     """Measured runs of one apparatus.
 
     Args:
-        description: what the campaign file says, or what :func:`stickslip.campaign.described` makes without a file.
+        description: what the campaign file says, or what
+            :func:`stickslip.data.campaign.described` makes without a file.
         traces: the runs, in its order.
         effects: Python files with effects of one's own that were loaded with it.
 
@@ -139,7 +140,7 @@ class Campaign(Shown):
         Raises:
             InputError: no run of that name, no run that can take part, or the mass is not given.
         """
-        from ..diagnose.prepare import prepare
+        from ..inference.diagnose.prepare import prepare
 
         try:
             return prepare(self.description, self.displaced[0], self.scaled[0], holdout)
@@ -192,12 +193,12 @@ class Campaign(Shown):
             name: of the run; default the first.
 
         Returns:
-            See :func:`stickslip.forecast.levels`.
+            See :func:`stickslip.inference.forecast.levels`.
 
         Raises:
             InputError: no run of that name, no slip, or neither load point nor force is known.
         """
-        from ..forecast import levels
+        from ..inference.forecast import levels
 
         trace = self.traces[0] if name is None else self[name]
         try:
@@ -228,7 +229,7 @@ class Campaign(Shown):
         """Signals of a run over time (s), SI units in the attributes."""
         import xarray
 
-        from ..trace import SIGNALS
+        from ..data.trace import SIGNALS
 
         trace = self[name]
         units = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
@@ -256,7 +257,7 @@ class Campaign(Shown):
 
     def inputs(self) -> list[dict[str, str]]:
         """Name and SHA-256 of everything with measured numbers."""
-        from ..runstore import file_record
+        from ..system.runstore import file_record
 
         if not self.description.filed:
             return [{"file": t.name, "sha256": t.provenance.sha256} for t in self.traces]

@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..checks import stopping
-from ..conformance import try_laws
-from ..diagnose.climb import Climbed
-from ..diagnose.engine import Diagnosis as Found
-from ..diagnose.engine import diagnose as search
-from ..diagnose.pieces import Store
-from ..diagnose.summary import summary
-from ..effects import catalogue
+from ..data.checks import stopping
 from ..errors import InputError, nearest
-from ..report import abilities, write_report
-from ..report.diagnosis_result import trace_sections
-from ..runstore import json_text, open_run, refuse_existing, versions
+from ..inference.diagnose.checkpoints import Store
+from ..inference.diagnose.climb import Climbed
+from ..inference.diagnose.engine import Diagnosis as Found
+from ..inference.diagnose.engine import diagnose as search
+from ..inference.diagnose.summary import summary
+from ..physics.effects import catalogue
+from ..show.report import abilities, write_report
+from ..show.report.diagnosis_result import trace_sections
+from ..simulation.conformance import try_laws
+from ..system.runstore import json_text, open_run, refuse_existing, versions
 from .campaign import Campaign, load_campaign
+from .checkpoints import Pieces, code_digest
 from .fit import Fit
-from .kept import Pieces, code_digest
 from .run import Tell, dataset, head, save
 from .shown import Shown, facts, table
 

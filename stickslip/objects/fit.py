@@ -10,25 +10,25 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..conformance import try_laws
-from ..diagnose.climb import Climbed, chosen, climb, extended, pinned, profiled, replaced, shortened
-from ..diagnose.confirm import Confirmation
-from ..diagnose.fitted import fitted_model
-from ..diagnose.summary import fitted_sections
-from ..effects import catalogue
 from ..errors import InputError, nearest
-from ..fit.parameters import Free, effect_parameters
-from ..fit.record import Fitted
-from ..force.backbone import backbone, power_law
-from ..force.fit import Fit as ForceFit
-from ..force.fit import at, deviations
-from ..force.fit import fit as fit_force
-from ..force.heldout import unseen
-from ..force.knots import PHASES
-from ..force.residual import coordinates
-from ..report.diagnosis_result import trace_sections
-from ..report.identifiability import identifiability
-from ..units import shown, to_si
+from ..inference.diagnose.climb import Climbed, chosen, climb, extended, pinned, profiled, replaced, shortened
+from ..inference.diagnose.confirm import Confirmation
+from ..inference.diagnose.fitted import fitted_model
+from ..inference.diagnose.summary import fitted_sections
+from ..inference.fit.parameters import Free, effect_parameters
+from ..inference.fit.serialised import Fitted
+from ..inference.force.backbone import backbone, power_law
+from ..inference.force.fit import Fit as ForceFit
+from ..inference.force.fit import at, deviations
+from ..inference.force.fit import fit as fit_force
+from ..inference.force.heldout import unseen
+from ..inference.force.knots import PHASES
+from ..inference.force.residual import coordinates
+from ..physics.effects import catalogue
+from ..show.report.diagnosis_result import trace_sections
+from ..show.report.identifiability import identifiability
+from ..simulation.conformance import try_laws
+from ..system.units import shown, to_si
 from .picture import FitPlots
 from .run import Tell, dataset, head, save
 from .shown import Shown, facts, table
@@ -319,7 +319,7 @@ class Fit(Shown):
         Returns:
             A row for each run: relative errors (1) of recurrence, slip and creep before the onset; slips missed.
         """
-        from ..diagnose.free_errors import errors
+        from ..inference.diagnose.free_errors import errors
 
         c = self.confirm(progress)
         free = c.models.get(self.parts)
@@ -350,14 +350,14 @@ class Fit(Shown):
             run: drive as this measured run was; default at the first run's velocity, for so many ``events``.
             events: slips to simulate where the drive has one velocity.
         """
-        from ..scenario.fitted import FittedRun
+        from .fitted_run import FittedRun
 
         record = FittedRun(Path(), {"title": self.campaign.title}, self.fitted)
         return record.scenario(changes, run, events)
 
     def simulate(self, changes: Sequence[str] = (), run: str | None = None, events: int = 5) -> xarray.Dataset:
         """Run the model freely under another drive; arguments as of :meth:`scenario`."""
-        from ..scenario import simulate
+        from ..simulation.scenario import simulate
 
         return simulate(self.scenario(changes, run, events))
 
@@ -585,10 +585,10 @@ def fit_static(
     Raises:
         InputError: nothing in the runs can be compared with the static model, or the rig lacks what it takes.
     """
-    from ..fit.static_table import StaticRig
-    from ..report import describe_trace, trace_pieces
-    from ..report.static_result import static_result
-    from ..trace import Trace
+    from ..data.trace import Trace
+    from ..inference.fit.static_table import StaticRig
+    from ..show.report import describe_trace, trace_pieces
+    from ..show.report.static_result import static_result
 
     tell, file = progress or _silent, campaign.description.path
     traces, found = campaign.traces, campaign.scaled[0]

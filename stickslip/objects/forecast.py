@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, nearest
-from ..forecast.levels import levels, wandering
-from ..forecast.predict import METHODS, Compared, Forecaster, goes_back, training_slips
-from ..forecast.rolling import SHARES, Rolled, choose, prepare, roll
-from ..forecast.telling import told
-from ..forecast.wander import Wander
+from ..inference.forecast.levels import levels, wandering
+from ..inference.forecast.predict import METHODS, Compared, Forecaster, goes_back, training_slips
+from ..inference.forecast.rolling import SHARES, Rolled, choose, prepare, roll
+from ..inference.forecast.telling import told
+from ..inference.forecast.wander import Wander
 from .run import Tell, dataset, head, save
 from .shown import Shown, facts, table
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-    from ..forecast.past import Past
+    from ..inference.forecast.past import Past
     from .campaign import Campaign
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -127,13 +127,13 @@ class ForecastPlots:
 
     def levels(self) -> Figure:
         """Levels at onset and arrest against time, and the level at onset against that at the arrest before."""
-        from ..report.forecast_figures import levels_picture
+        from ..show.report.forecast_figures import levels_picture
 
         return levels_picture(self._data)
 
     def calibration(self) -> Figure:
         """Forecast intervals against what came, and the calibration of every method."""
-        from ..report.forecast_figures import calibration_picture
+        from ..show.report.forecast_figures import calibration_picture
 
         return calibration_picture(self._data)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from ..runstore import open_run
+from ..system.runstore import open_run
 from .run import dataset, head
 from .shown import Shown, facts, table
 
@@ -60,7 +60,7 @@ class Inspection(Shown):
     @cached_property
     def arrays(self) -> xarray.Dataset:
         """Every run thinned for pictures, with its creep and slip."""
-        from ..report.pieces import reduced_record
+        from ..show.report.excerpts import reduced_record
 
         more: dict[str, tuple] = {}
         for i, (trace, found) in enumerate(zip(self.campaign.traces, self.campaign.events, strict=True)):
@@ -76,9 +76,9 @@ class Inspection(Shown):
         Raises:
             RunFolderError: the folder exists or cannot be written.
         """
-        from ..plots import save
-        from ..report import write_report
-        from ..report.figures import trace_picture
+        from ..show.plots import save
+        from ..show.report import write_report
+        from ..show.report.figures import trace_picture
 
         with open_run(folder, force=force) as run:
             run.arrays(self.arrays)
@@ -96,10 +96,10 @@ class Inspection(Shown):
 
 def inspect(campaign: Campaign) -> Inspection:
     """See :meth:`Campaign.inspect`."""
-    from ..checks import rig_against_motion, stopping
-    from ..diagnose.spring import spring_finding
-    from ..report import abilities, describe_trace, trace_pieces
-    from ..report.ripple import stick_ripple
+    from ..data.checks import rig_against_motion, stopping
+    from ..inference.diagnose.spring import spring_finding
+    from ..show.report import abilities, describe_trace, trace_pieces
+    from ..show.report.ripple import stick_ripple
 
     rows: list[dict[str, Any]] = []
     variables: dict[str, tuple] = {}
@@ -131,8 +131,8 @@ def inspect(campaign: Campaign) -> Inspection:
 
 def _lacking(campaign: Campaign) -> list[str]:
     """What the campaign does not say of the rig and a fit will ask for."""
-    from ..fit.normalised import is_ramp
-    from ..fit.static_table import StaticRig
+    from ..inference.fit.normalised import is_ramp
+    from ..inference.fit.static_table import StaticRig
 
     slipping = [t for t, s in zip(campaign.traces, campaign.events, strict=True) if s.events and not is_ramp(t)]
     said = []

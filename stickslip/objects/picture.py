@@ -9,8 +9,8 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
 from ..errors import InputError, nearest
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
-from ..report.force_figures import COLOURS
+from ..show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
+from ..show.report.force_figures import COLOURS
 
 if TYPE_CHECKING:
     import xarray

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..fit.parameters import to_si
-from ..force.posterior import Walked, walked
+from ..inference.fit.parameters import to_si
+from ..inference.force.posterior import Walked, walked
 
 if TYPE_CHECKING:
     import arviz

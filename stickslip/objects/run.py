@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ..runstore import open_run, versions
+from ..system.runstore import open_run, versions
 
 if TYPE_CHECKING:
     import xarray
@@ -59,7 +59,7 @@ def save(found: Result, folder: str | Path, force: bool = False, **more: Any) ->
     Raises:
         RunFolderError: the folder exists or cannot be written.
     """
-    from ..report import write_report
+    from ..show.report import write_report
 
     result, arrays = {**found.result, **more}, found.arrays
     with open_run(folder, force=force) as run:

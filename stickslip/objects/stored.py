@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnose.climb import Climbed
-from ..diagnose.engine import Rung, static_residual
-from ..effects import catalogue
-from ..force.candidates import with_start
-from ..force.fit import Fit as ForceFit
-from ..force.fit import at
-from ..force.heldout import unseen
-from ..force.problem import Point, Problem
-from ..force.scatter import Scatter
-from ..params import specs, variants
+from ..inference.diagnose.climb import Climbed
+from ..inference.diagnose.engine import Rung, static_residual
+from ..inference.force.candidates import with_start
+from ..inference.force.fit import Fit as ForceFit
+from ..inference.force.fit import at
+from ..inference.force.heldout import unseen
+from ..inference.force.problem import Point, Problem
+from ..inference.force.scatter import Scatter
+from ..physics.effects import catalogue
+from ..physics.params import specs, variants
 from .campaign import Campaign
 from .fit import Fit
 

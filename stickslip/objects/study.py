@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cluster import cluster
 from ..errors import InputError, StickslipError
-from ..lifeline import end_with
+from ..system.cluster import cluster
+from ..system.lifeline import end_with
 from .campaign import load_campaign
 from .run import Tell
 
@@ -75,7 +75,7 @@ def _name(path: Path) -> str:
 
 def _fitted(path: str, effects: tuple[str, ...], files: tuple[str, ...], parent: int | None) -> dict[str, Any]:
     """One campaign, in a worker."""
-    from .. import cache
+    from ..system import cache
 
     if parent is not None:
         end_with(parent)

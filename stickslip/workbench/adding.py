@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import campaign as files
+from ..data import campaign as files
+from ..data.readers import Columns, read_columns
 from ..errors import InputError
 from ..objects import Campaign, load_campaign
-from ..readers import Columns, read_columns
-from ..runstore import alone, write_aside
-from ..units import factor_to_si, to_si
+from ..system.runstore import alone, write_aside
+from ..system.units import factor_to_si, to_si
 from .places import new_place
 
 NONE = "-"  # no column

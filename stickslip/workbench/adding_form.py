@@ -7,9 +7,9 @@ from typing import Any
 
 import panel as pn
 
+from ..data.readers import Columns
 from ..errors import InputError
 from ..objects import Campaign
-from ..readers import Columns
 from .adding import CHANNELS, NONE, Choice, add, entry_text, guess, look
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Words

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import param
 
 from ..errors import StickslipError
-from ..progress import Cancelled, breathe
+from ..system.progress import Cancelled, breathe
 from .session import Session
 from .work import Worker, at_once
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import panel as pn
 
+from ..data.segment import Segmentation
 from ..objects import Campaign, Inspection
-from ..segment import Segmentation
-from ..units import shown
+from ..system.units import shown
 from .adding_form import adding
 from .beside import Beside, Show, Tell, beside
 from .controls import Message

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..segment import Segmentation
+from ..data.segment import Segmentation
 from .overview import Array, Record, reduced
 
 CREEP, SLIP, RING = "creep", "slip", "ring-down"

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..effects import catalogue
-from ..force.promise import Promise
+from ..inference.force.first_order import Promise
 from ..objects import Diagnosis, Fit
 from ..objects.picture import AGAINST
-from ..units import shown
+from ..physics.effects import catalogue
+from ..system.units import shown
 
 BINS = 12  # of a signature, each with as many points
 LEAST = 1.0  # fall of the cost that is shown at all

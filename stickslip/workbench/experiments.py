@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
+from ..data.segment import Segmentation
 from ..errors import InputError
 from ..objects import Campaign, Diagnosis, Fit
-from ..progress import breathe
-from ..scenario import Scenario
-from ..scenario.recording import Recording
-from ..scenario.schema import SweepTable
-from ..scenario.series import scenarios_of, summary
-from ..scenario.simulation import Progress, record
-from ..scenario.writers import write_campaign
-from ..segment import Segmentation
-from ..units import to_si
+from ..simulation.scenario import Scenario
+from ..simulation.scenario.recording import Recording
+from ..simulation.scenario.schema import SweepTable
+from ..simulation.scenario.series import scenarios_of, summary
+from ..simulation.scenario.simulation import Progress, record
+from ..simulation.scenario.writers import write_campaign
+from ..system.progress import breathe
+from ..system.units import to_si
 from .places import new_place
 
 Tell = Callable[[str, float], None]

@@ -18,7 +18,7 @@ from bokeh.models import (
 from bokeh.models.annotations import Legend, Span
 from bokeh.plotting import figure as bokeh_figure
 
-from ..plots.style import scaled
+from ..show.plots.style import scaled
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ..force.fit import Fit as ForceFit
+from ..inference.force.fit import Fit as ForceFit
 from ..objects import Campaign, Diagnosis, Fit
 from ..objects.stored import Arrays, packed, unpacked
-from ..runstore import json_text, read_result, write_aside
+from ..system.runstore import json_text, read_result, write_aside
 
 FOLDER = ".stickslip-workbench"
 SCHEMA = 1

@@ -10,8 +10,8 @@ from typing import Any
 
 from ..errors import InputError, RunFolderError
 from ..objects import Campaign, Diagnosis, Fit
-from ..report.html import REPORT
-from ..runstore import RESULT, read_result
+from ..show.report.html import REPORT
+from ..system.runstore import RESULT, read_result
 from .places import new_place
 
 MOST = 100  # run folders that are listed

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..objects import Fit
 from ..objects.fit import MEANINGS, STRENGTH
-from ..units import shown
+from ..system.units import shown
 
 DEVIATIONS = 12.0  # of a parameter that a slider reaches to either side
 LEAST, MOST = 0.3, 3.5  # e-folds to either side on a logarithmic scale

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..objects import Diagnosis, load_campaign
-from ..runstore import RESULT, read_result
+from ..system.runstore import RESULT, read_result
 from .session import Session
 
 CAMPAIGN = "campaign.toml"

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tsdownsample import MinMaxDownsampler, MinMaxLTTBDownsampler
 
-from ..segment import Segmentation, block_motion
-from ..trace import Trace
+from ..data.segment import Segmentation, block_motion
+from ..data.trace import Trace
 
 Array = NDArray[np.float64]
 POINTS = 3000  # that are sent of a curve

@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..effects import catalogue
 from ..errors import StickslipError
-from ..force.candidates import every_form
-from ..force.fit import Fit as ForceFit
-from ..force.promise import Promise, promise
-from ..force.score import Explained
+from ..inference.force.candidates import every_form
+from ..inference.force.first_order import Promise, promise
+from ..inference.force.fit import Fit as ForceFit
+from ..inference.force.signatures import Explained
 from ..objects import Campaign, Diagnosis, Fit, load_campaign
+from ..physics.effects import catalogue
 from .work import Search, Tell
 
 FIRST = (

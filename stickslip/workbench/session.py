@@ -16,12 +16,12 @@ from typing import Any
 
 import param
 
-from ..conformance import load_effects
 from ..errors import RunFolderError, StickslipError
-from ..force.promise import Promise
+from ..inference.force.first_order import Promise
 from ..objects import Campaign, Diagnosis, Fit, load_campaign
-from ..progress import Cancelled
-from ..runstore import alone
+from ..simulation.conformance import load_effects
+from ..system.progress import Cancelled
+from ..system.runstore import alone
 from . import searches
 from .journal import Journal
 from .watching import watch

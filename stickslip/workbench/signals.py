@@ -9,8 +9,8 @@ import panel as pn
 from bokeh.events import Tap
 from bokeh.models import Range1d, RangeTool
 
+from ..data.segment import Segmentation
 from ..objects import Campaign
-from ..segment import Segmentation
 from .figures import crosshair, figure, label, look, source, unit_of
 from .overview import DISPLACEMENT, FORCE, GAP, Record, Window, record
 from .picked import chosen, select

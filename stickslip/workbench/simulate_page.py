@@ -12,8 +12,8 @@ from bokeh.models import FixedTicker
 
 from ..errors import InputError
 from ..objects import Fit
-from ..scenario.recording import Recording
-from ..units import shown
+from ..simulation.scenario.recording import Recording
+from ..system.units import shown
 from . import experiments
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Words

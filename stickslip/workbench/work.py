@@ -16,7 +16,7 @@ from typing import Any
 from cloudpickle import dumps, loads
 
 from ..errors import StickslipError
-from ..progress import Cancelled, cancellable
+from ..system.progress import Cancelled, cancellable
 
 Tell = Callable[[str, float], None]
 PATIENCE = 3.0  # s that a process has to end after it gave its answer; its own workers may wait for more work
@@ -164,13 +164,13 @@ def end_all() -> None:
 def _child(there: Connection, work: bytes, files: Sequence[str], parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server's own; it ends this process
     os.environ.setdefault("PYTHONWARNINGS", QUIET)
-    from .. import cache, threads
-    from ..lifeline import end_with
+    from ..system import cache, threads
+    from ..system.lifeline import end_with
 
     end_with(parent)
     threads.one_for_linear_algebra()
     cache.enable()
-    from ..conformance import load_effects
+    from ..simulation.conformance import load_effects
 
     def tell(text: str, share: float) -> None:
         there.send_bytes(dumps(("tell", (text, share))))

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from joblib import Parallel, delayed
 
-from stickslip.solve import Tolerance
+from stickslip.simulation.solve import Tolerance
 from tests.solve.rig import tighter
 
 from .case import Case

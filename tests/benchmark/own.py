@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from stickslip.contact import Bank, bank_from_backbone, binning_error, default_edges
-from stickslip.model import Block, LoadPoint, Model, Weakening
-from stickslip.solve import ContactStepper, Stats, Tolerance, integrate
-from stickslip.solve.integrate import step_control
+from stickslip.physics.contact import Bank, bank_from_backbone, binning_error, default_edges
+from stickslip.physics.model import Block, LoadPoint, Model, Weakening
+from stickslip.simulation.solve import ContactStepper, Stats, Tolerance, integrate
+from stickslip.simulation.solve.integrate import step_control
 from tests.solve.rig import tighter
 
 from .case import C_S, D_C, DAMPING, MASS, RATIO, T_H, Answer, Case, on_grid

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, save, styled
+from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, save, styled
 
 from . import own
 from .case import REFERENCE, Answer, Case, events_of, leapfrog, measure

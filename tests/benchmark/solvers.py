@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from stickslip.contact import Bank
+from stickslip.physics.contact import Bank
 
 from . import own, peers
 from .case import CREEP, REFERENCE, STEPS, TIMES, Accuracy, Answer, Case, events_of, leapfrog, measure

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numba
 import numpy as np
 
-from stickslip.contact import (
+from stickslip.physics.contact import (
     Indentation,
     Profile,
     StaticContact,

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from stickslip.challenge.run import _protocol
-from stickslip.challenge.seal import CASES, RUNS, TRUTH, digest, make_seal
-from stickslip.runstore import file_record
+from stickslip.blind.run import _protocol
+from stickslip.blind.seal import CASES, RUNS, TRUTH, digest, make_seal
+from stickslip.system.runstore import file_record
 
 
 def effect(tag: str, multiple: float, amplitude: float = 1.0, *, own: bool = False, form: str = "") -> dict[str, Any]:

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from stickslip.challenge.generator import Bank as Springs
-from stickslip.challenge.generator import Drive, Rig, draw_setup, make_bank, simulate
-from stickslip.contact import Bank
-from stickslip.model import Block, LoadPoint, Model, Weakening
-from stickslip.solve import Tolerance, integrate
+from stickslip.blind.generator import Bank as Springs
+from stickslip.blind.generator import Drive, Rig, draw_setup, make_bank, simulate
+from stickslip.physics.contact import Bank
+from stickslip.physics.model import Block, LoadPoint, Model, Weakening
+from stickslip.simulation.solve import Tolerance, integrate
 
 STEP = 2e-5  # s, the generator's as in campaigns
 TIGHT = 1e5  # the model's default tolerance over the one used; its first onset converges with the root of it

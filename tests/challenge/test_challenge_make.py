@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.challenge.detection import DETECTION, detection, largest_multiple
-from stickslip.challenge.generator import CATALOGUED, EFFECTS, OUTSIDE
-from stickslip.challenge.make import make_challenge
-from stickslip.challenge.mix import Case, counts, plan
-from stickslip.challenge.seal import CASES, TRUTH, check_seal, digest
-from stickslip.challenge.visibility import SEEN, Reference
+from stickslip.blind.detection import DETECTION, detection, largest_multiple
+from stickslip.blind.generator import CATALOGUED, EFFECTS, OUTSIDE
+from stickslip.blind.make import make_challenge
+from stickslip.blind.mix import Case, counts, plan
+from stickslip.blind.seal import CASES, TRUTH, check_seal, digest
+from stickslip.blind.visibility import SEEN, Reference
 from stickslip.cli import run
 from stickslip.errors import InputError, RunFolderError, StickslipError
 
@@ -144,7 +144,7 @@ def test_making_is_deterministic_sealed_and_resumed(tmp_path: Path, monkeypatch:
     assert files == set(check_seal(first)["files"])
 
     # interrupted after the first case: the second start makes only the others, and the result is the same
-    import stickslip.challenge.make as module
+    import stickslip.blind.make as module
 
     made: list[str] = []
     real = module.make_case
@@ -189,8 +189,8 @@ def test_making_is_deterministic_sealed_and_resumed(tmp_path: Path, monkeypatch:
 
 
 def test_a_rig_that_does_not_slip_is_drawn_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import stickslip.challenge.generator as generator
-    from stickslip.challenge.make import make_case
+    import stickslip.blind.generator as generator
+    from stickslip.blind.make import make_case
 
     tried: list[tuple[int, float]] = []
 

@@ -18,14 +18,14 @@ import dask
 import pytest
 from invented import effect, make
 
-from stickslip.challenge.one_case import failures
-from stickslip.challenge.run import PROTOCOL, UNRECORDED, Progress, code_digest, run_challenge, time_left
-from stickslip.challenge.score import score_challenge
-from stickslip.challenge.seal import RUNS
-from stickslip.challenge.table import score_text
+from stickslip.blind.one_case import failures
+from stickslip.blind.run import PROTOCOL, UNRECORDED, Progress, code_digest, run_challenge, time_left
+from stickslip.blind.score import score_challenge
+from stickslip.blind.seal import RUNS
+from stickslip.blind.table import score_text
 from stickslip.cli import run
-from stickslip.cluster import cluster
 from stickslip.errors import InputError
+from stickslip.system.cluster import cluster
 
 NAMES = [f"case-{i:03d}" for i in range(1, 7)]
 
@@ -41,7 +41,7 @@ def invented_diagnosis(log: Path, slow: float = 0.0, failing: str = "", dying: s
         import os
         import time
 
-        from stickslip.runstore import file_record, open_run
+        from stickslip.system.runstore import file_record, open_run
 
         with log.open("a") as stream:
             stream.write(f"{out.name} {os.getpid()}\n")
@@ -140,7 +140,7 @@ def test_some_cases_first(tmp_path: Path, capsys: pytest.CaptureFixture, monkeyp
         asked.append(options["only"])
         return {"done": 2, "failed": len(asked) - 1, "open": 4}
 
-    monkeypatch.setattr("stickslip.challenge.run.run_challenge", instead)
+    monkeypatch.setattr("stickslip.blind.run.run_challenge", instead)
     command = ["challenge", "run", str(folder), "--only", "case-005, case-002"]
     assert run(command) == 0  # what was asked for is done
     assert run(command) == 3
@@ -166,7 +166,7 @@ def test_other_code_goes_on_and_is_written_down(tmp_path: Path, monkeypatch: pyt
     assert score_challenge(folder)["protocol"]["codes"] == {code_digest(): first}
     assert "versions of the code" not in score_text(score_challenge(folder))
 
-    monkeypatch.setattr("stickslip.challenge.run.code_digest", lambda: "other")
+    monkeypatch.setattr("stickslip.blind.run.code_digest", lambda: "other")
     run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log))
     rest = sorted(set(NAMES[:4]) - set(first))
     found = json.loads(path.read_text())
@@ -178,7 +178,7 @@ def test_other_code_goes_on_and_is_written_down(tmp_path: Path, monkeypatch: pyt
     codes = {code_digest(): [n for n in first if n != NAMES[1]], "other": sorted([*rest, NAMES[1]])}
     assert json.loads(path.read_text())["codes"] == {code: done for code, done in codes.items() if done}
     before = path.read_bytes()
-    monkeypatch.setattr("stickslip.challenge.run.code_digest", lambda: "third")
+    monkeypatch.setattr("stickslip.blind.run.code_digest", lambda: "third")
     run_challenge(folder, workers=1, retry=True, diagnosis=invented_diagnosis(log))
     assert path.read_bytes() == before
 
@@ -206,8 +206,8 @@ def test_the_time_left_counts_with_the_workers(workers: int, finished: int) -> N
 
 def test_a_scheduler_without_workers_is_told_and_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, log = challenge(tmp_path / "c", NAMES[:2]), tmp_path / "log"
-    monkeypatch.setattr("stickslip.cluster.LOOK", 0.1)
-    monkeypatch.setattr("stickslip.cluster.LONELY", 1.0)
+    monkeypatch.setattr("stickslip.system.cluster.LOOK", 0.1)
+    monkeypatch.setattr("stickslip.system.cluster.LONELY", 1.0)
     noted: list[str] = []
     with loopback_cluster(tmp_path, 0) as (address, _):
         come: list[subprocess.Popen] = []
@@ -299,7 +299,7 @@ def test_a_diagnosis_without_a_result_is_a_failure(tmp_path: Path) -> None:
 
 def test_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = challenge(tmp_path / "c", NAMES[:1])
-    monkeypatch.setattr("stickslip.cluster.PATIENCE", 1.0)
+    monkeypatch.setattr("stickslip.system.cluster.PATIENCE", 1.0)
     assert run(["challenge", "run", str(folder), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     assert "no scheduler answers" in capsys.readouterr().err
     assert run(["challenge", "run", str(tmp_path)]) == 2

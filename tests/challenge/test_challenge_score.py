@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from invented import answer, effect, make, result
 
-from stickslip.challenge.answers import read_answer
-from stickslip.challenge.figures import VERDICTS, verdict_label
-from stickslip.challenge.marks import mark, rate
-from stickslip.challenge.one_case import record_failure
-from stickslip.challenge.pictures import amplitude_figure, confusion_by_amplitude_figure, confusion_figure
-from stickslip.challenge.score import score_challenge
-from stickslip.challenge.seal import RUNS, SealError, read_truth
-from stickslip.challenge.table import score_text
+from stickslip.blind.answers import read_answer
+from stickslip.blind.figures import VERDICTS, verdict_label
+from stickslip.blind.marks import mark, rate
+from stickslip.blind.one_case import record_failure
+from stickslip.blind.pictures import amplitude_figure, confusion_by_amplitude_figure, confusion_figure
+from stickslip.blind.score import score_challenge
+from stickslip.blind.seal import RUNS, SealError, read_truth
+from stickslip.blind.table import score_text
 from stickslip.cli import run
 from stickslip.errors import InputError
 

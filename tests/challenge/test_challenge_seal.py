@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from invented import answer, effect, make, result
 
-from stickslip.challenge.run import run_challenge
-from stickslip.challenge.score import score_challenge
-from stickslip.challenge.seal import CASES, RUNS, SEAL, TRUTH, SealError, check_seal, digest
+from stickslip.blind.run import run_challenge
+from stickslip.blind.score import score_challenge
+from stickslip.blind.seal import CASES, RUNS, SEAL, TRUTH, SealError, check_seal, digest
 from stickslip.cli import run
 from stickslip.errors import InputError
-from stickslip.runstore import file_record
+from stickslip.system.runstore import file_record
 
 CASE = {"case-1": ("one", [effect("wear", 6.0)]), "case-2": ("nothing", [])}
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from invented import effect
 
-from stickslip.challenge.answers import Answer
-from stickslip.challenge.generator import EFFECTS, Drive, Rig, Setup, Surface, make_bank, simulate
-from stickslip.challenge.generator import slots as S
-from stickslip.challenge.generator.laws import body_force, load_point, spring_force, wave
-from stickslip.challenge.sizes import Size, compared, factor
-from stickslip.effects import catalogue
-from stickslip.effects.base import Contact, Motion
+from stickslip.blind.answers import Answer
+from stickslip.blind.generator import EFFECTS, Drive, Rig, Setup, Surface, make_bank, simulate
+from stickslip.blind.generator import slots as S
+from stickslip.blind.generator.laws import body_force, load_point, spring_force, wave
+from stickslip.blind.sizes import Size, compared, factor
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.base import Contact, Motion
 
 TURNS = np.arange(0.0, 4000.0, 0.01 * np.sqrt(3))  # never the same place of a turn twice
 

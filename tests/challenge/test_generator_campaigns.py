@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.campaign import load_campaign, load_traces
-from stickslip.challenge import generator
-from stickslip.challenge.generator import Run, campaigns, draw_setup, make_campaign
-from stickslip.challenge.generator.__main__ import main
-from stickslip.challenge.generator.rigs import unstable
-from stickslip.challenge.generator.sensor import COUNT
+from stickslip.blind import generator
+from stickslip.blind.generator import Run, campaigns, draw_setup, make_campaign
+from stickslip.blind.generator.__main__ import main
+from stickslip.blind.generator.rigs import unstable
+from stickslip.blind.generator.sensor import COUNT
+from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.errors import InputError
 
 SHORT = (
@@ -163,7 +163,7 @@ def test_generator_shares_nothing_with_the_model() -> None:
     """Of the package it may import the errors and the units alone."""
     root = Path(generator.__file__).parent
     for path in root.rglob("*.py"):
-        package = ("stickslip.challenge.generator." + str(path.relative_to(root).parent).replace(".", "")).rstrip(".")
+        package = ("stickslip.blind.generator." + str(path.relative_to(root).parent).replace(".", "")).rstrip(".")
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
                 names = [alias.name for alias in node.names]
@@ -173,7 +173,7 @@ def test_generator_shares_nothing_with_the_model() -> None:
             else:
                 continue
             for name in names:
-                allowed = ("stickslip.challenge.generator", "stickslip.errors", "stickslip.units")
+                allowed = ("stickslip.blind.generator", "stickslip.errors", "stickslip.system.units")
                 assert not name.startswith("stickslip") or name.startswith(allowed), f"{path.name} imports {name}"
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.challenge.generator import Bank, Drive, Rig, Surface, make_bank, simulate
-from stickslip.challenge.generator import slots as S
-from stickslip.challenge.generator.bank import join
-from stickslip.challenge.generator.contacts import fresh_lines
-from stickslip.challenge.generator.lines import slide_curve
+from stickslip.blind.generator import Bank, Drive, Rig, Surface, make_bank, simulate
+from stickslip.blind.generator import slots as S
+from stickslip.blind.generator.bank import join
+from stickslip.blind.generator.contacts import fresh_lines
+from stickslip.blind.generator.lines import slide_curve
 from stickslip.errors import InputError, SolveError
 
 LOADS = np.full(4, 0.31)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from stickslip.challenge.generator import (
+from stickslip.blind.generator import (
     CATALOGUED,
     EFFECTS,
     OUTSIDE,
@@ -19,8 +19,8 @@ from stickslip.challenge.generator import (
     make_bank,
     simulate,
 )
-from stickslip.challenge.generator.forms import find
-from stickslip.challenge.generator.sensor import SILENT, counts, spot
+from stickslip.blind.generator.forms import find
+from stickslip.blind.generator.sensor import SILENT, counts, spot
 from stickslip.errors import InputError
 
 TAGS = """inertia velocity-weakening slip-weakening contact-ageing rate-and-state direct-effect thermal-creep

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from stickslip.challenge.generator import Rig
-from stickslip.challenge.generator import slots as S
-from stickslip.challenge.generator.implicit import kick
-from stickslip.challenge.generator.laws import advance, decay, load_point, rate_factor, spring_force, wave
-from stickslip.challenge.generator.springs import clip, creep_rate, plain
+from stickslip.blind.generator import Rig
+from stickslip.blind.generator import slots as S
+from stickslip.blind.generator.implicit import kick
+from stickslip.blind.generator.laws import advance, decay, load_point, rate_factor, spring_force, wave
+from stickslip.blind.generator.springs import clip, creep_rate, plain
 
 V_STAR, LENGTH, RIG = 1e-6, 2e-6, Rig().vector()
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from stickslip.challenge.generator.bank import make_bank
-from stickslip.challenge.generator.lines import (
+from stickslip.blind.generator.bank import make_bank
+from stickslip.blind.generator.lines import (
     Surface,
     gaps,
     group,

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.campaign import load_campaign, load_traces
-from stickslip.challenge.generator import Run, draw_setup, make_campaign
-from stickslip.challenge.generator.recorder import RANGE, RECORDERS, record
-from stickslip.challenge.generator.sensor import COUNT
+from stickslip.blind.generator import Run, draw_setup, make_campaign
+from stickslip.blind.generator.recorder import RANGE, RECORDERS, record
+from stickslip.blind.generator.sensor import COUNT
 from stickslip.cli import run
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.trace import Trace
 from stickslip.errors import InputError
-from stickslip.trace import Trace
 
 RUNS = (
     Run("v200", 2e-4, events=4),

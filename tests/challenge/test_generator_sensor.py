@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from stickslip.challenge.generator.sensor import COUNT, FRINGE, SILENT, Sensor, counts, filtered, noise, spot
+from stickslip.blind.generator.sensor import COUNT, FRINGE, SILENT, Sensor, counts, filtered, noise, spot
 
 RATE = 1e4
 

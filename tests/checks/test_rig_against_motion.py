@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip.challenge.generator import Run, make_campaign
+from stickslip.blind.generator import Run, make_campaign
 from stickslip.errors import InputError
 from stickslip.objects.diagnosis import diagnose_campaign
 

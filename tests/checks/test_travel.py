@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.checks.sign import sign_findings
-from stickslip.checks.travel import travel
-from stickslip.segment import segment
-from stickslip.trace import Drive, Trace
+from stickslip.data.checks.sign import sign_findings
+from stickslip.data.checks.travel import travel
+from stickslip.data.segment import segment
+from stickslip.data.trace import Drive, Trace
 
 SLIP, LAST = 45e-6, 0.03  # m, s
 

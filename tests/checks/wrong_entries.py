@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 
 from stickslip import __version__
-from stickslip.campaign import load_campaign, load_traces
-from stickslip.challenge.detection import amplitude, largest_multiple, visible_forms
-from stickslip.challenge.generator import make_campaign
-from stickslip.challenge.generator.forms import EFFECTS
-from stickslip.checks import Finding, rig_against_motion
+from stickslip.blind.detection import amplitude, largest_multiple, visible_forms
+from stickslip.blind.generator import make_campaign
+from stickslip.blind.generator.forms import EFFECTS
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.checks import Finding, rig_against_motion
+from stickslip.data.segment import segment
 from stickslip.errors import InputError
-from stickslip.segment import segment
 
 HIDDEN = ("sensor-gain", "wear", "position-dependent-friction", "velocity-weakening", "sensor-drift")
 MULTIPLE = 10.0  # of detection, or the largest that is plausible

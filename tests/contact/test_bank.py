@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import (
+from stickslip.errors import InputError
+from stickslip.physics.contact import (
     bank_from_backbone,
     bank_from_contact,
     binning_error,
@@ -22,7 +23,6 @@ from stickslip.contact import (
     spring_bank,
     static_contact,
 )
-from stickslip.errors import InputError
 
 F_S, U_MAX, P = 0.2604, 1e-6, 3.2
 

@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import (
+from stickslip.errors import InputError
+from stickslip.physics.contact import (
     creep_curve,
     creep_displacements,
     default_loads,
@@ -17,7 +18,6 @@ from stickslip.contact import (
     static_contact,
     virtual_time,
 )
-from stickslip.errors import InputError
 
 L = 20e-6
 SMALL = {"lines": 6, "n_springs": 512}

@@ -2,8 +2,8 @@
 
 import pytest
 
-from stickslip.contact import equal_bodies, two_bodies
 from stickslip.errors import InputError
+from stickslip.physics.contact import equal_bodies, two_bodies
 
 
 def test_steel_on_steel():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip.contact import (
+from stickslip.physics.contact import (
     Hysteresis,
     damping_ratio,
     loop_area,

@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import (
+from stickslip.errors import InputError
+from stickslip.physics.contact import (
     Profile,
     SaturationWarning,
     check_saturation,
@@ -19,8 +20,7 @@ from stickslip.contact import (
     rough_lines,
     rough_table,
 )
-from stickslip.contact.indentation import sort_gaps
-from stickslip.errors import InputError
+from stickslip.physics.contact.indentation import sort_gaps
 
 STEEL = equal_bodies()
 L = 20e-6

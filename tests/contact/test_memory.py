@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import (
+from stickslip.errors import InputError
+from stickslip.physics.contact import (
     arrest,
     arrest_force,
     loading_displacement,
@@ -13,7 +14,6 @@ from stickslip.contact import (
     power_law_bank,
     reload_displacement,
 )
-from stickslip.errors import InputError
 
 F_S, U_MAX, P = 0.2604, 1e-6, 3.2
 TABLE = [(0.95, 0.90, 16, 36, 21), (0.90, 0.80, 32, 83, 9.2), (0.85, 0.70, 48, 134, 5.7), (0.70, 0.40, 102, 298, 2.6)]

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from stickslip.contact import (
+from stickslip.errors import InputError
+from stickslip.physics.contact import (
     add_curvature,
     cone,
     exponential_gaps,
@@ -15,7 +16,6 @@ from stickslip.contact import (
     rough_lines,
     sphere,
 )
-from stickslip.errors import InputError
 
 
 def test_analytic_gaps():

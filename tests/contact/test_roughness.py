@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import cut_to_line_factor, line_phasors, rough_lines
-from stickslip.contact.roughness import amplitudes, lines_from_phasors
 from stickslip.errors import InputError
+from stickslip.physics.contact import cut_to_line_factor, line_phasors, rough_lines
+from stickslip.physics.contact.roughness import amplitudes, lines_from_phasors
 
 
 @pytest.mark.parametrize("H", [0.05, 0.3, 0.9])

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import default_loads
+from stickslip.physics.contact import default_loads
 from tests.benchmark import static
 
 

@@ -4,7 +4,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import (
+from stickslip.errors import InputError
+from stickslip.physics.contact import (
     add_curvature,
     cone,
     equal_bodies,
@@ -18,7 +19,6 @@ from stickslip.contact import (
     sphere,
     static_contact,
 )
-from stickslip.errors import InputError
 
 STEEL = equal_bodies()
 L = 20e-6

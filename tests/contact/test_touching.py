@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import (
+from stickslip.physics.contact import (
     Profile,
     creep_curve,
     default_loads,

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from stickslip.campaign import Unmeasured, campaign_template, load_campaign, load_traces
-from stickslip.campaign.place import key_lines
+from stickslip.data.campaign import Unmeasured, campaign_template, load_campaign, load_traces
+from stickslip.data.campaign.place import key_lines
 
 ROWS = np.column_stack([np.arange(100) * 0.01, np.arange(100) * 0.4])
 TRACE = """time = { column = "time", unit = "s" }

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import scipy.io
 
-from stickslip.campaign import campaign_text, load_campaign, load_traces
 from stickslip.cli import run as command
-from stickslip.segment import segment
-from stickslip.trace import Drive, Trace
+from stickslip.data.campaign import campaign_text, load_campaign, load_traces
+from stickslip.data.segment import segment
+from stickslip.data.trace import Drive, Trace
 
 TIME = 'time = { column = "time", unit = "s" }\n'
 X = 'displacement = { column = "x", unit = "um" }\n'

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from stickslip.features import measurement
-from stickslip.features.layout import LEVELS
-from stickslip.features.measurement import measure
-from stickslip.segment import event_shapes, segment
-from stickslip.trace import Drive, Trace
+from stickslip.data.segment import event_shapes, segment
+from stickslip.data.trace import Drive, Trace
+from stickslip.inference.features import measurement
+from stickslip.inference.features.layout import LEVELS
+from stickslip.inference.features.measurement import measure
 
 
 def measured(model, rate, noise, seed, period=2e-3):

@@ -9,9 +9,9 @@ import pytest
 import scipy.io
 import xarray
 
+from stickslip.data.readers import READERS, read_columns
+from stickslip.data.readers.npy import NpyReader
 from stickslip.errors import InputError
-from stickslip.readers import READERS, read_columns
-from stickslip.readers.npy import NpyReader
 
 T = np.arange(50) * 1e-3
 X = np.sin(T * 30) * 1e-6
@@ -171,8 +171,8 @@ def test_content_counts_more_than_the_ending(tmp_path):
 def test_a_plug_in_reader_is_found_and_a_broken_one_left_out(tmp_path, monkeypatch):
     from importlib.metadata import EntryPoint
 
-    from stickslip import registry
-    from stickslip.readers import Columns, Reader, Registry
+    from stickslip.data.readers import Columns, Reader, Registry
+    from stickslip.system import registry
 
     class Mine:
         name, suffixes, description = "mine", (".mine",), "my own format"
@@ -212,7 +212,7 @@ def test_what_another_file_left_open_is_no_warning_of_this_one(tmp_path):
 
     np.save(tmp_path / "a.npy", X)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip.readers.find_reader", lambda *a: Reader())
+        patch.setattr("stickslip.data.readers.find_reader", lambda *a: Reader())
         assert read_columns(tmp_path / "a.npy").notes == ["warning of the reader: of this file"]
 
 

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip.readers import find_reader, read_columns
-from stickslip.readers.base import split_unit
+from stickslip.data.readers import find_reader, read_columns
+from stickslip.data.readers.base import split_unit
 
 T = np.array([0.0, 0.001, 0.002, 0.003, 0.004])
 X = np.array([1.5, -2.25, 3e-7, 40000.0, 0.125])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pyuff
 
-from stickslip.readers import read_columns
+from stickslip.data.readers import read_columns
 
 T = np.arange(40) * 2.5e-4
 X = np.cos(T * 300) * 1e-6

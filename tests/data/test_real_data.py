@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from stickslip.campaign import load_campaign, load_traces
-from stickslip.readers import read_columns
-from stickslip.segment import segment
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.readers import read_columns
+from stickslip.data.segment import segment
 
 
 @pytest.fixture

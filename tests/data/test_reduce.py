@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.segment import reduce_trace, segment
-from stickslip.trace import Drive, Trace
+from stickslip.data.segment import reduce_trace, segment
+from stickslip.data.trace import Drive, Trace
 
 LSB = 7.91e-9
 
@@ -66,8 +66,8 @@ def test_a_record_without_events_is_shortened_too():
 
 LONG = """
 import resource, sys, time
-from stickslip.campaign import load_campaign, load_traces
-from stickslip.segment import reduce_trace, segment
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.segment import reduce_trace, segment
 start = time.process_time()
 (trace,) = load_traces(load_campaign(sys.argv[1]))
 found = segment(trace)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
-from stickslip.readers.repair import (
+from stickslip.data.readers.repair import (
     correct_clock,
     despike,
     drop_duplicates,
@@ -14,8 +13,9 @@ from stickslip.readers.repair import (
     join_resets,
     unwrap,
 )
-from stickslip.resolution import estimate_resolution, noise_level
-from stickslip.trace import Drive, Trace
+from stickslip.data.resolution import estimate_resolution, noise_level
+from stickslip.data.trace import Drive, Trace
+from stickslip.errors import InputError
 
 LSB = 7.91e-9
 RATE = 10_000

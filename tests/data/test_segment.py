@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from stickslip.segment import PHASES, block_motion, choose_settings, segment, segment_motion, velocity
-from stickslip.trace import Drive, Trace
+from stickslip.data.segment import PHASES, block_motion, choose_settings, segment, segment_motion, velocity
+from stickslip.data.trace import Drive, Trace
 
 LSB = 7.91e-9
 
@@ -324,7 +324,7 @@ def test_windowed_velocity_is_exact_for_steady_motion_and_has_the_stated_noise(h
     t = 1e4 + np.arange(600_000) * 2e-5
     assert np.abs(velocity(t, 3e-5 * t, half) / 3e-5 - 1).max() < 1e-6
     noise = np.random.default_rng(2).normal(0, 1e-8, t.size)
-    from stickslip.segment.kinematics import velocity_noise
+    from stickslip.data.segment.kinematics import velocity_noise
 
     assert np.std(velocity(t, noise, half)) == pytest.approx(velocity_noise(1e-8, half, 2e-5), rel=0.03)
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from stickslip.segment import LEVELS, event_shapes, segment
-from stickslip.trace import Drive, Trace
+from stickslip.data.segment import LEVELS, event_shapes, segment
+from stickslip.data.trace import Drive, Trace
 
 DECAY = {
     "exponential": lambda t, fold: np.exp(-t / fold),

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from stickslip.data.trace import Drive, Trace
 from stickslip.errors import InputError
-from stickslip.trace import Drive, Trace
 
 
 def test_trace_cannot_be_changed_from_outside():

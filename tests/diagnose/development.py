@@ -22,14 +22,14 @@ from typing import Any
 import numpy as np
 
 from stickslip import __version__
-from stickslip.challenge.answers import read_answer
-from stickslip.challenge.detection import amplitude, largest_multiple, visible_forms
-from stickslip.challenge.generator import CATALOGUED, EFFECTS
-from stickslip.challenge.make import make_challenge
-from stickslip.challenge.marks import mark, rate
-from stickslip.challenge.mix import Case, Hidden, case_seed
-from stickslip.challenge.run import Progress, run_challenge
-from stickslip.challenge.seal import RUNS, read_seal, read_truth
+from stickslip.blind.answers import read_answer
+from stickslip.blind.detection import amplitude, largest_multiple, visible_forms
+from stickslip.blind.generator import CATALOGUED, EFFECTS
+from stickslip.blind.make import make_challenge
+from stickslip.blind.marks import mark, rate
+from stickslip.blind.mix import Case, Hidden, case_seed
+from stickslip.blind.run import Progress, run_challenge
+from stickslip.blind.seal import RUNS, read_seal, read_truth
 from stickslip.objects.diagnosis import diagnose_campaign
 
 MULTIPLE = 10.0  # of detection, or the largest at which the block slips
@@ -93,7 +93,7 @@ class LeftOut:
     hidden: dict[str, str]
 
     def __call__(self, campaign: Path, out: Path) -> Any:
-        from stickslip.effects import catalogue
+        from stickslip.physics.effects import catalogue
 
         tag = self.hidden[campaign.parent.name]
         tried = [t for t, cls in catalogue.all().items() if t != tag and tag not in cls.generalises]

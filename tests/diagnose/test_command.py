@@ -9,14 +9,14 @@ import pytest
 
 from stickslip.cli import run
 from stickslip.cli.diagnose import _print, _teller
-from stickslip.effects import catalogue
 from stickslip.errors import InputError
+from stickslip.objects.checkpoints import Pieces
 from stickslip.objects.diagnosis import diagnose_campaign
-from stickslip.objects.kept import Pieces
-from stickslip.runstore import open_run
+from stickslip.physics.effects import catalogue
+from stickslip.system.runstore import open_run
 
-OWN = """from stickslip.effects import Threshold
-from stickslip.params import parameter
+OWN = """from stickslip.physics.effects import Threshold
+from stickslip.effects import parameter
 
 class Mine(Threshold):
     tag = "mine"
@@ -128,7 +128,7 @@ def test_without_a_folder_it_is_named_after_the_campaign(tmp_path, monkeypatch, 
 
 
 def test_the_shipped_campaign_is_what_a_diagnosis_asks_for():
-    from stickslip.campaign import load_campaign, load_traces
+    from stickslip.data.campaign import load_campaign, load_traces
 
     assert sum(file.stat().st_size for file in CAMPAIGN.parent.iterdir()) <= 5e6
     traces = load_traces(load_campaign(CAMPAIGN))
@@ -174,7 +174,7 @@ def test_the_terminal_says_every_step_of_the_ladder_and_every_experiment(tmp_pat
 
 @pytest.mark.slow
 def test_the_shipped_campaign_is_diagnosed(tmp_path):
-    from stickslip.runstore import read_result
+    from stickslip.system.runstore import read_result
 
     out = tmp_path / "out"
     tried = "contact-ageing,rate-and-state,viscous-drag,sensor-drift"

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 import xarray
 
-from stickslip.diagnose import confirm as confirming
-from stickslip.diagnose.confirm import confirm
-from stickslip.diagnose.engine import settled
-from stickslip.diagnose.free_errors import contradiction, errors, predicted, summed
-from stickslip.diagnose.free_words import cautions, free_variables
-from stickslip.diagnose.prepare import Prepared
-from stickslip.effects import catalogue
-from stickslip.force.candidates import try_effect
-from stickslip.force.fit import fit
-from stickslip.force.heldout import halves, points
-from stickslip.force.score import Explained
-from stickslip.report.free_figures import free_picture
+from stickslip.inference.diagnose import confirm as confirming
+from stickslip.inference.diagnose.confirm import confirm
+from stickslip.inference.diagnose.engine import settled
+from stickslip.inference.diagnose.free_errors import contradiction, errors, predicted, summed
+from stickslip.inference.diagnose.free_words import cautions, free_variables
+from stickslip.inference.diagnose.prepare import Prepared
+from stickslip.inference.force.candidates import try_effect
+from stickslip.inference.force.fit import fit
+from stickslip.inference.force.heldout import halves, points
+from stickslip.inference.force.signatures import Explained
+from stickslip.physics.effects import catalogue
+from stickslip.show.report.free_figures import free_picture
 from tests.force.conftest import made, seen
 
 BASE, AGED = ("static", "inertia"), ("static", "inertia", "contact-ageing")

@@ -8,10 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.diagnose.decide import CHANCE, DISPERSION, ERRORS, Judged, best_forms, named, odd, standard_error
-from stickslip.effects import catalogue
-from stickslip.fit.parameters import effect_parameters
-from stickslip.force.candidates import Candidate
+from stickslip.inference.diagnose.decide import (
+    CHANCE,
+    DISPERSION,
+    ERRORS,
+    Judged,
+    best_forms,
+    named,
+    odd,
+    standard_error,
+)
+from stickslip.inference.fit.parameters import effect_parameters
+from stickslip.inference.force.candidates import Candidate
+from stickslip.physics.effects import catalogue
 
 EVENTS = 40
 

@@ -9,17 +9,17 @@ import sys
 import pytest
 
 from stickslip.cli import run
-from stickslip.effects import catalogue
-from stickslip.runstore import read_result
-from stickslip.scenario import make_scenario, simulate
-from stickslip.scenario.demonstration import RIG
-from stickslip.scenario.writers import write_campaign
+from stickslip.physics.effects import catalogue
+from stickslip.simulation.scenario import make_scenario, simulate
+from stickslip.simulation.scenario.demonstration import RIG
+from stickslip.simulation.scenario.writers import write_campaign
+from stickslip.system.runstore import read_result
 
 SIZE = 0.05
 EFFECT = """
 from jax import Array
 from stickslip.effects import Threshold
-from stickslip.params import parameter
+from stickslip.effects import parameter
 
 class Finish(Threshold):
     tag = "surface-finish"
@@ -44,7 +44,7 @@ def files(tmp_path, monkeypatch, request):
         info = tmp_path / "surface_finish-1.0.dist-info"
         info.mkdir()
         (info / "METADATA").write_text("Metadata-Version: 2.1\nName: surface-finish\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text("[stickslip.effects]\nsurface-finish = surface_finish:Finish\n")
+        (info / "entry_points.txt").write_text("[stickslip.physics.effects]\nsurface-finish = surface_finish:Finish\n")
         monkeypatch.syspath_prepend(str(tmp_path))
         monkeypatch.setattr(catalogue.EFFECTS, "_plugged", None)
         importlib.invalidate_caches()

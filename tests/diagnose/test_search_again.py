@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.diagnose import engine
-from stickslip.diagnose.decide import Judged
-from stickslip.force.candidates import Candidate
-from stickslip.force.problem import Composition
+from stickslip.inference.diagnose import engine
+from stickslip.inference.diagnose.decide import Judged
+from stickslip.inference.force.candidates import Candidate
+from stickslip.inference.force.problem import Composition
 
 EVENTS = 30
 

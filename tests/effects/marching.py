@@ -5,9 +5,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from stickslip.contact import Bank
-from stickslip.effects.base import Motion
-from stickslip.model import Block, LoadPoint, Model, Weakening
+from stickslip.physics.contact import Bank
+from stickslip.physics.effects.base import Motion
+from stickslip.physics.model import Block, LoadPoint, Model, Weakening
 
 
 def bank_of(stiffness, strength):

@@ -8,19 +8,19 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.conformance import check_effect
-from stickslip.contact import power_law_bank
-from stickslip.effects import catalogue
-from stickslip.effects.equations import of_model, of_tags
 from stickslip.errors import InputError
-from stickslip.model import Block, LoadPoint, Model, Weakening
-from stickslip.solve import integrate
+from stickslip.physics.contact import power_law_bank
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.equations import of_model, of_tags
+from stickslip.physics.model import Block, LoadPoint, Model, Weakening
+from stickslip.simulation.conformance import check_effect
+from stickslip.simulation.solve import integrate
 
 MY_EFFECT = """
 from jax import Array
 import jax.numpy as jnp
 from stickslip.effects import Threshold
-from stickslip.params import parameter
+from stickslip.effects import parameter
 
 class Humming(Threshold):
     tag = "humming"
@@ -83,7 +83,10 @@ def test_loading_again_replaces(tmp_path: Path, no_user_effects: None) -> None:
         (('tag = "humming"', 'tag = "sensor-drift"'), "taken"),
         (('tag = "humming"', 'tag = "Humming"'), "needs a tag"),
         (("(Threshold)", "(Treshold)"), "line 7.*Treshold"),
-        (("from stickslip.effects import Threshold", "from stickslip.effects import Treshold"), "line 4.*Treshold"),
+        (
+            ("from stickslip.effects import Threshold", "from stickslip.effects import Treshold"),
+            "line 4.*Treshold",
+        ),
         (("def strength", "def strengt"), "method is not written"),
         (("(self, state", "(self state"), "not valid Python"),
         (("null=0.0, ", ""), "needs an amplitude"),

@@ -8,12 +8,12 @@ import jax.numpy as jnp
 import pytest
 from jax import Array
 
-from stickslip.conformance import check_effect, check_effects
-from stickslip.conformance.statics import check_metadata
-from stickslip.contact import Bank
-from stickslip.effects import catalogue
-from stickslip.effects.base import BodyForce, Contact, Memory, Motion, Threshold
-from stickslip.params import parameter, variant
+from stickslip.physics.contact import Bank
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.base import BodyForce, Contact, Memory, Motion, Threshold
+from stickslip.physics.params import parameter, variant
+from stickslip.simulation.conformance import check_effect, check_effects
+from stickslip.simulation.conformance.statics import check_metadata
 
 TAGS = [
     "inertia",

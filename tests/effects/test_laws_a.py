@@ -6,26 +6,26 @@ import pytest
 from marching import bank_of, march, spread_out, still_model
 from scipy.integrate import solve_ivp
 
-from stickslip.contact import mixture, power_law_backbone, power_law_bank
-from stickslip.effects.adhesion import Adhesion
-from stickslip.effects.contact_ageing import ContactAgeing
-from stickslip.effects.contact_damping import ContactDamping
-from stickslip.effects.contact_renewal import ContactRenewal
-from stickslip.effects.curvature import Curvature
-from stickslip.effects.direct_effect import DirectEffect
-from stickslip.effects.flash_heating import FlashHeating
-from stickslip.effects.plasticity import Plasticity
-from stickslip.effects.position_dependent_friction import PositionDependentFriction
-from stickslip.effects.residual_load import ResidualLoad
-from stickslip.effects.roll_off import RollOff
-from stickslip.effects.slip_weakening import SlipWeakening
-from stickslip.effects.thermal_creep import ThermalCreep
-from stickslip.effects.unequal_contacts import UnequalContacts
-from stickslip.effects.velocity_weakening import VelocityWeakening
-from stickslip.effects.viscoelastic_contact import ViscoelasticContact
-from stickslip.effects.viscous_drag import ViscousDrag
-from stickslip.effects.wear import Wear
-from stickslip.solve import Tolerance, integrate
+from stickslip.physics.contact import mixture, power_law_backbone, power_law_bank
+from stickslip.physics.effects.adhesion import Adhesion
+from stickslip.physics.effects.contact_ageing import ContactAgeing
+from stickslip.physics.effects.contact_damping import ContactDamping
+from stickslip.physics.effects.contact_renewal import ContactRenewal
+from stickslip.physics.effects.curvature import Curvature
+from stickslip.physics.effects.direct_effect import DirectEffect
+from stickslip.physics.effects.flash_heating import FlashHeating
+from stickslip.physics.effects.plasticity import Plasticity
+from stickslip.physics.effects.position_dependent_friction import PositionDependentFriction
+from stickslip.physics.effects.residual_load import ResidualLoad
+from stickslip.physics.effects.roll_off import RollOff
+from stickslip.physics.effects.slip_weakening import SlipWeakening
+from stickslip.physics.effects.thermal_creep import ThermalCreep
+from stickslip.physics.effects.unequal_contacts import UnequalContacts
+from stickslip.physics.effects.velocity_weakening import VelocityWeakening
+from stickslip.physics.effects.viscoelastic_contact import ViscoelasticContact
+from stickslip.physics.effects.viscous_drag import ViscousDrag
+from stickslip.physics.effects.wear import Wear
+from stickslip.simulation.solve import Tolerance, integrate
 
 STRENGTH = 0.26
 ONE = bank_of(1e6, STRENGTH)  # a single element, threshold 0.26 um

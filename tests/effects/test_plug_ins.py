@@ -9,18 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from stickslip.conformance import check_effect
-from stickslip.effects import catalogue
 from stickslip.errors import InputError
-from stickslip.force.candidates import every_form
-from stickslip.objects.kept import code_digest
-from stickslip.scenario import make_scenario, simulate
-from stickslip.scenario.demonstration import RIG
+from stickslip.inference.force.candidates import every_form
+from stickslip.objects.checkpoints import code_digest
+from stickslip.physics.effects import catalogue
+from stickslip.simulation.conformance import check_effect
+from stickslip.simulation.scenario import make_scenario, simulate
+from stickslip.simulation.scenario.demonstration import RIG
 
 MODULE = """
 from jax import Array
 from stickslip.effects import Threshold
-from stickslip.params import parameter, variant
+from stickslip.effects import parameter, variant
 
 class Humming(Threshold):
     tag = "humming"
@@ -106,7 +106,7 @@ def test_what_cannot_be_used_is_left_out_with_a_warning(installed, points, modul
     installed(points, module)
     with pytest.warns(UserWarning, match=f"(?s){message}"):
         assert catalogue.tags() == before
-    assert catalogue.get("wear").__module__ == "stickslip.effects.wear"
+    assert catalogue.get("wear").__module__ == "stickslip.physics.effects.wear"
 
 
 def test_one_that_fails_leaves_the_others(installed):

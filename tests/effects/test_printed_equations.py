@@ -13,17 +13,17 @@ from jax import Array
 from matplotlib.mathtext import MathTextParser
 
 from stickslip.cli import run
-from stickslip.contact import Bank, normal_scores, power_law_bank
-from stickslip.effects import catalogue
-from stickslip.effects.base import BodyForce, Contact, Effect, Motion
-from stickslip.effects.equations import PowerLaw, equations, of_tags
-from stickslip.effects.named import effects_of
-from stickslip.effects.plain import plain
-from stickslip.effects.printed import pieces
-from stickslip.effects.symbols import distinct, found, marks, of_parameters, replaced, subscripted
 from stickslip.errors import InputError
-from stickslip.model import Block, Weakening
-from stickslip.params import parameter, specs
+from stickslip.physics.contact import Bank, normal_scores, power_law_bank
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.base import BodyForce, Contact, Effect, Motion
+from stickslip.physics.effects.equations import PowerLaw, equations, of_tags
+from stickslip.physics.effects.named import effects_of
+from stickslip.physics.effects.plain import plain
+from stickslip.physics.effects.printed import pieces
+from stickslip.physics.effects.symbols import distinct, found, marks, of_parameters, replaced, subscripted
+from stickslip.physics.model import Block, Weakening
+from stickslip.physics.params import parameter, specs
 
 # tag and form -> what the printed law must say (with a ¬: must not say)
 TOLD: dict[tuple[str, ...], tuple[str, ...]] = {

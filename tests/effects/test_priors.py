@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from jax import Array
 
-from stickslip.conformance import check_effect
-from stickslip.effects import catalogue
-from stickslip.effects.base import BodyForce, Contact, Motion
-from stickslip.fit.parameters import effect_parameters, priors
-from stickslip.params import parameter, specs
+from stickslip.inference.fit.parameters import effect_parameters, priors
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.base import BodyForce, Contact, Motion
+from stickslip.physics.params import parameter, specs
+from stickslip.simulation.conformance import check_effect
 
 
 def test_parameters_that_say_nothing_keep_the_old_rule_bit_for_bit() -> None:

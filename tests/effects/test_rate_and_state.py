@@ -11,9 +11,9 @@ from marching import bank_of, march, spread_out, still_model
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from stickslip.effects.rate_and_state import RateAndState
-from stickslip.model import LoadPoint
-from stickslip.solve import Tolerance, integrate
+from stickslip.physics.effects.rate_and_state import RateAndState
+from stickslip.physics.model import LoadPoint
+from stickslip.simulation.solve import Tolerance, integrate
 
 STRENGTH = 0.26
 MASS = 0.0894

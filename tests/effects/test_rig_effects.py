@@ -12,12 +12,12 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from stickslip.contact import Bank, power_law_bank, return_map
-from stickslip.effects import lag
-from stickslip.effects.base import Contact, Motion
-from stickslip.effects.catalogue import make
-from stickslip.model import Block, LoadPoint, Model, Weakening
-from stickslip.solve import Tolerance, integrate
+from stickslip.physics.contact import Bank, power_law_bank, return_map
+from stickslip.physics.effects import lag
+from stickslip.physics.effects.base import Contact, Motion
+from stickslip.physics.effects.catalogue import make
+from stickslip.physics.model import Block, LoadPoint, Model, Weakening
+from stickslip.simulation.solve import Tolerance, integrate
 
 BANK = power_law_bank(0.2604, 0.95e-6, 3.6, n=24)
 

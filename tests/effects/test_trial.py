@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from stickslip.conformance import load_effects, trial, try_laws
-from stickslip.effects import catalogue
 from stickslip.errors import InputError
+from stickslip.physics.effects import catalogue
+from stickslip.simulation.conformance import load_effects, trial, try_laws
 
 LAW = """from jax import numpy as jnp
 from stickslip.effects import Memory, Threshold
-from stickslip.params import parameter, variant
+from stickslip.effects import parameter, variant
 
 class Mine(Memory, Threshold):
     tag = "mine"

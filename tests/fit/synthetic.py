@@ -7,13 +7,13 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 
-from stickslip.effects.base import Effect
-from stickslip.features.measurement import Measurement, measure
-from stickslip.fit.composition import START, Composition
-from stickslip.fit.parameters import Free
-from stickslip.segment import segment
-from stickslip.solve import Tolerance, integrate
-from stickslip.trace import Drive, Trace
+from stickslip.data.segment import segment
+from stickslip.data.trace import Drive, Trace
+from stickslip.inference.features.measurement import Measurement, measure
+from stickslip.inference.fit.composition import START, Composition
+from stickslip.inference.fit.parameters import Free
+from stickslip.physics.effects.base import Effect
+from stickslip.simulation.solve import Tolerance, integrate
 
 TRUTH = {
     "contact.strength": ("N", 0.26),

@@ -7,16 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.campaign import Rig
 from stickslip.cli.fit import _gains_of_effects, _named
-from stickslip.diagnose.climb import chosen, climb
-from stickslip.diagnose.fitted import fitted_model
-from stickslip.diagnose.prepare import prepare
-from stickslip.effects import catalogue
+from stickslip.data.campaign import Rig
+from stickslip.data.segment import segment
 from stickslip.errors import InputError
-from stickslip.fit.record import from_record, record
-from stickslip.force.backbone import backbone, power_law
-from stickslip.segment import segment
+from stickslip.inference.diagnose.climb import chosen, climb
+from stickslip.inference.diagnose.fitted import fitted_model
+from stickslip.inference.diagnose.prepare import prepare
+from stickslip.inference.fit.serialised import from_record, record
+from stickslip.inference.force.backbone import backbone, power_law
+from stickslip.physics.effects import catalogue
 
 from . import synthetic
 

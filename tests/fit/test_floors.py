@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.campaign import load_campaign, load_traces
-from stickslip.challenge.generator import draw_setup, make_campaign
-from stickslip.features.measurement import measure
-from stickslip.fit.start import ring_period
-from stickslip.floors import floors, scatter_factor
-from stickslip.segment import segment
+from stickslip.blind.floors import floors, scatter_factor
+from stickslip.blind.generator import draw_setup, make_campaign
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.segment import segment
+from stickslip.inference.features.measurement import measure
+from stickslip.inference.fit.start import ring_period
 
 pytestmark = pytest.mark.slow  # eight campaigns
 

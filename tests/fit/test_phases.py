@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.effects import catalogue
-from stickslip.fit.composition import Composition, run_of
-from stickslip.fit.parameters import Free, effect_parameters
-from stickslip.fit.record import shared
+from stickslip.inference.fit.composition import Composition, run_of
+from stickslip.inference.fit.parameters import Free, effect_parameters
+from stickslip.inference.fit.serialised import shared
+from stickslip.physics.effects import catalogue
 
 TAG = "base-vibration"
 

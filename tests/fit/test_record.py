@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.diagnose.fitted import _driven
-from stickslip.fit.record import Fitted, from_record, record
-from stickslip.runstore import json_text
-from stickslip.trace import Drive, Trace
+from stickslip.data.trace import Drive, Trace
+from stickslip.inference.diagnose.fitted import _driven
+from stickslip.inference.fit.serialised import Fitted, from_record, record
+from stickslip.system.runstore import json_text
 
 from .synthetic import composition, truth
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.features.measurement import MAINS, Measurement
-from stickslip.floors import floors
+from stickslip.blind.floors import floors
+from stickslip.inference.features.measurement import MAINS, Measurement
 
 from . import synthetic
 

@@ -7,14 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip.contact import creep_curve, creep_displacements, default_loads
+from stickslip.data.segment import segment
+from stickslip.data.trace import Drive, Trace
 from stickslip.errors import InputError
-from stickslip.fit.creep_process import CreepProcess, creep_processes
-from stickslip.fit.normalised import Ramp, break_away, fit_ramps
-from stickslip.fit.static import fit_static, tied_quantities
-from stickslip.fit.static_table import StaticRig, static_table, virtual_curve
-from stickslip.segment import segment
-from stickslip.trace import Drive, Trace
+from stickslip.inference.fit.creep_process import CreepProcess, creep_processes
+from stickslip.inference.fit.normalised import Ramp, break_away, fit_ramps
+from stickslip.inference.fit.static import fit_static, tied_quantities
+from stickslip.inference.fit.static_table import StaticRig, static_table, virtual_curve
+from stickslip.physics.contact import creep_curve, creep_displacements, default_loads
 
 V0, V_LIM = 50e-6, 1e-6
 RIG = StaticRig(0.31, 0.21, 4, 1000.0)

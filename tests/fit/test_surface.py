@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from stickslip.campaign import Rig
-from stickslip.contact import rough_table, static_contact
+from stickslip.data.campaign import Rig
 from stickslip.errors import InputError
-from stickslip.fit.surface import LINES, LOADS, nearest_exponent, sensitivity
-from stickslip.uncertainty import null_directions
+from stickslip.inference.fit.surface import LINES, LOADS, nearest_exponent, sensitivity
+from stickslip.inference.uncertainty import null_directions
+from stickslip.physics.contact import rough_table, static_contact
 
 KNOWN = {"contacts": 4, "normal_force": 0.31, "friction_coefficient": 0.21, "H": 0.3, "h_rms": 2.46e-6}
 

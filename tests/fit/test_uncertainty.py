@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from stickslip.uncertainty import flat_directions, null_directions, profile, relative
+from stickslip.inference.uncertainty import flat_directions, null_directions, profile, relative
 
 NAMES = ("strength", "u_max", "p")
 

@@ -7,17 +7,17 @@ from typing import Any
 
 import pytest
 
-from stickslip.campaign import load_campaign, load_traces
-from stickslip.challenge.detection import detection
-from stickslip.challenge.generator import Run, make_campaign
-from stickslip.challenge.generator.forms import EFFECTS
-from stickslip.fit.resonance import ringing
-from stickslip.force.begin import begin
-from stickslip.force.knots import Knots, knots
-from stickslip.force.problem import Point, Problem
-from stickslip.force.scales import Scales, scales
-from stickslip.segment import Segmentation, segment
-from stickslip.trace import Trace
+from stickslip.blind.detection import detection
+from stickslip.blind.generator import Run, make_campaign
+from stickslip.blind.generator.forms import EFFECTS
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.segment import Segmentation, segment
+from stickslip.data.trace import Trace
+from stickslip.inference.fit.resonance import ringing
+from stickslip.inference.force.knots import Knots, knots
+from stickslip.inference.force.problem import Point, Problem
+from stickslip.inference.force.scales import Scales, scales
+from stickslip.inference.force.starting_values import begin
 
 SMALL = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4))
 

@@ -10,13 +10,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from stickslip.conformance.rig import base_model
-from stickslip.effects import catalogue
-from stickslip.effects.base import Effect
-from stickslip.force.along import Held, Way, along, turning
-from stickslip.model import Model
-from stickslip.params import specs
-from stickslip.solve import Steps, Tolerance, integrate
+from stickslip.inference.force.along import Held, Way, along, turning
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.base import Effect
+from stickslip.physics.model import Model
+from stickslip.physics.params import specs
+from stickslip.simulation.conformance.rig import base_model
+from stickslip.simulation.solve import Steps, Tolerance, integrate
 
 STRENGTH = 0.2604  # N, of the rig's contact
 TIMES, POSITIONS = np.array([0.0, 0.13, 0.2, 2.2]), np.array([0.0, 0.13e-3, 0.13e-3, 0.53e-3])  # s, m; a short hold

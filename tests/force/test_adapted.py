@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.force.fit import adapted, fit, refit
-from stickslip.force.scatter import NAMES, Scatter
+from stickslip.inference.force.fit import adapted, fit, refit
+from stickslip.inference.force.scatter import NAMES, Scatter
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from stickslip.contact import Bank
-from stickslip.solve import Tolerance
+from stickslip.physics.contact import Bank
+from stickslip.simulation.solve import Tolerance
 
 from . import driven
 

@@ -8,9 +8,9 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from stickslip.effects import catalogue
-from stickslip.fit.parameters import effect_parameters
-from stickslip.force.problem import Point, is_own
+from stickslip.inference.fit.parameters import effect_parameters
+from stickslip.inference.force.problem import Point, is_own
+from stickslip.physics.effects import catalogue
 
 LADDER = 10.0 ** np.arange(-3.0, -7.5, -0.5)  # of each direction's own unit
 # residuals have kinks where an element begins to slide: a difference over one of them is no derivative, and the share

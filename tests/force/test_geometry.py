@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from stickslip.campaign import Rig
-from stickslip.challenge.generator.lines import Surface, press, rough_line
-from stickslip.contact import Bank, rough_bank, rough_table, static_contact
-from stickslip.diagnose.engine import Verdict, with_shape
-from stickslip.diagnose.shape import Shape, judged, section, shape_of
-from stickslip.effects import make
+from stickslip.blind.generator.lines import Surface, press, rough_line
+from stickslip.data.campaign import Rig
 from stickslip.errors import InputError
-from stickslip.fit.static_table import StaticRig
-from stickslip.force import geometry
-from stickslip.force.backbone import Backbone, power_law
-from stickslip.force.geometry import Laws, geometry_laws, in_logarithms
-from stickslip.force.rough_contacts import RoughContacts, rough_contacts
+from stickslip.inference.diagnose.engine import Verdict, with_shape
+from stickslip.inference.diagnose.shape import Shape, judged, section, shape_of
+from stickslip.inference.fit.static_table import StaticRig
+from stickslip.inference.force import geometry
+from stickslip.inference.force.backbone import Backbone, power_law
+from stickslip.inference.force.geometry import Laws, geometry_laws, in_logarithms
+from stickslip.inference.force.rough_contacts import RoughContacts, rough_contacts
+from stickslip.physics.contact import Bank, rough_bank, rough_table, static_contact
+from stickslip.physics.effects import make
 
 HURST, HEIGHT, LOAD, FRICTION, CONTACTS = 0.3, 2.46e-6, 0.31, 0.21, 4
 KNOWN = {"contacts": CONTACTS, "normal_force": LOAD, "friction_coefficient": FRICTION, "line_length": 20e-6}
@@ -289,7 +289,7 @@ def test_without_load_or_friction_it_says_what_is_missing(missing, monkeypatch):
     curve = measured(independent(7), 7)
     with pytest.raises(InputError, match=missing):
         laws(curve, **{missing: None})
-    monkeypatch.setattr("stickslip.diagnose.shape.backbone", lambda fit: curve)
+    monkeypatch.setattr("stickslip.inference.diagnose.shape.backbone", lambda fit: curve)
     found = section(shape_of(SimpleNamespace(), rig_with(**{missing: None})))
     assert missing in found["text"]
     assert (found["rough_line"], found["laws"]) == (None, [])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.force.fit import fit, prior_rows, reach, refit
-from stickslip.force.heldout import folds, unseen
-from stickslip.force.scatter import covariance
+from stickslip.inference.force.fit import fit, prior_rows, reach, refit
+from stickslip.inference.force.heldout import folds, unseen
+from stickslip.inference.force.scatter import covariance
 
 from .test_derivatives import EFFECTS, with_effects
 

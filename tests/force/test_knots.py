@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.force.kernels import kernels
-from stickslip.force.knots import CREEP, knots
-from stickslip.force.smoothing import hum, onward
+from stickslip.inference.force.kernels import kernels
+from stickslip.inference.force.knots import CREEP, knots
+from stickslip.inference.force.smoothing import hum, onward
 
 RATE = 1e4
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.force.fit import fit, noise
-from stickslip.force.knots import RING, knots
-from stickslip.force.problem import Problem
-from stickslip.force.scatter import Blocks
+from stickslip.inference.force.fit import fit, noise
+from stickslip.inference.force.knots import RING, knots
+from stickslip.inference.force.problem import Problem
+from stickslip.inference.force.scatter import Blocks
 
 TRIALS = 120
 SMALL = 1e-12  # m, so that nothing but the linear answer is seen

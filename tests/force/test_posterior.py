@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.force.fit import SETTLED
-from stickslip.force.posterior import walked
+from stickslip.inference.force.fit import SETTLED
+from stickslip.inference.force.posterior import walked
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from stickslip.challenge.generator import Run
-from stickslip.force.candidates import try_effect
-from stickslip.force.fit import fit
-from stickslip.force.score import Explained
+from stickslip.blind.generator import Run
+from stickslip.inference.force.candidates import try_effect
+from stickslip.inference.force.fit import fit
+from stickslip.inference.force.signatures import Explained
 
 from .conftest import made, seen
 

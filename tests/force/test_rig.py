@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip.diagnose.decide import Judge
-from stickslip.force.fit import fit
-from stickslip.force.rig import SPRING, slips_finding, spring_freed
-from stickslip.units import shown
+from stickslip.inference.diagnose.decide import Judge
+from stickslip.inference.force.fit import fit
+from stickslip.inference.force.rig import SPRING, slips_finding, spring_freed
+from stickslip.system.units import shown
 
 from .conftest import Case
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.force.knots import PHASES
-from stickslip.force.scatter import NAMES, Blocks, Known, Scatter, _slopes, covariance, estimate, misfit
+from stickslip.inference.force.knots import PHASES
+from stickslip.inference.force.scatter import NAMES, Blocks, Known, Scatter, _slopes, covariance, estimate, misfit
 
 STRENGTH = 0.25  # N
 EVENTS, POINTS = 60, 48

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from jax import Array
 
-from stickslip.effects import catalogue
-from stickslip.effects.base import Motion, Sensor
-from stickslip.force.along import _slope, read, undone
-from stickslip.params import parameter
+from stickslip.inference.force.along import _slope, read, undone
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.base import Motion, Sensor
+from stickslip.physics.params import parameter
 
 from . import driven
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.campaign import load_campaign, load_traces
-from stickslip.challenge.generator import Run, make_campaign
-from stickslip.diagnose.prepare import prepare
-from stickslip.force.fit import fit
-from stickslip.motion import with_displacements
-from stickslip.segment import segment
+from stickslip.blind.generator import Run, make_campaign
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.displacements import with_displacements
+from stickslip.data.segment import segment
+from stickslip.inference.diagnose.prepare import prepare
+from stickslip.inference.force.fit import fit
 
 RUNS = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4), Run("v400", 4e-4, 4))
 NOISE = 2e-9  # m; of the force over the spring's stiffness

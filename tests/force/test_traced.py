@@ -14,11 +14,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip import traced
-from stickslip.effects import catalogue
-from stickslip.effects.base import Effect
-from stickslip.force.problem import _program
-from stickslip.traced import Program
+from stickslip.inference.force.problem import _program
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.base import Effect
+from stickslip.system import traced
+from stickslip.system.traced import Program
 
 
 @pytest.fixture
@@ -118,9 +118,9 @@ def test_an_output_that_is_no_known_container_is_traced_every_time(folder):
 
 
 ADDS = """
-from stickslip import cache
+from stickslip.system import cache
 cache.enable()
-from stickslip.traced import Program
+from stickslip.system.traced import Program
 print(Program(lambda x: x + 1.0, "adds")(1.0))
 """
 
@@ -131,7 +131,7 @@ def test_traces_are_kept_where_compiled_code_is(tmp_path, off, number):
     environment.pop("JAX_COMPILATION_CACHE_DIR", None)
     done = subprocess.run([sys.executable, "-c", ADDS], env=environment, capture_output=True, text=True, check=True)
     assert float(done.stdout) == 2.0
-    assert len(list(tmp_path.glob("stickslip/traced/*/*"))) == number
+    assert len(list(tmp_path.glob("stickslip/system/traced/*/*"))) == number
 
 
 def test_traces_belong_to_the_code_and_old_ones_of_other_code_go(tmp_path, monkeypatch):

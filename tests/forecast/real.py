@@ -20,12 +20,12 @@ import numpy as np
 import pandas
 
 import stickslip as ss
-from stickslip.forecast.predict import METHODS, Forecaster
-from stickslip.forecast.rolling import prepare, roll
-from stickslip.forecast.wander import Wander
+from stickslip.inference.forecast.predict import METHODS, Forecaster
+from stickslip.inference.forecast.rolling import prepare, roll
+from stickslip.inference.forecast.wander import Wander
 from stickslip.objects import Forecast
-from stickslip.plots import save
-from stickslip.plots.style import DARK, LIGHT, MIDDLE, figure, styled
+from stickslip.show.plots import save
+from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, styled
 
 DOCS = Path(__file__).parents[2] / "docs"
 FAULT = "psu-stickslip-p5198/newDF_TimeToFailure_from_6600_to_6900_WITHOUT_subwindows.csv"

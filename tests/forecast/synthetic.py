@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stickslip.forecast.wander import Component, Wander, covariance
-from stickslip.trace import Trace
+from stickslip.data.trace import Trace
+from stickslip.inference.forecast.wander import Component, Wander, covariance
 
 STIFFNESS, SPEED = 168.0, 42e-6  # N/m, m/s
 MEANS = (0.08, 0.06)  # N, at onset and arrest

@@ -10,13 +10,13 @@ from scipy.stats import norm, truncnorm
 
 import stickslip as ss
 from stickslip.cli import run
+from stickslip.data.trace import Trace
 from stickslip.errors import InputError
-from stickslip.forecast.past import Past
-from stickslip.forecast.predict import MEMBERS, Forecaster, times, waiting
-from stickslip.forecast.rolling import choose, moments, prepare, roll
-from stickslip.forecast.scoring import crps, score, standard_error
-from stickslip.runstore import read_result
-from stickslip.trace import Trace
+from stickslip.inference.forecast.past import Past
+from stickslip.inference.forecast.predict import MEMBERS, Forecaster, times, waiting
+from stickslip.inference.forecast.rolling import choose, moments, prepare, roll
+from stickslip.inference.forecast.scoring import crps, score, standard_error
+from stickslip.system.runstore import read_result
 
 from .synthetic import LAW, SPEED, STIFFNESS, record
 

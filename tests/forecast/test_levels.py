@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.data.segment import segment
+from stickslip.data.trace import Trace
 from stickslip.errors import InputError
-from stickslip.forecast.levels import levels, wandering
-from stickslip.segment import segment
-from stickslip.trace import Trace
+from stickslip.inference.forecast.levels import levels, wandering
 
 from .synthetic import MEANS, SPEED, STIFFNESS, record
 

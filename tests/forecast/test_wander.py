@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.forecast.predict import Compared, compare, coordinates, predictor, take
-from stickslip.forecast.telling import told
-from stickslip.forecast.wander import (
+from stickslip.inference.forecast.predict import Compared, compare, coordinates, predictor, take
+from stickslip.inference.forecast.telling import told
+from stickslip.inference.forecast.wander import (
     ARREST,
     ONSET,
     Component,

@@ -9,8 +9,8 @@ import xarray as xr
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.force.problem import Problem
-from stickslip.runstore import read_result
+from stickslip.inference.force.problem import Problem
+from stickslip.system.runstore import read_result
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 RIG = {"mass": "89.4 g", "spring_stiffness": "980.2 N/m", "contacts": 4, "normal_force": "0.31 N",

@@ -7,9 +7,9 @@ import pytest
 
 from stickslip.cli import run
 from stickslip.errors import RunFolderError
-from stickslip.report.compare import comparison
-from stickslip.report.compare_figure import comparison_figure
-from stickslip.runstore import json_text
+from stickslip.show.report.compare import comparison
+from stickslip.show.report.compare_figure import comparison_figure
+from stickslip.system.runstore import json_text
 
 
 def rung(model, train, held, **phases):

@@ -2,11 +2,11 @@
 
 from html import unescape
 
-from stickslip.effects import catalogue
-from stickslip.effects.equations import equations
-from stickslip.model import Block, Weakening
-from stickslip.report import write_report
-from stickslip.runstore import json_text
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.equations import equations
+from stickslip.physics.model import Block, Weakening
+from stickslip.show.report import write_report
+from stickslip.system.runstore import json_text
 
 
 def test_equations_stand_in_the_report_and_their_latex_is_folded(tmp_path):

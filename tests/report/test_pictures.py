@@ -6,13 +6,13 @@ import xarray
 
 from stickslip.cli import run
 from stickslip.cli.show import quantity
-from stickslip.plots.style import scaled
-from stickslip.report import trace_pieces
-from stickslip.report.figures import trace_picture
-from stickslip.report.fit_figures import creep_grid, ladder_picture, ramp_grid
-from stickslip.report.tables import show
-from stickslip.segment import segment
-from stickslip.trace import Drive, Trace
+from stickslip.data.segment import segment
+from stickslip.data.trace import Drive, Trace
+from stickslip.show.plots.style import scaled
+from stickslip.show.report import trace_pieces
+from stickslip.show.report.figures import trace_picture
+from stickslip.show.report.fit_figures import creep_grid, ladder_picture, ramp_grid
+from stickslip.show.report.tables import show
 
 SPEED, PERIOD = 5e-5, 1.0  # m/s, s
 

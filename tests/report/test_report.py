@@ -11,8 +11,8 @@ import pytest
 import xarray
 
 from stickslip.errors import RunFolderError
-from stickslip.report import write_report
-from stickslip.runstore import json_text
+from stickslip.show.report import write_report
+from stickslip.system.runstore import json_text
 
 EVIL = '<script>document.title="bad"</script><img src=x onerror=alert(1)> $\\frac{1}$'
 DIAGNOSIS = {

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from stickslip.checks.spring_force import force_findings, gain_is_wrong, stick_gain
-from stickslip.motion import true_gains
-from stickslip.report import abilities
-from stickslip.report.describe import describe_trace
-from stickslip.report.ripple import stick_ripple, stick_spectrum
-from stickslip.segment import segment
-from stickslip.trace import Drive, Trace
+from stickslip.data.checks.spring_force import force_findings, gain_is_wrong, stick_gain
+from stickslip.data.displacements import true_gains
+from stickslip.data.segment import segment
+from stickslip.data.trace import Drive, Trace
+from stickslip.show.report import abilities
+from stickslip.show.report.describe import describe_trace
+from stickslip.show.report.ripple import stick_ripple, stick_spectrum
 
 
 def sawtooth(

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.challenge.seal import CASES, TRUTH, make_seal
-from stickslip.objects.kept import Pieces
-from stickslip.runstore import file_record, open_run
+from stickslip.blind.seal import CASES, TRUTH, make_seal
+from stickslip.objects.checkpoints import Pieces
+from stickslip.system.runstore import file_record, open_run
 
 
 def _line(folder: Path) -> None:

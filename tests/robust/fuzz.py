@@ -6,8 +6,8 @@ goes through a command of the program as well, which must end with 2, in words, 
 every fiftieth is inspected to the end.
 
 Inputs are read in child processes of many inputs each, with bounded memory: compiled libraries crash and hang too.
-The program's own precaution against that (`stickslip.readers.guard`) costs a process for each file and is switched off
-at first; an input that takes a child down is read again with it.
+The program's own precaution against that (`stickslip.data.readers.guard`) costs a process for each file and is switched
+off at first; an input that takes a child down is read again with it.
 """
 
 from __future__ import annotations
@@ -110,17 +110,17 @@ def _pool(kind: str) -> list[tuple[str, bytes]]:
 def load(path: Path) -> None:
     """Read a file with everything that reads it."""
     if path.name.startswith("campaign"):
-        from stickslip.campaign import load_campaign, load_traces
+        from stickslip.data.campaign import load_campaign, load_traces
 
         load_traces(load_campaign(path))
     elif path.name.startswith("scenario"):
-        from stickslip.scenario.drive import load_point
-        from stickslip.scenario.load import load_scenario
+        from stickslip.simulation.scenario.drive import load_point
+        from stickslip.simulation.scenario.load import load_scenario
 
         scenario = load_scenario(path)
         load_point(scenario.file.drive, scenario.folder)
     else:
-        from stickslip.campaign import load_campaign, load_traces
+        from stickslip.data.campaign import load_campaign, load_traces
 
         campaign = path.parent / "of-one.toml"
         campaign.write_text(
@@ -234,7 +234,7 @@ def child(seed: int, first: int, number: int, state: Path, guarded: bool, comman
     """Try inputs one after the other; every outcome is one line of JSON on stdout."""
     import resource
 
-    from stickslip.readers import guard
+    from stickslip.data.readers import guard
 
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

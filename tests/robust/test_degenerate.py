@@ -6,12 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import Bank, power_law_bank
-from stickslip.effects.load_modulation import LoadModulation
 from stickslip.errors import InputError
-from stickslip.model import Block, LoadPoint, Model, Weakening
-from stickslip.scenario.load import make_scenario
-from stickslip.solve import Tolerance, integrate
+from stickslip.physics.contact import Bank, power_law_bank
+from stickslip.physics.effects.load_modulation import LoadModulation
+from stickslip.physics.model import Block, LoadPoint, Model, Weakening
+from stickslip.simulation.scenario.load import make_scenario
+from stickslip.simulation.solve import Tolerance, integrate
 
 N, STRENGTH, U_MAX, P, SPRING = 32, 0.26, 1e-6, 2.0, 1000.0
 FINE = Tolerance(1e-4, 1e-13, 1e-9)

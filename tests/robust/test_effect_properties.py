@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip.conformance.dynamics import ACTIVE, GAIN
-from stickslip.conformance.rig import DRIVE, STOPPED, TIGHT, Rig, march_step, prescribed
-from stickslip.effects import catalogue
-from stickslip.params import specs
+from stickslip.physics.effects import catalogue
+from stickslip.physics.params import specs
+from stickslip.simulation.conformance.dynamics import ACTIVE, GAIN
+from stickslip.simulation.conformance.rig import DRIVE, STOPPED, TIGHT, Rig, march_step, prescribed
 
 EFFECTS = tuple(catalogue.get(tag)() for tag in catalogue.tags())
 

@@ -14,9 +14,9 @@ import scipy.io
 import xarray
 
 from stickslip.cli import run
+from stickslip.data.readers import read_columns
 from stickslip.errors import InputError
-from stickslip.readers import read_columns
-from stickslip.units import to_si
+from stickslip.system.units import to_si
 
 from .seeds import SCENARIO, T, X, beside
 

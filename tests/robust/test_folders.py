@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.challenge.one_case import do_case
+from stickslip.blind.one_case import do_case
 from stickslip.cli import run
-from stickslip.report import write_report
-from stickslip.runstore import RESULT, open_run, read_result
+from stickslip.show.report import write_report
+from stickslip.system.runstore import RESULT, open_run, read_result
 
 from .challenges import challenge
 from .seeds import beside
@@ -128,7 +128,8 @@ def test_the_second_run_into_a_folder_is_refused_while_the_first_is_at_work(file
 
 def test_of_many_at_once_exactly_one_writes(tmp_path):
     program = (
-        "import sys, time\nfrom stickslip.runstore import open_run\nfrom stickslip.errors import RunFolderError\n"
+        "import sys, time\nfrom stickslip.system.runstore import open_run\n"
+        "from stickslip.errors import RunFolderError\n"
         "try:\n  with open_run(sys.argv[1]) as run:\n    run.json({'by': sys.argv[2]}); time.sleep(0.5)\n"
         "except RunFolderError: sys.exit(2)\n"
     )
@@ -339,7 +340,7 @@ def test_every_command_on_a_disk_that_is_full(every_command, tmp_path):
 
 CHALLENGE = """
 import resource, sys
-from stickslip.challenge.run import run_challenge
+from stickslip.blind.run import run_challenge
 from stickslip.errors import StickslipError
 from tests.robust.challenges import piecewise
 if __name__ == "__main__":
@@ -395,9 +396,9 @@ def test_a_report_that_does_not_fit_is_no_failure_of_the_case(tmp_path, monkeypa
     def diagnosis(campaign, out):
         with open_run(out, resume=True) as folder:
             folder.json({"schema": 1, "kind": "compare"})
-            monkeypatch.setattr("stickslip.report.html.render", lambda *a: "<html></html>")
-            monkeypatch.setattr("stickslip.report.html._arrays", lambda *a: {})
-            monkeypatch.setattr("stickslip.report.sections.pictures", lambda *a: [])
+            monkeypatch.setattr("stickslip.show.report.html.render", lambda *a: "<html></html>")
+            monkeypatch.setattr("stickslip.show.report.html._arrays", lambda *a: {})
+            monkeypatch.setattr("stickslip.show.report.sections.pictures", lambda *a: [])
             write_report(folder.folder)
 
     runs.mkdir()
@@ -439,7 +440,8 @@ def test_a_full_disk_behind_the_standard_output(files, name):
 def test_a_disk_that_fills_while_pieces_are_kept(tmp_path):
     """What was kept before stays, is whole, and is gone on from."""
     program = (
-        "import sys, numpy as np\nfrom stickslip.runstore import open_run\nfrom stickslip.objects.kept import Pieces\n"
+        "import sys, numpy as np\nfrom stickslip.system.runstore import open_run\n"
+        "from stickslip.objects.checkpoints import Pieces\n"
         "with open_run(sys.argv[1], resume=True) as run:\n  store = Pieces(run, 'i')\n  kept = 0\n"
         "  for n in range(6):\n    if store.load(f'p{n}') is None:\n"
         "      store.save(f'p{n}', {'z': np.arange(10_000.0 * (n + 1))})\n    else: kept += 1\n"

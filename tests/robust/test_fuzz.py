@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from stickslip.cli import run
+from stickslip.data.readers import guard, read_columns
 from stickslip.errors import InputError
-from stickslip.readers import guard, read_columns
 
 from .fuzz import campaign, inputs, mutated, prepare, try_one
 from .seeds import beside, seeds, tables

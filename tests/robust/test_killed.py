@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 import xarray
 
-from stickslip.runstore import RESULT, open_run, read_result
+from stickslip.system.runstore import RESULT, open_run, read_result
 
 from .challenges import challenge
 
@@ -29,7 +29,7 @@ SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect"
 PIECEWISE = """
 import sys, time
 import numpy as np
-from stickslip.runstore import open_run
+from stickslip.system.runstore import open_run
 from stickslip.objects.kept import Pieces
 with open_run(sys.argv[1], resume=True, force="--force" in sys.argv) as run:
     store, total = Pieces(run, "inputs"), np.zeros(40_000)
@@ -196,7 +196,7 @@ def test_a_diagnosis_killed_at_twenty_random_moments(tmp_path, jobs):
 
 CHALLENGE = """
 import sys
-from stickslip.challenge.run import run_challenge
+from stickslip.blind.run import run_challenge
 from tests.robust.challenges import piecewise
 if __name__ == "__main__":
     if sys.argv[2] == "real":

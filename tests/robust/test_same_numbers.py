@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import xarray
 
-from stickslip.runstore import read_result
+from stickslip.system.runstore import read_result
 
 from .test_folders import SCENARIO
 from .test_killed import diagnosis, small_campaign, without_time

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from stickslip.contact import Bank
 from stickslip.errors import SolveError
-from stickslip.model import Block, LoadPoint, Model, Weakening
-from stickslip.params import specs
-from stickslip.solve import Tolerance, integrate
+from stickslip.physics.contact import Bank
+from stickslip.physics.model import Block, LoadPoint, Model, Weakening
+from stickslip.physics.params import specs
+from stickslip.simulation.solve import Tolerance, integrate
 
 N = 16
 MOST = 30_000  # steps of one example

@@ -17,7 +17,7 @@ SWEEP = """
 import os, sys, time
 from pathlib import Path
 from joblib import Parallel, delayed
-from stickslip.lifeline import end_with
+from stickslip.system.lifeline import end_with
 def job(parent, folder):
     end_with(parent)
     Path(folder, str(os.getpid())).touch()
@@ -61,8 +61,8 @@ def test_workers_of_a_killed_sweep_end(tmp_path):
 def test_a_trial_in_a_worker_ends_with_the_diagnosis(monkeypatch):
     from cloudpickle import dumps, loads
 
-    from stickslip import cache, lifeline
-    from stickslip.diagnose import trials
+    from stickslip.inference.diagnose import trials
+    from stickslip.system import cache, lifeline
 
     ends = []
     monkeypatch.setattr(lifeline, "end_with", ends.append)

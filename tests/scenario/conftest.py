@@ -63,6 +63,6 @@ def as_toml(content: dict[str, Any]) -> str:
 @pytest.fixture(scope="session")
 def stick_slip():
     """Data set of the small rig."""
-    from stickslip.scenario import make_scenario, simulate
+    from stickslip.simulation.scenario import make_scenario, simulate
 
     return simulate(make_scenario(rig()))

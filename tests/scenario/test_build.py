@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.contact import equal_bodies, power_law_backbone, rough_bank
 from stickslip.errors import InputError
-from stickslip.scenario import build, load_scenario, make_scenario, static_creep
-from stickslip.scenario.contacts import build_contact
+from stickslip.physics.contact import equal_bodies, power_law_backbone, rough_bank
+from stickslip.simulation.scenario import build, load_scenario, make_scenario, static_creep
+from stickslip.simulation.scenario.contacts import build_contact
 
 from .conftest import rig
 

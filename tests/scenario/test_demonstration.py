@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.effects import catalogue
-from stickslip.scenario.demonstration import typical_amplitude, with_and_without
+from stickslip.physics.effects import catalogue
+from stickslip.simulation.scenario.demonstration import typical_amplitude, with_and_without
 
 
 @pytest.mark.slow

@@ -10,13 +10,13 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import run
-from stickslip.effects import catalogue
 from stickslip.errors import InputError, RunFolderError
-from stickslip.fit.composition import Composition
-from stickslip.fit.parameters import Free, effect_parameters
-from stickslip.fit.record import KEY, Driven, Fitted, record
-from stickslip.runstore import json_text
-from stickslip.scenario import build
+from stickslip.inference.fit.composition import Composition
+from stickslip.inference.fit.parameters import Free, effect_parameters
+from stickslip.inference.fit.serialised import KEY, Driven, Fitted, record
+from stickslip.physics.effects import catalogue
+from stickslip.simulation.scenario import build
+from stickslip.system.runstore import json_text
 
 VALUES = {
     "contact.strength": ("N", 0.26),

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.scenario import load_scenario, make_scenario
-from stickslip.scenario.overrides import parse_assignment, parse_sweep, series, sweep_values
-from stickslip.scenario.template import scenario_template
+from stickslip.simulation.scenario import load_scenario, make_scenario
+from stickslip.simulation.scenario.overrides import parse_assignment, parse_sweep, series, sweep_values
+from stickslip.simulation.scenario.template import scenario_template
 
 from .conftest import as_toml, rig
 

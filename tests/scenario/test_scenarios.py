@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import xarray
 
-from stickslip.campaign import load_campaign, load_traces
 from stickslip.cli import run
-from stickslip.scenario import load_scenario
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.simulation.scenario import load_scenario
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 SHORT = ["contact.bins=32", "output.sampling_rate=2000"]

@@ -9,8 +9,8 @@ import pytest
 import xarray
 
 from stickslip.errors import InputError
-from stickslip.scenario import Progress, make_scenario, record, simulate
-from stickslip.scenario.events import UNITS
+from stickslip.simulation.scenario import Progress, make_scenario, record, simulate
+from stickslip.simulation.scenario.events import UNITS
 
 from .conftest import rig
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from stickslip.scenario.schema import BlockTable, WeakeningTable
-from stickslip.scenario.stability import steady_sliding
+from stickslip.simulation.scenario.schema import BlockTable, WeakeningTable
+from stickslip.simulation.scenario.stability import steady_sliding
 
 
 def growth(block: BlockTable, law: WeakeningTable, strength: float, velocity: float) -> float:

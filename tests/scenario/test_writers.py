@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.campaign import load_campaign, load_traces
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.readers import read_columns
 from stickslip.errors import InputError
-from stickslip.readers import read_columns
-from stickslip.scenario import make_scenario, simulate
-from stickslip.scenario.writers import write_campaign, write_trace
+from stickslip.simulation.scenario import make_scenario, simulate
+from stickslip.simulation.scenario.writers import write_campaign, write_trace
 
 from .conftest import rig
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from stickslip.contact import Hysteresis
-from stickslip.solve import Steps, Tolerance, integrate
+from stickslip.physics.contact import Hysteresis
+from stickslip.simulation.solve import Steps, Tolerance, integrate
 
 from .rig import STRENGTH, drive, rig, tighter
 

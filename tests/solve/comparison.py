@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stickslip.contact import (
+from stickslip.physics.contact import (
     Bank,
     Indentation,
     bank_from_contact,
@@ -16,7 +16,7 @@ from stickslip.contact import (
     rough_lines,
     static_contact,
 )
-from stickslip.solve import Tolerance
+from stickslip.simulation.solve import Tolerance
 
 from . import brute_force
 from .rig import MASS, Slips, rig, slips

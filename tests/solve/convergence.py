@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from stickslip.contact import Bank
-from stickslip.model import Model, State
-from stickslip.solve import ContactStepper, Tolerance, integrate
+from stickslip.physics.contact import Bank
+from stickslip.physics.model import Model, State
+from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
 
 from .rig import FAR, MASS, bank, drive, rig, slips, tighter
 from .slip_events import run

@@ -12,9 +12,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from stickslip.model import Block, LoadPoint, Model, State, Weakening
-from stickslip.solve import ContactStepper, Tolerance
-from stickslip.solve.integrate import step_control
+from stickslip.physics.model import Block, LoadPoint, Model, State, Weakening
+from stickslip.simulation.solve import ContactStepper, Tolerance
+from stickslip.simulation.solve.integrate import step_control
 
 from .rig import MASS, STRENGTH, U_MAX, P, bank
 

@@ -8,9 +8,9 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from stickslip.contact import Bank, bank_from_backbone, power_law_backbone, power_law_bank
-from stickslip.model import Block, LoadPoint, Model, State, Weakening
-from stickslip.solve import Tolerance
+from stickslip.physics.contact import Bank, bank_from_backbone, power_law_backbone, power_law_bank
+from stickslip.physics.model import Block, LoadPoint, Model, State, Weakening
+from stickslip.simulation.solve import Tolerance
 
 STRENGTH = 0.2604  # N
 U_MAX = 0.95e-6  # m

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from stickslip.contact import microslip_ring_down
-from stickslip.model import Model
-from stickslip.solve import Tolerance, integrate
+from stickslip.physics.contact import microslip_ring_down
+from stickslip.physics.model import Model
+from stickslip.simulation.solve import Tolerance, integrate
 
 from .rig import FAR, MASS, STRENGTH, U_MAX, P, drive, fine_start_bank, rig, tighter
 

@@ -8,9 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from stickslip.model import Model
-from stickslip.solve import Tolerance, integrate
-from stickslip.solve.derivatives import EXACT, GRIDS, Slips, mean_slips, slip_derivatives, slip_grid
+from stickslip.physics.model import Model
+from stickslip.simulation.solve import Tolerance, integrate
+from stickslip.simulation.solve.derivatives import EXACT, GRIDS, Slips, mean_slips, slip_derivatives, slip_grid
 
 from . import brute_force
 from .derivatives import BASE, build

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.model import Model
-from stickslip.solve import Tolerance, Trajectory, integrate
+from stickslip.physics.model import Model
+from stickslip.simulation.solve import Tolerance, Trajectory, integrate
 
 from .rig import MASS, STRENGTH, Slips, bank, rig, sliding, slips, tighter
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stickslip.model import Model
-from stickslip.solve import Tolerance, integrate
+from stickslip.physics.model import Model
+from stickslip.simulation.solve import Tolerance, integrate
 
 from .rig import MASS, STRENGTH, U_MAX, P, already_creeping, bank, rig, tighter
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.contact import Hysteresis
-from stickslip.effects.wear import Wear
-from stickslip.solve import integrate
+from stickslip.physics.contact import Hysteresis
+from stickslip.physics.effects.wear import Wear
+from stickslip.simulation.solve import integrate
 
 from .books import imbalance, slow_cycle
 from .rig import STRENGTH, rig, tighter

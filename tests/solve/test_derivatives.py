@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.solve import Tolerance, integrate
+from stickslip.simulation.solve import Tolerance, integrate
 
 from .derivatives import BASE, NAMES, Outcome, build, creep_displacements, differences, outcome, trace
 from .rig import DEFAULT, tighter

@@ -8,10 +8,10 @@ import numpy as np
 import optimistix
 import pytest
 
-from stickslip.scenario.drive import Motion
-from stickslip.scenario.events import find_events
-from stickslip.solve import ContactStepper, Tolerance, Trajectory, integrate
-from stickslip.solve.integrate import step_control
+from stickslip.simulation.scenario.drive import Motion
+from stickslip.simulation.scenario.events import find_events
+from stickslip.simulation.solve import ContactStepper, Tolerance, Trajectory, integrate
+from stickslip.simulation.solve.integrate import step_control
 
 from .rig import STRENGTH, rig, tighter
 from .slip_differences import brute_slips

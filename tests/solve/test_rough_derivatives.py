@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact.rough_bank import rough_bank
-from stickslip.model import Block, LoadPoint, Model, Weakening
-from stickslip.solve import slip_derivatives
+from stickslip.physics.contact.rough_bank import rough_bank
+from stickslip.physics.model import Block, LoadPoint, Model, Weakening
+from stickslip.simulation.solve import slip_derivatives
 
 from . import brute_force
 from .rig import MASS, tighter

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.contact import arrest, reload_displacement
-from stickslip.solve import integrate
+from stickslip.physics.contact import arrest, reload_displacement
+from stickslip.simulation.solve import integrate
 
 from .rig import STRENGTH, bank, rig, tighter
 from .slip_events import classical, creep_to, critical_velocity, growth, run

@@ -8,12 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.contact import Bank
-from stickslip.effects.base import BodyForce
-from stickslip.effects.inertia import AddedMass
 from stickslip.errors import InputError, SolveError
-from stickslip.solve import ContactStepper, Tolerance, integrate
-from stickslip.solve.integrate import step_control
+from stickslip.physics.contact import Bank
+from stickslip.physics.effects.base import BodyForce
+from stickslip.physics.effects.inertia import AddedMass
+from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
+from stickslip.simulation.solve.integrate import step_control
 
 from .rig import rig
 

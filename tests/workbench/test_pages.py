@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.force.candidates import every_form, try_effect
-from stickslip.force.promise import promise
-from stickslip.force.score import Explained
+from stickslip.inference.force.candidates import every_form, try_effect
+from stickslip.inference.force.first_order import promise
+from stickslip.inference.force.signatures import Explained
 from stickslip.objects import Diagnosis
 from stickslip.workbench import app, missing_page, model_page
 from stickslip.workbench.evidence import best_forms, rows, signature
@@ -100,7 +100,7 @@ def test_a_promise_is_what_the_trial_of_an_effect_begins_with(base, promises):
 
 
 def test_what_a_promise_takes_off_brings_the_cost_down(base, promises):
-    from stickslip.force.scatter import covariance
+    from stickslip.inference.force.scatter import covariance
 
     fit = base.force_fit
     found = next(p for p in promises if p.tag == "contact-ageing")

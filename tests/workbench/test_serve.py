@@ -14,7 +14,7 @@ import pytest
 
 from stickslip.cli import run
 from stickslip.errors import InputError
-from stickslip.runstore import json_text
+from stickslip.system.runstore import json_text
 from stickslip.workbench import own
 from stickslip.workbench.opening import campaign_of, offered, opened
 from stickslip.workbench.serve import _free
@@ -27,7 +27,7 @@ EFFECT = '''"""An effect of one's own."""
 from jax import Array
 
 from stickslip.effects import BodyForce
-from stickslip.params import parameter
+from stickslip.effects import parameter
 
 
 class Pull(BodyForce):

@@ -8,7 +8,7 @@ import pytest
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.objects import Diagnosis
-from stickslip.progress import Cancelled, cancellable
+from stickslip.system.progress import Cancelled, cancellable
 from stickslip.workbench import experiments, simulate_page
 from stickslip.workbench.beside import beside
 from stickslip.workbench.experiments import Setting

@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.progress import Cancelled, breathe
+from stickslip.system.progress import Cancelled, breathe
 from stickslip.workbench.work import Search, Worker
 
 

@@ -1,0 +1,120 @@
+"""How large a hidden effect is, in multiples of the amplitude from which it can be seen at all."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .generator.forms import Effect, Form
+
+LARGEST = 30.0  # multiples of detection
+# amplitudes in the unit of the generator, made by stickslip.blind.visibility
+DETECTION: dict[tuple[str, str], float] = {
+    ("velocity-weakening", "exponent 1"): 0.014,
+    ("velocity-weakening", "hyperbolic"): 0.017,
+    ("velocity-weakening", "exponent 2"): 0.013,
+    ("velocity-weakening", "exponent 1/2"): 0.0043,
+    ("slip-weakening", "exponential"): 0.0049,
+    ("slip-weakening", "linear"): 0.0045,
+    ("slip-weakening", "hyperbolic"): 0.0039,
+    ("contact-ageing", "logarithm"): 0.00032,
+    ("contact-ageing", "power"): 0.00025,
+    ("rate-and-state", "ageing law"): 0.00029,
+    ("rate-and-state", "slip law"): 0.00026,
+    ("direct-effect", "logarithm"): 0.00027,
+    ("direct-effect", "asinh"): 0.00027,
+    ("position-dependent-friction", "sine"): 0.0005,
+    ("position-dependent-friction", "three waves"): 0.00054,
+    ("position-dependent-friction", "saw"): 0.00041,
+    ("wear", "linear"): 0.00046,
+    ("wear", "logarithm"): 0.0016,
+    ("wear", "saturating"): 0.00069,
+    ("wear", "softer by event"): 0.021,
+    ("flash-heating", "lumped"): 0.0037,
+    ("thermal-creep", "Eyring"): 8.1e-08,
+    ("thermal-creep", "power"): 8.2e-08,
+    ("viscoelastic-contact", "single"): 0.072,
+    ("viscoelastic-contact", "renewed"): 0.018,
+    ("viscoelastic-contact", "stretched"): 0.016,
+    ("contact-damping", "sticking"): 1.9e-06,
+    ("contact-damping", "fading"): 4.5e-06,
+    ("plasticity", "cap"): 0.15,
+    ("plasticity", "soft"): 0.11,
+    ("adhesion", "contact"): 0.021,
+    ("adhesion", "range"): 0.0036,
+    ("residual-load", "scaled"): 0.009,
+    ("residual-load", "some springs"): 0.00035,
+    ("contact-renewal", "Poisson"): 480.0,
+    ("contact-renewal", "fixed life"): 610.0,
+    ("unequal-contacts", "load"): 0.39,
+    ("unequal-contacts", "roughness"): 0.27,
+    ("curvature", "parabola"): 11000.0,
+    ("curvature", "quartic"): 12000.0,
+    ("roll-off", "flat"): 1.3,
+    ("roll-off", "smooth"): 1.3,
+    ("inertia", "mass of the spring"): 0.0079,
+    ("viscous-drag", "quadratic"): 0.21,
+    ("viscous-drag", "sublinear"): 0.56,
+    ("viscous-drag", "superlinear"): 0.31,
+    ("load-modulation", "sine"): 0.00032,
+    ("load-modulation", "triangle"): 0.00038,
+    ("load-modulation", "three tones"): 0.00038,
+    ("tilt", "lift"): 0.0091,
+    ("tilt", "lever"): 0.0078,
+    ("drive-ripple", "sine"): 1.4e-07,
+    ("drive-ripple", "two harmonics"): 1.3e-07,
+    ("drive-ripple", "triangle"): 1.6e-07,
+    ("machine-compliance", "fixture"): 9e-08,
+    ("machine-compliance", "laser spot"): 6.8e-08,
+    ("nonlinear-spring", "quadratic"): 0.005,
+    ("nonlinear-spring", "cubic"): 0.0041,
+    ("base-vibration", "line"): 0.0006,
+    ("base-vibration", "band"): 0.00068,
+    ("base-vibration", "two modes"): 0.00046,
+    ("sensor-drift", "linear"): 5.3e-09,
+    ("sensor-drift", "settling"): 9.8e-09,
+    ("sensor-high-pass", "first order"): 4e-06,
+    ("sensor-high-pass", "second order"): 2.8e-06,
+    ("sensor-low-pass", "first order"): 6.4e-05,
+    ("sensor-low-pass", "Bessel"): 7.8e-05,
+    ("sensor-gain", "constant"): 0.0026,
+    ("sensor-gain", "bent"): 0.0039,
+    ("yaw-mode", "one mode"): 0.0017,
+    ("temperature-ramp", "tanh"): 0.0012,
+    ("loosening-clamp", "linear"): 0.004,
+    ("loosening-clamp", "settling"): 0.0058,
+    ("eddy-brake", "bilinear"): 0.076,
+    ("anelastic-spring", "one branch"): 0.012,
+    ("magnetic-detent", "sine"): 0.00027,
+}
+
+
+def detection(effect: Effect, form: str) -> float:
+    """The amplitude from which an effect can be seen in one of its forms, in its unit: five standard deviations.
+
+    Not of noise alone but of noise and the scatter of the contact together, in five runs of a rig whose friction,
+    weakening, damping and roughness are unknown (see :mod:`.visibility`); geometric mean of two rigs.
+    """
+    return DETECTION[effect.tag, form]
+
+
+def visible_forms(effect: Effect) -> list[Form]:
+    """The forms that can be seen at some plausible amplitude."""
+    return [form for form in effect.forms if effect.high >= detection(effect, form.name)]
+
+
+def largest_multiple(effect: Effect, form: str) -> float:
+    """The largest multiple to be drawn: 30, or less where the plausible range ends before."""
+    return min(LARGEST, effect.high / detection(effect, form))
+
+
+def draw_multiple(effect: Effect, form: str, rng: np.random.Generator) -> float:
+    """A multiple of detection, log-uniform from 1 to the largest."""
+    return float(np.exp(rng.uniform(0.0, np.log(largest_multiple(effect, form)))))
+
+
+def amplitude(effect: Effect, form: str, multiple: float, sign: float) -> float:
+    """Amplitude of an effect at a multiple of detection; ``sign`` counts where either sign makes sense."""
+    return multiple * detection(effect, form) * (sign if effect.signed else effect.sign)

@@ -1,0 +1,60 @@
+"""TDMS of LabVIEW, by npTDMS (an extra)."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError
+from .base import Columns, add_array, need_columns
+
+
+class TdmsReader:
+    """LabVIEW TDMS."""
+
+    name = "tdms"
+    suffixes: tuple[str, ...] = (".tdms",)
+    description = "TDMS of LabVIEW (needs the extra 'tdms')"
+
+    def sniff(self, path: Path, head: bytes) -> bool:
+        return head.startswith(b"TDSm")
+
+    def read(self, path: Path) -> Columns:
+        try:
+            import nptdms
+        except ImportError:
+            raise InputError(
+                "reading TDMS files needs the package npTDMS, which is not installed",
+                file=path,
+                hint="pip install 'stickslip[tdms]', or export the file as CSV",
+            ) from None
+        columns = Columns({})
+        nptdms.log.log_manager.set_level(logging.ERROR)  # what it tells of a file cut short is told below
+        try:
+            with nptdms.TdmsFile.open(path) as file:
+                for group in file.groups():
+                    for channel in group.channels():
+                        _add(columns, group.name, channel)
+                if file.file_status.incomplete_final_segment:
+                    columns.notes.append("the file is cut short; what is there was read")
+        except InputError:
+            raise
+        except Exception as error:  # nptdms raises many kinds on a damaged file
+            raise InputError(f"not a readable TDMS file ({type(error).__name__}: {error})", file=path) from None
+        return need_columns(columns, path)
+
+
+def _add(columns: Columns, group: str, channel: object) -> None:
+    properties = channel.properties  # type: ignore[attr-defined]
+    name = channel.name if channel.name not in columns.data else f"{group}/{channel.name}"  # type: ignore[attr-defined]
+    values = channel[:]  # type: ignore[index]
+    unit = properties.get("unit_string") or properties.get("NI_UnitDescription")
+    add_array(columns, name, values, unit if isinstance(unit, str) else None)
+    if "wf_increment" in properties and name in columns.data:
+        own = f"{name} time"
+        first, step = float(properties.get("wf_start_offset", 0.0)), float(properties["wf_increment"])
+        add_array(columns, own, first + step * np.arange(columns.data[name].size), "s")
+        columns.data.setdefault("time", columns.data[own])
+        columns.units.setdefault("time", "s")

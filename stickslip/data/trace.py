@@ -1,0 +1,376 @@
+"""One measured (or simulated) run: SI arrays that nobody can change, where they came from and what was mended."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from ..system.units import factor_to_si, to_si
+from .resolution import estimate_resolution, noise_level
+
+Array = NDArray[np.float64]
+SIGNALS = {"displacement": "m", "velocity": "m/s", "spring_force": "N"}
+
+
+@dataclass(frozen=True)
+class Repair:
+    """Something changed or left out between the file and the trace.
+
+    Args:
+        kind: a short name such as ``"spike"``, ``"wrap"``, ``"nan"``, ``"dropped-samples"``.
+        count: how many samples or places.
+        where: the channel and the first place.
+        reason: why it was necessary, in words.
+    """
+
+    kind: str
+    count: int
+    where: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.count} ({self.where}): {self.reason}"
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a trace came from: file, its SHA-256, the reader, and quantity -> column and unit."""
+
+    file: str = ""
+    sha256: str = ""
+    reader: str = ""
+    columns: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """The load point's position against time, piecewise linear.
+
+    Args:
+        times: breakpoints, s, shape (k,), k >= 2, strictly increasing.
+        positions: load-point positions there, m, shape (k,).
+
+    Beyond its ends the drive goes on with the velocity of its first and last piece.
+    """
+
+    times: Array
+    positions: Array
+
+    def __post_init__(self) -> None:
+        times, positions = _frozen(self.times, "drive times"), _frozen(self.positions, "drive positions")
+        if times.size < 2 or times.shape != positions.shape:
+            raise InputError(
+                "a drive needs at least two times and as many positions", value=(times.size, positions.size)
+            )
+        if not (np.all(np.isfinite(times)) and np.all(np.isfinite(positions)) and np.all(np.diff(times) > 0)):
+            raise InputError("the times of a drive must be finite and increase", hint="check the drive's 'until' times")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "positions", positions)
+
+    @classmethod
+    def constant(cls, velocity: float, start: float = 0.0, stop: float | None = None) -> Drive:
+        """A drive at one velocity (m/s), at position zero at ``start`` (s)."""
+        end = start + 1.0 if stop is None or stop <= start else stop
+        return cls(np.array([start, end]), np.array([0.0, velocity * (end - start)]))
+
+    @classmethod
+    def from_pieces(cls, until: ArrayLike, velocities: ArrayLike, start: float = 0.0) -> Drive:
+        """A drive of constant velocities (m/s), each lasting until a time (s), at position zero at ``start``."""
+        ends, speeds = np.asarray(until, float), np.asarray(velocities, float)
+        if ends.shape != speeds.shape or ends.ndim != 1 or ends.size == 0:
+            raise InputError("every piece of a drive needs one end time and one velocity")
+        times = np.concatenate([[start], ends])
+        if not np.all(np.diff(times) > 0):
+            raise InputError("the times of a drive must be finite and increase", hint="check the drive's 'until' times")
+        return cls(times, np.concatenate([[0.0], np.cumsum(speeds * np.diff(times))]))
+
+    @classmethod
+    def from_samples(cls, time: ArrayLike, position: ArrayLike, tolerance: float) -> Drive:
+        """Few straight pieces that stay within about ``tolerance`` (m) of sampled positions (never beyond its double).
+
+        The "swinging door" of process historians: a piece is stretched as long as one slope serves all its
+        samples, so a million samples of steady drive become one piece while ripple above the tolerance stays. Each
+        piece ends at the mean of a few samples: one that ended at the tolerance's edge would make the next one short.
+        """
+        t, y = np.asarray(time, float), np.asarray(position, float)
+        knots, values, n = [0], [float(y[0])], t.size
+        while knots[-1] < n - 1:
+            i = knots[-1]
+            stop = _reach(t, y, i, values[-1], tolerance)
+            near = min(3, stop - i - 1, n - 1 - stop)
+            value = float(y[stop - near : stop + near + 1].mean())
+            knots.append(stop)
+            values.append(min(max(value, float(y[stop]) - tolerance), float(y[stop]) + tolerance))
+        return cls(t[knots], np.array(values))
+
+    @classmethod
+    def sampled(
+        cls, time: ArrayLike, position: ArrayLike, resolution: float = 0.0, noise: float | None = None
+    ) -> Drive:
+        """A drive from measured positions (m), straight within a few counts and what their noise (m) makes."""
+        values = np.asarray(position, float)
+        level = noise_level(values, resolution or None) if noise is None else noise
+        return cls.from_samples(time, values, max(1.5 * resolution, 4 * level, 1e-9 * float(np.ptp(values)), 1e-15))
+
+    def _piece(self, time: ArrayLike) -> NDArray[np.intp]:
+        return np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, self.times.size - 2)
+
+    def velocity(self, time: ArrayLike) -> Array:
+        """Load-point velocity, m/s, same shape as ``time``; at a breakpoint that of the piece it opens."""
+        speeds = np.diff(self.positions) / np.diff(self.times)
+        return speeds[self._piece(time)]
+
+    def position(self, time: ArrayLike) -> Array:
+        """Load-point position, m, same shape as ``time`` (s)."""
+        t = np.asarray(time, float)
+        if self.times.size == 2:  # one piece: no search through millions of samples
+            speed = (self.positions[1] - self.positions[0]) / (self.times[1] - self.times[0])
+            return np.asarray(self.positions[0] + speed * (t - self.times[0]))
+        piece = self._piece(t)
+        speeds = np.diff(self.positions) / np.diff(self.times)
+        return self.positions[piece] + speeds[piece] * (t - self.times[piece])
+
+    @property
+    def breakpoints(self) -> Array:
+        """Times (s) where the velocity changes, the two ends left out."""
+        return self.times[1:-1]
+
+    @property
+    def speed(self) -> float:
+        """The speed at which the drive moves when it moves: the time-weighted median of |v| over moving pieces, m/s."""
+        lengths = np.diff(self.times)
+        speeds = np.abs(np.diff(self.positions) / lengths)
+        moving = speeds > 0.05 * speeds.max(initial=0.0)
+        if not moving.any():
+            return 0.0
+        order = np.argsort(speeds[moving])
+        weight = np.cumsum(lengths[moving][order])
+        return float(speeds[moving][order][np.searchsorted(weight, 0.5 * weight[-1])])
+
+    def holds(self, start: float, stop: float, fraction: float = 0.05) -> list[tuple[float, float]]:
+        """Stretches (s, s) within [start, stop] where the drive is slower than ``fraction`` of its usual speed."""
+        limit = fraction * self.speed
+        if limit == 0:
+            return [(start, stop)]
+        slow = np.abs(np.diff(self.positions) / np.diff(self.times)) < limit
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))
+        found = []
+        for first, last in edges.reshape(-1, 2):
+            a = start if first == 0 else max(start, self.times[first])
+            b = stop if last == slow.size else min(stop, self.times[last])
+            if b > a:
+                found.append((float(a), float(b)))
+        return found
+
+
+def _reach(t: Array, y: Array, i: int, anchor: float, tolerance: float) -> int:
+    """Last index that one line from ``anchor`` at sample ``i`` reaches within the tolerance."""
+    low, high, j, chunk = -np.inf, np.inf, i + 1, 64
+    while j < t.size:
+        part = slice(j, min(j + chunk, t.size))
+        dt = t[part] - t[i]
+        lows = np.maximum.accumulate(np.maximum((y[part] - tolerance - anchor) / dt, low))
+        highs = np.minimum.accumulate(np.minimum((y[part] + tolerance - anchor) / dt, high))
+        bad = np.flatnonzero(lows > highs)
+        if bad.size:
+            return max(j + int(bad[0]) - 1, i + 1)
+        low, high, j, chunk = float(lows[-1]), float(highs[-1]), part.stop, min(2 * chunk, 1 << 20)
+    return t.size - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A run in SI units; every array read-only, shape (n,).
+
+    Args:
+        name: unique within its campaign.
+        time: s, strictly increasing.
+        displacement, velocity, spring_force: of the block in m, m/s, N; at least one.
+        drive: the load point, if known.
+        drive_position: the measured load point, m, if there is a channel.
+        normal_load: N, if measured.
+        resolution: one count of the leading signal, in its unit.
+        noise: standard deviation of one sample of the leading signal, in its unit.
+        walk: random walk of the displacement, m/sqrt(s), where somebody stated it.
+        hum: amplitude of the displacement's error at the mains frequency, m, where somebody stated it.
+        spring_stiffness: N/m, where this run's spring is known.
+        virgin: whether the run starts from a freshly set down, never loaded contact.
+        role: ``"train"``, ``"held-out"`` or ``""`` (undecided).
+        minimum_slip: m, the smallest slip that counts as an event, where somebody stated it.
+        missing: times (s) of the last sample before each gap in the record.
+        repairs, warnings, provenance: what was mended, what looks odd, where it came from.
+
+    Raises:
+        InputError: no signal, lengths that differ, time that does not increase, values that are not finite.
+    """
+
+    name: str
+    time: Array
+    displacement: Array | None = None
+    velocity: Array | None = None
+    spring_force: Array | None = None
+    drive: Drive | None = None
+    drive_position: Array | None = None
+    normal_load: Array | None = None
+    resolution: float | None = None
+    noise: float | None = None
+    walk: float = 0.0
+    hum: float = 0.0
+    spring_stiffness: float | None = None
+    virgin: bool = False
+    role: str = ""
+    minimum_slip: float | None = None
+    missing: tuple[float, ...] = ()
+    repairs: tuple[Repair, ...] = ()
+    warnings: tuple[str, ...] = ()
+    provenance: Provenance = field(default_factory=Provenance)
+
+    def __post_init__(self) -> None:
+        time = _frozen(self.time, f"{self.name}: time")
+        if time.size < 2:
+            raise InputError(f"trace '{self.name}' has {time.size} samples", allowed="at least 2")
+        # one pass without a copy of the differences: long records must fit in memory
+        if not (time[1:] > time[:-1]).all():
+            row = int(np.flatnonzero(~(time[1:] > time[:-1]))[0]) + 1
+            raise InputError(f"trace '{self.name}': time does not increase at sample {row}", value=float(time[row]))
+        object.__setattr__(self, "time", time)
+        if all(getattr(self, name) is None for name in SIGNALS):
+            raise InputError(f"trace '{self.name}' has no signal", allowed="displacement, velocity or spring_force")
+        for name in (*SIGNALS, "drive_position", "normal_load"):
+            values = getattr(self, name)
+            if values is None:
+                continue
+            array = _frozen(values, f"{self.name}: {name}")
+            if array.shape != time.shape:
+                raise InputError(f"trace '{self.name}': {name} has {array.size} samples, time has {time.size}")
+            if not np.isfinite(array).all():
+                raise InputError(f"trace '{self.name}': {name} holds values that are not finite")
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def from_arrays(
+        cls, name: str = "run", *, time: Any, displacement: Any = None, velocity: Any = None, spring_force: Any = None,
+        drive_velocity: float | str | None = None, drive_position: Any = None,
+        drive: Sequence[tuple[float | str, float | str]] | None = None, resolution: float | str | None = None,
+        noise: float | str | None = None, spring_stiffness: float | str | None = None, virgin: bool = False,
+        role: str = "",
+    ) -> Trace:  # fmt: skip
+        """A run from arrays, without a file.
+
+        Args:
+            name: unique within its campaign.
+            time: s, shape (n,). Arrays, lists, pandas Series and xarray DataArrays are taken; those of xarray may have
+                ``attrs["units"]``, all others are in SI.
+            displacement, velocity, spring_force: of the block (m, m/s, N), shape (n,); at least one.
+            drive_velocity: of the load point, a number in m/s or text such as ``"50 um/s"``; or
+            drive: until when and how fast, piece by piece: ``[("4.3 s", "100 um/s"), ("5.3 s", 0), ...]``; or
+            drive_position: the measured load point (m), shape (n,).
+            resolution, noise: one count, and the standard deviation of one sample, of the leading signal; default what
+                the record itself shows.
+            spring_stiffness: N/m or text, where this run's spring is known.
+            virgin, role: as of the class.
+
+        Raises:
+            InputError: no signal, lengths that differ, times that do not increase, values that are not finite, two
+                ways of giving the drive, a unit that cannot be read.
+        """
+        given = {"displacement": displacement, "velocity": velocity, "spring_force": spring_force}
+        si = {**SIGNALS, "drive_position": "m"}
+        arrays: dict[str, Any] = {
+            key: _si_array(v, si[key], f"{name}: {key}") for key, v in given.items() if v is not None
+        }
+        t = _si_array(time, "s", f"{name}: time")
+        if sum(way is not None for way in (drive_velocity, drive_position, drive)) > 1:
+            raise InputError(
+                f"trace '{name}': the drive is given more than once",
+                hint="keep one of drive_velocity, drive_position, drive",
+            )
+        if not arrays:
+            raise InputError(f"trace '{name}' has no signal", allowed="displacement, velocity or spring_force")
+        leading = next(key for key in SIGNALS if key in arrays)
+
+        def known(value: float | str | None, unit: str, key: str) -> float | None:
+            return None if value is None else to_si(value, unit, key=f"{name}: {key}")
+
+        count = known(resolution, SIGNALS[leading], "resolution")
+        count = estimate_resolution(arrays[leading]) if count is None else count
+        level = known(noise, SIGNALS[leading], "noise")
+        level = noise_level(arrays[leading], count) if level is None else level
+        speed = known(drive_velocity, "m/s", "drive_velocity")
+        motion = None if speed is None else Drive.constant(speed, float(t[0]), float(t[-1]))
+        if drive is not None:
+            until = [to_si(end, "s", key=f"{name}: drive") for end, _ in drive]
+            motion = Drive.from_pieces(until, [to_si(v, "m/s", key=f"{name}: drive") for _, v in drive], float(t[0]))
+        if drive_position is not None:
+            arrays["drive_position"] = position = _si_array(drive_position, "m", f"{name}: drive_position")
+            motion = Drive.sampled(t, position)
+        digest = hashlib.sha256(t.tobytes())
+        for key, values in arrays.items():
+            digest.update(key.encode() + values.tobytes())
+        return cls(
+            name, t, **arrays, drive=motion, resolution=count, noise=level, virgin=virgin, role=role,
+            spring_stiffness=known(spring_stiffness, "N/m", "spring_stiffness"),
+            provenance=Provenance("", digest.hexdigest(), "arrays"),
+        )  # fmt: skip
+
+    @property
+    def leading(self) -> str:
+        """Name of the signal that is measured best known to tell events: displacement, else velocity, else force."""
+        return next(name for name in SIGNALS if getattr(self, name) is not None)
+
+    @property
+    def signal(self) -> Array:
+        """The leading signal, SI, shape (n,)."""
+        return getattr(self, self.leading)
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, s."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def sampling_rate(self) -> float:
+        """Mean sampling rate, Hz."""
+        return (self.time.size - 1) / self.duration
+
+    @property
+    def drive_velocity(self) -> float | None:
+        """The drive's usual speed, m/s, or None where no drive is known."""
+        return None if self.drive is None else self.drive.speed
+
+    def replace(self, **changes: object) -> Trace:
+        """A copy with some fields changed."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+
+def _si_array(values: Any, unit: str, what: str) -> Array:
+    """Values as an array of its own in the SI ``unit``; text in ``attrs["units"]`` says another unit of theirs."""
+    written = getattr(values, "attrs", {}).get("units")
+    factor = 1.0 if written is None else factor_to_si(str(written), unit, key=what)
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what} holds no numbers ({error})") from None
+    return array * factor
+
+
+def _frozen(values: ArrayLike, what: str) -> Array:
+    """A read-only float view; copies only what someone else could still write to."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 1:
+        raise InputError(f"{what} must be one-dimensional", value=array.shape)
+    if array.flags.writeable:
+        array = array.copy() if array.base is not None or array is values else array
+        array.flags.writeable = False
+    return array

@@ -1,0 +1,57 @@
+"""What a file with a law of one's own imports: the roles, the declaration of parameters, the catalogue and its checks.
+
+>>> from stickslip.effects import Threshold, parameter
+
+The laws themselves are in :mod:`stickslip.physics.effects`.
+"""
+
+from .physics.effects import (
+    BodyForce,
+    Contact,
+    Drive,
+    Effect,
+    Flow,
+    Geometry,
+    Inertia,
+    Memory,
+    Motion,
+    Sensor,
+    Spring,
+    Stiffness,
+    Threshold,
+    forms,
+    get,
+    load_file,
+    make,
+    register,
+    roles,
+    tags,
+)
+from .physics.params import parameter, variant
+from .simulation.conformance import check_effect
+
+__all__ = [
+    "BodyForce",
+    "Contact",
+    "Drive",
+    "Effect",
+    "Flow",
+    "Geometry",
+    "Inertia",
+    "Memory",
+    "Motion",
+    "Sensor",
+    "Spring",
+    "Stiffness",
+    "Threshold",
+    "check_effect",
+    "forms",
+    "get",
+    "load_file",
+    "make",
+    "parameter",
+    "register",
+    "roles",
+    "tags",
+    "variant",
+]

@@ -1,0 +1,1 @@
+"""Laws from motion: the force along it, fits, the diagnosis, the forecast."""

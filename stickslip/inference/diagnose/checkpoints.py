@@ -1,0 +1,76 @@
+"""Finished pieces of a diagnosis as plain arrays, so that an interrupted one goes on from files that hold data only."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from ...physics.effects import catalogue
+from ..force.candidates import Candidate, with_start
+from ..force.fit import Fit, at
+from ..force.problem import Point, Problem
+from ..force.scatter import Scatter
+
+_POINT = ("z", "phases", "weights", "events", "common")
+_FACTS = ("tag", "form", "promise", "note", "members", "visible", "start")
+
+
+class Store(Protocol):
+    """Where finished pieces are kept."""
+
+    def load(self, key: str) -> Mapping[str, np.ndarray] | None:
+        """A finished piece, or None."""
+
+    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
+        """Keep a finished piece."""
+
+
+def kept(store: Store | None, key: str, problem: Problem, make: Callable[[], Fit]) -> Fit:
+    """A fit of the problem from the store, or made and kept there."""
+    found = store.load(key) if store is not None else None
+    if found is not None:
+        problem = problem.with_composition(replace(problem.composition, reach=np.asarray(found["reach"], float)))
+        return at(problem, _point(found), Scatter(found["sizes"]), found["dropped"].astype(bool))
+    fit = make()
+    if store is not None:
+        reach = fit.problem.composition.reach
+        store.save(key, {**_arrays(fit.point), "sizes": fit.scatter.sizes, "dropped": fit.dropped, "reach": reach})
+    return fit
+
+
+def name_of(tag: str, form: Mapping[str, str]) -> str:
+    """Name of a candidate among the pieces of a round."""
+    return "-".join([tag, *form.values()]).replace(" ", "_")
+
+
+def save_candidate(store: Store, key: str, candidate: Candidate) -> None:
+    """Keep a candidate."""
+    head = json.dumps({name: getattr(candidate, name) for name in _FACTS})
+    fit = candidate.fit
+    point = {} if fit is None else {**_arrays(fit.point), "sizes": fit.scatter.sizes}
+    store.save(key, {"head": np.array(head), **point})
+
+
+def load_candidate(store: Store, key: str, base: Fit) -> Candidate | None:
+    """A kept candidate on top of its base, or None."""
+    found = store.load(key)
+    if found is None:
+        return None
+    head = json.loads(str(found["head"]))
+    if "z" not in found:
+        return Candidate(**head, fit=None)
+    effect = catalogue.get(head["tag"])(**head["form"])
+    problem, _ = with_start(base.problem, effect, head["start"])
+    return Candidate(**head, fit=at(problem, _point(found), Scatter(found["sizes"]), base.dropped, base.known))
+
+
+def _arrays(point: Point) -> dict[str, np.ndarray]:
+    return {name: np.asarray(getattr(point, name)) for name in _POINT}
+
+
+def _point(found: Mapping[str, np.ndarray]) -> Point:
+    return Point(*(np.asarray(found[name], float) for name in _POINT))

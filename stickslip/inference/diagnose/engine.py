@@ -1,0 +1,376 @@
+"""The diagnosis: fit the base along the measured motion, try every effect, name one or say why not, add it, repeat."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from ...data.campaign import Campaign
+from ...data.checks import Finding
+from ...data.segment import Segmentation, segment
+from ...data.trace import Trace
+from ...physics.effects import catalogue
+from ..force.candidates import Candidate, every_form
+from ..force.fit import Array, Fit, deviations, fit
+from ..force.heldout import unseen
+from ..force.problem import Point, Problem
+from ..force.residual import Structure, structures
+from ..force.rig import slips_finding, spring_freed
+from ..force.signatures import Explained
+from .checkpoints import Store, kept, name_of
+from .confirm import Confirmation, Parts, confirm
+from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named
+from .prepare import Prepared, prepare
+from .shape import Shape, shape_of
+from .trials import Tell, trials
+
+SEVERAL = "unequal-contacts"  # means nothing where there is one
+LEFT = 0.5  # of what named effects explain, from which what is left is no matter of a law's form any more
+BEST = 10  # effects of a round that are tried again beside the one that was named
+STRUCTURED = 1e-6  # chance of the residual force being a function of some variable, below which something is missing
+MEMBERS = 2  # of a set that are run freely besides the first
+
+
+@dataclass(frozen=True)
+class Round:
+    """All effects on top of one model.
+
+    Attributes:
+        base: that model.
+        judged: every form that was fitted.
+        candidates: everything that was tried.
+        close: what was named, and behind it what these data cannot tell from it.
+        rival: the model with the spring's stiffness free in place of an effect, where the file states it.
+    """
+
+    base: Fit
+    judged: tuple[Judged, ...]
+    candidates: tuple[Candidate, ...]
+    close: tuple[Judged, ...]
+    rival: Compared | None = None
+
+    @property
+    def doubt(self) -> Compared | None:
+        """The spring or mass other than stated, where no effect predicts unseen runs better than that."""
+        rival = self.rival
+        doubted = rival is not None and rival.seen and (not self.close or as_well(self.close[0], rival))
+        return rival if doubted else None
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One model of the ladder.
+
+    Attributes:
+        model: tags of its parts. added: the last of them, None where the ladder begins.
+        residual: of the force with all events alike, on the runs it was fitted to (N), shape (p,).
+        unseen: the same of runs left out; None for the static model, which has no fit of its own.
+        fit: None for the static model.
+        removed: an effect that is not needed any more with those that came after it.
+    """
+
+    model: tuple[str, ...]
+    added: str | None
+    residual: Array
+    unseen: Array | None
+    fit: Fit | None
+    removed: str | None = None
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The answer: see :mod:`.summary` for the words."""
+
+    kind: str
+    effects: tuple[str, ...] = ()
+    set: tuple[str, ...] = ()
+    structure: Structure | None = None
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a report needs.
+
+    Attributes:
+        verdict, ladder, rounds: what was found, and how.
+        named: effects of the last model, each with the round in which it was last told from others.
+        prepared: the data.
+        floor: of the force at every point: noise and scatter of the last model (N), shape (p,).
+        shape: the backbone that the last model measured, and its laws.
+        dropped: what was left out, and why.
+        in_time: whether the time limit was not met.
+        confirmation: the leading models run freely.
+        wrong: what the motion contradicts of the rig as it is stated, so that no effect was tried.
+    """
+
+    verdict: Verdict
+    ladder: tuple[Rung, ...]
+    rounds: tuple[Round, ...]
+    named: Mapping[str, Round]
+    prepared: Prepared
+    floor: Array
+    shape: Shape
+    dropped: tuple[str, ...] = field(default=())
+    in_time: bool = True
+    confirmation: Confirmation = field(default_factory=Confirmation)
+    wrong: tuple[Finding, ...] = ()
+
+    @property
+    def fit(self) -> Fit:
+        """Of the last model."""
+        last = self.ladder[-1].fit
+        assert last is not None
+        return last
+
+
+def diagnose(
+    campaign: Campaign,
+    traces: Sequence[Trace],
+    segmentations: Sequence[Segmentation] | None = None,
+    *,
+    candidates: Sequence[str] | None = None,
+    max_effects: int = 4,
+    holdout: Sequence[str] = (),
+    jobs: int | None = None,
+    store: Store | None = None,
+    time_limit: float | None = None,
+    wrong: Sequence[Finding] = (),
+    progress: Callable[[str, float], None] | None = None,
+) -> Diagnosis:
+    """Find out what the base model lacks.
+
+    Args:
+        campaign, traces, segmentations: the measurement.
+        candidates: tags to try; default the whole catalogue.
+        max_effects: at most so many are added one after the other.
+        holdout: runs to keep aside, besides those whose role in the campaign is "held-out".
+        jobs: processes; default the number of cores.
+        store: keeps finished pieces.
+        time_limit: seconds after which the best answer so far is given.
+        wrong: what the motion contradicts of the rig as it is stated: with any, the base is fitted and no effect tried.
+        progress: told the stage and the share of it done.
+
+    Raises:
+        InputError: no run can take part, or the mass is not given.
+        FitError: the base model gives no finite force.
+    """
+    began = time.monotonic()
+
+    def in_time() -> bool:
+        return time_limit is None or time.monotonic() - began < time_limit
+
+    tell: Tell = progress or (lambda text, share: None)
+    segmentations = [segment(t) for t in traces] if segmentations is None else segmentations
+    tell("the measured force", 0.0)
+    prepared = prepare(campaign, traces, segmentations, holdout)
+    dropped = list(prepared.dropped)
+    tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]
+    if campaign.rig.contacts == 1 and SEVERAL in tags:
+        tags.remove(SEVERAL)
+        dropped.append(f"{SEVERAL}: not tried, for the rig has one contact")
+    jobs = (os.cpu_count() or 1) if jobs is None else jobs
+    tell("fitting the base model", 0.5)
+    base = kept(store, "base", prepared.problem, lambda: fit(prepared.problem, prepared.start))
+    ladder = [Rung(("static",), None, static_residual(base), None, None), _rung(("static", "inertia"), "inertia", base)]
+    search = Search(base, ladder, jobs, tell, in_time, store)
+    verdict: Verdict | None = None
+    if wrong:  # an effect would be fitted to the wrong entry
+        search.rounds.append(Round(base, (), (), ()))
+        verdict = Verdict("unknown")
+    while verdict is None:
+        done = search.round([t for t in tags if t not in search.named and t not in search.gone])
+        if done.doubt is not None:
+            wrong = (*wrong, slips_finding(done.base, done.doubt.fit))
+            tied = done.close and as_well(done.doubt, done.close[0])
+            alike = tuple(j.tag for j in done.close) if tied else ()
+            verdict = Verdict("ambiguous" if tied else "unknown", tuple(search.named), alike)
+        elif not done.close or not in_time():
+            verdict = _end(search.named, done)
+        else:
+            search.add(done)
+            if len(search.named) >= max_effects:
+                verdict = _end(search.named, Round(search.base, (), (), ()))
+    floor = deviations(search.base)
+    tell("the laws of the backbone", 1.0)
+    shape = shape_of(search.base, campaign.rig, tags)
+    verdict = verdict if wrong else with_shape(verdict, shape)
+    complete = in_time()
+    confirmed = confirm(leading(ladder, search.named), ladder[-1].model, prepared, store, tell, in_time)
+    return Diagnosis(
+        verdict, tuple(ladder), tuple(search.rounds), dict(search.named), prepared, floor, shape, tuple(dropped),
+        complete, confirmed, tuple(wrong),
+    )  # fmt: skip
+
+
+class Search:
+    """The model as it grows: effects added, and each tried again with those that came after it.
+
+    Attributes:
+        base: the model as it stands.
+        ladder: its steps.
+        rounds: all effects on top of each model.
+        named: effects of the model, each with the round in which it was last told from others.
+        gone: effects that were taken out again; they are not tried any more, so that the search ends.
+    """
+
+    def __init__(
+        self, base: Fit, ladder: list[Rung], jobs: int, tell: Tell, in_time: Callable[[], bool], store: Store | None
+    ) -> None:
+        self.base, self.ladder = base, ladder
+        self.rounds: list[Round] = []
+        self.named: dict[str, Round] = {}
+        self.gone: set[str] = set()
+        self._jobs, self._tell, self._in_time, self._store = jobs, tell, in_time, store
+
+    def round(self, tags: Sequence[str]) -> Round:
+        """Every effect of these on top of the model."""
+        name = f"round {len(self.rounds) + 1}"
+        done = self._tried(self.base, tags, name)
+        self.rounds.append(done)
+        return done
+
+    def add(self, done: Round) -> None:
+        """Take up what a round named, and try again each effect named before."""
+        tag, key = done.close[0].tag, f"round{len(self.rounds)}"
+        self._tell(f"round {len(self.rounds)}: the model with {tag}", 1.0)
+        self._take(settled(done.base, done.close[0].candidate, self._store, key), tag, None)
+        self.named[tag] = done
+        for earlier in list(self.named)[:-1]:
+            if self._in_time():
+                self._again(earlier)
+
+    def _again(self, tag: str) -> None:
+        """An effect tried once more, beside the best of its own round, with all others in the model."""
+        name = f"again {tag} in round {len(self.rounds)}"
+        key = name.replace(" ", "-")
+        problem, _ = _taken_out(self.base, tag)
+        apart = kept(self._store, f"{key}-without", problem, lambda: without(self.base, tag))
+        seen = sorted((j for j in best_forms(self.named[tag].judged) if j.seen), key=lambda j: -j.better)
+        tags = [j.tag for j in seen if j.tag == tag or j.tag not in {*self.named, *self.gone}][:BEST]
+        done = self._tried(apart, tags, name)
+        if not done.close:
+            del self.named[tag]
+            self._take(apart, None, tag)
+        elif done.close[0].tag == tag:
+            self.named[tag] = done
+        else:
+            other = done.close[0].tag
+            self._take(settled(apart, done.close[0].candidate, self._store, key), other, tag)
+            self.named = {other if t == tag else t: done if t == tag else r for t, r in self.named.items()}
+
+    def _tried(self, base: Fit, tags: Sequence[str], name: str) -> Round:
+        key = name.replace(" ", "")
+        return one_round(base, tags, self._jobs, partial(_told, self._tell, name), self._in_time, self._store, key)
+
+    def _take(self, base: Fit, added: str | None, removed: str | None) -> None:
+        self.base = base
+        self.gone |= {removed} if removed else set()
+        model = [t for t in self.ladder[-1].model if t != removed]
+        self.ladder.append(_rung((*model, *([added] if added else [])), added, base, removed))
+
+
+def without(base: Fit, tag: str) -> Fit:
+    """The model without one of its effects, fitted anew with what is random."""
+    problem, point = _taken_out(base, tag)
+    return fit(problem, point, base.scatter, dropped=base.dropped, first=True)
+
+
+def _taken_out(base: Fit, tag: str) -> tuple[Problem, Point]:
+    composition, point = base.problem.composition, base.point
+    own = f"{tag}."
+    keep = [not f.name.startswith(own) for f in composition.shared]
+    turns = [not f.name.startswith(own) for f in composition.phases]
+    problem = base.problem.with_composition(composition.without(tag))
+    return problem, replace(point, z=point.z[keep], phases=point.phases[turns])
+
+
+def leading(ladder: Sequence[Rung], named: Mapping[str, Round]) -> dict[Parts, Fit]:
+    """The models that are run freely: base and last of the ladder, and what the data cannot tell from an effect."""
+    fits = [(r.model, r.fit) for r in (ladder[1], ladder[-1])]
+    for done in named.values():
+        parts = (*ladder[1].model, *(e.tag for e in done.base.problem.composition.effects))
+        fits += [((*parts, j.tag), j.candidate.fit) for j in done.close[1 : 1 + MEMBERS]]
+    return {parts: fit for parts, fit in fits if fit is not None}
+
+
+def _told(tell: Tell, name: str, text: str, share: float) -> None:
+    tell(f"{name}: {text}", share)
+
+
+def one_round(
+    base: Fit,
+    tags: Sequence[str],
+    jobs: int,
+    tell: Tell,
+    in_time: Callable[[], bool],
+    store: Store | None = None,
+    name: str = "round",
+) -> Round:
+    """Every effect on top of one model, and which of them is to be named."""
+    tried = trials(base, tags, jobs, tell, in_time, store, name)
+    judge = Judge(base, max(len(every_form(tags)), 1))
+    judged = tuple(j for j in map(judge, tried) if j is not None)
+    freed = spring_freed(base)
+    rival = None if freed is None else judge.beside(freed, 1)
+    return Round(base, judged, tuple(tried), tuple(named(judged)), rival)
+
+
+def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: str = "round") -> Fit:
+    """The model with an effect, what is random estimated anew."""
+    found = candidate.fit
+    assert found is not None
+    key = f"{name}-settled-{name_of(candidate.tag, candidate.form)}"
+    return kept(
+        store, key, found.problem,
+        lambda: fit(found.problem, found.point, found.scatter, dropped=base.dropped, first=True),
+    )  # fmt: skip
+
+
+def _end(named: Mapping[str, Round], last: Round) -> Verdict:
+    """Nothing more is seen: what that means."""
+    taken, sets = tuple(named), [r.close for r in named.values() if len(r.close) > 1]
+    structure = None
+    found = structures(last.base, Explained(last.base), DISPERSION)
+    explained = sum(r.close[0].gain for r in named.values())
+    if found and found[0].chance < STRUCTURED and found[0].fall > LEFT * explained and not last.close:
+        structure = found[0]
+    if structure is not None:
+        return Verdict("unknown", taken, tuple(dict.fromkeys(j.tag for c in sets for j in c)), structure)
+    if sets:
+        every = tuple(dict.fromkeys([*taken, *(j.tag for c in sets for j in c)]))
+        return Verdict("ambiguous", taken, every)
+    return Verdict("missing" if taken else "complete", taken, taken)
+
+
+def with_shape(verdict: Verdict, shape: Shape) -> Verdict:
+    """The answer with what the backbone names: one effect more that is missing, alone or in a set."""
+    tags = tuple(law.tag for law in shape.close)
+    if not tags:
+        return verdict
+    kind = {"complete": "missing"}.get(verdict.kind, verdict.kind)
+    if kind == "missing" and len(tags) > 1:
+        kind = "ambiguous"
+    effects = (*verdict.effects, tags[0])
+    return replace(verdict, kind=kind, effects=effects, set=tuple(dict.fromkeys([*verdict.set, *tags])))
+
+
+def _rung(model: tuple[str, ...], added: str | None, found: Fit, removed: str | None = None) -> Rung:
+    return Rung(model, added, found.marginal, unseen(found).residual, found, removed)
+
+
+def static_residual(base: Fit) -> Array:
+    """Residual force of the paper's static model: the same backbone, no weakening and no inertia (N), shape (p,)."""
+    problem = base.problem
+    composition = replace(problem.composition, mass=1e-12)
+    names = [f.name for f in composition.shared]
+    z = base.point.z.copy()
+    for name in ("weakening.drop", "rig.damping"):
+        free = composition.shared[names.index(name)]
+        z[names.index(name)] = free.inward(free.lower)
+    point = replace(base.point, z=z, events=np.zeros_like(base.point.events))
+    return problem.with_composition(composition).evaluate(point).residual

@@ -1,0 +1,119 @@
+"""Every effect on top of a model, in processes side by side."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from cloudpickle import dumps, loads
+from joblib import Parallel, delayed
+
+from ...physics.contact import Bank
+from ...physics.effects import catalogue
+from ...physics.effects.base import Memory
+from ..force.candidates import Candidate, every_form, try_effect
+from ..force.fit import Fit
+from ..force.signatures import Explained
+from .checkpoints import Store, load_candidate, name_of, save_candidate
+
+Tell = Callable[[str, float], None]
+
+
+def trials(
+    base: Fit,
+    tags: Sequence[str],
+    jobs: int,
+    tell: Tell,
+    until: Callable[[], bool],
+    store: Store | None = None,
+    name: str = "round",
+) -> list[Candidate]:
+    """Every form of every effect, refitted with the base.
+
+    Args:
+        base: the model they are added to.
+        tags: effects to try.
+        jobs: processes.
+        tell: told what was tried and the share done.
+        until: whether there is time for more; what is not tried then is missing from the answer.
+        store, name: keeps what is finished, under this name.
+    """
+    work = every_form(tags)
+    out: list[Candidate] = []
+    left = []
+    for tag, form in work:
+        known = None if store is None else load_candidate(store, f"{name}-{name_of(tag, form)}", base)
+        if known is None:
+            left.append((tag, form))
+        else:
+            out.append(known)
+    # the largest first, so that no process waits for one that was begun last
+    groups = [(tag, [form for other, form in left if other == tag]) for tag in dict.fromkeys(t for t, _ in left)]
+    groups.sort(key=lambda job: -_size(base, *job))
+    for made in _made(base, groups, jobs):
+        out += made
+        if store is not None:
+            for candidate in made:
+                save_candidate(store, f"{name}-{name_of(candidate.tag, candidate.form)}", candidate)
+        tell(made[-1].tag, len(out) / len(work))
+        if not until():
+            break
+    order = {(tag, tuple(form.items())): i for i, (tag, form) in enumerate(work)}
+    return sorted(out, key=lambda c: order[c.tag, tuple(c.form.items())])
+
+
+Job = tuple[str, list[dict[str, str]]]  # an effect in some of its forms
+
+
+def _made(base: Fit, work: Sequence[Job], jobs: int) -> Iterator[list[Candidate]]:
+    if jobs == 1 or len(work) < 4:
+        explained = Explained(base)
+        for tag, forms in work:
+            yield try_effect(base, explained, tag, forms)
+        return
+    files = tuple(str(m.__file__) for m in catalogue.user_modules())
+    job = dumps(base)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="A worker stopped")
+        pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
+        yield from (
+            loads(a) for a in pool(delayed(_in_worker)(job, tag, forms, files, os.getpid()) for tag, forms in work)
+        )
+
+
+def _size(base: Fit, tag: str, forms: Sequence[Mapping[str, str]]) -> int:
+    """Numbers that an effect remembers, over its forms."""
+    reach = base.problem.composition.reach
+    total = len(forms)
+    for form in forms:
+        effect = catalogue.get(tag)(**form)
+        if isinstance(effect, Memory):
+            state = effect.start(Bank(jnp.ones(reach.size), jnp.asarray(reach)))
+            total += sum(int(np.size(leaf)) for leaf in jax.tree.leaves(state))
+    return total
+
+
+_kept: dict[int, tuple[Fit, Explained]] = {}
+
+
+def _in_worker(job: bytes, tag: str, forms: list[dict[str, str]], files: tuple[str, ...], parent: int) -> Any:
+    """One effect in a worker, which loads the user's files first and keeps the base of its last job."""
+    from ...system import cache
+    from ...system.lifeline import end_with
+
+    end_with(parent)
+    cache.enable()
+    for file in files:
+        if not any(str(m.__file__) == file for m in catalogue.user_modules()):
+            catalogue.load_file(file)
+    key = hash(job)
+    if key not in _kept:
+        _kept.clear()
+        base = loads(job)
+        _kept[key] = (base, Explained(base))
+    return dumps(try_effect(*_kept[key], tag, forms))

@@ -1,0 +1,107 @@
+"""The contact's resonance, heard in the ringing after the arrests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import periodogram
+from scipy.signal.windows import hann
+from scipy.stats import chi2
+from scipy.stats import f as ratio_of_powers
+
+from ...data.segment import Event, Segmentation
+from ...data.trace import Trace
+
+Array = NDArray[np.float64]
+SKIPPED = 1e-3  # s after an arrest that are no ringing yet
+LONG = 0.03  # s listened to after an arrest
+SHORT = (0.015, 0.008)  # s, where the ringing may have died before the long window is half over
+LOWEST = 60.0  # Hz
+PERIODS = 3.0  # a short window must hold, so that a slow motion is no ringing
+STANDS_OUT = 10.0  # times the median of the spectrum
+LOUDER = 4.0  # times the power later in the stick, which knows of noise of any colour and of hum
+ALARM = 2e-3  # chance of a peak of noise alone in one spectrum
+CALM = 4  # windows later in a stick
+LAST = 0.8  # of a stick, after which the next slip may begin
+
+
+def ringing(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float | None:
+    """Period (s) of the ringing after the arrests: the highest peak of the mean spectrum of the 30 ms after them.
+
+    Where nothing stands out there, of the 15 or the 8 ms after them, where ringing that dies within a few periods is
+    louder. None where the sampling is too slow or nothing rings: no peak stands out of its spectrum and of the spectrum
+    later in the sticks further than noise would once in a hundred records.
+    """
+    heard = _heard(traces, segmentations, LONG)
+    if heard is None:
+        others = [h for h in (_heard(traces, segmentations, length) for length in SHORT) if h is not None]
+        heard = max(others, key=lambda h: h[1], default=None)
+    return None if heard is None else 1.0 / heard[0]
+
+
+def _heard(traces: Sequence[Trace], segmentations: Sequence[Segmentation], length: float) -> tuple[float, float] | None:
+    """Frequency (Hz) of what rings within ``length`` s after the arrests, and how far above the limit it is."""
+    rates = [t.sampling_rate for t, s in zip(traces, segmentations, strict=True) if t.displacement is not None]
+    pieces: dict[int, list[tuple[Array, list[Array]]]] = {}
+    for trace, segments in zip(traces, segmentations, strict=True):
+        if trace.displacement is None:
+            continue
+        for i, event in enumerate(segments.events):
+            later = segments.events[i + 1] if i + 1 < len(segments.events) else None
+            piece = _windows(trace.displacement, trace.sampling_rate, event, later, length)
+            if piece is not None:
+                pieces.setdefault(round(trace.sampling_rate), []).append(piece)
+    if not pieces:
+        return None
+    top = max(pieces)
+    rate, found = next(r for r in rates if round(r) == top), pieces[top]
+    size = min(y.size for y, _ in found)  # rates that are equal but for rounding
+    frequency = np.fft.rfftfreq(8 * size, 1.0 / rate)
+    low = LOWEST if length == LONG else PERIODS / length
+    band = np.flatnonzero((frequency > low) & (frequency < rate / 5.0))
+    if band.size < 3:
+        return None
+    loud = np.mean([_power(y[:size], rate, length) for y, _ in found], axis=0)
+    i = int(band[np.argmax(loud[band])])
+    # the spectrum of a slow motion, or of noise that grows towards low frequencies, has no peak but an edge
+    if loud[i] < loud[i - 1 : i + 2].max():
+        return None
+    bins = 2.0 * band.size / 8.0
+    events = len(found)
+    limit = max(STANDS_OUT, chi2.isf(ALARM / bins, 2 * events) / chi2.median(2 * events))
+    excess = float(loud[i] / (limit * np.median(loud[band])))
+    calm = [_power(y[:size], rate, length) for _, rest in found for y in rest]
+    if calm:
+        limit = max(LOUDER, ratio_of_powers.isf(ALARM / bins, 2 * events, 2 * len(calm)))
+        excess = min(excess, float(loud[i] / (limit * np.mean(calm, axis=0)[i])))
+    return (float(frequency[i]), excess) if excess > 1.0 else None
+
+
+def _windows(
+    position: Array, rate: float, event: Event, later: Event | None, length: float
+) -> tuple[Array, list[Array]] | None:
+    """What follows an arrest, and some pieces of the same length from the second half of that stick."""
+    n = round(length * rate)
+    first = event.i_arrest + max(int(SKIPPED * rate), 1)
+    if first + n >= position.size or n < (64 if length == LONG else 32):
+        return None
+    stop = position.size if later is None else event.i_arrest + int(LAST * (later.i_onset - event.i_arrest))
+    begin = max(first + n, (event.i_arrest + stop) // 2)
+    count = min((stop - begin) // n, CALM)
+    starts = np.linspace(begin, stop - n, count).astype(int) if count > 0 else np.empty(0, int)
+    return position[first : first + n], [position[k : k + n] for k in starts]
+
+
+def _power(y: Array, rate: float, length: float) -> Array:
+    """Spectrum of a piece freed from slow motion; a short one is weighed where its ringing is loudest."""
+    s = np.linspace(-1, 1, y.size)
+    y = y - np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyfit(s, y, 3))
+    taper: Array = hann(y.size, sym=False)
+    if length != LONG:
+        rise = y.size // 4
+        taper = np.concatenate(
+            [hann(2 * rise, sym=False)[:rise], hann(2 * (y.size - rise), sym=False)[y.size - rise :]]
+        )
+    return np.asarray(periodogram(y, rate, window=taper, nfft=8 * y.size, detrend=False)[1], float)

@@ -1,0 +1,163 @@
+"""The model driven by a given motion: no equation of motion is integrated, the friction law is fed what was measured.
+
+Inverse dynamics: contact, weakening and every effect are taken by :meth:`stickslip.physics.model.Model.advance` over
+the increments of the motion, as the solver does within its steps. What they give is the force that the model holds
+against the block along that motion.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from ...physics.contact import Bank
+from ...physics.effects.base import Contact, Drive, Memory, Motion, Sensor
+from ...physics.model import Model, State
+
+PASSES = 4  # of undoing the sensor
+
+
+class Way(NamedTuple):
+    """A motion at its knots, shape (n,), the first of which is the start.
+
+    Attributes:
+        t, x, v: time (s), displacement (m) and velocity (m/s) of the block.
+        drive: the load point as the drive was told (m).
+        turn: from the knot before to the turning point within the increment (m); zero where there is none.
+        strength, stretch: factors on caps and on yield displacements of all elements, which vary from event to event.
+    """
+
+    t: Any
+    x: Any
+    v: Any
+    drive: Any
+    turn: Any
+    strength: Any
+    stretch: Any
+
+
+class Held(NamedTuple):
+    """What the model holds along a motion, at its knots.
+
+    Attributes:
+        pull: force of the spring (N), shape (n,).
+        body: force of effects on the block (N), shape (n,).
+        contact: force of the contact against the block (N), shape (n,).
+        elements: share of its full strength that each element carries, shape (n, k).
+        tangent: stiffness of the elements that stick (N/m), shape (n,).
+    """
+
+    pull: Array
+    body: Array
+    contact: Array
+    elements: Array
+    tangent: Array
+
+
+def lead(model: Model, t: Array, drive: Array) -> Array:
+    """Displacement of the load point (m), effects on the drive included; shape as ``t``."""
+    return drive + sum((e.lead(t, drive) for e in model.effects if isinstance(e, Drive)), jnp.zeros(()))
+
+
+def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
+    """Drive the model along a motion.
+
+    Args:
+        model: its load point is not used; the motion brings its own.
+        way: what moves.
+        knots: number of those that count; the rest is padding, costs nothing and is zero in the result. Default all.
+    """
+    bank = model.shaped()
+    led = lead(model, way.t, way.drive)
+    mass = model.mass()
+    start = model.rest(way.t[0], way.x[0], way.v[0])
+    dt, dx = jnp.diff(way.t, prepend=way.t[:1]), jnp.diff(way.x, prepend=way.x[:1])
+    items = (way.t, dt, way.x, dx, way.v, led, way.turn, way.strength, way.stretch)
+    share = 1.0 / jnp.where(bank.strength > 0.0, bank.strength, 1.0)
+
+    def step(i: Array, carry: tuple[State, Array, Held]) -> tuple[State, Array, Held]:
+        state, pull, held = carry
+        t, dt, x, dx, v, at, turn, strength, stretch = (a[i] for a in items)
+        own = Bank(bank.stiffness * (strength / stretch), bank.strength * strength)
+        contact = Contact(state.force, own.stiffness, own.strength, pull, state.cap, mass)
+        motion = Motion(t, dt, x, v, turn, dx, at)
+        state, forces = model.advance(state, own, contact, motion)
+        sticks = jnp.abs(state.force) < state.cap * (1.0 - 1e-6)
+        tangent = jnp.sum(jnp.where(sticks, state.stiffness, 0.0))
+        here = Held(forces.spring, forces.body, forces.contact, state.force * share, tangent)
+        return state, forces.spring, Held(*(a.at[i].set(b) for a, b in zip(held, here, strict=True)))
+
+    n, none = way.t.size, jnp.zeros(way.t.size)
+    pull = model.pull(led[0] - way.x[0])
+    first = Held(
+        none.at[0].set(pull), none, none, jnp.zeros((n, share.size)), none.at[0].set(jnp.sum(bank.stiffness))
+    )  # fmt: skip
+    return jax.lax.fori_loop(1, n if knots is None else knots, step, (start, pull, first))[2]
+
+
+def turning(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Way from the knot before to the turning point of each increment (m), by a constant deceleration; else zero."""
+    before, after = v[:-1], v[1:]
+    reverses = before * after < 0.0
+    apart = np.where(reverses, before - after, 1.0)
+    return np.concatenate([[0.0], np.where(reverses, 0.5 * np.diff(t) * before**2 / apart, 0.0)])
+
+
+def undone(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Way:
+    """The motion of the block from that of the reading: the chain of sensor effects undone.
+
+    By van Cittert's iteration ``x <- x + (reading - sensor(x))``, which needs nothing but the sensor itself; it ends
+    for every filter that loses or delays less than it shows, after few passes where it changes little.
+
+    Args:
+        model: with effects on the sensor.
+        way: the reading in place of the displacement.
+        force: that the contact holds at the knots (N), for sensors that see it, shape (n,).
+        knots: number of those that count.
+    """
+    if not any(isinstance(e, Sensor) for e in model.effects):
+        return way
+    seen = way.x
+    for _ in range(PASSES):
+        shift = way.x + (seen - read(model, way, force, knots)) - seen
+        way = way._replace(x=seen + shift, v=way.v + _slope(shift, way.t) - _slope(way.x - seen, way.t))
+    return way
+
+
+def read(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Array:
+    """What the sensors show of a motion (m), shape (n,); arguments as of :func:`undone`, ``way`` that of the block."""
+    sensors: list[Any] = sorted((e for e in model.effects if isinstance(e, Sensor)), key=lambda e: e.place)
+    bank = model.shaped()
+    memory = tuple(e.start(bank) if isinstance(e, Memory) else () for e in sensors)
+    zero, mass = jnp.zeros_like(bank.stiffness), model.mass()
+    dt, dx = jnp.diff(way.t, prepend=way.t[:1]), jnp.diff(way.x, prepend=way.x[:1])
+    items = (way.t, dt, way.x, dx, way.v, way.drive, force)
+
+    def step(i: Array, carry: tuple[Any, Array]) -> tuple[Any, Array]:
+        states, readings = carry
+        t, dt, x, dx, v, at, f = (a[i] for a in items)
+        contact = Contact(zero, bank.stiffness, bank.strength, f, zero, mass)
+        motion = Motion(t, dt, x, v, jnp.zeros(()), dx, at)
+        states = tuple(
+            e.advance(m, motion, contact) if isinstance(e, Memory) else m for e, m in zip(sensors, states, strict=True)
+        )
+        shown = x
+        for e, m in zip(sensors, states, strict=True):
+            shown = e.read(m, shown, motion, f)
+        return states, readings.at[i].set(shown)
+
+    last = way.t.size if knots is None else knots
+    return jax.lax.fori_loop(1, last, step, (memory, way.x))[1]
+
+
+def _slope(y: Array, t: Array) -> Array:
+    """Rate of change at the knots by parabolas through three of them."""
+    dt, dy = jnp.diff(t), jnp.diff(y)
+    rate = dy / dt
+    inner = (rate[:-1] * dt[1:] + rate[1:] * dt[:-1]) / (dt[:-1] + dt[1:])
+    return jnp.concatenate([rate[:1], inner, rate[-1:]])

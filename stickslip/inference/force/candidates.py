@@ -1,0 +1,278 @@
+"""Every effect in every form: where its inner parameters are best, and the model refitted in full with it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+
+from ...errors import StickslipError
+from ...physics.effects import catalogue
+from ...physics.effects.base import Effect, Geometry
+from ...physics.params import Spec, specs
+from ..fit.parameters import Free, effect_parameters
+from .fit import Array, Fit, adapted, refit
+from .problem import Point, Problem, is_own
+from .signatures import Explained, signatures
+
+FREQUENCIES = 240  # of a periodic effect
+FEW = 12  # members of a family for which no program of their own is compiled
+STARTS = 4  # members of a family from which a refit is begun; each to its end, for after a few steps none leads yet
+ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
+LONGEST = 1.5  # of a record: a longer wave is a trend
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One form of an effect on top of a model.
+
+    Attributes:
+        tag, form: which.
+        promise: fall of the cost that its best member promises for a small amplitude.
+        fit: with the effect in it; None where it could not be fitted.
+        note: why.
+        members: how many values of the inner parameters were tried.
+        visible: amplitude that would be five standard deviations (SI, distance from the null).
+        start: values of the effect that its fit began with (SI).
+    """
+
+    tag: str
+    form: dict[str, str]
+    promise: float
+    fit: Fit | None
+    note: str = ""
+    members: int = 1
+    visible: float | None = None
+    start: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name of the amplitude."""
+        return f"{self.tag}.{catalogue.get(self.tag).amplitude}"
+
+
+def shapes_backbone(effect: Effect) -> bool:
+    """Whether all that an effect does is to change the backbone, which the free bank measures anyway."""
+    if not isinstance(effect, Geometry):
+        return False
+    return getattr(effect, "where", "series") == "series"
+
+
+def every_form(tags: Sequence[str]) -> list[tuple[str, dict[str, str]]]:
+    """All forms of the effects that act along the motion."""
+    out = []
+    for tag in tags:
+        cls = catalogue.get(tag)
+        for form in catalogue.forms(cls):
+            if not shapes_backbone(cls(**form)):
+                out.append((tag, form))
+    return out
+
+
+def grid(effect: Effect) -> list[dict[str, float]]:
+    """Coarse grid of the inner parameters that have one."""
+    axes: dict[str, tuple[float, ...]] = {}
+    for name, spec in specs(effect).items():
+        if name == effect.amplitude or is_own(name):
+            continue
+        own = float(getattr(effect, name))
+        axes[name] = _axis(spec, own)
+    return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())] or [{}]
+
+
+def _axis(spec: Spec, own: float) -> tuple[float, ...]:
+    if not spec.grid:
+        return (own,)
+    return tuple(dict.fromkeys((*spec.grid, own))) if len(spec.grid) < 3 else spec.grid
+
+
+def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[str, str]]) -> list[Candidate]:
+    """An effect in some of its forms, each refitted in full, then once more from where the best of them ended.
+
+    The best is given sizes of its own of what is random.
+    """
+    made = [_tried(base, explained, tag, form) for form in forms]
+    best = min(made, key=_cost)
+    if best.fit is None:
+        return made
+    if catalogue.get(tag).periodic is None:
+        own = {n.partition(".")[2]: v for n, v in best.fit.values.items() if n.startswith(f"{tag}.")}
+        made = [c if c is best or c.fit is None else _better(c, _from(base, c, own)) for c in made]
+        best = min(made, key=_cost)
+    assert best.fit is not None
+    return [replace(c, fit=adapted(best.fit)) if c is best else c for c in made]
+
+
+def _tried(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> Candidate:
+    effect = catalogue.get(tag)(**form)
+    try:
+        if effect.periodic is not None and hasattr(effect, "phase"):
+            return _periodic(base, explained, effect, form)
+        return _plain(base, explained, effect, form)
+    except StickslipError as error:
+        return Candidate(tag, form, 0.0, None, str(error).split("\n")[0])
+
+
+def _cost(c: Candidate) -> float:
+    return np.inf if c.fit is None else c.fit.cost
+
+
+def _better(one: Candidate, other: Candidate) -> Candidate:
+    return other if _cost(other) < _cost(one) else one
+
+
+def _from(base: Fit, c: Candidate, values: dict[str, float]) -> Candidate:
+    """The candidate refitted from other values of its parameters (SI)."""
+    effect = catalogue.get(c.tag)(**c.form)
+    start = {name: values.get(name, value) for name, value in c.start.items()}
+    try:
+        return replace(c, fit=_refit(base, effect, start), start=start)
+    except StickslipError:
+        return replace(c, fit=None)
+
+
+def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]) -> Candidate:
+    members = grid(effect)
+    columns = (_columns if len(members) <= FEW else signatures)(base, effect, members)
+    usable = np.isfinite(columns).all(axis=1) & (np.abs(columns).max(axis=1) > 0.0)
+    if not usable.any():
+        return Candidate(effect.tag, form, 0.0, None, "it does nothing along this motion")
+    members = [m for m, ok in zip(members, usable, strict=True) if ok]
+    apart = explained.apart(columns[usable].T)
+    falls, sizes, errors = explained.singly(apart)
+    spec = specs(effect)[effect.amplitude]
+    null = spec.null or 0.0
+    inside = np.clip(sizes, spec.lower - null, spec.upper - null)
+    # a parabola through the promise: what is left of it where the amplitude may not go all the way
+    share = np.where(sizes != 0.0, inside / np.where(sizes != 0.0, sizes, 1.0), 0.0)
+    falls = falls * (1.0 - (1.0 - share) ** 2)
+    starts = []
+    for i in _unlike(apart, falls):
+        size, least = float(inside[i]), 0.3 * float(errors[i])  # at the null itself inner parameters do nothing
+        if share[i] < 1.0:
+            size *= 0.5  # not at the bound either
+        if abs(size) < least:
+            sign = 1.0 if size >= 0.0 and spec.upper > null else -1.0
+            size = sign * min(least, 0.5 * abs((spec.upper if sign > 0 else spec.lower) - null))
+        starts.append((i, {**members[i], effect.amplitude: null + size}))
+    ends = [(_refit(base, effect, start), i, start) for i, start in starts]
+    found, i, start = min(ends, key=lambda end: end[0].cost)
+    return Candidate(
+        effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * float(errors[i]), start
+    )  # fmt: skip
+
+
+def _unlike(apart: Array, falls: Array) -> list[int]:
+    """Members that promise most, each unlike the ones before it in what it does to the residuals."""
+    unit = apart / (np.sqrt((apart**2).sum(axis=0)) + 1e-300)
+    chosen: list[int] = []
+    for i in np.argsort(-falls).tolist():
+        if all(abs(float(unit[:, i] @ unit[:, j])) < ALIKE for j in chosen):
+            chosen.append(i)
+        if len(chosen) == STARTS:
+            break
+    return chosen
+
+
+def _columns(base: Fit, effect: Effect, members: Sequence[dict[str, float]]) -> Array:
+    """Derivative of the residual force in the amplitude at its null, shape (members, p): by the refit's own program."""
+    null = specs(effect)[effect.amplitude].null or 0.0
+    out = []
+    for member in members:
+        problem, free = with_start(base.problem, effect, {**member, effect.amplitude: null}, inside=False)
+        name = f"{effect.tag}.{effect.amplitude}"
+        at, own = next((i, f) for i, f in enumerate(problem.composition.shared) if f.name == name)
+        slopes = problem.evaluate(_start(base, free, None))
+        out.append(slopes.shared[:, at] / own.slope(own.inward(null)))
+    return np.stack(out)
+
+
+def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
+    """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,)."""
+    problem, free = with_start(base.problem, effect, values)
+    return refit(problem, _start(base, free, turns), base)
+
+
+def with_start(
+    problem: Problem, effect: Effect, values: dict[str, float], inside: bool = True
+) -> tuple[Problem, list[Free]]:
+    """The problem with an effect more, whose search starts at these values (SI), and its free parameters.
+
+    ``inside`` keeps the start off the bounds, one of which may be the null.
+    """
+    free = effect_parameters(effect, amplitude=values[effect.amplitude])
+    free = [f if f.amplitude and not inside else _kept(f, values) for f in free]
+    for name, value in values.items():
+        effect = eqx.tree_at(lambda e, n=name: getattr(e, n), effect, np.float64(value))  # type: ignore[misc]
+    return problem.with_composition(problem.composition.with_effect(effect, free)), free
+
+
+def _kept(f: Free, values: dict[str, float]) -> Free:
+    own = f.name.partition(".")[2]
+    return f.starting(values[own]) if own in values else f
+
+
+def _start(base: Fit, free: Sequence[Free], turns: Array | None) -> Point:
+    own = [f for f in free if not is_own(f.name)]
+    z = np.concatenate([base.point.z, [f.inward(f.start) for f in own]])
+    phases = base.point.phases
+    for f in free:
+        if is_own(f.name):
+            at = np.full(len(base.problem.runs), f.start) if turns is None else turns
+            phases = np.vstack([phases, at / float(f.scale)])
+    return replace(base.point, z=z, phases=phases)
+
+
+def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]) -> Candidate:
+    """An effect with a period and a phase for each run: the period of a periodogram on top of everything."""
+    name, variable = effect.periodic
+    spec = specs(effect)[name]
+    if getattr(effect, "form", None) == "trend":
+        return _plain(base, explained, effect, form)
+    frequencies = resolved(base, variable, spec, name)
+    if frequencies.size == 0:
+        return Candidate(effect.tag, form, 0.0, None, "the records are too short for a period")
+    values = frequencies if name == "frequency" else 1.0 / frequencies
+    runs = base.problem.run
+    number = len(base.problem.runs)
+    members = [{name: float(v), "phase": turn} for v in values for turn in (0.0, 0.5 * np.pi)]
+    columns = signatures(base, effect, members)
+    best, top, at = -np.inf, np.zeros(0), 0
+    for i in range(values.size):
+        pair = columns[2 * i : 2 * i + 2]
+        split = np.zeros((runs.size, 2 * number))
+        for r in range(number):
+            split[runs == r, 2 * r : 2 * r + 2] = pair[:, runs == r].T
+        fall, sizes = explained.gain(split)
+        if fall > best:
+            best, top, at = fall, sizes, i
+    waves = top.reshape(number, 2)
+    size = np.hypot(waves[:, 0], waves[:, 1])
+    amplitude = float(np.sqrt(np.mean(size**2)))
+    limit = specs(effect)[effect.amplitude]
+    amplitude = float(np.clip(amplitude, 1e-3 * limit.upper, 0.9 * limit.upper))
+    turns = np.arctan2(waves[:, 1], waves[:, 0])
+    start = {name: float(values[at]), effect.amplitude: amplitude}
+    found = _refit(base, effect, start, turns)
+    # in the mean over runs and phases a wave is seen as each of its two parts is
+    seen = explained.singly(explained.apart(columns[2 * at : 2 * at + 2].T))[2]
+    return Candidate(effect.tag, form, best, found, "", int(values.size), 5.0 * float(np.mean(seen)), start)
+
+
+def resolved(base: Fit, variable: str, spec: Spec, name: str) -> Array:
+    """Frequencies that the records resolve, within the bounds of the parameter."""
+    runs = base.problem.runs
+    way = {"time": "t", "load point": "drive", "displacement": "x"}[variable]
+    spans = np.array([np.ptp(getattr(k, way)) for k in runs])
+    low, high = (spec.lower, spec.upper) if name == "frequency" else (1.0 / spec.upper, 1.0 / spec.lower)
+    low = max(low, 1.0 / (LONGEST * spans.max()))
+    events = [k.events / max(np.ptp(getattr(k, way)), 1e-300) for k in runs]
+    # beyond some periods a stick the windows of the creep see nothing of it
+    high = min(high, 60.0 * max(events))
+    if high <= low:
+        return np.zeros(0)
+    return np.geomspace(low, high, FREQUENCIES)

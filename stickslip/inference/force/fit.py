@@ -1,0 +1,440 @@
+"""Gauss-Newton with exact derivatives; random effects and misfit within events in the likelihood."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+from scipy.sparse import dia_array
+
+from ...errors import FitError
+from ...system.progress import breathe
+from ..fit.parameters import Free
+from .bank import placed, spacing
+from .problem import PULL, Point, Problem, Slopes
+from .scatter import Blocks, Known, Scatter, covariance, estimate, misfit
+
+Array = NDArray[np.float64]
+BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean
+FARTHEST = 1.5  # step of a parameter on the search scale
+PLACED = 2  # rounds after which the bank's elements are put where the strength is
+ROUNDS = 10  # times that the scatter is estimated anew
+FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
+HALVINGS = 5  # of a step that does not lower the cost
+LAST = 15  # steps with the covariance as it was found
+STEPS = 3  # of Gauss-Newton between
+NEWTON = 4  # steps of the sizes between
+BESIDE, ASIDE, SEED = 2, 0.02, 1  # fits begun anew beside the end of one, how far (on the search scale), and where
+SETTLED = 0.3  # fall of the cost (in units of chi-square) at which a round ends
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An optimum.
+
+    Attributes:
+        problem, point: what was fitted, and where.
+        slopes: residuals and derivatives there.
+        scatter: sizes of what is random.
+        dropped: points left out, for they lie beyond what else is random (a jump of the sensor), shape (p,).
+        known: what the covariance is made of.
+        blocks: points by event.
+        strength: force of the contact at full strength (N).
+        evaluations: of the model.
+    """
+
+    problem: Problem
+    point: Point
+    slopes: Slopes
+    scatter: Scatter
+    dropped: NDArray[np.bool_]
+    known: Known
+    blocks: Blocks
+    strength: float
+    evaluations: int
+
+    @cached_property
+    def _judged(self) -> tuple[Array, float, Array]:
+        """Found when asked for: a model that a hand moves is drawn, and judged when it stands still."""
+        system = _System(self.problem, self.point, self.slopes, self.scatter, self.known, self.blocks)
+        return system.likelihood(), float((system.target**2).sum()), system.covariance()
+
+    @property
+    def likelihood(self) -> Array:
+        """Twice the negative logarithm of the marginal likelihood of each event, shape (E,)."""
+        return self._judged[0]
+
+    @property
+    def prior(self) -> float:
+        """Of the shared parameters (chi-square)."""
+        return self._judged[1]
+
+    @property
+    def covariance(self) -> Array:
+        """Of shared parameters, phases and weights, events marginalised."""
+        return self._judged[2]
+
+    @property
+    def cost(self) -> float:
+        """Twice the negative logarithm of likelihood and priors."""
+        return float(self.likelihood.sum()) + self.prior
+
+    @property
+    def residual(self) -> Array:
+        """Residual force with every event at its own best strength, stretch and offset (N), shape (p,)."""
+        return self.slopes.residual
+
+    @property
+    def marginal(self) -> Array:
+        """Residual force with all events alike (N), shape (p,)."""
+        return self.slopes.residual - (self.slopes.local * self.point.events[self.problem.of]).sum(axis=1)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Name -> SI value of what is shared."""
+        return self.problem.values(self.point)
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        """What is shared."""
+        return self.problem.composition.shared
+
+    def std(self) -> dict[str, float]:
+        """Name -> standard deviation (SI)."""
+        sd = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return {f.name: float(s * f.slope(float(z))) for f, s, z in zip(self.free, sd, self.point.z, strict=False)}
+
+
+class _System:
+    """The linear system of one step."""
+
+    def __init__(self, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks):
+        self.problem, self.point, self.slopes = problem, point, slopes
+        # what the noise is carried by stays as it is, or costs would jump; derivatives in the events are those here
+        known = known.with_local(blocks(slopes.local))
+        self.known, self.blocks, self.scatter = known, blocks, scatter
+        plain, whole = (np.asarray(a) for a in covariance(scatter.sizes, known))
+        self.plain = np.linalg.cholesky(plain)
+        self.whole = np.linalg.cholesky(whole)
+        self.random = np.exp(2.0 * scatter.sizes[:3])
+        prior, target = prior_rows(problem, point)
+        self.prior, self.target = prior, target
+        local = blocks(slopes.local)
+        self.local = local
+        marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", local, point.events)
+        self.marginal = marginal
+        side = np.concatenate([blocks(slopes.shared), marginal[..., None]], axis=2)
+        white = np.linalg.solve(self.whole, side)
+        self.rows, self.rest = white[..., :-1], white[..., -1]
+
+    def objective(self, point: Point, slopes: Slopes) -> float:
+        """Of residual, random effects and priors, with this covariance."""
+        white = np.linalg.solve(self.plain, self.blocks(slopes.residual)[..., None])[..., 0]
+        _, target = prior_rows(self.problem, point)
+        return float((white**2).sum() + (point.events**2 / self.random).sum() + (target**2).sum())
+
+    def step(self) -> tuple[Array, Array]:
+        """Changes of the shared parameters and the events' own values after it."""
+        rows = self.rows.reshape(-1, self.rows.shape[-1])
+        normal = rows.T @ rows + self.prior.T @ self.prior
+        right = rows.T @ self.rest.ravel() + self.prior.T @ self.target
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        root = np.linalg.cholesky(normal * scale[:, None] * scale + 1e-11 * np.eye(len(normal)))
+        low, high = reach(self.problem, self.point)
+        high = np.where(high - low > 1e-12, high, low + 1e-12)
+        found = lsq_linear(root.T, -np.linalg.solve(root, right * scale), (low / scale, high / scale), method="bvls")
+        change = found.x * scale
+        left = self.marginal + np.einsum("eip,p->ei", self.blocks(self.slopes.shared), change)
+        weighted = np.linalg.solve(np.swapaxes(self.whole, 1, 2), np.linalg.solve(self.whole, left[..., None]))[..., 0]
+        events = -self.random * np.einsum("eia,ei->ea", self.local, weighted)
+        return change, events
+
+    def covariance(self) -> Array:
+        """Of the shared parameters; what stands at a bound does not move."""
+        rows = self.rows.reshape(-1, self.rows.shape[-1])
+        normal = rows.T @ rows + self.prior.T @ self.prior
+        low, high = reach(self.problem, self.point)
+        free = np.flatnonzero((low < 0.0) & (high > 0.0))
+        out = np.zeros_like(normal)
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(normal)[free], 1e-300))
+        part = normal[np.ix_(free, free)] * scale[:, None] * scale
+        out[np.ix_(free, free)] = np.linalg.pinv(part, hermitian=True) * scale[:, None] * scale
+        return out
+
+    def likelihood(self) -> Array:
+        logs = np.log(np.diagonal(self.whole, axis1=1, axis2=2))
+        return (self.rest**2).sum(axis=1) + 2.0 * np.where(self.known.there, logs, 0.0).sum(axis=1)
+
+
+def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
+    """Rows of the priors over their standard deviations, and where the parameters stand in them."""
+    shared = problem.composition.shared
+    a, k = len(shared), point.weights.size
+    b, c = point.phases.size, point.common.size
+    size = a + b + k + c
+    rows, target = [], []
+    for i, f in enumerate(shared):
+        if np.isfinite(f.width):
+            row = np.zeros(size)
+            row[i] = 1.0 / f.width
+            rows.append(row)
+            target.append((point.z[i] - f.inward(f.prior)) / f.width)
+    for j, f in enumerate(problem.composition.phases):
+        if f.name == PULL:
+            for r, run in enumerate(problem.runs):
+                row = np.zeros(size)
+                row[a + j * len(problem.runs) + r] = 1e6 if run.virgin else 0.1
+                rows.append(row)
+                target.append(row.max() * point.phases[j, r] if run.virgin else 0.0)
+    level, deviation = problem.composition.nominal
+    if np.isfinite(deviation):
+        row = np.zeros(size)
+        row[a + b : a + b + k] = 1.0 / point.weights.sum() / deviation
+        rows.append(row)
+        target.append((np.log(point.weights.sum()) - np.log(level)) / deviation)
+    # in shares of the mean weight as it is: else a contact as a whole weaker would look smoother
+    whole, second = point.weights.sum(), np.diff(np.eye(k), 2, axis=0) / spacing(problem.composition.reach)
+    bent = k / (BEND * whole) * (second @ point.weights)
+    bend = np.zeros((k - 2, size))
+    bend[:, a + b : a + b + k] = k / (BEND * whole) * second - bent[:, None] / whole
+    alike = np.zeros((c, size))
+    alike[:, a + b + k :] = np.eye(c) / problem.systematic
+    return (
+        np.vstack([*rows, bend, alike]),
+        np.concatenate([target, bent, point.common / problem.systematic]),
+    )
+
+
+def moved(point: Point, change: Array, events: Array) -> Point:
+    """The point after a step, within the bounds."""
+    a, b = point.z.size, point.phases.size
+    phases = point.phases + change[a : a + b].reshape(point.phases.shape)
+    k = point.weights.size
+    weights = np.maximum(point.weights + change[a + b : a + b + k], 0.0)
+    return Point(point.z + change[:a], phases, weights, events, point.common + change[a + b + k :])
+
+
+def reach(problem: Problem, point: Point) -> tuple[Array, Array]:
+    """The least and the largest change of every shared parameter."""
+    shared = problem.composition.shared
+    b = np.full(point.phases.size, np.inf)
+    bounds = np.array([f.bounds for f in shared]).reshape(-1, 2).T
+    low, high = np.maximum(bounds[0] - point.z, -FARTHEST), np.minimum(bounds[1] - point.z, FARTHEST)
+    more, c = np.full(point.weights.size, np.inf), np.full(point.common.size, np.inf)
+    return np.concatenate([low, -b, -point.weights, -c]), np.concatenate([high, b, more, c])
+
+
+def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size: int) -> NDArray[np.bool_]:
+    """Points that what else is known of their event would not let expect, shape (p,)."""
+    _, whole = covariance(scatter.sizes, known)
+    inverse = np.linalg.inv(np.asarray(whole))
+    z = np.einsum("eij,ej->ei", inverse, marginal) / np.sqrt(np.diagonal(inverse, axis1=1, axis2=2))
+    out = np.zeros(size, bool)
+    out[blocks.index[blocks.there]] = np.abs(z[blocks.there]) > FAR
+    return out
+
+
+def known_of(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks, dropped: NDArray[np.bool_]) -> Known:
+    """What the covariance is made of, at a point."""
+    strength = float(point.weights.sum())
+    return Known(
+        noise(problem, point, slopes, blocks), blocks(np.where(dropped, strength**2, 0.0)), blocks(slopes.local),
+        blocks(problem.phase), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed), blocks.there,
+        strength,
+    )  # fmt: skip
+
+
+def noise(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks) -> Array:
+    """Covariance of the residual force (N^2) by the noise of single samples, event by event, shape (E, n, n).
+
+    A sample that is off by e changes the force of springs and contact by k e, that of inertia by m e'': together, so
+    that near the resonance of the contact, where the one nearly undoes the other, little noise is left.
+    """
+    values = problem.values(point)
+    event, place = np.zeros(problem.of.size, int), np.zeros(problem.of.size, int)
+    e, i = np.nonzero(blocks.there)
+    event[blocks.index[e, i]], place[blocks.index[e, i]] = e, i
+    out = np.zeros((*blocks.there.shape, blocks.there.shape[1]))
+    first = 0
+    for run, stiffness in zip(problem.runs, slopes.sticking, strict=True):
+        own = slice(first, first + run.at.size)
+        rate, acceleration = run.moving
+        spring = values.get("rig.spring_stiffness", 0.0) if run.stiffness is None else run.stiffness
+        stiff = dia_array((stiffness + spring, 0), shape=(stiffness.size, stiffness.size))
+        carried = run.mean @ (stiff @ run.reading) + values["rig.damping"] * rate + values["rig.mass"] * acceleration
+        pairs = (carried @ carried.T).tocoo()
+        i, j = pairs.coords
+        together = event[own][i] == event[own][j]
+        i, j = i[together], j[together]
+        out[event[own][i], place[own][i], place[own][j]] = run.noise**2 * pairs.data[together]
+        first += run.at.size
+    return out
+
+
+def fit(
+    problem: Problem, point: Point, scatter: Scatter | None = None, *, rounds: int = ROUNDS, steps: int = STEPS,
+    dropped: NDArray[np.bool_] | None = None, first: bool = False,
+) -> Fit:  # fmt: skip
+    """Find the optimum.
+
+    Args:
+        problem: data and composition.
+        point: where to begin.
+        scatter: sizes of what is random; default what is usually expected, estimated after the first round. Without
+            them nothing is known of the contact either, and the bank's elements are put where its strength is.
+        rounds, steps: of the search.
+        first: whether the sizes are estimated before the first step too (else after the first round).
+        dropped: points left out; default those that are found to lie far off.
+
+    Raises:
+        FitError: the model gives no finite force at the start, or none at all.
+    """
+    if not point.weights.sum() > 0.0:
+        raise FitError(
+            "along this motion the contact would hold no force: check mass and spring, and the signs and units of "
+            "drive and displacement"
+        )
+    blocks = Blocks.of(problem.of, problem.events)
+    sizes = Scatter.wide() if scatter is None else scatter
+    out = np.zeros(problem.of.size, bool) if dropped is None else dropped
+    slopes = problem.evaluate(point)
+    evaluations = 1
+    if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
+        raise FitError("the model gives no finite force along the motion")
+    for turn in range(rounds):
+        if scatter is None and turn == PLACED:
+            problem, point = placed(problem, point)
+            slopes = problem.evaluate(point)
+        made = known_of(problem, point, slopes, blocks, out)
+        if turn or first:
+            marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
+            sizes = estimate(sizes, marginal, made, NEWTON)
+            more = beyond(made, sizes, marginal, blocks, out.size) & ~out
+            if dropped is None and more.any():
+                out = out | more
+                made = known_of(problem, point, slopes, blocks, out)
+                sizes = estimate(sizes, marginal, made, NEWTON)
+        point, slopes, total, count = descend(problem, point, slopes, sizes, made, blocks, steps)
+        evaluations += count
+        if turn > PLACED + 2 and total < 1.0:
+            break
+    made = known_of(problem, point, slopes, blocks, out)
+    point, slopes, _, count = descend(problem, point, slopes, sizes, made, blocks, LAST)
+    return _best(adapted(_found(problem, point, slopes, sizes, out, made, evaluations + count)))
+
+
+def _best(found: Fit) -> Fit:
+    """The best of a fit and of those begun beside its end.
+
+    Where an element begins to slide the force has a kink, and at one of them the search may stand still before it has
+    arrived: then every law that is added gains by leaving it.
+    """
+    rng = np.random.default_rng(SEED)
+    best, evaluations = found, found.evaluations
+    for _ in range(BESIDE):
+        z = found.point.z + ASIDE * rng.standard_normal(found.point.z.size)
+        low, high = np.array([f.bounds for f in found.free]).reshape(-1, 2).T
+        with suppress(FitError):
+            other = adapted(refit(found.problem, replace(found.point, z=np.clip(z, low, high)), found))
+            evaluations += other.evaluations
+            best = min(best, other, key=lambda f: f.cost)
+    return replace(best, evaluations=evaluations)
+
+
+def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
+    """Another model of the same data from a point, in at most ``last`` steps.
+
+    With the covariance of ``base`` as it is: else the costs of the two could not be compared.
+
+    Raises:
+        FitError: the model gives no finite force at the start.
+    """
+    blocks, slopes = base.blocks, problem.evaluate(point)
+    if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
+        raise FitError("the model gives no finite force along the motion")
+    point, slopes, _, count = descend(problem, point, slopes, base.scatter, base.known, blocks, last)
+    return _found(problem, point, slopes, base.scatter, base.dropped, base.known, count + 1)
+
+
+def adapted(found: Fit) -> Fit:
+    """A refit with sizes of its own of what is random; what carries the noise to a force stays that of its base.
+
+    Under the sizes of a model that lacks an effect, events look as scattered as the effect makes them, and laws that
+    describe it more or less well look alike.
+    """
+    problem, blocks = found.problem, found.blocks
+    point, slopes, sizes, evaluations = found.point, found.slopes, found.scatter, found.evaluations
+    for _ in range(ROUNDS):
+        known = found.known.with_local(blocks(slopes.local))
+        marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", known.local, point.events)
+        before = misfit(sizes.sizes, marginal, known)
+        sizes = estimate(sizes, marginal, known, NEWTON)
+        fallen = before - misfit(sizes.sizes, marginal, known)
+        point, slopes, total, count = descend(problem, point, slopes, sizes, known, blocks, STEPS)
+        evaluations += count
+        if fallen + total < 1.0:
+            break
+    return _found(problem, point, slopes, sizes, found.dropped, found.known, evaluations)
+
+
+def descend(
+    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks, most: int
+) -> tuple[Point, Slopes, float, int]:
+    """Gauss-Newton steps with the covariance as it is, until the cost falls no more.
+
+    Returns:
+        The point and the slopes there, by how much the cost fell, and how often the model was evaluated.
+    """
+    total, count = 0.0, 0
+    for _ in range(most):
+        breathe()
+        system = _System(problem, point, slopes, scatter, known, blocks)
+        now = system.objective(point, slopes)
+        change, events = system.step()
+        fallen, share = 0.0, 1.0
+        for _ in range(HALVINGS):
+            trial = moved(point, share * change, point.events + share * (events - point.events))
+            there = problem.evaluate(trial)
+            count += 1
+            held = np.isfinite(there.residual).all() and trial.weights.sum() > 0.0
+            then = system.objective(trial, there) if held else np.inf
+            if then < now:
+                point, slopes, fallen = trial, there, now - then
+                break
+            share *= 0.3
+        total += fallen
+        if fallen < SETTLED:
+            break
+    return point, slopes, total, count
+
+
+def at(problem: Problem, point: Point, scatter: Scatter, dropped: NDArray[np.bool_], known: Known | None = None) -> Fit:
+    """A fit that was made before, from where it ended; arguments as of :func:`fit`."""
+    blocks = Blocks.of(problem.of, problem.events)
+    slopes = problem.evaluate(point)
+    made = known or known_of(problem, point, slopes, blocks, dropped)
+    return _found(problem, point, slopes, scatter, dropped, made, 1)
+
+
+def _found(
+    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, dropped: NDArray[np.bool_], known: Known,
+    evaluations: int,
+) -> Fit:  # fmt: skip
+    blocks = Blocks.of(problem.of, problem.events)
+    return Fit(
+        problem, point, slopes, scatter, dropped, known.with_local(blocks(slopes.local)), blocks,
+        float(point.weights.sum()), evaluations,
+    )  # fmt: skip
+
+
+def deviations(found: Fit) -> Array:
+    """Standard deviation of the residual at every point: noise and scatter (N), shape (p,)."""
+    _, whole = covariance(found.scatter.sizes, found.known)
+    sd = np.sqrt(np.diagonal(np.asarray(whole), axis1=1, axis2=2))
+    out = np.zeros(found.problem.of.size)
+    out[found.blocks.index[found.blocks.there]] = sd[found.blocks.there]
+    return out

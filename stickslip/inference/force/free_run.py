@@ -1,0 +1,78 @@
+"""The model of a fit along the motion, left to itself: the equation of motion through the measured cycles.
+
+The fit never integrates; here nothing but the integration is asked. Contact, weakening and effects are those of the
+fit, the contact is the measured bank itself, and each cycle runs from a measured arrest to the next (:mod:`..forward`).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import export
+
+from ...physics.contact import Bank
+from ...physics.model import LoadPoint, Model
+from ...simulation.shooting import MOST_STEPS, Cycles, Track, run_cycles
+from ...simulation.solve.stepper import Tolerance
+from ...system.traced import Program, of_this_package
+from .problem import EMPTY, PULL, Point, Problem, model_of
+
+FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)
+
+export.register_namedtuple_serialization(
+    Track, serialized_name="stickslip.simulation.shooting.Track"
+)  # what is kept returns one
+
+
+def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events: np.ndarray | None = None) -> Track:
+    """The model through the cycles of one run.
+
+    Args:
+        problem: its composition says which model.
+        point: its parameters; strengths, stretches and offsets of its events are not used.
+        run: number of the run in the problem, whose phases and pull at the start are taken.
+        cycles: of that run, arrays (n,).
+        events: logarithms of factors on strength and on yield displacements in every cycle, shape (n, 2); default
+            all events alike.
+
+    Returns:
+        The tracks, with a leading axis of cycles.
+    """
+    c = problem.composition
+    turns = {f.name: np.float64(float(f.scale) * point.phases[j, run]) for j, f in enumerate(c.phases)}
+    values = {**{n: np.float64(v) for n, v in problem.values(point).items()}, **turns}
+    own = problem.runs[run].stiffness
+    program = _program(tuple(values), jax.tree.structure(c.effects))
+    found: Track = program(
+        values, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), np.asarray(c.reach),
+        np.float64(np.nan if own is None else own), np.zeros((np.size(cycles.start), 2)) if events is None else events,
+        cycles, FINE,
+    )  # fmt: skip
+    return found
+
+
+@lru_cache(maxsize=64)
+def _program(names: tuple[str, ...], structure: Any) -> Program:
+    def one_run(
+        values: dict[str, Any], leaves: Any, weights: Any, reach: Any, own: Any, events: Any, cycles: Cycles,
+        tolerance: Tolerance,
+    ) -> Track:  # fmt: skip
+        effects = jax.tree.unflatten(structure, leaves)
+
+        def build(event: Any, nodes: Any) -> Model:
+            strength, stretch = jnp.exp(event[0]), jnp.exp(event[1])
+            bank = Bank(weights / reach * (strength / stretch), weights * strength)
+            model = model_of(values, effects, bank, own)
+            begun = jnp.zeros(())
+            if PULL in values:
+                begun = jnp.where(cycles.virgin, 0.0, values[PULL] / model.block.spring_stiffness)
+            return eqx.tree_at(lambda m: m.load_point, model, LoadPoint(nodes[0], nodes[1], begun))
+
+        return run_cycles(build, events, cycles, tolerance, MOST_STEPS)
+
+    return Program(one_run, f"freely {names} {structure}" if of_this_package(structure) else None)

@@ -1,0 +1,358 @@
+"""The measured motion of a run, thinned to knots: windows where the block creeps, samples where it is fast.
+
+Beside the knots stands what turns forces at the knots into the numbers that are compared: at a window the force
+itself, where the block is fast its mean under a smooth test function. The acceleration under the same test function is
+the test function's second derivative applied to the displacement (the weak form), so nothing is differentiated and the
+kinks of onset and arrest are no trouble.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+from ...data.segment import Event, Segmentation
+from ...data.trace import Trace
+from .kernels import kernels
+from .scales import Scales
+from .smoothing import Smoother, even, hum, onward, smoothed, unsteady
+from .turns import Turns
+from .windows import apart, edges_of, fast, hasty, thin
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+CREEP, NUCLEATION, SLIP, RING = range(4)
+PHASES = ("creep", "nucleation", "slip", "ring-down")
+POINTS = ("at", "phase", "of", "rate", "acceleration", "place", "elapsed")
+UNSTEADY = 4.0  # levels of slow noise by which two windows must differ
+
+
+@dataclass(frozen=True)
+class Knots:
+    """One run at its knots, shape (n,), and the points that are compared, shape (p,).
+
+    Attributes:
+        name: of the run.
+        t, x, v: time (s), reading (m) and its rate (m/s) at the knots.
+        drive: load point (m).
+        event: number of the event whose stick and onset a knot belongs to; it changes in the middle of a slip, where
+            all elements slide and nothing is remembered.
+        arrest: number of the event that a knot's stick leads to, counted from the arrest before; -1 in the later half
+            of a slip and before the first arrest.
+        mean: (p, n) from forces at the knots to forces at the points.
+        smooth: (p, n) the same for the test function's first and second derivative: rate and acceleration of what is
+            given at the knots; empty rows at windows.
+        at: time of the points (s).
+        phase: of the points, an index of PHASES.
+        of: event of the points.
+        rate, acceleration: of the reading at the points, under the test function (m/s, m/s2).
+        reading: (n, N) from the samples of the reading to the displacement at the knots.
+        moving: (p, N) from the samples to rate and acceleration at the points.
+        place: coordinate along which misfits are alike, one unit apart little (1).
+        elapsed: time since the arrest before, or the start (s).
+        noise: standard deviation of one sample (m).
+        stiffness: of the driving spring, where this run has its own (N/m).
+        virgin: whether the contact is force-free at the start.
+    """
+
+    name: str
+    t: Array
+    x: Array
+    v: Array
+    drive: Array
+    event: Index
+    arrest: Index
+    mean: csr_array
+    smooth: tuple[csr_array, csr_array]
+    at: Array
+    phase: Index
+    of: Index
+    rate: Array
+    acceleration: Array
+    reading: csr_array
+    moving: tuple[csr_array, csr_array]
+    place: Array
+    elapsed: Array
+    noise: float
+    stiffness: float | None
+    virgin: bool
+
+    @property
+    def events(self) -> int:
+        """Number of events."""
+        return int(self.of.max(initial=-1)) + 1
+
+
+def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None = None) -> Knots:
+    """Thin a run.
+
+    Args:
+        trace: with displacement and drive.
+        found: its events, at least one.
+        times: of the campaign.
+        extra: added to every sample once it is decided where the knots are (m).
+    """
+    assert trace.displacement is not None and trace.drive is not None
+    t, x = even(trace.time, trace.displacement)
+    rate = 1.0 / (t[1] - t[0])
+    noise = max(float(trace.noise or 0.0), 1e-13)
+    d = np.asarray(trace.drive.position(t))
+    x = x - hum(t, x, found.events, rate, times)
+    followed, speed, smoother = smoothed(x, noise, rate, times)
+    breaks = np.searchsorted(t, trace.drive.breakpoints)
+    steady, raw = speed, x
+    step = max(trace.resolution or 0.0, 2.0 * noise, UNSTEADY * unsteady(x, t, found.events, rate))
+    if extra is not None:
+        x = x + extra[: x.size]
+        followed, speed, smoother = smoothed(x, noise, rate, times)
+    phi, first, second = kernels(times.half, rate)
+    h = phi.size // 2
+    pieces = _Pieces(step)
+    pieces.start(t, x, d)
+    edge = 1
+    n = t.size
+    events = found.events
+    for e, event in enumerate(events):
+        begin, end = fast(events, e, times, rate, n, t, h)
+        begin = max(begin, edge + 1)
+        pieces.windows(apart(edges_of(edge, begin, event.i_onset, breaks), raw, step, breaks), e, t, x, d)
+        if end <= begin:
+            continue
+        onset = min(max(event.i_onset, begin), end)
+        pieces.windows(hasty(begin, onset, steady, noise, rate, h), e, t, x, d, compared=False)
+        pieces.samples(thin(onset, end, event, times, rate, h), t, followed, speed, d, events, e)
+        pieces.compare(begin + h, end - h, h, t, x, event, e, times, (phi, first, second), noise)
+        edge = end
+    if n - edge > 4 * h:
+        last = len(events)
+        pieces.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, compared=False)
+    return pieces.made(trace, t, (phi, first, second), events, noise, times, smoother)
+
+
+class _Pieces:
+    """Knots and points as they are made."""
+
+    def __init__(self, step: float) -> None:
+        self.step = step
+        self.t: list[Array] = []
+        self.x: list[Array] = []
+        self.v: list[Array] = []
+        self.d: list[Array] = []
+        self.weight: list[Array] = []
+        self.event: list[Index] = []
+        self.slow: list[NDArray[np.bool_]] = []
+        self.sample: list[tuple[int, Index]] = []
+        self.window: list[tuple[Index, Index]] = []
+        self.size = 0
+        self.points: list[dict[str, Array]] = []
+
+    def _add(self, t: Array, x: Array, v: Array, d: Array, event: Index, slow: bool, weight: Array) -> Index:
+        for into, what in ((self.t, t), (self.x, x), (self.v, v), (self.d, d), (self.weight, weight)):
+            into.append(what)
+        self.event.append(event)
+        self.slow.append(np.full(t.size, slow))
+        index = np.arange(self.size, self.size + t.size)
+        self.size += t.size
+        return index
+
+    def start(self, t: Array, x: Array, d: Array) -> None:
+        """Where the record begins."""
+        self._add(t[:1], x[:1], np.zeros(1), d[:1], np.zeros(1, int), True, np.ones(1))
+
+    def windows(self, edges: Index, e: int, t: Array, x: Array, d: Array, compared: bool = True) -> None:
+        """Means over the windows between ``edges``."""
+        count = np.diff(edges)
+        if count.size == 0 or edges[-1] <= edges[0]:
+            return
+        mean = [np.add.reduceat(y[: edges[-1]], edges[:-1]) / count for y in (t, x, d)]
+        index = self._add(
+            mean[0], mean[1], np.full(count.size, np.nan), mean[2], np.full(count.size, e), True, count.astype(float)
+        )
+        self.window.append((index, edges))
+        if compared:
+            self.points.append(
+                {
+                    "knot": index.astype(float), "at": mean[0], "count": count.astype(float),
+                    "of": np.full(count.size, float(e)), "phase": np.full(count.size, float(CREEP)),
+                }
+            )  # fmt: skip
+
+    def samples(self, index: Index, t: Array, x: Array, v: Array, d: Array, events: tuple[Event, ...], e: int) -> None:
+        """Samples as they are."""
+        self.sample.append((self.size, index))
+        middle = 0.5 * (events[e].t_onset + events[e].t_arrest)
+        self._add(
+            t[index], x[index], v[index], d[index], np.where(t[index] < middle, e, e + 1), False, np.ones(index.size)
+        )
+
+    def compare(
+        self, low: int, high: int, h: int, t: Array, x: Array, event: Event, e: int, times: Scales,
+        weights: tuple[Array, Array, Array], noise: float,
+    ) -> None:  # fmt: skip
+        """Points under the test function between two samples."""
+        step = max(1, round(0.4 * h))
+        centre = np.arange(low, high, step)
+        centre = centre[(centre >= h) & (centre < t.size - h)]
+        if centre.size == 0:
+            return
+        around = centre[:, None] + np.arange(-h, h + 1)
+        seen = x[around] - x[centre][:, None]
+        at = t[centre]
+        lag = 0.5 * times.half
+        phase = np.where(at < event.t_onset, NUCLEATION, np.where(at < event.t_arrest + 0.5 * lag, SLIP, RING))
+        middle = 0.5 * (event.t_onset + event.t_arrest)
+        self.points.append(
+            {
+                "centre": centre.astype(float), "at": at, "of": np.where(at < middle, e, e + 1.0),
+                "phase": phase.astype(float), "rate": seen @ weights[1], "acceleration": seen @ weights[2],
+            }
+        )  # fmt: skip
+
+    def made(
+        self, trace: Trace, t: Array, weights: tuple[Array, Array, Array], events: tuple[Event, ...], noise: float,
+        times: Scales, smoother: Smoother,
+    ) -> Knots:  # fmt: skip
+        knot_t = np.concatenate(self.t)
+        d = np.concatenate(self.d)
+        x = onward(np.concatenate(self.x), np.concatenate(self.weight), np.concatenate(self.slow),
+                    np.concatenate(self.event), max(noise, 0.3 * self.step))  # fmt: skip
+        v, slow = np.concatenate(self.v), np.concatenate(self.slow)
+        slopes = np.gradient(x, knot_t)
+        v = np.where(slow, slopes, v)
+        inner = np.arange(2, v.size - 2)
+        bends = np.zeros(v.size)
+        bends[inner] = (v[inner + 2] - v[inner - 2]) / (knot_t[inner + 2] - knot_t[inner - 2])
+        rate = 1.0 / (t[1] - t[0])
+        phi, first, second = weights
+        h = phi.size // 2
+        rows: list[list[Index]] = [[], []]
+        values: list[list[Array]] = [[], [], []]
+        fast_rows: list[Index] = []
+        shaken: tuple[list[Any], ...] = ([], [], [], [])  # rows, samples, and weights under the kernels' derivatives
+        out: dict[str, list[Array]] = {k: [] for k in ("at", "of", "phase", "rate", "acceleration")}
+        p = 0
+        columns_window: list[Index] = []
+        rows_window: list[Index] = []
+        for piece in self.points:
+            size = piece["at"].size
+            index = np.arange(p, p + size)
+            if "knot" in piece:
+                rows_window.append(index)
+                columns_window.append(piece["knot"].astype(int))
+                knot = piece["knot"].astype(int)
+                piece["rate"], piece["acceleration"] = v[knot], bends[knot]
+            else:
+                centre = piece["centre"].astype(int)
+                offsets = np.arange(-h, h + 1)
+                moments = t[centre][:, None] + offsets / rate
+                right = np.clip(np.searchsorted(knot_t, moments), 1, knot_t.size - 1)
+                share = (moments - knot_t[right - 1]) / (knot_t[right] - knot_t[right - 1])
+                share = np.clip(share, 0.0, 1.0)
+                row = np.repeat(index, offsets.size)
+                for column, part in ((right - 1, 1.0 - share), (right, share)):
+                    rows[0].append(row)
+                    rows[1].append(column.ravel())
+                    for into, kernel in zip(values, (phi, first, second), strict=True):
+                        into.append((part * kernel).ravel())
+                fast_rows.append(index)
+                shaken[0].append(row)
+                shaken[1].append((centre[:, None] + offsets).ravel())
+                for into, kernel in zip(shaken[2:], (first, second), strict=True):
+                    into.append(np.tile(kernel, size))
+            for key, into in out.items():
+                into.append(piece[key])
+            p += size
+        # between windows the velocity is a mean, which tells no turning point
+        turns = Turns.of(knot_t, x, np.where(slow, 0.0, v), slow)
+        shape = (p, turns.size)
+        r = np.concatenate([*rows[0], *rows_window])
+        c = turns.place[np.concatenate([*rows[1], *columns_window])]
+        ones = [np.ones(w.size) for w in rows_window]
+        mean = coo_array((np.concatenate([*values[0], *ones]), (r, c)), shape=shape).tocsr()
+        smooth = tuple(_sparse(k, rows[0], [turns.place[i] for i in rows[1]], shape) for k in values[1:])
+        moving = tuple(_sparse(k, shaken[0], shaken[1], (p, t.size)) for k in shaken[2:])
+        made = {k: np.concatenate(w) for k, w in out.items()}
+        event = np.concatenate(self.event)
+        of, phase = made["of"].astype(int), made["phase"].astype(int)
+        # of a contact that was loaded before the record begins nothing is known until all of it slides
+        keep = (of < len(events)) & ((of > 0) | trace.virgin)
+        reading = self._reading(smoother, (knot_t.size, t.size))
+        knot_t, x, v, d = (
+            turns.joined(y, own) for y, own in zip((knot_t, x, v, d), turns.at(knot_t, x, d), strict=True)
+        )
+        event = event[turns.source]
+        knots_made = Knots(
+            trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
+            made["at"], phase, of, made["rate"], made["acceleration"],
+            turns.rows(reading), (moving[0], moving[1]),
+            _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, events, float(t[0])),
+            noise, trace.spring_stiffness, trace.virgin,
+        )  # fmt: skip
+        return selected(knots_made, keep)
+
+    def _reading(self, smoother: Smoother, shape: tuple[int, int]) -> csr_array:
+        """From samples to knots: means over windows, and smoothed samples."""
+        rows, columns, values = [np.zeros(1, int)], [np.zeros(1, int)], [np.ones(1)]  # the start
+        for knot, edges in self.window:
+            count = np.diff(edges)
+            rows.append(np.repeat(knot, count))
+            columns.append(np.arange(edges[0], edges[-1]))
+            values.append(np.repeat(1.0 / count, count))
+        for first, index in self.sample:
+            part = smoother.matrix(index).tocoo()
+            rows.append(first + part.coords[0])
+            columns.append(part.coords[1])
+            values.append(part.data)
+        return _sparse(values, rows, columns, shape)
+
+
+def _sparse(values: list[Array], rows: list[Index], columns: list[Index], shape: tuple[int, int]) -> csr_array:
+    return coo_array((np.concatenate(values or [np.zeros(0)]), (_joined(rows), _joined(columns))), shape=shape).tocsr()
+
+
+def _joined(pieces: list[Index]) -> Index:
+    return np.concatenate([p.ravel() for p in pieces]) if pieces else np.zeros(0, int)
+
+
+def selected(k: Knots, keep: NDArray[np.bool_]) -> Knots:
+    """Some of the points."""
+    index = np.flatnonzero(keep)
+    return replace(
+        k, mean=k.mean[index], smooth=(k.smooth[0][index], k.smooth[1][index]),
+        moving=(k.moving[0][index], k.moving[1][index]),
+        **{n: getattr(k, n)[index] for n in POINTS},
+    )  # fmt: skip
+
+
+def _arrests(t: Array, events: tuple[Event, ...], times: Scales) -> Index:
+    # at the arrest itself all elements are at their caps and take no step onwards
+    later = 0.25 * times.ring or 0.5 * times.half
+    out = np.full(t.size, -1)
+    out[1:][t[1:] < 0.5 * (events[0].t_onset + events[0].t_arrest)] = 0
+    for e in range(1, len(events) + 1):
+        stop = np.inf if e == len(events) else 0.5 * (events[e].t_onset + events[e].t_arrest)
+        out[(t >= events[e - 1].t_arrest + later) & (t < stop)] = e
+    return out
+
+
+def _elapsed(at: Array, of: Index, events: tuple[Event, ...], start: float) -> Array:
+    begun = np.array([start, *(e.t_arrest for e in events)])
+    return np.maximum(at - begun[np.minimum(of, len(events))], 0.0)
+
+
+def _places(at: Array, phase: Index, of: Index, events: tuple[Event, ...], times: Scales) -> Array:
+    """A coordinate that grows with time: in the stick the logarithms of the times from the arrest and to the onset."""
+    out = np.zeros(at.size)
+    for e in np.unique(of):
+        own = of == e
+        onset = events[e].t_onset if e < len(events) else at[own].max() + 1.0
+        start = events[e - 1].t_arrest if e else at[own].min() - times.half
+        begun = np.arcsinh((at[own] - start) / times.half)
+        left = np.arcsinh((onset - at[own]) / times.half)
+        out[own] = begun - left
+    return out

@@ -1,0 +1,360 @@
+"""Force that is measured less force that the model holds, at the points of all runs, and its derivatives.
+
+The free parameters: those of the base, the weights of a free bank of Jenkins elements (which measures the backbone),
+those of effects, a phase for each run where an effect has one, and for each event a factor on strength, one on the
+yield displacements and the error of the position at the arrest before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from ...physics.contact import Bank
+from ...physics.effects.base import Effect, Sensor
+from ...physics.model import Block, LoadPoint, Model, Weakening
+from ...system.traced import Program, of_this_package
+from ..fit.parameters import Free, to_si
+from .along import Way, along, undone
+from .knots import Knots
+
+Array = NDArray[np.float64]
+PHASE = "phase"
+PULL = "start.pull"  # of the spring at the start of a record, where the contact is not virgin (N)
+PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
+EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
+NODES = (
+    -8.0,
+    -6.0,
+    -4.5,
+    -3.0,
+    -2.0,
+    -1.0,
+    0.0,
+    1.0,
+    2.0,
+    3.0,
+    4.5,
+    6.0,
+)  # of what cycles share, in units of the place
+LOCAL = ("strength", "stretch", "offset")  # of each event: two logarithms, and a length (m)
+
+
+class Start(NamedTuple):
+    """The effects without their numbers, which decide about a compiled program."""
+
+    effects: tuple[Effect, ...]
+
+
+@dataclass(frozen=True)
+class Composition:
+    """The base with some effects, and what of it is free.
+
+    Attributes:
+        mass: of the block (kg).
+        reach: yield displacements of the bank's elements (m), shape (k,), increasing.
+        free: free parameters of base and effects, those called "phase" for every run.
+        fixed: SI values of base parameters that are not free.
+        effects: instances; their free fields are overwritten.
+        nominal: what is known of the full strength beforehand (N), and the standard deviation of its logarithm.
+    """
+
+    mass: float
+    reach: Array
+    free: tuple[Free, ...]
+    fixed: dict[str, float] = field(default_factory=dict)
+    effects: tuple[Effect, ...] = ()
+    nominal: tuple[float, float] = (1.0, np.inf)
+
+    @property
+    def shared(self) -> tuple[Free, ...]:
+        """Free parameters with one value for all runs."""
+        return tuple(f for f in self.free if not is_own(f.name))
+
+    @property
+    def phases(self) -> tuple[Free, ...]:
+        """Free parameters with a value for every run."""
+        return tuple(f for f in self.free if is_own(f.name))
+
+    def with_effect(self, effect: Effect, free: Sequence[Free]) -> Composition:
+        """The same with one effect more."""
+        return replace(self, free=(*self.free, *free), effects=(*self.effects, effect))
+
+    def without(self, tag: str) -> Composition:
+        """The same without an effect."""
+        return replace(
+            self,
+            free=tuple(f for f in self.free if not f.name.startswith(f"{tag}.")),
+            effects=tuple(e for e in self.effects if e.tag != tag),
+        )
+
+
+def is_own(name: str) -> bool:
+    """Whether a parameter has a value for every run."""
+    return name == PULL or name.rpartition(".")[2] == PHASE
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where in the space of parameters.
+
+    Attributes:
+        z: shared parameters on the search scale, shape (a,).
+        phases: shape (b, R).
+        weights: strength of every element (N), not negative, shape (k,).
+        events: :data:`LOCAL` of each event, shape (E, 3).
+        common: error of the position that all cycles share, as a function of the place in the cycle (m), shape (c,).
+    """
+
+    z: Array
+    phases: Array
+    weights: Array
+    events: Array
+    common: Array
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Residual force and derivatives at a point.
+
+    Attributes:
+        residual: measured force less the model's (N), shape (p,).
+        shared: derivatives in z, phases of all runs, weights and what cycles share, shape (p, a + b R + k + c).
+        local: in the event's own, shape (p, 3).
+        tangent: stiffness of what sticks (N/m), shape (p,).
+        sticking: the same at the knots of every run, shape (n,) each.
+        held: force that the model holds (N), shape (p,).
+    """
+
+    residual: Array
+    shared: Array
+    local: Array
+    tangent: Array
+    sticking: tuple[Array, ...]
+    held: Array
+
+
+class Problem:
+    """All runs of a campaign under one composition."""
+
+    def __init__(self, composition: Composition, runs: Sequence[Knots]) -> None:
+        self.composition, self.runs = composition, tuple(runs)
+        first = np.cumsum([0, *(k.events for k in runs)])
+        self.first, self.events = first[:-1], int(first[-1])
+        n = _room(max(k.t.size for k in runs))
+        self.way = _padded(runs, n)
+        self.of = np.concatenate([k.of + f for k, f in zip(runs, first[:-1], strict=True)])
+        self.run = np.concatenate([np.full(k.at.size, r) for r, k in enumerate(runs)])
+        self.event_run = np.concatenate([np.full(k.events, r) for r, k in enumerate(runs)])
+        self.phase, self.place, self.at = (
+            np.concatenate([getattr(k, name) for k in runs]) for name in ("phase", "place", "at")
+        )
+        self.elapsed = np.concatenate([k.elapsed for k in runs])
+        self._index = _indices(runs, n, first)
+        self._knots = np.array([k.t.size for k in runs])
+        virgin = np.isin(self.of, [f for f, k in zip(first[:-1], runs, strict=True) if k.virgin])
+        hats = _hats(self.place)
+        # quantisation, filters and hum leave about as much alike in all cycles as the noise of one sample is
+        self.systematic = max(float(np.median([k.noise for k in runs])), 1e-12)
+        self.cycles = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
+
+    def with_composition(self, composition: Composition) -> Problem:
+        """The same runs under another composition."""
+        other = object.__new__(Problem)
+        other.__dict__.update(self.__dict__)
+        other.composition = composition
+        return other
+
+    def values(self, point: Point) -> dict[str, float]:
+        """Name -> SI value of what is shared."""
+        c = self.composition
+        return {**c.fixed, "rig.mass": c.mass, **to_si(c.shared, point.z)}
+
+    def evaluate(self, point: Point) -> Slopes:
+        """Residuals and derivatives."""
+        c = self.composition
+        shared, phases = c.shared, c.phases
+        names = tuple(f.name for f in shared)
+        scales = np.array([0.0 if f.scale == "log" else float(f.scale) for f in shared])
+        program = _program(names, tuple(f.name for f in phases), jax.tree.structure(c.effects))
+        own = np.array([np.nan if k.stiffness is None else k.stiffness for k in self.runs])
+        phase_scale = np.array([float(f.scale) for f in phases])
+        leaves = tuple(jax.tree.leaves(c.effects))
+        fixed = {n: np.float64(v) for n, v in {**c.fixed, "rig.mass": c.mass}.items()}
+        q, shift, mass, dq, dshift, dmass, elements, tangent = (
+            np.asarray(a)
+            for a in program(
+                point.z, scales, point.phases.T * phase_scale, phase_scale, fixed, leaves,
+                np.maximum(point.weights, EMPTY), c.reach,
+                own, self.way, self._index, self._knots, np.concatenate([point.events, np.zeros((1, 3))]),
+            )
+        )  # fmt: skip
+        values = self.values(point)
+        damping = values["rig.damping"]
+        a, b, k, runs = len(shared), len(phases), point.weights.size, len(self.runs)
+        size = self.at.size
+        residual, tangents, held = np.zeros(size), np.zeros(size), np.zeros(size)
+        cycles = self.cycles.shape[1]
+        slopes, local = np.zeros((size, a + b * runs + k + cycles)), np.zeros((size, 3))
+        sensed = any(isinstance(e, Sensor) for e in c.effects)
+        at_damping = next((i for i, f in enumerate(shared) if f.name == "rig.damping"), None)
+        weights = np.maximum(point.weights, EMPTY)
+        p = 0
+        for r, run in enumerate(self.runs):
+            n, s = run.t.size, slice(p, p + run.at.size)
+            rate, acceleration = run.rate, run.acceleration
+            mean, (first, second) = run.mean, run.smooth
+            if sensed:
+                rate, acceleration = rate + first @ shift[r, :n], acceleration + second @ shift[r, :n]
+            residual[s] = mean @ q[r, :n] - mass[r] * acceleration - damping * rate
+            moved = mean @ dq[r, :, :n].T - acceleration[:, None] * dmass[r]
+            if sensed:
+                moved = moved - mass[r] * (second @ dshift[r, :, :n].T) - damping * (first @ dshift[r, :, :n].T)
+            slopes[s, :a] = moved[:, :a]
+            if at_damping is not None:
+                slopes[s, at_damping] -= damping * rate
+            for j in range(b):
+                slopes[s, a + j * runs + r] = moved[:, a + j]
+            local[s] = moved[:, a + b :]
+            share = mean @ elements[r, :n]
+            slopes[s, a + b * runs : a + b * runs + k] = -share
+            held[s] = share @ weights
+            tangents[s] = mean @ tangent[r, :n]
+            p += run.at.size
+        slopes[:, a + b * runs + k :] = tangents[:, None] * self.cycles
+        residual += slopes[:, a + b * runs + k :] @ point.common
+        sticking = tuple(tangent[r, : k.t.size] for r, k in enumerate(self.runs))
+        return Slopes(residual, slopes, local, tangents, sticking, held)
+
+
+def _room(size: int) -> int:
+    """Knots that a compiled program has room for: few different numbers, so that campaigns share programs."""
+    least = 512
+    while least < size:
+        least = -(-least * 5 // 4 // 64) * 64
+    return least
+
+
+def _padded(runs: Sequence[Knots], n: int) -> Way:
+    def grown(a: Array, step: float = 0.0) -> Array:
+        more = n - a.size
+        return np.concatenate([a, a[-1] + step * np.arange(1, more + 1)])
+
+    ones = np.ones((len(runs), n))
+    return Way(
+        np.stack([grown(k.t, 1e-3) for k in runs]),
+        np.stack([grown(k.x) for k in runs]),
+        np.stack([np.concatenate([k.v, np.zeros(n - k.v.size)]) for k in runs]),
+        np.stack([grown(k.drive) for k in runs]),
+        np.zeros((len(runs), n)),  # turning points are knots
+        ones,
+        ones,
+    )
+
+
+def _hats(place: Array) -> Array:
+    """Piecewise linear basis over the place in the cycle, shape (p, c)."""
+    return np.stack([np.interp(place, NODES, row) for row in np.eye(len(NODES))], axis=1)
+
+
+def _indices(runs: Sequence[Knots], n: int, first: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Of each knot the event of its strength and stretch, and that of its offset; the last one stands for none."""
+    none = int(first[-1])
+    by_event, by_arrest = np.full((len(runs), n), none), np.full((len(runs), n), none)
+    for r, k in enumerate(runs):
+        own = (k.event >= 0) & (k.event < k.events)
+        by_event[r, : k.t.size] = np.where(own, k.event + first[r], none)
+        own = (k.arrest >= 0) & (k.arrest < k.events)
+        by_arrest[r, : k.t.size] = np.where(own, k.arrest + first[r], none)
+    return by_event, by_arrest
+
+
+def model_of(values: dict[str, Any], effects: tuple[Effect, ...], bank: Bank, own: Any) -> Model:
+    """The model with these numbers; ``own`` is the spring of the run (N/m), nan where it has none."""
+    spring = jnp.where(jnp.isnan(own), values["rig.spring_stiffness"], own)
+    block = Block(mass=values["rig.mass"], spring_stiffness=spring, damping=values["rig.damping"])
+    weakening = Weakening(
+        ratio=1.0 - values["weakening.drop"],
+        slip_distance=values["weakening.slip_distance"],
+        healing_time=values["weakening.healing_time"],
+    )
+    still = LoadPoint(jnp.array([0.0, 1.0]), jnp.array([0.0, 0.0]))
+    return Model(block, bank, weakening, still, tuple(_set(e, values) for e in effects))
+
+
+def _set(effect: Effect, values: dict[str, Any]) -> Effect:
+    for name, value in values.items():
+        tag, _, own = name.partition(".")
+        if tag == effect.tag:
+            effect = eqx.tree_at(attrgetter(own), effect, value)
+    return effect
+
+
+@lru_cache(maxsize=PROGRAMS)
+def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) -> Program:
+    """The compiled forces at the knots, shape (R, n), with derivatives in shared, phases and locals."""
+    a, b = len(names), len(phases)
+
+    def forces(
+        z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, own: Any,
+        way: Way, index: Any, knots: Any,
+    ) -> Any:  # fmt: skip
+        si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
+        values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
+        if PULL in values:
+            spring = jnp.where(jnp.isnan(own), values["rig.spring_stiffness"], own)
+            way = way._replace(drive=way.drive + values[PULL] / spring)
+        model = model_of(values, effects, Bank(weights / reach, weights), own)
+        by_event, by_arrest = index
+        seen = way
+        if any(isinstance(e, Sensor) for e in effects):
+            # the measured force, near enough for a sensor that sees it
+            force = model.block.spring_stiffness * (way.drive - way.x)
+            seen = undone(model, way, force, knots)
+        shift = seen.x - way.x
+        moved = seen._replace(
+            x=seen.x + event[by_arrest, 2],
+            strength=jnp.exp(event[by_event, 0]),
+            stretch=jnp.exp(event[by_event, 1]),
+        )
+        held = along(model, moved, knots)
+        return (held.pull + held.body - held.contact, shift, model.mass()), (held.elements, held.tangent)
+
+    def whole(
+        z: Any, scales: Any, turns: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any,
+        own: Any, way: Way, index: Any, knots: Any, event: Any,
+    ) -> Any:  # fmt: skip
+        effects = jax.tree.unflatten(structure, leaves)
+        size = a + b + 3
+        rows = jnp.eye(size)
+
+        def of_run(run: Any) -> Any:
+            turn, own, way, index, knots = run
+
+            def moved(row: Any) -> Any:
+                def f(z: Any, turn: Any, event: Any) -> Any:
+                    return forces(z, turn, event, scales, fixed, effects, weights, reach, own, way, index, knots)
+
+                # all events, and the phase of whatever run, are moved at once: each acts on its own points only
+                step = jnp.broadcast_to(row[a + b :], event.shape).at[-1].set(0.0)
+                (out, slope, aux) = jax.jvp(
+                    f, (z, turn, event), (row[:a], row[a : a + b] * turn_scale, step), has_aux=True
+                )
+                return out, slope, aux
+
+            (q, shift, mass), (dq, dshift, dmass), (elements, tangent) = jax.vmap(moved, out_axes=(None, 0, None))(rows)
+            return q, shift, mass, dq, dshift, dmass, elements, tangent
+
+        # one after the other: the shorter ones cost less then
+        return jax.lax.map(of_run, (turns, own, way, index, knots))
+
+    return Program(whole, f"along {names} {phases} {structure}" if of_this_package(structure) else None)

@@ -1,0 +1,73 @@
+"""Structure that no effect of the catalogue takes: the residual force as a smooth function of one variable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from .fit import Array, Fit
+from .knots import RING
+from .signatures import Explained
+
+NODES = 7
+VARIABLES = ("time", "displacement", "velocity", "spring force", "time in contact", "number of the event")
+UNITS = ("s", "m", "m/s", "N", "s", "1")
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What the residual force says of a variable.
+
+    Attributes:
+        variable, unit: which.
+        fall: of the cost with a smooth force of it.
+        chance: of such a fall where there is nothing, corrected for the variables tried.
+        at, force: the smooth force (N) over the variable, shape (NODES,).
+    """
+
+    variable: str
+    unit: str
+    fall: float
+    chance: float
+    at: Array
+    force: Array
+
+
+def coordinates(fit: Fit) -> dict[str, Array]:
+    """The variables at the points, shape (p,) each."""
+    problem = fit.problem
+    runs = problem.runs
+    x = np.concatenate([k.mean @ k.x for k in runs])
+    drive = np.concatenate([k.mean @ k.drive for k in runs])
+    # while it rings the noise of the rate is that of the force a sample or two later, and would look like a law
+    rate = np.where(problem.phase == RING, 0.0, np.concatenate([k.rate for k in runs]))
+    shared = fit.values.get("rig.spring_stiffness", np.nan)
+    stiffness = np.concatenate([np.full(k.at.size, shared if k.stiffness is None else k.stiffness) for k in runs])
+    number = problem.of - problem.first[problem.run]
+    return dict(
+        zip(
+            VARIABLES,
+            (problem.at, x, rate, stiffness * (drive - x), problem.elapsed, number.astype(float)),
+            strict=True,
+        )
+    )
+
+
+def structures(fit: Fit, explained: Explained, dispersion: float = 1.0) -> list[Structure]:
+    """All variables, the most telling first."""
+    out = []
+    for (name, values), unit in zip(coordinates(fit).items(), UNITS, strict=True):
+        scaled = (
+            np.arcsinh(values / (0.02 * np.abs(values).max())) if name in ("velocity", "time in contact") else values
+        )
+        nodes = np.unique(np.quantile(scaled, np.linspace(0.0, 1.0, NODES)))
+        if nodes.size < 3:
+            continue
+        basis = np.stack([np.interp(scaled, nodes, row) for row in np.eye(nodes.size)], axis=1) * fit.strength
+        fall, found = explained.gain(-basis)
+        chance = float(chi2.sf(fall / dispersion, nodes.size) * len(VARIABLES))
+        at = np.interp(nodes, np.sort(scaled), np.sort(values))
+        out.append(Structure(name, unit, fall, min(chance, 1.0), at, found * fit.strength))
+    return sorted(out, key=lambda s: s.chance)

@@ -1,0 +1,45 @@
+"""Times of a campaign that decide how its runs are thinned, and whether they are sampled finely enough."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...data.segment import Segmentation
+
+HALF = 3.0  # samples, the least half-width of the test function
+COARSE = 0.15  # of a slip, the largest half-width that still resolves its inertia
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Times that decide how a run is thinned, of the data themselves.
+
+    Attributes:
+        half: half-width of the test function (s).
+        ring: period of the ringing after an arrest (s); 0 where none is heard.
+        slip: usual duration of a slip (s).
+    """
+
+    half: float
+    ring: float
+    slip: float
+
+
+def scales(segmentations: list[Segmentation], ring: float | None, rate: float) -> Scales:
+    """The times of a campaign: medians over its slips, and the period of the ringing (s) where one is heard."""
+    slip = float(np.median([e.duration for s in segmentations for e in s.events]))
+    half = min(ring, slip / 8.0) if ring else slip / 12.0
+    return Scales(max(half, HALF / rate), ring or 0.0, slip)
+
+
+def too_coarse(times: Scales, rate: float) -> str | None:
+    """A sentence where samples lie too far apart for the inertia of a slip (sampling rate in Hz), else None."""
+    if times.half <= COARSE * times.slip:
+        return None
+    return (
+        f"sampling at {rate:.4g} Hz is too coarse for inertia: the acceleration is a mean over {2e3 * times.half:.3g} "
+        f"ms of a slip of {1e3 * times.slip:.3g} ms, so mass, damping and what acts within a slip are told badly; "
+        f"{HALF / (COARSE * times.slip):.3g} Hz would do"
+    )

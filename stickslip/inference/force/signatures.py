@@ -1,0 +1,177 @@
+"""What an effect would add to the force along the motion, one small amplitude at a time, and how much that explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ...physics.contact import Bank
+from ...physics.effects.base import Effect, Sensor
+from ...physics.params import specs
+from ...system.traced import Program, of_this_package
+from .along import Way, along, undone
+from .fit import Array, Fit
+from .problem import EMPTY, PROGRAMS, PULL, Problem, model_of
+from .scatter import covariance
+
+CHUNK = 64  # members evaluated at once
+
+
+def signatures(fit: Fit, effect: Effect, members: Sequence[dict[str, float]]) -> Array:
+    """Derivative of the residual force in the amplitude of an effect that is absent, shape (members, p).
+
+    Args:
+        fit: the model without it.
+        effect: in its form.
+        members: values of its other parameters (SI).
+    """
+    problem = fit.problem
+    program = _program(jax.tree.structure(problem.composition.effects), jax.tree.structure(effect), type(effect))
+    names = tuple(specs(effect))
+    out = []
+    arguments = _arguments(fit)
+    for at in range(0, len(members), CHUNK):
+        part = list(members[at : at + CHUNK])
+        size = len(part)
+        if len(members) > CHUNK:
+            part += [part[-1]] * (CHUNK - size)
+        values = {n: np.array([float(m.get(n, float(getattr(effect, n)))) for m in part]) for n in names}
+        values[effect.amplitude] = np.full(len(part), specs(effect)[effect.amplitude].null or 0.0)
+        q, shift, mass = (np.asarray(a) for a in program(values, *arguments))
+        out.append(_at_points(problem, fit, q[:size], shift[:size], mass[:size], isinstance(effect, Sensor)))
+    return np.concatenate(out)
+
+
+def _arguments(fit: Fit) -> tuple[Any, ...]:
+    problem, point = fit.problem, fit.point
+    c = problem.composition
+    own = np.array([np.nan if k.stiffness is None else k.stiffness for k in problem.runs])
+    turns = np.array([float(f.scale) * point.phases[j] for j, f in enumerate(c.phases)]).reshape(-1, len(own)).T
+    values = {n: np.float64(v) for n, v in problem.values(point).items()}
+    names = tuple(f.name for f in c.phases)
+    turned = {n: turns[:, j] for j, n in enumerate(names)}
+    return (
+        values, turned, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), c.reach, own, problem.way,
+        problem._index, problem._knots, np.concatenate([point.events, np.zeros((1, 3))]),
+    )  # fmt: skip
+
+
+def _at_points(problem: Problem, fit: Fit, q: Array, shift: Array, mass: Array, sensed: bool) -> Array:
+    out = np.zeros((len(q), problem.at.size))
+    values = problem.values(fit.point)
+    p = 0
+    for r, run in enumerate(problem.runs):
+        n, s = run.t.size, slice(p, p + run.at.size)
+        moved = (run.mean @ q[:, r, :n].T).T - mass[:, r, None] * run.acceleration
+        if sensed:
+            first, second = run.smooth
+            moved = moved - values["rig.mass"] * (second @ shift[:, r, :n].T).T
+            moved = moved - values["rig.damping"] * (first @ shift[:, r, :n].T).T
+        out[:, s] = moved
+        p += run.at.size
+    return out
+
+
+@lru_cache(maxsize=PROGRAMS)
+def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
+    names = tuple(specs(cls))
+    place = names.index(cls.amplitude)
+
+    def one(
+        values: Any, known: Any, turned: Any, leaves: Any, weights: Any, reach: Any, own: Any, way: Way, index: Any,
+        knots: Any, event: Any,
+    ) -> Any:  # fmt: skip
+        effects = jax.tree.unflatten(base, leaves)
+
+        def of_run(run: Any) -> Any:
+            turned, own, way, index, knots = run
+            everything = {**known, **turned}
+
+            def forces(amplitude: Any) -> Any:
+                numbers = [values[n] for n in names]
+                numbers[place] = amplitude
+                effect = jax.tree.unflatten(structure, numbers)
+                model = model_of(everything, effects, Bank(weights / reach, weights), own)
+                model = type(model)(
+                    model.block, model.bank, model.weakening, model.load_point, (*model.effects, effect)
+                )
+                moving = way
+                if PULL in everything:
+                    moving = moving._replace(drive=moving.drive + everything[PULL] / model.block.spring_stiffness)
+                seen = moving
+                if any(isinstance(e, Sensor) for e in model.effects):
+                    force = model.block.spring_stiffness * (moving.drive - moving.x)
+                    seen = undone(model, moving, force, knots)
+                by_event, by_arrest = index
+                moved = seen._replace(
+                    x=seen.x + event[by_arrest, 2], strength=jnp.exp(event[by_event, 0]),
+                    stretch=jnp.exp(event[by_event, 1]),
+                )  # fmt: skip
+                held = along(model, moved, knots)
+                return held.pull + held.body - held.contact, seen.x - way.x, model.mass()
+
+            start = values[names[place]]
+            return jax.jvp(forces, (start,), (jnp.ones(()),))[1]
+
+        return jax.lax.map(of_run, (turned, own, way, index, knots))
+
+    every = jax.vmap(one, in_axes=(0, *[None] * 10))
+    own = of_this_package(base) and cls.__module__.split(".")[0] == __name__.split(".")[0]
+    return Program(every, f"signature {base} {structure}" if own else None)
+
+
+class Explained:
+    """How much of the residuals columns explain that the model's own parameters and the events do not."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit = fit
+        _, whole = covariance(fit.scatter.sizes, fit.known)
+        self.root = np.linalg.cholesky(np.asarray(whole))
+        self.inverse = np.linalg.inv(self.root)
+        rows = self._white(fit.slopes.shared)
+        from .fit import prior_rows, reach
+
+        low, high = reach(fit.problem, fit.point)
+        free = (low < 0.0) & (high > 0.0)
+        prior, target = prior_rows(fit.problem, fit.point)
+        self.extra = len(prior)
+        self.basis, self._corner = np.linalg.qr(np.vstack([rows[:, free], prior[:, free]]))
+        self._shared = fit.slopes.shared[:, free]
+        rest = np.concatenate([self._white(fit.marginal[:, None])[:, 0], target])
+        self.rest = rest - self.basis @ (self.basis.T @ rest)
+        e, n = fit.blocks.index.shape
+        self.event = np.concatenate([np.repeat(np.arange(e), n), np.full(self.extra, -1)])
+
+    def _white(self, columns: Array) -> Array:
+        side = self.fit.blocks(columns)
+        return np.einsum("eij,ejp->eip", self.inverse, side).reshape(-1, side.shape[-1])
+
+    def apart(self, columns: Array) -> Array:
+        """Columns (p, m) whitened and freed of what the model can do itself."""
+        white = np.vstack([self._white(columns), np.zeros((self.extra, columns.shape[1]))])
+        return white - self.basis @ (self.basis.T @ white)
+
+    def left(self, columns: Array) -> Array:
+        """Forces (p, m) less what the model's own parameters would take of them (N)."""
+        white = np.vstack([self._white(columns), np.zeros((self.extra, columns.shape[1]))])
+        own, *_ = np.linalg.lstsq(self._corner, self.basis.T @ white, rcond=1e-10)
+        return columns - self._shared @ own
+
+    def gain(self, columns: Array) -> tuple[float, Array]:
+        """Fall of the cost (chi-square) with the columns, and their coefficients."""
+        apart = self.apart(columns)
+        scale = np.sqrt((apart**2).sum(axis=0)) + 1e-300
+        found, *_ = np.linalg.lstsq(apart / scale, -self.rest, rcond=1e-8)
+        left = self.rest + (apart / scale) @ found
+        return float((self.rest**2).sum() - (left**2).sum()), found / scale
+
+    def singly(self, apart: Array) -> tuple[Array, Array, Array]:
+        """The same for each column of :meth:`apart` by itself: falls, coefficients, their deviations, each (m,)."""
+        norm = (apart**2).sum(axis=0) + 1e-300
+        projected = apart.T @ self.rest
+        return projected**2 / norm, -projected / norm, norm**-0.5

@@ -1,0 +1,143 @@
+"""What of a reading is motion: even steps, mains hum, slow noise, smoothed displacement and velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+from scipy.optimize import isotonic_regression
+from scipy.signal import savgol_filter
+from scipy.sparse import coo_array, csr_array
+
+from ...data.segment import Event
+from .scales import Scales
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+BACK = 5.0  # noise levels of one sample within which a step back is noise
+HUM = 50.0  # Hz, the mains
+
+
+def even(t: Array, x: Array) -> tuple[Array, Array]:
+    """Equal steps of time; lost samples are filled in linearly."""
+    step = np.median(np.diff(t))
+    if np.ptp(np.diff(t)) < 1e-3 * step:
+        return np.asarray(t), np.asarray(x)
+    even = np.arange(t[0], t[-1], step)
+    return even, np.interp(even, t, x)
+
+
+def hum(t: Array, x: Array, events: tuple[Event, ...], rate: float, times: Scales) -> Array:
+    """The sine at the mains frequency in the sticks, which is the sensor's (m)."""
+    width = round(rate / HUM)
+    if width < 8:
+        return np.zeros_like(x)
+    still = np.ones(x.size, bool)
+    for event in events:
+        a = np.searchsorted(t, event.t_onset - 2.0 * times.slip)
+        b = np.searchsorted(t, event.t_arrest + 3.0 * times.slip)
+        still[max(a, 0) : b] = False
+    still[: 2 * width] = still[-2 * width :] = False
+    if still.sum() < 20 * width:
+        return np.zeros_like(x)
+    total = np.cumsum(np.insert(x, 0, 0.0))
+    mean = np.zeros_like(x)
+    half = width // 2
+    i = np.arange(half, x.size - width + half)
+    mean[i] = (total[i - half + width] - total[i - half]) / width
+    basis = np.stack([np.sin(2 * np.pi * HUM * t), np.cos(2 * np.pi * HUM * t)], axis=1)
+    rest = (x - mean)[still]
+    rest = rest - np.median(rest)
+    keep = np.abs(rest) < 6.0 * max(np.median(np.abs(rest)) * 1.48, 1e-15)
+    found, *_ = np.linalg.lstsq(basis[still][keep], rest[keep], rcond=None)
+    spread = float(np.std(rest[keep])) * np.sqrt(2.0 / keep.sum()) * np.sqrt(width)
+    return basis @ found if np.hypot(*found) > 4.0 * spread else np.zeros_like(x)
+
+
+def unsteady(x: Array, t: Array, events: tuple[Event, ...], rate: float) -> float:
+    """Slow noise of the reading (m): how far means over a hundredth of a stick stray from a line through two others."""
+    found = []
+    for before, event in pairwise(events):
+        a = int(np.searchsorted(t, before.t_arrest + 0.4 * (event.t_onset - before.t_arrest)))
+        b = int(np.searchsorted(t, before.t_arrest + 0.8 * (event.t_onset - before.t_arrest)))
+        width = (b - a) // 40
+        if width < 2:
+            continue
+        mean = x[a : a + 40 * width].reshape(40, width).mean(axis=1)
+        found.append(np.median(np.abs(np.diff(mean, 2))) / 0.6745 / np.sqrt(6.0))
+    return float(np.median(found)) if found else 0.0
+
+
+@dataclass(frozen=True)
+class Smoother:
+    """Weights of the samples around one in its smoothed displacement.
+
+    Attributes:
+        slow, fast: of slow motion and of what is added to it, shape (2 h + 1,) both.
+        gain: how much of that is added at every sample, shape (N,).
+    """
+
+    slow: Array
+    fast: Array
+    gain: Array
+
+    def matrix(self, index: Index) -> csr_array:
+        """From all samples to the smoothed displacement at some of them."""
+        h, n = self.slow.size // 2, self.gain.size
+        around = np.clip(index[:, None] + np.arange(-h, h + 1), 0, n - 1)
+        weights = self.slow + self.gain[index][:, None] * self.fast
+        rows = np.repeat(np.arange(index.size), 2 * h + 1)
+        return coo_array((weights.ravel(), (rows, around.ravel())), shape=(index.size, n)).tocsr()
+
+
+def smoothed(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, Array, Smoother]:
+    """Displacement and velocity where every sample counts, and how the former is made of the samples.
+
+    Slow motion by a parabola over a ringing period, on top of it what a parabola over a third of it adds, shrunk by as
+    much as noise adds to it in squares: the noise of one sample, taken for motion, would be a path that weakens the
+    contact and makes it young.
+    """
+    period = times.ring or times.half
+    wide, narrow = (max(round(width * rate) // 2 * 2 + 1, 3) for width in (period, period / 3.0))
+    if wide < 5:
+        return x, np.gradient(x) * rate, Smoother(np.ones(1), np.zeros(1), np.zeros(x.size))
+
+    def parabola(y: Array, length: int, derivative: int = 0) -> Array:
+        if length < 5:
+            return y if derivative == 0 else np.gradient(y) * rate
+        return savgol_filter(y, length, 2, deriv=derivative, delta=1.0 / rate)
+
+    slow = parabola(x, wide)
+    fast = parabola(x, narrow) - slow
+    pulse = np.zeros(2 * wide + 1)
+    pulse[wide] = 1.0
+    still = parabola(pulse, wide)
+    more = parabola(pulse, narrow) - still
+    level = noise**2 * float((more**2).sum())
+    seen = np.maximum(uniform_filter1d(fast**2, wide), 1e-300)
+    gain = np.sqrt(np.maximum(1.0 - level / seen, 0.0))
+    own = slice(wide - wide // 2, wide + wide // 2 + 1)
+    smoother = Smoother(still[own], more[own], gain)
+    return slow + gain * fast, parabola(x, wide, 1) + gain * (parabola(x, narrow, 1) - parabola(x, wide, 1)), smoother
+
+
+def onward(x: Array, weight: Array, slow: NDArray[np.bool_], event: Index, noise: float) -> Array:
+    """The windows of every stick without steps back that are the noise's: the block creeps one way.
+
+    A step back by a nanometre would unload every element, and the next one forward would not load them again at once:
+    noise would make the model weaker than the contact. Where the block does go back by more than noise, nothing is
+    changed.
+    """
+    out = x.copy()
+    edges = np.flatnonzero(np.diff(slow.astype(int)) | (np.diff(event) != 0)) + 1
+    for piece in np.split(np.arange(x.size), edges):
+        if piece.size < 3 or not slow[piece[0]]:
+            continue
+        rising = bool(x[piece[-1]] >= x[piece[0]])
+        found = isotonic_regression(x[piece], weights=weight[piece], increasing=rising).x
+        if np.abs(found - x[piece]).max() < BACK * noise:
+            out[piece] = found
+    return out

@@ -1,0 +1,216 @@
+"""The model that a run folder holds: what a fit or a diagnosis found, to be simulated and asked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, RunFolderError, nearest
+from ..inference.fit.equations import solved
+from ..inference.fit.serialised import KEY, Driven, Fitted, constant_drive, from_record, pieces_drive, shared
+from ..physics.effects.equations import Equations
+from ..physics.model import Model
+from ..physics.params import specs, variants
+from ..simulation.conformance import load_effects
+from ..simulation.scenario.load import Scenario, make_scenario
+from ..simulation.scenario.overrides import parse_assignment
+from ..system.runstore import RESULT, read_result
+
+EVENTS = 5  # slips that are simulated unless told otherwise
+FRICTION = 0.2  # where neither load nor friction of a contact is known; only their product acts
+_OTHERWISE = {  # parameters of a fit that a scenario has in another way -> what to set
+    "weakening.drop": "set weakening.ratio, which is 1 - drop",
+    "contact.strength": "set contact.friction_coefficient: strength = contacts x normal_force x friction_coefficient",
+}
+
+
+@dataclass(frozen=True)
+class FittedRun:
+    """A run folder of ``stickslip fit --model inertial`` or ``stickslip diagnose``.
+
+    Attributes:
+        folder: where it lies.
+        result: what ``result.json`` holds.
+        fitted: the family of models, the member that was found, and its covariance.
+    """
+
+    folder: Path
+    result: Mapping[str, Any]
+    fitted: Fitted
+
+    @property
+    def title(self) -> str:
+        """Of the campaign."""
+        return str(self.result.get("title") or self.folder.name)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Tags of what is in the model, such as ``("static", "inertia", "contact-ageing")``."""
+        return self.fitted.parts
+
+    @property
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """Name -> ``value`` and ``std`` (SI), ``unit`` and ``doc`` of every fitted parameter of the model."""
+        values, std = self.fitted.values, self.fitted.std
+        free = [f for f in self.fitted.composition.free if shared(f.name)]
+        return {f.name: {"value": values[f.name], "std": std[f.name], "unit": f.unit, "doc": f.doc} for f in free}
+
+    @property
+    def runs(self) -> tuple[Driven, ...]:
+        """How the measured runs were driven."""
+        return self.fitted.runs
+
+    @property
+    def model(self) -> Model:
+        """The model, driven as the first measured run was."""
+        return self.model_of(self._first())
+
+    def model_at(self, velocity: float) -> Model:
+        """The model under a drive of one velocity (m/s), with the rig's spring."""
+        return self.fitted.model(constant_drive(velocity), self._spring())
+
+    def model_of(self, trace: str | Driven) -> Model:
+        """The model, driven as a measured run was (from time zero).
+
+        Raises:
+            InputError: there is no such run.
+        """
+        run = self._run(trace)
+        drive = pieces_drive(run.pieces) if run.pieces else constant_drive(run.velocity)
+        return self.fitted.model(drive, run.stiffness)
+
+    def equations(self) -> Equations:
+        """The equations that are solved, with the fitted values."""
+        return solved(self.fitted)
+
+    def scenario(self, changes: Sequence[str] = (), trace: str | None = None, events: int = EVENTS) -> Scenario:
+        """The model as a scenario.
+
+        Args:
+            changes: such as ``"drive.velocity=100um/s"``, as after ``--set``; parameters also by the name that the fit
+                gives them (``"rig.mass=0.1"``, ``"contact-ageing.rate=0"``).
+            trace: drive as this measured run was; default at the first run's velocity, for so many ``events``.
+            events: slips to simulate where the drive has one velocity.
+
+        Raises:
+            InputError: no such run, or a change that is none.
+        """
+        run = self._first() if trace is None else self._run(trace)
+        drive: dict[str, Any] = {"velocity": run.velocity, "events": events}
+        if trace is not None and run.pieces:
+            drive = {"piece": [{"velocity": v, "duration": dt} for v, dt in run.pieces]}
+        spring = self._spring() if trace is None else run.stiffness
+        content = scenario_content(self.fitted, f"{self.title}: {' + '.join(self.parts)}", drive, spring)
+        given = [(self.key(name), value) for name, value in map(parse_assignment, changes)]
+        made = make_scenario(content, self.folder).with_changes(given)
+        return replace(made, path=self.folder / RESULT)
+
+    def key(self, name: str) -> str:
+        """What a scenario calls a parameter of the fit; other names as they are.
+
+        Raises:
+            InputError: a scenario has it in another way.
+        """
+        if name in _OTHERWISE:
+            raise InputError("a scenario has this parameter of a fit in another way", key=name, hint=_OTHERWISE[name])
+        table, _, rest = name.partition(".")
+        tags = [effect.tag for effect in self.fitted.effects()]
+        return f"block.{rest}" if table == "rig" else f"effect.{name}" if table in tags else name
+
+    def _first(self) -> Driven:
+        if not self.runs:
+            raise RunFolderError("the fitted model names no measured run", file=self.folder / RESULT)
+        return self.runs[0]
+
+    def _run(self, trace: str | Driven) -> Driven:
+        if isinstance(trace, Driven):
+            return trace
+        found = [run for run in self.runs if run.name in (trace, Path(trace).stem)]
+        if not found:
+            names = [run.name for run in self.runs]
+            raise InputError(
+                "no run of that name was fitted", file=self.folder / RESULT, value=trace, hint=nearest(trace, names)
+            )
+        return found[0]
+
+    def _spring(self) -> float | None:
+        """Of the first run where every run has a spring of its own, else None: the rig's."""
+        own = [run.stiffness for run in self.runs]
+        return own[0] if own and None not in own else None
+
+
+def load_run(folder: str | Path, effects: Sequence[str | Path] = ()) -> FittedRun:
+    """Read the model that a fit or a diagnosis left in its run folder.
+
+    Args:
+        folder: of ``stickslip fit --model inertial --out`` or ``stickslip diagnose --out``.
+        effects: Python files with effects of one's own that are in the model; their code is run.
+
+    Raises:
+        RunFolderError: no run folder, a damaged one, or one that holds no fitted model.
+        InputError: the model has an effect that is not known here.
+    """
+    folder = Path(folder)
+    result = read_result(folder)
+    load_effects(effects)
+    section = result.get(KEY)
+    if section is None:
+        raise RunFolderError(
+            "this run holds no fitted model",
+            file=folder / RESULT,
+            hint="stickslip diagnose and stickslip fit --model inertial leave one; older runs must be made again",
+        )
+    try:
+        found = FittedRun(folder, result, from_record(section))
+        scenario_content(found.fitted, "", {}, found._spring())  # whether every parameter is there
+        return found
+    except InputError as error:
+        hint = f"{error.hint or ''} An effect of your own: name its file (--effect).".strip()
+        raise InputError(
+            error.what, file=folder / RESULT, key=error.key, value=error.value, allowed=error.allowed, hint=hint
+        ) from None
+    except (KeyError, IndexError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
+        what = f"the fitted model is damaged ({type(error).__name__}: {error})"
+        raise RunFolderError(what, file=folder / RESULT, hint="make the run again") from None
+
+
+def scenario_content(found: Fitted, title: str, drive: Mapping[str, Any], spring: float | None) -> dict[str, Any]:
+    """A fitted model as the tables of a scenario file; ``spring`` in N/m, None for the rig's."""
+    c, v = found.composition, found.values
+    whole = v["contact.strength"] / c.contacts
+    load, friction = found.normal_force, found.friction
+    if load is None:
+        load = whole / (friction or FRICTION)
+    return {
+        "schema": 1,
+        "title": title,
+        "block": {
+            "mass": v.get("rig.mass", c.mass),
+            "spring_stiffness": v["rig.spring_stiffness"] if spring is None else spring,
+            "damping": v["rig.damping"],
+        },
+        "drive": dict(drive),
+        "contact": {
+            "kind": "power-law",
+            "contacts": c.contacts,
+            "normal_force": load,
+            "friction_coefficient": whole / load,
+            "u_max": v["contact.u_max"],
+            "p": v["contact.p"],
+            "spread": v["contact.spread"],
+            "bins": c.bins,
+        },
+        "weakening": {
+            "ratio": 1.0 - v["weakening.drop"],
+            "slip_distance": v["weakening.slip_distance"],
+            "healing_time": v["weakening.healing_time"],
+        },
+        "effect": [
+            {"type": e.tag}
+            | {name: getattr(e, name) for name in variants(e)}
+            | {name: float(getattr(e, name)) for name in specs(e)}
+            for e in found.effects()
+        ],
+    }

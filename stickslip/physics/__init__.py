@@ -1,0 +1,1 @@
+"""Laws, one increment at a time: contact, effects, the block, the sensor."""

@@ -1,0 +1,108 @@
+"""Self-affine rough lines: fixed amplitudes, random phases.
+
+The line is the one-dimensional equivalent of an isotropic surface in the method of dimensionality reduction (Geike
+and Popov 2007), with spectral density C_1D(q) = pi q C_2D(q) ~ q^(-2H-1); it has the surface's H and rms height. It
+is not a cut through the surface, see `cut_to_line_factor`.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.scipy.special import gammaln
+from jax.typing import ArrayLike
+
+from ...errors import InputError
+from ...system import jax_settings  # noqa: F401  (before the first array)
+from ._ranges import check_within
+
+
+def rough_lines(
+    H: ArrayLike,
+    n_lines: int = 100,
+    n_springs: int = 4096,
+    seed: int = 0,
+    *,
+    roll_off: ArrayLike | None = None,
+    cut_off: ArrayLike | None = None,
+) -> Array:
+    """Periodic lines with zero mean and unit rms height; multiply by the rms height wanted.
+
+    Line i of a seed keeps its phases whatever H, the rms height, ``n_lines`` and ``n_springs`` are (a finer line adds
+    short waves to the same long ones), so differences between parameters are not hidden by chance.
+    Differentiable in H, ``roll_off`` and ``cut_off``.
+
+    Args:
+        H: Hurst exponent in (0, 1).
+        n_lines: how many lines.
+        n_springs: points of a line, an even number. At small H the contact depends on it: quote it with every result.
+        seed: of the phases.
+        roll_off: wavelength, as a share of the line's length, above which the spectrum is flat. Default: no roll-off.
+        cut_off: wavelength, as a share of the line's length, below which there is no roughness. Default: down to two
+            spacings.
+
+    Returns:
+        (n_lines, n_springs) heights.
+
+    Raises:
+        InputError: a value out of its range.
+    """
+    check_line(H, n_lines, n_springs)
+    return lines_from_phasors(H, line_phasors(n_lines, n_springs, seed), roll_off=roll_off, cut_off=cut_off)
+
+
+def lines_from_phasors(
+    H: ArrayLike, phasors: ArrayLike, *, roll_off: ArrayLike | None = None, cut_off: ArrayLike | None = None
+) -> Array:
+    """`rough_lines` from given phase factors (n_lines, n_springs/2); for use inside jit, where they are an argument."""
+    phasors = jnp.asarray(phasors)
+    half = phasors.shape[-1]
+    amplitude = amplitudes(H, half, roll_off=roll_off, cut_off=cut_off)
+    spectrum = jnp.pad(amplitude * phasors, [(0, 0)] * (phasors.ndim - 1) + [(1, 0)])
+    # Parseval: each wave counts twice (+q and -q) but the shortest, of which only the real part exists
+    power = 2.0 * jnp.sum(amplitude[:-1] ** 2) + (amplitude[-1] * phasors[..., -1:].real) ** 2
+    return jnp.fft.irfft(spectrum, axis=-1) * (2 * half / jnp.sqrt(power))
+
+
+def amplitudes(
+    H: ArrayLike, half: int, *, roll_off: ArrayLike | None = None, cut_off: ArrayLike | None = None
+) -> Array:
+    """(half,) amplitudes k^-(H + 1/2) of the waves with k = 1 ... half periods on the line (not normalised)."""
+    k = jnp.arange(1, half + 1, dtype=float)
+    amplitude = (k if roll_off is None else jnp.maximum(k, 1.0 / roll_off)) ** -(H + 0.5)
+    if cut_off is None:
+        return amplitude
+    # the last wave fades in over one unit of k, so that the line is continuous in the cut-off
+    return amplitude * jnp.clip(1.0 / cut_off + 1.0 - k, 0.0, 1.0)
+
+
+@lru_cache(maxsize=8)
+def line_phasors(n_lines: int, n_springs: int, seed: int) -> np.ndarray:
+    """(n_lines, n_springs/2) factors exp(i phi), phi uniform on the circle; one generator for each line."""
+    phases = np.stack([np.random.default_rng([seed, line]).random(n_springs // 2) for line in range(n_lines)])
+    phasors = np.exp(2j * np.pi * phases)
+    phasors.flags.writeable = False
+    return phasors
+
+
+def cut_to_line_factor(H: ArrayLike) -> Array:
+    """By which factor the heights of a measured cut must be multiplied to serve as an equivalent line.
+
+    A cut through an isotropic self-affine surface has the density C_1D * Gamma(H + 1/2) / (sqrt(pi) Gamma(H + 1)).
+    """
+    check_within("the Hurst exponent", H, above=0.0, below=1.0, key="H")
+    return jnp.exp(0.5 * (0.5 * jnp.log(jnp.pi) + gammaln(H + 1.0) - gammaln(H + 0.5)))
+
+
+def check_line(H: ArrayLike, n_lines: int, n_springs: int) -> None:
+    """Raise InputError unless H, the number of lines and the number of springs are usable."""
+    check_within("the Hurst exponent", H, above=0.0, below=1.0, key="H")
+    if n_lines < 1:
+        raise InputError("no rough line", key="lines", value=n_lines, allowed="1 or more")
+    if n_springs < 4 or n_springs % 2:
+        raise InputError(
+            "cannot make a line of that many springs", key="springs", value=n_springs, allowed="even, >= 4"
+        )

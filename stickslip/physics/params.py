@@ -1,0 +1,144 @@
+"""Parameters that know what they are: value, unit, bounds, prior, null value and source, kept beside the field.
+
+A physical class is an ``equinox.Module`` whose fields are made by :func:`parameter`; :func:`specs` reads them back.
+Names are local to the class; nothing here is a global table.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..errors import InputError
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What a person must know of one parameter.
+
+    Attributes:
+        unit: SI unit (``"1"`` for a pure number).
+        lower, upper: the plausible range; values outside are refused.
+        null: the value at which the effect is absent (``None`` for a shape parameter, which has no null).
+        log: whether it is sought and drawn on a logarithmic scale.
+        grid: values from which a search starts, for shape parameters that are not identified at the null.
+        doc: meaning in words.
+        source: the equation or paper.
+        symbol: LaTeX symbol.
+        ends: ends of the range where the law becomes a special case (a sharp corner, no direct effect): a fit may
+            arrive there, which says nothing against it.
+        prior: centre of what is known of the value beforehand (``None``: the default, of an amplitude its null).
+        width: standard deviation of that knowledge: of the natural logarithm for a parameter that is sought on a
+            logarithmic scale, else in SI (an amplitude is never sought on one); infinite where nothing is known.
+            ``None`` leaves it to the rule of :func:`stickslip.inference.fit.parameters.effect_parameters`.
+        usual: from where to where values lie as a rule, if that is less than lower to upper; one beyond is doubted in
+            words, and not refused.
+    """
+
+    unit: str
+    lower: float
+    upper: float
+    doc: str
+    null: float | None = None
+    log: bool = False
+    grid: tuple[float, ...] = ()
+    source: str = ""
+    symbol: str = ""
+    ends: tuple[float, ...] = ()
+    prior: float | None = None
+    width: float | None = None
+    usual: tuple[float, float] | None = None
+
+    @property
+    def range(self) -> str:
+        """``"0 ... 0.05 m/s"``."""
+        return span(self.lower, self.upper, self.unit)
+
+
+def span(lower: float, upper: float, unit: str) -> str:
+    """A range with its unit, which a pure number does not have."""
+    return f"{lower:g} ... {upper:g}{'' if unit == '1' else f' {unit}'}"
+
+
+def _as_float(value: Any) -> Any:
+    if isinstance(value, (bool, int, float, np.ndarray, np.floating, np.integer)):
+        return jnp.asarray(value, dtype=jnp.float64)
+    return value
+
+
+def parameter(
+    default: float,
+    *,
+    unit: str,
+    lower: float,
+    upper: float,
+    doc: str,
+    null: float | None = None,
+    log: bool = False,
+    grid: tuple[float, ...] = (),
+    source: str = "",
+    symbol: str = "",
+    ends: tuple[float, ...] = (),
+    prior: float | None = None,
+    width: float | None = None,
+    usual: tuple[float, float] | None = None,
+) -> Any:
+    """A field of a physical class: a 64-bit float with its :class:`Spec`. Arguments as there."""
+    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, source, symbol, ends, prior, width, usual)
+    return eqx.field(default=float(default), converter=_as_float, metadata={"spec": spec})
+
+
+def phase(doc: str) -> Any:
+    """The angle at which an oscillation begins. A turn to either side: a fit may go round without meeting a border."""
+    turn = 2.0 * np.pi
+    return parameter(0.0, unit="rad", lower=-turn, upper=turn, grid=(0.0, turn / 4), symbol=r"\varphi", doc=doc)
+
+
+def variant(default: str, choices: tuple[str, ...], doc: str = "") -> Any:
+    """A field that chooses between several forms of a law found in the literature (static: another compilation)."""
+    return eqx.field(default=default, static=True, metadata={"choices": choices, "doc": doc})
+
+
+def specs(thing: Any) -> dict[str, Spec]:
+    """Name -> :class:`Spec` of every parameter of a class or an instance, in the order of definition."""
+    return {f.name: f.metadata["spec"] for f in dataclasses.fields(thing) if "spec" in f.metadata}
+
+
+def variants(thing: Any) -> dict[str, tuple[str, ...]]:
+    """Name -> allowed choices of every variant field of a class or an instance."""
+    return {f.name: f.metadata["choices"] for f in dataclasses.fields(thing) if "choices" in f.metadata}
+
+
+def check(thing: Any, *, where: str = "") -> None:
+    """Refuse values outside the range of their :class:`Spec` and unknown variants.
+
+    Raises:
+        InputError: names the parameter, its value and the allowed range. Traced values are not checked.
+    """
+    prefix = f"{where}." if where else ""
+    for name, spec in specs(thing).items():
+        value = getattr(thing, name)
+        if isinstance(value, jax.core.Tracer):
+            continue
+        number = np.asarray(value, dtype=float)
+        if not np.all(np.isfinite(number)) or np.any(number < spec.lower) or np.any(number > spec.upper):
+            raise InputError(
+                f"{spec.doc or name} is outside its range",
+                key=f"{prefix}{name}",
+                value=number.tolist(),
+                allowed=spec.range,
+            )
+    for name, choices in variants(thing).items():
+        if getattr(thing, name) not in choices:
+            raise InputError(
+                "unknown form of the law",
+                key=f"{prefix}{name}",
+                value=getattr(thing, name),
+                allowed=", ".join(choices),
+            )

@@ -1,0 +1,100 @@
+"""The look all pictures share."""
+
+from __future__ import annotations
+
+import functools
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from ...system.runstore import write_aside
+from ...system.units import PREFIXES, power_for, takes_prefix
+
+# dark, middle and light, so that a grey print keeps them apart; the line styles differ as well
+DARK, MIDDLE, LIGHT = "#14213d", "#c8553d", "#8d99ae"
+_LOOK: Any = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e6ea",
+    "grid.linewidth": 0.6,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "lines.linewidth": 1.3,
+    "axes.formatter.useoffset": False,
+}
+
+
+def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    """Decorator of a function that makes a figure: it is drawn in this look, and nobody else's settings change."""
+
+    @functools.wraps(draw)
+    def wrapper(*args: Any, **kwargs: Any) -> Figure:
+        with rc_context(_LOOK):
+            return draw(*args, **kwargs)
+
+    return wrapper
+
+
+def figure(rows: int = 1, columns: int = 1, *, width: float = 7.0, height: float = 4.2) -> tuple[Figure, np.ndarray]:
+    """A figure and its axes, shape (rows, columns); sizes in inches of the whole."""
+    made = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(made)
+    return made, np.asarray(made.subplots(rows, columns, squeeze=False))
+
+
+def plain(text: object, most: int = 120) -> str:
+    """Text from a file as matplotlib shows it literally, without its formula signs."""
+    shown = str(text).replace("\\", "/").replace("$", r"\$")
+    return shown if len(shown) <= most else shown[:most] + "..."
+
+
+def scaled(values: np.ndarray, unit: str) -> tuple[float, str]:
+    """The factor and the unit text that show values (in the SI ``unit``) as numbers between 1 and 1000."""
+    finite = np.abs(np.asarray(values, float))
+    finite = finite[np.isfinite(finite)]
+    top = float(finite.max()) if finite.size else 0.0
+    if top == 0.0 or not takes_prefix(unit):
+        return 1.0, unit
+    power = power_for(top, 12, 0)
+    return 10.0**-power, PREFIXES[power] + unit
+
+
+def logarithmic(axes: Axes, which: str) -> None:
+    """A logarithmic axis ("x" or "y") with plain numbers at 1, 2 and 5 of every decade."""
+    (axes.set_xscale if which == "x" else axes.set_yscale)("log")
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def remark(axes: Axes, text: str) -> None:
+    """A sentence in an empty panel."""
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", wrap=True, color=DARK)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.grid(False)
+
+
+def save(figure: Figure, path: str | Path, dpi: int = 130) -> Path:
+    """Write a PNG without time stamp or version, so that equal results are equal files."""
+    path = Path(path)
+    buffer = io.BytesIO()
+    metadata: dict[str, Any] = {"Software": None}
+    with rc_context(_LOOK):
+        figure.savefig(buffer, format="png", dpi=dpi, metadata=metadata)
+    return write_aside(path, buffer.getvalue())

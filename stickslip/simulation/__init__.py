@@ -1,0 +1,1 @@
+"""Motion from laws: the solver, scenario files, the rules that an effect's code must keep."""

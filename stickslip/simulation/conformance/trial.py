@@ -1,0 +1,93 @@
+"""Effects from elsewhere are tried before they are used: can the model be compiled with the law at all?"""
+
+from __future__ import annotations
+
+import inspect
+import traceback
+from collections.abc import Iterable
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from ...errors import InputError, StickslipError
+from ...physics.effects import catalogue
+from ...physics.effects.base import Effect, Motion
+from ...physics.model import Model, State
+from .rig import base_model
+
+_OURS = "stickslip."
+
+
+def load_effects(paths: Iterable[str | Path]) -> list[type[Effect]]:
+    """Put the effects of users' Python files into the catalogue, and try their laws.
+
+    Raises:
+        InputError: as of :func:`stickslip.physics.effects.load_file` and of :func:`try_laws`.
+    """
+    return [cls for path in paths for cls in catalogue.load_file(path, try_laws)]
+
+
+def try_laws(classes: Iterable[type[Effect]]) -> None:
+    """Trace one increment of the model with every form of each effect that is not the program's own.
+
+    Raises:
+        InputError: one cannot be compiled; names the file, the line in it, and what was raised.
+    """
+    for cls in classes:
+        if cls.__module__.startswith(_OURS):
+            continue
+        for form in catalogue.forms(cls):
+            try:
+                before, after = eqx.filter_eval_shape(_increment, base_model((cls(**form),)))
+            except StickslipError:
+                raise
+            except Exception as error:  # whatever a foreign law raises when it is traced
+                raise _refusal(cls, first_line(error), _line(error, cls)) from None
+            if _shapes(before) != _shapes(after):
+                raise _refusal(cls, "its state or what it changes has another shape or type after an increment")
+
+
+def first_line(error: Exception) -> str:
+    """Kind and first line of what a foreign law raised."""
+    return f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else ''}"
+
+
+def _increment(model: Model) -> tuple[State, State]:
+    """A state and what an increment makes of it, everything that an effect may act on included."""
+    t, dt, step = jnp.asarray(1.0), jnp.asarray(1e-3), jnp.asarray(1e-7)
+    bank, before = model.shaped(), model.rest()
+    motion = Motion(t, dt, step, jnp.asarray(1e-4), jnp.zeros(()), step, model.lead(t))
+    after, forces = model.advance(before, bank, model.contact(before, bank, t), motion)
+    speed = after.v + 0.0 * (
+        forces.net / model.mass() + model.read(after, motion, forces.contact) + model.rising(after)
+    )
+    return before, eqx.tree_at(lambda y: y.v, after, speed)
+
+
+def _shapes(state: State) -> list[tuple]:
+    return [(jax.tree.structure(state),), *((leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(state))]
+
+
+def _file(cls: type[Effect]) -> str | None:
+    try:
+        return inspect.getfile(cls)
+    except (OSError, TypeError):
+        return None
+
+
+def _line(error: Exception, cls: type[Effect]) -> str | None:
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == _file(cls)]
+    return f"line {lines[-1]}" if lines else None
+
+
+def _refusal(cls: type[Effect], what: str, key: str | None = None) -> InputError:
+    return InputError(
+        f"the law of '{cls.tag}' cannot be compiled: {what}",
+        file=_file(cls),
+        key=key,
+        hint="a law is written with jax.numpy and without 'if' on a value (jnp.tanh(v / v_r) for a sign, "
+        "jnp.maximum(x, 0.0) for a part); what it returns has the shape that its role asks for (documentation, "
+        "'Writing an effect')",
+    )

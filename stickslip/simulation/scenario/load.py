@@ -1,0 +1,141 @@
+"""Loading a scenario file: checked, in SI, with the changes asked for on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ...data.campaign.place import key_lines, readable
+from ...data.campaign.toml_file import read_toml
+from ...errors import InputError
+from .overrides import parse_assignment, with_overrides
+from .schema import ScenarioFile, file_model
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A validated scenario.
+
+    Args:
+        file: everything that was written, in SI.
+        path: of the file, or None where it was made in Python.
+        sha256: of the file.
+        content: what was read, with the changes in it, as plain tables.
+        changes: key and value of every change, in order.
+    """
+
+    file: ScenarioFile
+    path: Path | None
+    sha256: str
+    content: Mapping[str, Any]
+    changes: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def folder(self) -> Path:
+        """Where files named in the scenario are looked for."""
+        return self.path.parent if self.path else Path()
+
+    @property
+    def title(self) -> str:
+        """The title, or the file's name."""
+        return self.file.title or (self.path.stem if self.path else "scenario")
+
+    def changed(self, **changes: Any) -> Scenario:
+        """A copy with keys set; dots of a key are written as two underscores (``contact__H=0.5``)."""
+        return self.with_changes([(key.replace("__", "."), value) for key, value in changes.items()])
+
+    def with_changes(self, changes: Sequence[tuple[str, Any]]) -> Scenario:
+        """A copy with keys such as ``("contact.H", 0.5)`` set; checked as a file is."""
+        return _checked(dict(self.content), self.path, self.sha256, (*self.changes, *changes), changes, "")
+
+
+def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Read and check a scenario file (TOML; ``stickslip new scenario`` writes a commented one).
+
+    Args:
+        path: of the file.
+        overrides: changes such as ``"contact.H=0.5"``.
+
+    Raises:
+        InputError: the file is not there, not TOML or a campaign; unknown keys, missing units, values out of range.
+    """
+    path = Path(path)
+    changes = [parse_assignment(text) for text in overrides]
+    read = read_toml(path, "scenario")
+    return _checked(read.content, path, read.sha256, tuple(changes), changes, read.text)
+
+
+def make_scenario(content: Mapping[str, Any], folder: str | Path | None = None) -> Scenario:
+    """A scenario from nested dictionaries with the keys of the file.
+
+    Args:
+        content: as `tomllib` would read it from a file.
+        folder: where files it names are looked for.
+    """
+    path = None if folder is None else Path(folder) / "scenario.toml"
+    return _checked(dict(content), path, "", (), (), "")
+
+
+def _checked(
+    content: dict[str, Any],
+    path: Path | None,
+    digest: str,
+    all_changes: Sequence[tuple[str, Any]],
+    changes: Sequence[tuple[str, Any]],
+    text: str,
+) -> Scenario:
+    content = with_overrides(content, changes)
+    shown = path or Path("scenario")
+    try:
+        model = file_model(content)
+        file = model.model_validate(content)
+        _check_effects(file)
+    except ValidationError as error:
+        fault = readable(error, model, text, shown)
+    except InputError as error:
+        lines = key_lines(text)
+        place = tuple(int(p) - 1 if p.isdigit() else p for p in (error.key or "").split("."))
+        line = lines.get(place)
+        fault = InputError(
+            error.what,
+            file=shown,
+            key=f"line {line}: {error.key}" if line else error.key,
+            value=error.value,
+            allowed=error.allowed,
+            hint=error.hint,
+        )
+    else:
+        return Scenario(file, path, digest, content, tuple(all_changes))
+    raise _from_command_line(fault, all_changes)
+
+
+def _from_command_line(fault: InputError, changes: Sequence[tuple[str, Any]]) -> InputError:
+    """The same fault, placed on the command line where the value came from there."""
+    key = (fault.key or "").split(": ")[-1]
+    for name, _ in changes:
+        if key in (name, name.partition(".")[0] and _shown(name)):
+            return InputError(
+                fault.what, file="--set", key=name, value=fault.value, allowed=fault.allowed, hint=fault.hint
+            )
+    return fault
+
+
+def _shown(name: str) -> str:
+    """``effect.1.beta`` as messages show it, ``effect[1].beta``."""
+    text = ""
+    for part in name.split("."):
+        text += f"[{part}]" if part.isdigit() else (f".{part}" if text else part)
+    return text
+
+
+def _check_effects(file: ScenarioFile) -> None:
+    """Make every effect once, so that faults are found before anything runs."""
+    if not file.effect:
+        return
+    from .effects import make_effects
+
+    make_effects(file)

@@ -1,0 +1,95 @@
+"""A series of runs in which one key takes one value after another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import InputError
+from .events import UNITS
+from .load import Scenario
+from .overrides import is_bare, sweep_values
+from .schema import SweepTable
+from .simulation import Progress, simulate
+
+if TYPE_CHECKING:
+    import xarray
+
+_KNOWN_UNITS = {
+    "drive.velocity": "m/s",
+    "block.mass": "kg",
+    "block.spring_stiffness": "N/m",
+    "block.damping": "N s/m",
+    "contact.normal_force": "N",
+    "contact.h_rms": "m",
+    "contact.u_max": "m",
+    "weakening.slip_distance": "m",
+    "weakening.healing_time": "s",
+}
+SUMMED = ("recurrence", "slip", "peak_velocity", "creep_before_slip")
+
+
+def scenarios_of(scenario: Scenario, sweep: SweepTable) -> list[tuple[float, Scenario]]:
+    """Every value of the series and the scenario with it, all checked before the first runs.
+
+    Raises:
+        InputError: the key is unknown, or a value or its unit is not allowed.
+    """
+    table, _, name = sweep.key.rpartition(".")
+    if not table:
+        raise InputError(
+            "the key of a series is that of a table", key="sweep.key", value=sweep.key, allowed="table.key"
+        )
+    for written in (sweep.start, sweep.stop, *(sweep.values or ())):
+        if isinstance(written, str) and not is_bare(written):
+            scenario.with_changes([(sweep.key, written)])  # the schema knows the unit; what follows is plain numbers
+    values = sweep_values(sweep.key, sweep.start, sweep.stop, sweep.points, sweep.values)
+    found = []
+    for value in values:
+        number = int(value) if name in _INTEGERS and float(value).is_integer() else value
+        found.append((value, scenario.with_changes([(sweep.key, number)])))
+    return found
+
+
+_INTEGERS = {"springs", "bins", "contacts", "seed", "lines", "events", "counter_steps"}
+
+
+def simulate_series(
+    runs: list[tuple[float, Scenario]], progress: Callable[[int, Progress], None] | None = None
+) -> Iterator[xarray.Dataset]:
+    """The data set of every run, one after the other; ``progress`` is told the run's number from 0."""
+    for number, (_, scenario) in enumerate(runs):
+        watch = None if progress is None else (lambda p, number=number: progress(number, p))
+        yield simulate(scenario, watch)
+
+
+def summary(scenario: Scenario, key: str, values: list[float], runs: list[xarray.Dataset]) -> xarray.Dataset:
+    """Means and spreads of the events of every run, those after the first, virgin one where there are more.
+
+    Returns:
+        On the dimension ``run``: value, events, critical_velocity, and recurrence (s), slip (m), peak_velocity (m/s)
+        and creep_before_slip (m), each with ``..._std``; nan where a run has no event.
+    """
+    import xarray
+
+    columns: dict[str, tuple] = {
+        "value": ("run", np.array(values[: len(runs)]), {"units": _KNOWN_UNITS.get(key, "1"), "long_name": key}),
+        "events": ("run", np.array([run.sizes["event"] for run in runs]), {"units": "1"}),
+        "critical_velocity": ("run", np.array([run.attrs["critical_velocity"] for run in runs]), {"units": "m/s"}),
+    }
+    for name in SUMMED:
+        later = [_later(run[name].values) for run in runs]
+        columns[name] = ("run", np.array([a.mean() if a.size else np.nan for a in later]), {"units": UNITS[name]})
+        columns[f"{name}_std"] = (
+            "run",
+            np.array([a.std() if a.size else np.nan for a in later]),
+            {"units": UNITS[name]},
+        )
+    return xarray.Dataset(columns, attrs={"key": key, "title": scenario.title})
+
+
+def _later(values: np.ndarray) -> np.ndarray:
+    values = values[1:] if values.size > 1 else values
+    return values[np.isfinite(values)]

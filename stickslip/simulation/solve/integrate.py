@@ -1,0 +1,209 @@
+"""Integrate a model from a state to a time, in pieces of bounded memory, with progress and errors that teach."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ...errors import InputError, SolveError
+from ...physics.contact import Bank
+from ...physics.effects.base import Motion
+from ...physics.model import Model, State
+from ...physics.params import check
+from .stepper import ContactStepper, Increments, Step, Tolerance
+from .trajectory import Stats, Steps, Trajectory, energy_error
+
+PIECE = 4096  # steps between two looks at the clock; bounds the memory of one compiled call
+SMALLEST_STEP = 1e-10  # s; four orders below the period of any contact resonance a vibrometer could see
+LEAST_ADVANCE = 1e-2  # of the contact's period in PIECE steps; the tightest tolerance takes a hundred times as much
+
+_TERM = Increments()
+
+
+def error_norm(error: State) -> jax.Array:
+    """Largest of the two scaled errors the solver reports."""
+    return jnp.maximum(jnp.abs(error.x), jnp.abs(error.v))
+
+
+def step_control(dtmax: Any = None) -> diffrax.PIDController:
+    """The step-size controller; the solver's error is already scaled, so one is the limit."""
+    return diffrax.PIDController(
+        rtol=0.0, atol=1.0, pcoeff=0.2, icoeff=0.5, norm=error_norm, dtmin=SMALLEST_STEP, dtmax=dtmax, factormax=5.0
+    )
+
+
+def observe(t: Any, y: State, args: tuple[Model, Bank]) -> Steps:
+    """What is recorded at the end of a step."""
+    model, bank = args
+    lead = model.lead(t)
+    zero = jnp.zeros(())
+    contact_force = jnp.sum(y.force)
+    still = Motion(t + zero, zero + 1e-12, y.x, y.v, zero, zero, lead)
+    return Steps(
+        t=t + zero,
+        x=y.x,
+        v=y.v,
+        reading=model.read(y, still, contact_force),
+        spring_force=model.pull(lead - y.x),
+        contact_force=contact_force,
+        psi=y.psi,
+        sliding=jnp.sum(jnp.where(jnp.abs(y.force) >= (1 - 1e-9) * y.cap, bank.strength, 0.0)) / jnp.sum(bank.strength),
+        spring_work=y.work.spring,
+        friction_work=y.work.friction,
+        viscous_work=y.work.viscous,
+        body_work=y.work.body,
+        stored=model.stored(y),
+    )
+
+
+def _leaves(t: Any, y: State, args: Any) -> list[jax.Array]:
+    """The state as a flat list: diffrax cannot buffer a tree with an empty tuple in it."""
+    return jax.tree.leaves(y)
+
+
+@eqx.filter_jit
+def _piece(model: Model, bank: Bank, tolerance: Tolerance, times: jax.Array, y: State, carried: Any) -> Any:
+    """At most PIECE steps; ``times`` are start, end, first and largest step (s)."""
+    t0, t1, dt, dtmax = times
+    saves = diffrax.SaveAt(
+        subs=[diffrax.SubSaveAt(t0=True, steps=True, fn=observe), diffrax.SubSaveAt(t1=True, fn=_leaves)],
+        solver_state=True,
+        controller_state=True,
+    )
+    solver_state, controller_state = (None, None) if carried is None else carried
+    solution = diffrax.diffeqsolve(
+        _TERM,
+        ContactStepper(tolerance=tolerance),
+        t0,
+        t1,
+        dt,
+        y,
+        args=(model, bank),
+        saveat=saves,
+        stepsize_controller=step_control(dtmax),
+        adjoint=diffrax.ForwardMode(),
+        max_steps=PIECE,
+        throw=False,
+        solver_state=solver_state,
+        controller_state=controller_state,
+        made_jump=None if carried is None else False,
+    )
+    steps, leaves = solution.ys
+    last = jax.tree.unflatten(jax.tree.structure(y), leaves)
+    return solution.stats, solution.result, (solution.solver_state, solution.controller_state), steps, last
+
+
+def integrate(
+    model: Model,
+    t1: float,
+    *,
+    t0: float = 0.0,
+    state: State | None = None,
+    tolerance: Tolerance | None = None,
+    stops: Sequence[float] = (),
+    largest_step: float = 0.02,
+    most_steps: int = 50_000_000,
+    progress: Callable[[float, Steps], None] | None = None,
+) -> tuple[Trajectory, State]:
+    """Integrate the equation of motion.
+
+    Args:
+        model: block, contact, drive and effects.
+        t1, t0: end and start (s).
+        state: state at ``t0``; a virgin contact at rest at the load point's first position if not given.
+        tolerance: error allowed in a step.
+        stops: times (s) to land on: kinks of the drive.
+        largest_step: longest step (s).
+        most_steps: give up after so many steps.
+        progress: called now and then with the time reached (s) and the last piece's steps.
+
+    Returns:
+        The trajectory and the state at ``t1``.
+
+    Raises:
+        InputError: mass, spring, damping, weakening or an element of the contact is outside its range.
+        SolveError: the steps became too small to get anywhere or a number was lost; says when and what to change.
+    """
+    began = time.perf_counter()
+    tolerance = Tolerance() if tolerance is None else tolerance
+    bank = model.shaped()
+    least = LEAST_ADVANCE / PIECE * _refuse_impossible(model, bank)
+    state = model.rest(t0) if state is None else state
+    kinks = sorted({float(s) for s in stops if t0 < s < t1} | {float(t1)})
+    pieces: list[Steps] = []
+    accepted = rejected = 0
+    now, dt, carried = float(t0), 1e-5, None
+    for stop in kinks:
+        while now < stop:
+            times = jnp.asarray(np.array([now, stop, dt, largest_step]))
+            stats, result, carried, steps, last = _piece(model, bank, tolerance, times, state, carried)
+            state = jax.tree.map(lambda a: jnp.asarray(np.asarray(a)[0]), last)
+            n = int(stats["num_accepted_steps"])
+            accepted, rejected = accepted + n, rejected + int(stats["num_rejected_steps"])
+            piece = jax.tree.map(lambda a, n=n: np.asarray(a)[1 : n + 1], steps)
+            if not pieces:
+                pieces.append(jax.tree.map(lambda a: np.asarray(a)[:1], steps))
+            pieces.append(piece)
+            reached = float(piece.t[-1]) if n else now
+            _refuse_failure(result, reached, state, accepted, most_steps)
+            tried = n + int(stats["num_rejected_steps"])
+            if reached < stop and reached - now < least * tried:
+                raise SolveError(
+                    f"the integration stopped at t = {reached:.6g} s (v = {float(state.v):.3g} m/s): {tried} steps "
+                    f"advanced it by only {reached - now:.3g} s; look for an effect with a force that jumps, or loosen "
+                    "the tolerance"
+                )
+            if n > 1:
+                dt = float(piece.t[-1] - piece.t[-2])
+            now = reached
+            if progress is not None:
+                progress(now, piece)
+        dt = min(dt, 1e-4)
+    steps = Steps(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
+    stats = Stats(accepted, rejected, energy_error(steps), time.perf_counter() - began)
+    return Trajectory(steps, stats), state
+
+
+def _refuse_impossible(model: Model, bank: Bank) -> float:
+    """Refuse what cannot be a rig; the period of the block on its virgin contact and spring (s)."""
+    check(model.block, where="block")
+    check(model.weakening, where="weakening")
+    mass = float(model.mass())
+    if not (np.isfinite(mass) and mass > 0.0):
+        raise InputError("the moving mass must be positive", key="block.mass", value=mass, allowed="above 0 kg")
+    stiffness, strength = np.asarray(bank.stiffness), np.asarray(bank.strength)
+    for name, values in (("stiffness", stiffness), ("strength", strength)):
+        if not np.all(np.isfinite(values) & (values >= 0.0)):
+            worst = float(np.min(values))
+            raise InputError(
+                f"{name} of a Jenkins element is impossible", key=f"bank.{name}", value=worst, allowed=">= 0"
+            )
+    return float(2.0 * np.pi * np.sqrt(mass / (stiffness.sum() + float(model.block.spring_stiffness))))
+
+
+def _refuse_failure(result: Any, now: float, state: State, accepted: int, most_steps: int) -> None:
+    """Turn what diffrax reports into an error that says when and what to change."""
+    good = diffrax.RESULTS.successful, diffrax.RESULTS.max_steps_reached
+    finite = bool(np.isfinite(state.x)) and bool(np.isfinite(state.v))
+    if any(bool(result == r) for r in good) and finite and accepted < most_steps:
+        return
+    if accepted >= most_steps:
+        why = f"{accepted} steps were not enough; loosen the tolerance, raise the damping, or simulate less time"
+    elif not finite:
+        why = "position or velocity is no longer a number; look for a parameter far outside its usual range"
+    else:
+        why = (
+            f"the step size fell below {SMALLEST_STEP:g} s without the error of a step coming down; loosen the "
+            "tolerance, or look for an effect with a force that jumps"
+        )
+    raise SolveError(f"the integration stopped at t = {now:.6g} s (v = {float(state.v):.3g} m/s): {why}")
+
+
+__all__ = ["Step", "Tolerance", "integrate"]

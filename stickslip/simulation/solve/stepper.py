@@ -1,0 +1,278 @@
+"""TR-BDF2 for a block on a bank of Jenkins elements: a diffrax solver whose step contains the return map.
+
+A vector field with kinks handed to a stock solver is an invalid input: the kinks lie wherever an element starts or
+stops to slide. Here a step is an increment, as in finite elements: position and velocity follow TR-BDF2 (Bank et al.
+1985; L-stable, second order, third-order error estimate of Hosea & Shampine 1996), while contact and effects are
+taken by their own exact or implicit update from the start of the step to each of its two stages. Each stage is a
+scalar equation in the velocity, solved by Newton's method. A reversal inside the step is a turning point of its
+path, so hysteresis is kept without landing on it.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from ...physics.contact import Bank
+from ...physics.effects.base import Contact, Motion
+from ...physics.model import Forces, Model, State, Work
+
+GAMMA = 2.0 - math.sqrt(2.0)
+D = GAMMA / 2.0  # weight of the implicit end point in both stages
+W = math.sqrt(2.0) / 4.0  # weight of the start and of the first stage in the second
+# embedded third-order weights minus those of the method
+E0, E1, E2 = (1.0 - W) / 3.0 - W, (3.0 * W + 1.0) / 3.0 - W, D / 3.0 - D
+
+STIFFER = 50.0  # times the driving spring: where the contact holds the block, and a slip is over
+TINY = 1e-30
+
+
+class Increments(diffrax.AbstractTerm):
+    """Stands where diffrax wants a vector field: the solver takes the model through increments itself.
+
+    diffrax asks it for nothing but shapes; an ODETerm would promote the state's types leaf by leaf for that.
+    """
+
+    def vf(self, t: Any, y: Any, args: Any) -> Any:
+        return y
+
+    def contr(self, t0: Any, t1: Any, **kwargs: Any) -> Any:
+        return t1 - t0
+
+    def prod(self, vf: Any, control: Any) -> Any:
+        return vf
+
+
+class HermiteInterpolation(diffrax.AbstractLocalInterpolation):
+    """Cubic in the displacement, its derivative in the velocity, linear in the rest."""
+
+    t0: Any  # type: ignore[misc]  # diffrax declares both as class variables
+    t1: Any  # type: ignore[misc]
+    y0: State
+    y1: State
+
+    def evaluate(self, t0: Any, t1: Any = None, left: bool = True) -> State:
+        if t1 is not None:
+            return jax.tree.map(jnp.subtract, self.evaluate(t1), self.evaluate(t0))
+        h = self.t1 - self.t0
+        length = jnp.where(h > 0, h, 1.0)
+        s = jnp.where(h > 0, (t0 - self.t0) / length, 0.0)
+        y = jax.tree.map(lambda a, b: a + s * (b - a), self.y0, self.y1)
+        dx, v0, v1 = self.y1.x - self.y0.x, self.y0.v, self.y1.v
+        x = self.y0.x + hermite(s, h, dx, v0, v1)
+        v = 6.0 * s * (1.0 - s) * dx / length + (1.0 - s) * (1.0 - 3.0 * s) * v0 + s * (3.0 * s - 2.0) * v1
+        return eqx.tree_at(lambda y: (y.x, y.v), y, (x, v))
+
+
+def hermite(s: Array, h: Array, dx: Array, v0: Array, v1: Array) -> Array:
+    """Displacement since the start of a step at its fraction ``s``, from increment and end velocities (cubic)."""
+    return s * s * (3 - 2 * s) * dx + h * s * (1 - s) * ((1 - s) * v0 - s * v1)
+
+
+class Tolerance(eqx.Module):
+    """What the error of a step is measured against: the scale of the contact, not of the travel.
+
+    Creep moves picometres a step where the contact is stiff; a tolerance relative to the travel sees nothing.
+
+    Attributes:
+        relative: share of the step's own increment and of its velocity.
+        displacement: absolute part (m).
+        velocity: absolute part (m/s).
+        ringing: share of the amplitude with which the block rings on a contact that holds it; zero asks of the ringing
+            what is asked of a slip.
+        inaudible: amplitude of the ringing's velocity (m/s) that need not be resolved; slower creep is all the same.
+    """
+
+    relative: Any = eqx.field(default=3e-3, converter=jnp.asarray)
+    displacement: Any = eqx.field(default=3e-12, converter=jnp.asarray)
+    velocity: Any = eqx.field(default=3e-8, converter=jnp.asarray)
+    ringing: Any = eqx.field(default=0.0, converter=jnp.asarray)
+    inaudible: Any = eqx.field(default=0.0, converter=jnp.asarray)
+
+    def ring(self, v: Array, a0: Array, a1: Array, h: Array, stiffness: Array, driving: Array) -> tuple[Array, Array]:
+        """What ringing adds to the tolerance of a step, for displacement (m) and velocity (m/s).
+
+        Ringing is told from creep, however slow, by acceleration and jerk, and from a slip by the stiffness it rings
+        on. It decays in thousands of steps, and no onset or creep depends on its last digits.
+
+        Args:
+            v: velocity at the end (m/s).
+            a0, a1: accelerations at start and end (m/s^2).
+            h: length of the step (s).
+            stiffness: tangent of all that holds the block, over its mass (1/s^2).
+            driving: that of the driving spring alone.
+        """
+        v, a0, a1, h, stiffness, driving = lax.stop_gradient((v, a0, a1, h, stiffness, driving))
+        square = jnp.maximum(stiffness, driving)
+        held = jnp.clip(1.0 - STIFFER * driving / square, 0.0, 1.0)
+        amplitude = jnp.sqrt(jnp.maximum(a0 * a0, a1 * a1) / square + ((a1 - a0) / (h * square)) ** 2)
+        share = amplitude / (amplitude + jnp.abs(v) + TINY)
+        extra = held * (self.ringing * amplitude + self.inaudible * share)
+        return extra / jnp.sqrt(square), extra
+
+
+class Step(eqx.Module):
+    """What the solver carries from step to step: the acceleration at its start and the share of sliding elements."""
+
+    acceleration: Array
+    failed: Array
+
+
+class ContactStepper(diffrax.AbstractAdaptiveSolver):
+    """The solver. ``terms`` is an :class:`Increments`: its vector field is never called, the model is ``args``.
+
+    Attributes:
+        tolerance: see :class:`Tolerance`; the returned error is already divided by it.
+        newton_steps: most Newton iterations of a stage; a stage that needs more makes the step fail and be halved.
+    """
+
+    tolerance: Tolerance
+    newton_steps: int = eqx.field(default=12, static=True)
+
+    term_structure: ClassVar = diffrax.AbstractTerm
+    interpolation_cls: ClassVar[Callable[..., HermiteInterpolation]] = HermiteInterpolation
+
+    def order(self, terms: Any) -> int:
+        return 2
+
+    def error_order(self, terms: Any) -> int:
+        return 3
+
+    def init(self, terms: Any, t0: Any, t1: Any, y0: State, args: tuple[Model, Bank]) -> Step:
+        return Step(self.func(terms, t0, y0, args).v, jnp.zeros((), bool))
+
+    def func(self, terms: Any, t0: Any, y0: State, args: tuple[Model, Bank]) -> State:
+        """Rate of position and velocity at a point (the rest of the state has no rate of its own)."""
+        model, bank = args
+        zero = jnp.zeros(())
+        lead = model.lead(t0)
+        still = Motion(t0 + zero, zero + 1e-12, y0.x, y0.v, zero, zero, lead)
+        _, forces = model.advance(y0, bank, model.contact(y0, bank, t0), still)
+        rate = jax.tree.map(jnp.zeros_like, y0)
+        return eqx.tree_at(lambda y: (y.x, y.v), rate, (y0.v, forces.net / model.mass()))
+
+    def step(
+        self, terms: Any, t0: Any, t1: Any, y0: State, args: tuple[Model, Bank], solver_state: Step, made_jump: Any
+    ) -> tuple[State, State, dict, Step, Any]:
+        model, bank = args
+        h = t1 - t0
+        a0, v0 = solver_state.acceleration, y0.v
+        contact = model.contact(y0, bank, t0)
+        tol = self.tolerance
+        dh = D * h
+        exact = 1e-2 * tol.velocity + 1e-3 * tol.relative * jnp.abs(v0)
+
+        def stage(t: Array, dt: Array, known_dx: Array, known_v: Array, guess: Array) -> tuple:
+            """Solve v = known_v + D h a(v), dx = known_dx + D h v; the path runs from the start of the step."""
+            problem = (model, bank, y0, contact, t, dt, known_dx, known_v, model.lead(t), dh)
+            v, slope, converged = _root(problem, guess, exact, self.newton_steps)
+            _, state, forces, motion = _increment(v, *problem)
+            return v, (v - known_v) / dh, state, forces, motion, slope, converged
+
+        tg = t0 + GAMMA * h
+        v1, a1, _, f1, _, _, ok1 = stage(tg, GAMMA * h, dh * v0, v0 + dh * a0, v0)
+        wh = W * h
+        v2, a2, y1, f2, m2, slope, ok2 = stage(t1, h, wh * (v0 + v1), v0 + wh * (a0 + a1), v1)
+
+        ex = h * (E0 * v0 + E1 * v1 + E2 * v2)
+        ev = h * (E0 * a0 + E1 * a1 + E2 * a2)
+        # stiff part of the estimate damped by (1 - D h J)^-1, J the tangent of the second stage
+        ex, ev = (ex + dh * ev) / slope, (ev - (slope - 1.0) / dh * ex) / slope
+        sx = tol.displacement + tol.relative * m2.path
+        sv = tol.velocity + tol.relative * jnp.maximum(abs(v0), abs(v2))
+        held, driving = jnp.maximum(slope - 1.0, 0.0) / dh**2, model.block.spring_stiffness / model.mass()
+        rx, rv = tol.ring(v2, a0, a2, h, held, driving)
+        sx, sv = sx + rx, sv + rv
+        ok = ok1 & ok2
+        error = jax.tree.map(jnp.zeros_like, y0)
+        error = eqx.tree_at(
+            lambda y: (y.x, y.v),
+            error,
+            (
+                jnp.where(ok, ex / sx, jnp.inf),
+                jnp.where(ok, ev / sv, jnp.inf),
+            ),
+        )
+        y1 = eqx.tree_at(lambda y: y.work, y1, _work(y0, contact, (v0, v1, v2), (f1, f2), h, model))
+        return y1, error, {"y0": y0, "y1": y1}, Step(a2, ~ok), diffrax.RESULTS.successful
+
+
+def _work(y0: State, contact: Contact, v: tuple, f: tuple, h: Array, model: Model) -> Work:
+    """Energies of the step, by the method's own weights."""
+    v0, v1, v2 = v
+    f1, f2 = f
+
+    def quadrature(p0: Array, p1: Array, p2: Array) -> Array:
+        return h * (W * (p0 + p1) + D * p2)
+
+    spring = quadrature(contact.spring_force * v0, f1.spring * v1, f2.spring * v2)
+    viscous = quadrature(model.block.damping * v0 * v0, f1.viscous * v1, f2.viscous * v2)
+    body = quadrature(f1.body * v0, f1.body * v1, f2.body * v2)
+    w = y0.work
+    return Work(w.spring + spring, w.friction + f2.dissipated, w.viscous + viscous, w.body + body + f2.given)
+
+
+def _path(t: Array, dt: Array, x0: Array, v0: Array, v: Array, dx: Array, lead: Array) -> Motion:
+    """The increment, with its turning point where the velocity changes sign (parabola through the end velocities)."""
+    reverses = v0 * v < 0.0
+    turn = jnp.where(reverses, 0.5 * dt * v0 * v0 / jnp.where(reverses, v0 - v, 1.0), 0.0)
+    return Motion(t, dt, x0 + dx, v, turn, dx, lead)
+
+
+@jax.jit  # traced once, though every step calls it four times and its derivative twice
+def _increment(
+    v: Array,
+    model: Model,
+    bank: Bank,
+    y0: State,
+    contact: Contact,
+    t: Array,
+    dt: Array,
+    known_dx: Array,
+    known_v: Array,
+    lead: Array,
+    dh: Array,
+) -> tuple[Array, State, Forces, Motion]:
+    """Residual of a stage's equation for the end velocity ``v``, and what the increment then leads to."""
+    motion = _path(t, dt, y0.x, y0.v, v, known_dx + dh * v, lead)
+    state, forces = model.advance(y0, bank, contact, motion)
+    return v - known_v - dh * forces.net / model.mass(), state, forces, motion
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
+def _root(problem: tuple, guess: Array, exact: Array, most: int) -> tuple[Array, Array, Array]:
+    """Root of the scalar, monotone, piecewise smooth residual; slope at the root; whether it was reached."""
+
+    def cond(carry: tuple) -> Array:
+        _, _, step, n = carry
+        return (abs(step) > exact) & (n < most)
+
+    def body(carry: tuple) -> tuple:
+        v, _, _, n = carry
+        value, slope = jax.jvp(lambda v: _increment(v, *problem)[0], (v,), (jnp.ones(()),))
+        step = value / slope
+        return v - step, slope, step, n + 1
+
+    v, slope, step, _ = jax.lax.while_loop(cond, body, (guess, jnp.ones(()), jnp.full((), jnp.inf), 0))
+    return v, slope, abs(step) <= exact
+
+
+@_root.defjvp
+def _root_jvp(most: int, primals: tuple, tangents: tuple) -> tuple:
+    """Implicit function theorem; the slope only serves the error estimate and carries no derivative."""
+    problem, guess, exact = primals
+    v, slope, converged = _root(problem, guess, exact, most)
+    # Newton's own slope belongs to the point before its last step
+    _, tangent = jax.jvp(lambda v: _increment(v, *problem)[0], (v,), (jnp.ones(()),))
+    _, change = jax.jvp(lambda *p: _increment(v, *p)[0], problem, tangents[0])
+    zero = np.zeros((), jax.dtypes.float0)
+    return (v, slope, converged), (-change / tangent, jnp.zeros_like(slope), zero)

@@ -1,0 +1,1 @@
+"""What any program needs: run folders, caches, processes, units."""

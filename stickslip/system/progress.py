@@ -1,0 +1,130 @@
+"""Long work on stderr or in a notebook: what is being done, how far it is, and how long it may still take."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+from ..errors import StickslipError
+
+PATIENCE = 1.0  # s before anything is shown
+LEAST = 0.05  # share of a stage that tells how long the rest takes
+EVERY = 30.0  # s between lines where there is no terminal
+Tell = Callable[..., None]
+
+
+class Stage:
+    """How long a stage of long work may still take; a new one begins where the share that is done falls.
+
+    Args:
+        began: time (s) at which the first one did.
+    """
+
+    def __init__(self, began: float) -> None:
+        self._began, self._first, self._before = began, 0.0, 0.0
+
+    def left(self, now: float, share: float) -> float | None:
+        """Seconds from ``now`` until the stage is done of which ``share`` (0 to 1) is; None where too little tells."""
+        if share < self._before:
+            self._began, self._first = now, share
+        self._before, done = share, share - self._first
+        return (now - self._began) * (1.0 - share) / done if done > LEAST and share < 1.0 else None
+
+
+@contextmanager
+def working(title: str) -> Iterator[Tell]:
+    """A line with a bar on stderr; gives a function ``tell(text, share=None)``.
+
+    ``share`` (0 to 1) is how much is done; time left follows from it. A notebook shows the bar under the cell; where
+    stderr is neither that nor a terminal a line is written every half minute.
+    """
+    if not sys.stderr.isatty() and "ipykernel" not in sys.modules:
+        yield _lines(title)
+        return
+    from rich import progress as bars
+    from rich.console import Console
+    from rich.text import Text
+
+    class Words(bars.ProgressColumn):
+        def render(self, task: bars.Task) -> Text:
+            return Text(str(task.fields.get("text", "")), no_wrap=True, overflow="ellipsis")
+
+    bar = bars.Progress(
+        bars.TextColumn("{task.description}", markup=False),
+        bars.BarColumn(bar_width=10),
+        Words(),
+        bars.TimeElapsedColumn(),
+        bars.TextColumn("{task.fields[left]}", markup=False),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    task = bar.add_task(title, total=None, text="", left="")
+    began, shown = time.monotonic(), False
+    stage = Stage(began)
+
+    def tell(text: str, share: float | None = None) -> None:
+        nonlocal shown
+        now = time.monotonic()
+        spent = now - began
+        if not shown and spent > PATIENCE:
+            bar.start()
+            shown = True
+        seconds = None if share is None else stage.left(now, share)
+        left = "" if seconds is None else f"{seconds:.0f} s left"
+        total = 1.0 if share is not None else None
+        bar.update(task, text=text, total=total, completed=share or 0.0, left=left)
+
+    try:
+        yield tell
+    finally:
+        if shown:
+            bar.stop()
+
+
+def _lines(title: str) -> Tell:
+    """Tells by a line on stderr now and then, for a log."""
+    began = last = time.monotonic()
+    stage = Stage(began)
+
+    def tell(text: str, share: float | None = None) -> None:
+        nonlocal last
+        now = time.monotonic()
+        seconds = None if share is None else stage.left(now, share)
+        if now - last < EVERY:
+            return
+        last, spent = now, now - began
+        left = "" if seconds is None else f", about {seconds:.0f} s left of this stage"
+        print(f"{title}: {text} ({spent:.0f} s{left})", file=sys.stderr, flush=True)
+
+    return tell
+
+
+class Cancelled(StickslipError):
+    """Long work was told to end."""
+
+
+_asked: ContextVar[Callable[[], bool] | None] = ContextVar("asked", default=None)
+
+
+@contextmanager
+def cancellable(asked: Callable[[], bool]) -> Iterator[None]:
+    """Within it :func:`breathe` raises :class:`Cancelled` once ``asked`` is true."""
+    before = _asked.set(asked)
+    try:
+        yield
+    finally:
+        _asked.reset(before)
+
+
+def breathe() -> None:
+    """Called between the steps of long work, which ends here if that was asked for.
+
+    Raises:
+        Cancelled: it was.
+    """
+    asked = _asked.get()
+    if asked is not None and asked():
+        raise Cancelled("cancelled")
