@@ -23,7 +23,7 @@ from ..inference.force.fit import at, deviations
 from ..inference.force.fit import fit as fit_force
 from ..inference.force.heldout import unseen
 from ..inference.force.knots import PHASES
-from ..inference.force.residual import coordinates
+from ..inference.force.residual import VARIABLES, WAYS, coordinates
 from ..physics.effects import catalogue
 from ..show.report.diagnosis_result import trace_sections
 from ..show.report.identifiability import identifiability
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 STRENGTH = "contact.strength"
 MEANINGS = {STRENGTH: "friction force of all contacts at full strength", "rig.mass": "mass of the block"}
-VARIABLES = {"displacement": "m", "velocity": "m/s", "spring force": "N", "time in contact": "s"}
+COORDINATES = ("displacement", "velocity", "spring force", "time in contact", *WAYS)
 
 
 def _silent(text: str, share: float) -> None:
@@ -157,7 +157,8 @@ class Fit(Shown):
             "phase": ("point", np.array(PHASES)[problem.phase]),
             "time": ("point", problem.at, {"units": "s"}),
         }
-        for name, unit in VARIABLES.items():
+        for name in COORDINATES:
+            unit = (VARIABLES | WAYS)[name]
             coords[name.replace(" ", "_")] = ("point", where[name], {"units": unit, "long_name": name})
         held = found.slopes.held
         data = {

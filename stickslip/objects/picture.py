@@ -23,6 +23,8 @@ AGAINST = {
     "place": "displacement",
     "velocity": "velocity",
     "spring force": "spring_force",
+    "slip path": "slip_path",
+    "load point": "load_point",
     "event": "event",
 }
 PARTS = 15  # of a variable's range, each with as many points, whose medians are drawn
@@ -55,7 +57,8 @@ class FitPlots:
         """Residual force over its floor against a variable, by run, with running medians.
 
         Args:
-            against: "age" (time in contact), "time", "place", "velocity", "spring force" or "event".
+            against: "age" (time in contact), "time", "place", "velocity", "spring force", "slip path" (from the
+                start of the run), "load point" or "event".
         """
         if against not in AGAINST:
             raise InputError("no such variable", key="against", value=against, hint=nearest(against, list(AGAINST)))

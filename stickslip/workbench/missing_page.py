@@ -10,7 +10,9 @@ import panel as pn
 from bokeh.models import BasicTicker, FixedTicker, HoverTool
 from bokeh.models.annotations import Span
 
+from ..errors import InputError
 from ..objects.picture import AGAINST, PARTS, WIDEST
+from ..system.units import to_si
 from .controls import BUTTON, Catalogue, Message, Words
 from .evidence import best_forms, bins, rows
 from .figures import figure, label, legend, look, source, unit_of
@@ -19,7 +21,8 @@ from .session import Session, watch
 TITLE = "What is missing"
 WORDS = {"age": "time in contact", "place": "displacement", "event": "number of the event"}
 MANY = 4  # models of a ladder, above which their names are written aslant
-FOLDED = ("age", "velocity")  # variables whose small values matter as much as their large ones
+BENT = ("age", "velocity")  # variables whose small values matter as much as their large ones
+WAYS = ("time", "place", "slip path", "load point")  # along which something may come back
 CARD = "background: var(--wb-surface); border: 1px solid var(--wb-line); border-radius: 4px; padding: 8px 12px;"
 
 
@@ -28,7 +31,7 @@ def page(session: Session) -> Any:
     residual, ladder, bone = _Residual(session), _Ladder(session), _Backbone(session)
     listed = _Listed(session, residual)
     left = pn.Column(
-        residual.against,
+        pn.Row(residual.against, residual.period, sizing_mode="stretch_width"),
         pn.pane.Bokeh(residual.figure, sizing_mode="stretch_width"),
         pn.pane.Bokeh(ladder.figure, sizing_mode="stretch_width"),
         ladder.table,
@@ -51,6 +54,10 @@ class _Residual:
             name="residual force against", options={WORDS.get(a, a): a for a in AGAINST}, value="age", width=220,
             sizing_mode="fixed",
         )  # fmt: skip
+        self.period = pn.widgets.TextInput(
+            name="folded over a period of", placeholder="such as 100 um, or 20 ms; empty: none", value="", width=260,
+            sizing_mode="fixed", description="Shows the phase of a lead screw's turn, of a vibration, of a worn track",
+        )  # fmt: skip
         self.figure = figure(y="residual force / floor", height=330)
         self._points: dict[str, Any] = {}
         self._medians: dict[str, Any] = {}
@@ -71,6 +78,7 @@ class _Residual:
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
         legend(self.figure, "below")
         self.against.param.watch(lambda event: self.update(), "value")
+        self.period.param.watch(lambda event: self.update(), "value")
         watch(session, ["steps", "at", "promises"], self.update)
         self.update()
 
@@ -85,9 +93,13 @@ class _Residual:
         x = np.asarray(data[name].values, float)
         floor, use = data.floor.values, ~data.left_out.values
         z = data.residual.values / floor
-        k, unit = (1.0, "") if name == "event" else unit_of(x, str(data[name].attrs["units"]))
+        period = self._period(str(data[name].attrs.get("units", "1")))
+        if period is not None:
+            x, k, unit = np.mod(x / period, 1.0), 1.0, "periods"
+        else:
+            k, unit = (1.0, "") if name == "event" else unit_of(x, str(data[name].attrs["units"]))
         x = x * k + (1.0 if name == "event" else 0.0)
-        axis, text = (_folded(x), unit) if against in FOLDED else (x, unit)
+        axis, text = (_bent(x), unit) if against in BENT else (x, unit)
         for run in self._points:
             own = np.flatnonzero((data.run.values == run) & use)
             own = own[np.argsort(x[own], kind="stable")]
@@ -96,9 +108,9 @@ class _Residual:
             self._medians[run].data = {
                 "x": np.array([np.median(axis[p]) for p in parts]), "y": np.array([np.median(z[p]) for p in parts]),
             }  # fmt: skip
-        words = WORDS.get(against, against)
+        words = WORDS.get(against, against) if period is None else f"phase of {WORDS.get(against, against)}"
         self.figure.xaxis.axis_label = label(words, text)
-        if against in FOLDED:
+        if against in BENT:
             ticks, labels = _ticks(x)
             self.figure.xaxis.ticker = FixedTicker(ticks=ticks)
             self.figure.xaxis.major_label_overrides = labels
@@ -109,18 +121,38 @@ class _Residual:
         if law is None or law.size != z.size:
             self._law.data = {"x": [], "y": []}
         else:
-            parts = bins(fit, against)
+            parts = bins(fit, against) if period is None else _parts(x, np.flatnonzero(use))
             self._law.data = {
                 "x": [float(np.median(axis[p])) for p in parts],
                 "y": [float(np.median(law[p] / floor[p])) for p in parts],
             }
+
+    def _period(self, unit: str) -> float | None:
+        """The period that was typed (SI); None where there is none, or the variable has another unit."""
+        self.period.disabled = self.against.value not in WAYS
+        text = self.period.value.strip()
+        if self.period.disabled or not text:
+            return None
+        try:
+            found = to_si(text, unit, key="period")
+        except InputError as error:
+            self._session.said = str(error).split("\n")[0]
+            return None
+        if not found > 0.0:
+            self._session.said = "a period is larger than zero"
+            return None
+        return found
+
+
+def _parts(x: np.ndarray, use: np.ndarray) -> list[np.ndarray]:
+    return [p for p in np.array_split(use[np.argsort(x[use], kind="stable")], PARTS) if p.size]
 
 
 def _knee(x: np.ndarray) -> float:
     return max(0.002 * float(np.abs(x).max(initial=0.0)), 1e-300)
 
 
-def _folded(x: np.ndarray) -> np.ndarray:
+def _bent(x: np.ndarray) -> np.ndarray:
     """On a scale that is linear around zero and logarithmic beyond."""
     return np.asarray(np.arcsinh(x / _knee(x)))
 

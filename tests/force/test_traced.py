@@ -131,7 +131,7 @@ def test_traces_are_kept_where_compiled_code_is(tmp_path, off, number):
     environment.pop("JAX_COMPILATION_CACHE_DIR", None)
     done = subprocess.run([sys.executable, "-c", ADDS], env=environment, capture_output=True, text=True, check=True)
     assert float(done.stdout) == 2.0
-    assert len(list(tmp_path.glob("stickslip/system/traced/*/*"))) == number
+    assert len(list(tmp_path.glob("stickslip/traced/*/*"))) == number
 
 
 def test_traces_belong_to_the_code_and_old_ones_of_other_code_go(tmp_path, monkeypatch):

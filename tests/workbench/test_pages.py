@@ -70,6 +70,31 @@ def test_a_page_that_fails_says_so_and_leaves_the_others(session):
     assert "oh" in app._made(Broken, session).object  # type: ignore[arg-type]
 
 
+def test_the_residual_is_folded_over_a_period(session, base):
+    part = missing_page._Residual(session)
+    part.against.value, part.period.value = "load point", "20 um"
+    assert "phase of load point" in part.figure.xaxis.axis_label
+    force = base.force
+    run = str(force.run.values[0])
+    use = (force.run.values == run) & ~force.left_out.values
+    turns = np.sort(np.mod(force.load_point.values[use] / 20e-6, 1.0))
+    assert part._points[run].data["x"] == pytest.approx(turns)
+    for wrong in ("20", "20 s", "-1 um", "0 um", "wide"):
+        session.said = ""
+        part.period.value = wrong
+        assert session.said and "phase" not in part.figure.xaxis.axis_label
+    part.against.value = "velocity"
+    assert part.period.disabled
+
+
+def test_the_slip_path_is_the_way_there_and_back(base):
+    force = base.force
+    for run in np.unique(force.run.values):
+        own = force.isel(point=np.flatnonzero(force.run.values == run))
+        path = own.slip_path.values[np.argsort(own.time.values)]
+        assert (np.diff(path) >= 0.0).all() and path[-1] >= np.ptp(own.displacement.values) * 0.999
+
+
 def test_a_slider_sends_only_what_can_be_used(session, base):
     part = model_page._sliders(session)
     for message in (

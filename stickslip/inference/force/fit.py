@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 from scipy.sparse import dia_array
 
@@ -24,7 +25,8 @@ FARTHEST = 1.5  # step of a parameter on the search scale
 PLACED = 2  # rounds after which the bank's elements are put where the strength is
 ROUNDS = 10  # times that the scatter is estimated anew
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
-HALVINGS = 5  # of a step that does not lower the cost
+REGIONS = 3  # trust regions tried, each within the one before, until a step lowers the cost
+POOR, GOOD = 0.25, 0.7  # shares of the expected fall of the cost below and above which the trust region changes
 LAST = 15  # steps with the covariance as it was found
 STEPS = 3  # of Gauss-Newton between
 NEWTON = 4  # steps of the sizes between
@@ -128,30 +130,32 @@ class _System:
         marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", local, point.events)
         self.marginal = marginal
         side = np.concatenate([blocks(slopes.shared), marginal[..., None]], axis=2)
-        white = np.linalg.solve(self.whole, side)
+        white = solve_triangular(self.whole, side, lower=True)
         self.rows, self.rest = white[..., :-1], white[..., -1]
 
     def objective(self, point: Point, slopes: Slopes) -> float:
         """Of residual, random effects and priors, with this covariance."""
-        white = np.linalg.solve(self.plain, self.blocks(slopes.residual)[..., None])[..., 0]
+        white = solve_triangular(self.plain, self.blocks(slopes.residual)[..., None], lower=True)
         _, target = prior_rows(self.problem, point)
         return float((white**2).sum() + (point.events**2 / self.random).sum() + (target**2).sum())
 
-    def step(self) -> tuple[Array, Array]:
-        """Changes of the shared parameters and the events' own values after it."""
+    def step(self, radius: float) -> tuple[Array, Array, float]:
+        """Changes of what is shared within a trust region, the events' own values after it, and the cost expected."""
         rows = self.rows.reshape(-1, self.rows.shape[-1])
         normal = rows.T @ rows + self.prior.T @ self.prior
         right = rows.T @ self.rest.ravel() + self.prior.T @ self.target
         scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
         root = np.linalg.cholesky(normal * scale[:, None] * scale + 1e-11 * np.eye(len(normal)))
-        low, high = reach(self.problem, self.point)
+        low, high = reach(self.problem, self.point, radius)
         high = np.where(high - low > 1e-12, high, low + 1e-12)
         found = lsq_linear(root.T, -np.linalg.solve(root, right * scale), (low / scale, high / scale), method="bvls")
         change = found.x * scale
-        left = self.marginal + np.einsum("eip,p->ei", self.blocks(self.slopes.shared), change)
-        weighted = np.linalg.solve(np.swapaxes(self.whole, 1, 2), np.linalg.solve(self.whole, left[..., None]))[..., 0]
+        left = self.marginal + self.blocks(self.slopes.shared) @ change
+        white = solve_triangular(self.whole, left[..., None], lower=True)
+        weighted = solve_triangular(self.whole, white, lower=True, trans="T")[..., 0]
         events = -self.random * np.einsum("eia,ei->ea", self.local, weighted)
-        return change, events
+        rest, prior = self.rest.ravel() + rows @ change, self.target + self.prior @ change
+        return change, events, float(rest @ rest + prior @ prior)
 
     def covariance(self) -> Array:
         """Of the shared parameters; what stands at a bound does not move."""
@@ -218,12 +222,15 @@ def moved(point: Point, change: Array, events: Array) -> Point:
     return Point(point.z + change[:a], phases, weights, events, point.common + change[a + b + k :])
 
 
-def reach(problem: Problem, point: Point) -> tuple[Array, Array]:
-    """The least and the largest change of every shared parameter."""
+def reach(problem: Problem, point: Point, radius: float = FARTHEST) -> tuple[Array, Array]:
+    """The least and the largest change of everything shared; ``radius`` of the trust region on the search scale.
+
+    The force is linear in the weights, which need no such region.
+    """
     shared = problem.composition.shared
-    b = np.full(point.phases.size, np.inf)
+    b = np.full(point.phases.size, 4.0 * radius if radius < FARTHEST else np.inf)
     bounds = np.array([f.bounds for f in shared]).reshape(-1, 2).T
-    low, high = np.maximum(bounds[0] - point.z, -FARTHEST), np.minimum(bounds[1] - point.z, FARTHEST)
+    low, high = np.maximum(bounds[0] - point.z, -radius), np.minimum(bounds[1] - point.z, radius)
     more, c = np.full(point.weights.size, np.inf), np.full(point.common.size, np.inf)
     return np.concatenate([low, -b, -point.weights, -c]), np.concatenate([high, b, more, c])
 
@@ -302,7 +309,7 @@ def fit(
     sizes = Scatter.wide() if scatter is None else scatter
     out = np.zeros(problem.of.size, bool) if dropped is None else dropped
     slopes = problem.evaluate(point)
-    evaluations = 1
+    evaluations, radius = 1, FARTHEST
     if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
         raise FitError("the model gives no finite force along the motion")
     for turn in range(rounds):
@@ -318,12 +325,12 @@ def fit(
                 out = out | more
                 made = known_of(problem, point, slopes, blocks, out)
                 sizes = estimate(sizes, marginal, made, NEWTON)
-        point, slopes, total, count = descend(problem, point, slopes, sizes, made, blocks, steps)
+        point, slopes, total, count, radius = descend(problem, point, slopes, sizes, made, blocks, steps, radius)
         evaluations += count
         if turn > PLACED + 2 and total < 1.0:
             break
     made = known_of(problem, point, slopes, blocks, out)
-    point, slopes, _, count = descend(problem, point, slopes, sizes, made, blocks, LAST)
+    point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, blocks, LAST)
     return _best(adapted(_found(problem, point, slopes, sizes, out, made, evaluations + count)))
 
 
@@ -356,7 +363,7 @@ def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
     blocks, slopes = base.blocks, problem.evaluate(point)
     if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
         raise FitError("the model gives no finite force along the motion")
-    point, slopes, _, count = descend(problem, point, slopes, base.scatter, base.known, blocks, last)
+    point, slopes, _, count, _ = descend(problem, point, slopes, base.scatter, base.known, blocks, last)
     return _found(problem, point, slopes, base.scatter, base.dropped, base.known, count + 1)
 
 
@@ -368,13 +375,14 @@ def adapted(found: Fit) -> Fit:
     """
     problem, blocks = found.problem, found.blocks
     point, slopes, sizes, evaluations = found.point, found.slopes, found.scatter, found.evaluations
+    radius = FARTHEST
     for _ in range(ROUNDS):
         known = found.known.with_local(blocks(slopes.local))
         marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", known.local, point.events)
         before = misfit(sizes.sizes, marginal, known)
         sizes = estimate(sizes, marginal, known, NEWTON)
         fallen = before - misfit(sizes.sizes, marginal, known)
-        point, slopes, total, count = descend(problem, point, slopes, sizes, known, blocks, STEPS)
+        point, slopes, total, count, radius = descend(problem, point, slopes, sizes, known, blocks, STEPS, radius)
         evaluations += count
         if fallen + total < 1.0:
             break
@@ -382,34 +390,45 @@ def adapted(found: Fit) -> Fit:
 
 
 def descend(
-    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks, most: int
-) -> tuple[Point, Slopes, float, int]:
-    """Gauss-Newton steps with the covariance as it is, until the cost falls no more.
+    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks, most: int,
+    radius: float = FARTHEST,
+) -> tuple[Point, Slopes, float, int, float]:  # fmt: skip
+    """Gauss-Newton steps in a trust region, with the covariance as it is, until the cost falls no more.
+
+    The region is a box on the search scale (Conn, Gould & Toint 2000): what the data hardly determine is held back, and
+    not the whole step with it.
 
     Returns:
-        The point and the slopes there, by how much the cost fell, and how often the model was evaluated.
+        The point and the slopes there, by how much the cost fell, how often the model was evaluated, and the radius.
     """
     total, count = 0.0, 0
     for _ in range(most):
         breathe()
         system = _System(problem, point, slopes, scatter, known, blocks)
         now = system.objective(point, slopes)
-        change, events = system.step()
-        fallen, share = 0.0, 1.0
-        for _ in range(HALVINGS):
-            trial = moved(point, share * change, point.events + share * (events - point.events))
+        fallen = 0.0
+        for turn in range(REGIONS):
+            change, events, expected = system.step(radius)
+            far = float(np.abs(change[: point.z.size]).max(initial=0.0))
+            trial = moved(point, change, events)
             there = problem.evaluate(trial)
             count += 1
             held = np.isfinite(there.residual).all() and trial.weights.sum() > 0.0
             then = system.objective(trial, there) if held else np.inf
+            share = (now - then) / max(now - expected, 1e-300)
+            if share < POOR:
+                radius = 0.3 * min(radius, far)
+            elif share > GOOD and turn == 0:
+                radius = min(max(radius, 2.0 * far), FARTHEST)
             if then < now:
                 point, slopes, fallen = trial, there, now - then
                 break
-            share *= 0.3
+            if now - expected < SETTLED:
+                break
         total += fallen
         if fallen < SETTLED:
             break
-    return point, slopes, total, count
+    return point, slopes, total, count, radius
 
 
 def at(problem: Problem, point: Point, scatter: Scatter, dropped: NDArray[np.bool_], known: Known | None = None) -> Fit:

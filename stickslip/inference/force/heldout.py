@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 
 from .fit import Array, Fit, moved, prior_rows, reach
@@ -58,7 +59,7 @@ class _Parts:
         self.free = np.flatnonzero((self.low < 0.0) & (self.high > 0.0))
         blocks = fit.blocks
         side = np.concatenate([blocks(fit.slopes.shared)[..., self.free], blocks(fit.marginal)[..., None]], axis=2)
-        white = np.linalg.solve(root, side)
+        white = solve_triangular(root, side, lower=True)
         self.rows, self.rest = white[..., :-1], white[..., -1]
         prior, target = prior_rows(fit.problem, fit.point)
         prior = prior[:, self.free]

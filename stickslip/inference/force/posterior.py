@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 
 from .fit import Array, Fit, moved, prior_rows, reach
@@ -53,7 +54,7 @@ class Walked:
             raise FloatingPointError("the model gives no finite force here")
         rest = found.blocks(slopes.residual) - np.einsum("eia,ea->ei", found.known.local, start.events)
         together = np.concatenate([found.blocks(slopes.shared), rest[..., None]], axis=2)
-        white = np.linalg.solve(self.whitener, together).reshape(-1, together.shape[2])
+        white = solve_triangular(self.whitener, together, lower=True).reshape(-1, together.shape[2])
         prior, target = prior_rows(found.problem, start)
         rows, rest = np.vstack([white[:, :-1], prior]), np.concatenate([white[:, -1], target])
         change = self._best(rows[:, a:], rest, start)

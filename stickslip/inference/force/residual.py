@@ -12,8 +12,12 @@ from .knots import RING
 from .signatures import Explained
 
 NODES = 7
-VARIABLES = ("time", "displacement", "velocity", "spring force", "time in contact", "number of the event")
-UNITS = ("s", "m", "m/s", "N", "s", "1")
+# where a drive goes one way these go with place and time: they are looked at, and not tried by themselves
+VARIABLES = {
+    "time": "s", "displacement": "m", "velocity": "m/s", "spring force": "N", "time in contact": "s",
+    "number of the event": "1",
+}  # fmt: skip
+WAYS = {"slip path": "m", "load point": "m"}
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class Structure:
 
 
 def coordinates(fit: Fit) -> dict[str, Array]:
-    """The variables at the points, shape (p,) each."""
+    """The variables at the points, and the ways of block and load point, shape (p,) each."""
     problem = fit.problem
     runs = problem.runs
     x = np.concatenate([k.mean @ k.x for k in runs])
@@ -46,19 +50,17 @@ def coordinates(fit: Fit) -> dict[str, Array]:
     shared = fit.values.get("rig.spring_stiffness", np.nan)
     stiffness = np.concatenate([np.full(k.at.size, shared if k.stiffness is None else k.stiffness) for k in runs])
     number = problem.of - problem.first[problem.run]
-    return dict(
-        zip(
-            VARIABLES,
-            (problem.at, x, rate, stiffness * (drive - x), problem.elapsed, number.astype(float)),
-            strict=True,
-        )
-    )
+    path = np.concatenate([k.mean @ np.concatenate([[0.0], np.cumsum(np.abs(np.diff(k.x)))]) for k in runs])
+    values = (problem.at, x, rate, stiffness * (drive - x), problem.elapsed, number.astype(float), path, drive)
+    return dict(zip((*VARIABLES, *WAYS), values, strict=True))
 
 
 def structures(fit: Fit, explained: Explained, dispersion: float = 1.0) -> list[Structure]:
     """All variables, the most telling first."""
     out = []
-    for (name, values), unit in zip(coordinates(fit).items(), UNITS, strict=True):
+    found = coordinates(fit)
+    for name, unit in VARIABLES.items():
+        values = found[name]
         scaled = (
             np.arcsinh(values / (0.02 * np.abs(values).max())) if name in ("velocity", "time in contact") else values
         )
@@ -66,8 +68,8 @@ def structures(fit: Fit, explained: Explained, dispersion: float = 1.0) -> list[
         if nodes.size < 3:
             continue
         basis = np.stack([np.interp(scaled, nodes, row) for row in np.eye(nodes.size)], axis=1) * fit.strength
-        fall, found = explained.gain(-basis)
+        fall, sizes = explained.gain(-basis)
         chance = float(chi2.sf(fall / dispersion, nodes.size) * len(VARIABLES))
         at = np.interp(nodes, np.sort(scaled), np.sort(values))
-        out.append(Structure(name, unit, fall, min(chance, 1.0), at, found * fit.strength))
+        out.append(Structure(name, unit, fall, min(chance, 1.0), at, sizes * fit.strength))
     return sorted(out, key=lambda s: s.chance)

@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from .knots import PHASES
 
@@ -138,7 +139,7 @@ def misfit(sizes: Array, residual: Array, k: Known) -> float:
         root = np.linalg.cholesky(covariance(sizes, k)[1])
     except np.linalg.LinAlgError:
         return np.inf
-    white = np.linalg.solve(root, residual[..., None])
+    white = solve_triangular(root, residual[..., None], lower=True)
     logs = np.log(np.diagonal(root, axis1=1, axis2=2)).sum()
     return float((white**2).sum() + 2.0 * logs + (((sizes - CENTRES) / WIDTHS) ** 2).sum())
 

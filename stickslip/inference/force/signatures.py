@@ -149,7 +149,7 @@ class Explained:
 
     def _white(self, columns: Array) -> Array:
         side = self.fit.blocks(columns)
-        return np.einsum("eij,ejp->eip", self.inverse, side).reshape(-1, side.shape[-1])
+        return (self.inverse @ side).reshape(-1, side.shape[-1])
 
     def apart(self, columns: Array) -> Array:
         """Columns (p, m) whitened and freed of what the model can do itself."""
