@@ -76,19 +76,18 @@ def _drawn(draw: Callable[[dict[str, Any]], str]) -> Callable[[dict[str, Any]], 
 
 
 def rates(found: dict[str, Any]) -> str:
-    """How often a diagnosis is right, a row for each part of ``development.json`` and a column for each rate."""
+    """How often a diagnosis is right, a column for each part of ``development.json`` and a row for each rate."""
     names = list(dict.fromkeys(name for key in PARTS for name in (found.get(key) or {}).get("rates", {})))
     if not names:
         return MISSING
-    rows, sources = [], []
-    for key, words in PARTS.items():
-        measured = found.get(key)
-        if not measured:
-            rows.append([words, "", "not measured yet", *[""] * (len(names) - 1)])
-            continue
-        rows.append([words, len(measured["cases"]), *(rate(measured["rates"].get(name)) for name in names)])
-        sources.append(f"`{key}` version {measured['version']}, {measured['date']}, seed {measured['seed']}")
-    return table(["hidden", "campaigns", *names], rows) + f"\n\n*Parts: {'; '.join(sources)}.*"
+    parts = {key: found[key] for key in PARTS if found.get(key)}
+    rows: list[list[object]] = [["campaigns", *(len(part["cases"]) for part in parts.values())]]
+    counted = [[name, *(rate(part["rates"].get(name)) for part in parts.values())] for name in names]
+    rows += [row for row in counted if any(row[1:])]
+    lacking = [words for key, words in PARTS.items() if key not in parts]
+    sources = [f"`{k}` version {p['version']}, {p['date']}, seed {p['seed']}" for k, p in parts.items()]
+    end = f" Not measured yet: {'; '.join(lacking)}." if lacking else ""
+    return table(["hidden", *(PARTS[k] for k in parts)], rows) + f"\n\n*Parts: {'; '.join(sources)}.{end}*"
 
 
 def rate(found: dict[str, Any] | None) -> str:
@@ -103,12 +102,13 @@ def rate(found: dict[str, Any] | None) -> str:
 def cases(found: dict[str, Any]) -> str:
     """Every campaign of a part: what was hidden, what was said, and how far the error on unseen runs fell."""
     return table(
-        ["hidden", "lines", "times detection", "answer", "named, or the set", "error on unseen runs"],
+        ["hidden", "lines", "times detection", "margin", "answer", "named, or the set", "error on unseen runs"],
         [
             [
                 ", ".join(case["hidden"]) or "nothing",
                 case["lines"],
                 ", ".join(f"{m:.3g}" for m in case["multiples"]),
+                "" if case.get("margin") is None else f"{case['margin']:.3g}",
                 f"`{case['kind']}`",
                 ", ".join(case["set"] or case["named"]),
                 " → ".join(f"{e:.2f}" for e in case["unseen"] if e is not None),

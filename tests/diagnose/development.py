@@ -30,8 +30,11 @@ from stickslip.blind.marks import mark, rate
 from stickslip.blind.mix import Case, Hidden, case_seed
 from stickslip.blind.run import Progress, run_challenge
 from stickslip.blind.seal import RUNS, read_seal, read_truth
+from stickslip.inference.diagnose.decide import DISPERSION
 from stickslip.objects.diagnosis import diagnose_campaign
+from stickslip.physics.effects import catalogue
 
+TELLABLE = float(np.log(20.0))  # likelihood ratio of twenty
 MULTIPLE = 10.0  # of detection, or the largest at which the block slips
 VELOCITIES, HOLDS = (5e-5, 1e-4, 2e-4, 4e-4), (1.0, 5.0)  # m/s, s
 RESULTS = Path(__file__).parents[2] / "docs" / "results" / "development.json"
@@ -93,17 +96,31 @@ class LeftOut:
     hidden: dict[str, str]
 
     def __call__(self, campaign: Path, out: Path) -> Any:
-        from stickslip.physics.effects import catalogue
-
         tag = self.hidden[campaign.parent.name]
         tried = [t for t, cls in catalogue.all().items() if t != tag and tag not in cls.generalises]
         return diagnose_campaign(campaign, out, jobs=1, candidates=tried)
+
+
+def margin(result: dict[str, Any], tag: str) -> float | None:
+    """By how much the hidden effect's best fit is more likely than that of any rival, or of the base (log-likelihood).
+
+    Each at its best parameters; in units in which chance spreads as it should (the cost over its dispersion). None
+    where the hidden effect was not tried.
+    """
+    gains = {row["effect"]: float(row["gain"] or 0.0) for row in reversed(result.get("ranking") or ())}
+    if tag not in gains:
+        return None
+    containing = {t for t, cls in catalogue.all().items() if tag in cls.generalises}
+    rivals = [gain for other, gain in gains.items() if other != tag and other not in containing]
+    return 0.5 * (gains[tag] - max([*rivals, 0.0])) / DISPERSION
 
 
 def tally(folder: Path, seed: int) -> dict[str, Any]:
     """The answers so far, with their rates (Wilson's intervals at 95 %)."""
     marked = [mark(truth, read_answer(folder / RUNS, truth["name"])) for truth in read_truth(folder)["cases"]]
     marked = [m for m in marked if m.answer.kind != "not run"]
+    margins = {m.name: _margin(folder, m) for m in marked}
+    tellable = [m for m in marked if (margins[m.name] or 0.0) > TELLABLE]
     hidden = [m for m in marked if m.tags]
     sizes = [s for m in hidden for s in m.sizes]
     return {
@@ -114,6 +131,9 @@ def tally(folder: Path, seed: int) -> dict[str, Any]:
             "exact": rate(m.exact for m in marked),
             "right": rate(m.right for m in marked),
             "something wrong named": rate(not set(m.answer.named) <= set(m.tags) for m in marked),
+            "tellable": rate((margins[m.name] or 0.0) > TELLABLE for m in marked if len(m.tags) == 1),
+            "exact where tellable": rate(m.exact for m in tellable),
+            "right where tellable": rate(m.right for m in tellable),
             "complete": rate(m.answer.kind == "complete" for m in marked),
             "amplitude within two deviations": rate(bool(s.within(2.0)) for s in sizes if s.std is not None),
         },
@@ -125,6 +145,7 @@ def tally(folder: Path, seed: int) -> dict[str, Any]:
                 "kind": m.answer.kind,
                 "named": list(m.answer.named),
                 "set": list(m.answer.set),
+                "margin": margins[m.name],
                 "unseen": [m.answer.base, m.answer.final],
                 "seconds": m.answer.seconds,
             }
@@ -133,14 +154,24 @@ def tally(folder: Path, seed: int) -> dict[str, Any]:
     }
 
 
+def _margin(folder: Path, m: Any) -> float | None:
+    path = folder / RUNS / m.name / "result.json"
+    if len(m.tags) != 1 or not path.is_file():
+        return None
+    return margin(json.loads(path.read_text(encoding="utf-8")), m.tags[0])
+
+
 def table(found: dict[str, Any]) -> str:
     """Every answer, a row each (Markdown)."""
-    rows = ["| hidden | lines | times detection | said | unseen error |", "|---|---|---|---|---|"]
+    rows = ["| hidden | lines | times detection | margin | said | unseen error |", "|---|---|---|---|---|---|"]
     for case in found["cases"]:
         times = ", ".join(f"{m:.3g}" for m in case["multiples"])
+        far = "" if case["margin"] is None else f"{case['margin']:.3g}"
         said = f"`{case['kind']}` {', '.join(case['set'] or case['named'])}".strip()
         errors = " -> ".join(f"{e:.2f}" for e in case["unseen"] if e is not None)
-        rows.append(f"| {', '.join(case['hidden']) or 'nothing'} | {case['lines']} | {times} | {said} | {errors} |")
+        rows.append(
+            f"| {', '.join(case['hidden']) or 'nothing'} | {case['lines']} | {times} | {far} | {said} | {errors} |"
+        )
     return "\n".join(rows)
 
 

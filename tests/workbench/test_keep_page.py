@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from stickslip.cli import run
 from stickslip.errors import InputError
 from stickslip.workbench import keep_page, kept
 from stickslip.workbench.beside import beside
@@ -36,6 +37,22 @@ def test_saving_writes_what_fit_save_writes(saved, base, folder, tmp_path):
     base.save(tmp_path / "same")
     assert _plain(saved) == _plain(tmp_path / "same")
     assert {p.name for p in saved.iterdir()} == {p.name for p in (tmp_path / "same").iterdir()}
+
+
+def _numbers(thing, where=""):
+    """Every number of a result, by the way to it."""
+    if isinstance(thing, dict):
+        return {k: v for key, value in thing.items() for k, v in _numbers(value, f"{where}/{key}").items()}
+    if isinstance(thing, list):
+        return {k: v for i, value in enumerate(thing) for k, v in _numbers(value, f"{where}/{i}").items()}
+    return {where: thing} if isinstance(thing, (int, float)) else {}
+
+
+def test_the_command_writes_the_same_numbers(saved, folder, tmp_path):
+    out = tmp_path / "by the command"
+    assert run(["fit", str(folder / "campaign.toml"), "--model", "inertial", "--out", str(out)]) == 0
+    mine, its = _numbers(_plain(saved)), _numbers(_plain(out))
+    assert len(mine) > 300 and mine == pytest.approx(its, rel=1e-9, abs=1e-15, nan_ok=True)
 
 
 @pytest.mark.parametrize("name", ["../out", "/tmp/out", "a/b", "a\\b", "", "..", ".git", "first", "v050.csv", SCRIPT])
