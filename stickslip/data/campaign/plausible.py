@@ -124,15 +124,19 @@ def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str
 
 
 def _pulls_backwards(trace: Trace, blocks: int = 2000) -> bool:
-    """Whether force and load point mostly move in opposite ways while the load point moves."""
+    """Whether force and load point mostly move in opposite ways while the load point moves.
+
+    In most of the time, and not only in the largest steps: with much noise those are the slips alone.
+    """
     if trace.leading != "spring_force" or trace.spring_force is None or trace.drive is None:
         return False
     stride = max(1, trace.time.size // blocks)
     rises = np.diff(trace.spring_force[::stride])
     runs = np.diff(trace.drive.position(trace.time[::stride]))
     moving = np.abs(runs) > 0.2 * np.quantile(np.abs(runs), 0.9)
+    opposite = rises * runs < 0
     strong = moving & (np.abs(rises) > 6 * (trace.noise or 0.0))
-    return bool(strong.sum() > 20 and np.mean(rises[strong] * runs[strong] < 0) > 0.7)
+    return bool(strong.sum() > 20 and np.mean(opposite[strong]) > 0.7 and np.mean(opposite[moving]) > 0.5)
 
 
 def _reach(trace: Trace, rig: Rig, *, upper: bool = False) -> float | None:

@@ -22,6 +22,8 @@ from .signatures import Explained, signatures
 FREQUENCIES = 240  # of a periodic effect
 FEW = 12  # members of a family for which no program of their own is compiled
 STARTS = 4  # members of a family from which a refit is begun; each to its end, for after a few steps none leads yet
+SHORT = 12  # evaluations under the sizes of what is random in the model without the effect
+LARGE = 4.0  # times the promised amplitude: the model without the effect has taken a part of it, and laws may be bent
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 LONGEST = 1.5  # of a record: a longer wave is a trend
 
@@ -91,10 +93,7 @@ def _axis(spec: Spec, own: float) -> tuple[float, ...]:
 
 
 def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[str, str]]) -> list[Candidate]:
-    """An effect in some of its forms, each refitted in full, then once more from where the best of them ended.
-
-    The best is given sizes of its own of what is random.
-    """
+    """An effect in some of its forms, each refitted in full, then once more from where the best of them ended."""
     made = [_tried(base, explained, tag, form) for form in forms]
     best = min(made, key=_cost)
     if best.fit is None:
@@ -102,9 +101,7 @@ def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[s
     if catalogue.get(tag).periodic is None:
         own = {n.partition(".")[2]: v for n, v in best.fit.values.items() if n.startswith(f"{tag}.")}
         made = [c if c is best or c.fit is None else _better(c, _from(base, c, own)) for c in made]
-        best = min(made, key=_cost)
-    assert best.fit is not None
-    return [replace(c, fit=adapted(best.fit)) if c is best else c for c in made]
+    return made
 
 
 def _tried(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> Candidate:
@@ -150,14 +147,14 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     # a parabola through the promise: what is left of it where the amplitude may not go all the way
     share = np.where(sizes != 0.0, inside / np.where(sizes != 0.0, sizes, 1.0), 0.0)
     falls = falls * (1.0 - (1.0 - share) ** 2)
+    unlike = _unlike(apart, falls)
     starts = []
-    for i in _unlike(apart, falls):
-        size, least = float(inside[i]), 0.3 * float(errors[i])  # at the null itself inner parameters do nothing
-        if share[i] < 1.0:
-            size *= 0.5  # not at the bound either
+    for i, times in ((unlike[0], 1.0), *((i, LARGE) for i in unlike)):
+        size, least = times * float(inside[i]), 0.3 * float(errors[i])  # at the null itself inner parameters do nothing
         if abs(size) < least:
-            sign = 1.0 if size >= 0.0 and spec.upper > null else -1.0
-            size = sign * min(least, 0.5 * abs((spec.upper if sign > 0 else spec.lower) - null))
+            size = least if size >= 0.0 and spec.upper > null else -least
+        # not at the bound either
+        size = float(np.clip(size, 0.5 * (spec.lower - null), 0.5 * (spec.upper - null)))
         starts.append((i, {**members[i], effect.amplitude: null + size}))
     ends = [(_refit(base, effect, start), i, start) for i, start in starts]
     found, i, start = min(ends, key=lambda end: end[0].cost)
@@ -192,9 +189,13 @@ def _columns(base: Fit, effect: Effect, members: Sequence[dict[str, float]]) -> 
 
 
 def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
-    """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,)."""
+    """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,).
+
+    It is given sizes of its own of what is random: those of the base are as large as the lack of the effect makes them,
+    and under them ends of a search that differ much look alike.
+    """
     problem, free = with_start(base.problem, effect, values)
-    return refit(problem, _start(base, free, turns), base)
+    return adapted(refit(problem, _start(base, free, turns), base, SHORT))
 
 
 def with_start(

@@ -26,9 +26,10 @@ PLACED = 2  # rounds after which the bank's elements are put where the strength 
 ROUNDS = 10  # times that the scatter is estimated anew
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
 REGIONS = 3  # trust regions tried, each within the one before, until a step lowers the cost
-POOR, GOOD = 0.25, 0.7  # shares of the expected fall of the cost below and above which the trust region changes
-LAST = 15  # steps with the covariance as it was found
-STEPS = 3  # of Gauss-Newton between
+SHRUNK = 0.3  # size of a trust region over that of the step that failed in the one before
+GOOD = 0.7  # share of the expected fall of the cost above which the trust region grows
+LAST = 30  # evaluations with the covariance as it was found
+STEPS = 4  # evaluations between
 NEWTON = 4  # steps of the sizes between
 BESIDE, ASIDE, SEED = 2, 0.02, 1  # fits begun anew beside the end of one, how far (on the search scale), and where
 SETTLED = 0.3  # fall of the cost (in units of chi-square) at which a round ends
@@ -316,6 +317,8 @@ def fit(
         if scatter is None and turn == PLACED:
             problem, point = placed(problem, point)
             slopes = problem.evaluate(point)
+        problem = problem.carried_by(slopes.tangent)
+        slopes = problem.recarried(slopes, point)
         made = known_of(problem, point, slopes, blocks, out)
         if turn or first:
             marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
@@ -396,39 +399,42 @@ def descend(
     """Gauss-Newton steps in a trust region, with the covariance as it is, until the cost falls no more.
 
     The region is a box on the search scale (Conn, Gould & Toint 2000): what the data hardly determine is held back, and
-    not the whole step with it.
+    not the whole step with it. The valley of the cost is bent, so that a step along it may lead up its side and the
+    next one down to its bottom again: one step after which the cost is higher is gone on from (the watchdog of
+    Chamberlain, Powell, Lemarechal & Pedersen 1982) before the region shrinks.
 
     Returns:
         The point and the slopes there, by how much the cost fell, how often the model was evaluated, and the radius.
     """
-    total, count = 0.0, 0
-    for _ in range(most):
+    here, count, failed, poor, above = (point, slopes), 0, 0, 0, False
+    first = cost = np.nan
+    while count < most:
         breathe()
-        system = _System(problem, point, slopes, scatter, known, blocks)
-        now = system.objective(point, slopes)
-        fallen = 0.0
-        for turn in range(REGIONS):
-            change, events, expected = system.step(radius)
-            far = float(np.abs(change[: point.z.size]).max(initial=0.0))
-            trial = moved(point, change, events)
-            there = problem.evaluate(trial)
-            count += 1
-            held = np.isfinite(there.residual).all() and trial.weights.sum() > 0.0
-            then = system.objective(trial, there) if held else np.inf
-            share = (now - then) / max(now - expected, 1e-300)
-            if share < POOR:
-                radius = 0.3 * min(radius, far)
-            elif share > GOOD and turn == 0:
-                radius = min(max(radius, 2.0 * far), FARTHEST)
-            if then < now:
-                point, slopes, fallen = trial, there, now - then
-                break
-            if now - expected < SETTLED:
-                break
-        total += fallen
-        if fallen < SETTLED:
+        system = _System(problem, *here, scatter, known, blocks)
+        now = system.objective(*here)
+        if count == 0:
+            first = cost = now
+        change, events, expected = system.step(radius)
+        if not above and now - expected < SETTLED:
             break
-    return point, slopes, total, count, radius
+        far = float(np.abs(change[: point.z.size]).max(initial=0.0))
+        trial = moved(here[0], change, events)
+        there = problem.evaluate(trial)
+        count += 1
+        held = np.isfinite(there.residual).all() and trial.weights.sum() > 0.0
+        then = system.objective(trial, there) if held else np.inf
+        if then < cost:
+            poor = poor + 1 if cost - then < SETTLED else 0
+            if not above and (now - then) > GOOD * (now - expected):
+                radius = min(max(radius, 2.0 * far), FARTHEST)
+            here, point, slopes, cost, above, failed = (trial, there), trial, there, then, False, 0
+        elif np.isfinite(then) and not above:
+            here, above = (trial, there), True
+        else:
+            here, above, failed, radius = (point, slopes), False, failed + 1, SHRUNK * min(radius, far)
+        if failed == REGIONS or poor == 2:
+            break
+    return point, slopes, first - cost, count, radius
 
 
 def at(problem: Problem, point: Point, scatter: Scatter, dropped: NDArray[np.bool_], known: Known | None = None) -> Fit:

@@ -166,6 +166,7 @@ class Problem:
         # quantisation, filters and hum leave about as much alike in all cycles as the noise of one sample is
         self.systematic = max(float(np.median([k.noise for k in runs])), 1e-12)
         self.cycles = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
+        self.carrier: Array | None = None
 
     def with_composition(self, composition: Composition) -> Problem:
         """The same runs under another composition."""
@@ -173,6 +174,28 @@ class Problem:
         other.__dict__.update(self.__dict__)
         other.composition = composition
         return other
+
+    def carried_by(self, tangent: Array) -> Problem:
+        """The same with a given stiffness (N/m), shape (p,), that carries what cycles share of the position to a force.
+
+        With that of the model as it moves, a spring that begins to slide would make the force jump.
+        """
+        other = self.with_composition(self.composition)
+        other.carrier = tangent
+        return other
+
+    def recarried(self, slopes: Slopes, point: Point) -> Slopes:
+        """What :meth:`evaluate` would say at the point where another carrier has."""
+        columns = self._carried(slopes.tangent)
+        c = columns.shape[1]
+        shared = np.hstack([slopes.shared[:, :-c], columns])
+        return replace(
+            slopes, residual=slopes.residual + (columns - slopes.shared[:, -c:]) @ point.common, shared=shared
+        )
+
+    def _carried(self, tangent: Array) -> Array:
+        carrier = tangent if self.carrier is None else self.carrier
+        return np.asarray(carrier[:, None] * self.cycles)
 
     def values(self, point: Point) -> dict[str, float]:
         """Name -> SI value of what is shared."""
@@ -230,7 +253,7 @@ class Problem:
             held[s] = share @ weights
             tangents[s] = mean @ tangent[r, :n]
             p += run.at.size
-        slopes[:, a + b * runs + k :] = tangents[:, None] * self.cycles
+        slopes[:, a + b * runs + k :] = self._carried(tangents)
         residual += slopes[:, a + b * runs + k :] @ point.common
         sticking = tuple(tangent[r, : k.t.size] for r, k in enumerate(self.runs))
         return Slopes(residual, slopes, local, tangents, sticking, held)
