@@ -379,8 +379,7 @@ def test_equations_of_a_model(capsys):
 
 OWN = """
 from jax import Array
-from stickslip.effects.base import BodyForce
-from stickslip.effects import parameter
+from stickslip.effects import BodyForce, parameter
 
 class Push(BodyForce):
     tag = "my-push"

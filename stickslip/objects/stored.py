@@ -96,12 +96,16 @@ def _with(problem: Problem, effects: list[dict[str, Any]]) -> Problem:
 
 def _arrays(found: ForceFit) -> Arrays:
     point = {name: np.asarray(getattr(found.point, name)) for name in _POINT}
-    reach = found.problem.composition.reach
-    return {**point, "sizes": found.scatter.sizes, "dropped": found.dropped, "reach": np.asarray(reach)}
+    problem = found.problem
+    return {
+        **point, "sizes": found.scatter.sizes, "dropped": found.dropped,
+        "reach": np.asarray(problem.composition.reach), "carrier": np.asarray(problem.carrier),
+    }  # fmt: skip
 
 
 def _again(problem: Problem, arrays: Mapping[str, np.ndarray]) -> ForceFit:
     composition = replace(problem.composition, reach=np.asarray(arrays["reach"], float))
     point = Point(*(np.asarray(arrays[name], float) for name in _POINT))
     dropped = np.asarray(arrays["dropped"], bool)
-    return at(problem.with_composition(composition), point, Scatter(arrays["sizes"]), dropped)
+    carried = problem.with_composition(composition).carried_by(np.asarray(arrays["carrier"], float))
+    return at(carried, point, Scatter(arrays["sizes"]), dropped)

@@ -130,7 +130,7 @@ class _Residual:
     def _period(self, unit: str) -> float | None:
         """The period that was typed (SI); None where there is none, or the variable has another unit."""
         self.period.disabled = self.against.value not in WAYS
-        text = self.period.value.strip()
+        text = str(self.period.value or "").strip()
         if self.period.disabled or not text:
             return None
         try:
