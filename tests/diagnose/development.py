@@ -6,7 +6,7 @@ where it was stopped), prints the answers as a table with their rates, and write
 once with the same lines at every event and once with new ones), ``nothing``, ``two``, ``left-out`` (as ``one``
 with the same lines, but the effect and laws that contain it are not in the catalogue that is tried), and ``strong``
 (as ``one`` with the same lines, at the largest amplitude that is plausible, where that is more). A campaign takes
-about two minutes of one processor: ``--only 3 1`` diagnoses these.
+some minutes of one processor: ``--only 3 1`` diagnoses these.
 """
 
 from __future__ import annotations

@@ -294,7 +294,8 @@ def fit(
         point: where to begin.
         scatter: sizes of what is random; default what is usually expected, estimated after the first round. Without
             them nothing is known of the contact either, and the bank's elements are put where its strength is.
-        rounds, steps: of the search.
+        rounds: of the search, after each of which the scatter is estimated anew.
+        steps: evaluations in a round.
         first: whether the sizes are estimated before the first step too (else after the first round).
         dropped: points left out; default those that are found to lie far off.
 
@@ -356,7 +357,7 @@ def _best(found: Fit) -> Fit:
 
 
 def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
-    """Another model of the same data from a point, in at most ``last`` steps.
+    """Another model of the same data from a point, in at most ``last`` evaluations.
 
     With the covariance of ``base`` as it is: else the costs of the two could not be compared.
 

@@ -1,7 +1,7 @@
 """The model of a fit along the motion, left to itself: the equation of motion through the measured cycles.
 
 The fit never integrates; here nothing but the integration is asked. Contact, weakening and effects are those of the
-fit, the contact is the measured bank itself, and each cycle runs from a measured arrest to the next (:mod:`..forward`).
+fit, the contact is the measured bank itself, and each cycle runs from a measured arrest to the next (:mod:`stickslip.simulation.shooting`).
 """
 
 from __future__ import annotations
@@ -24,9 +24,8 @@ from .problem import EMPTY, PULL, Point, Problem, model_of
 
 FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)
 
-export.register_namedtuple_serialization(
-    Track, serialized_name="stickslip.simulation.shooting.Track"
-)  # what is kept returns one
+# what is kept returns one
+export.register_namedtuple_serialization(Track, serialized_name="stickslip.simulation.shooting.Track")
 
 
 def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events: np.ndarray | None = None) -> Track:
