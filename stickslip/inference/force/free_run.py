@@ -1,7 +1,8 @@
 """The model of a fit along the motion, left to itself: the equation of motion through the measured cycles.
 
 The fit never integrates; here nothing but the integration is asked. Contact, weakening and effects are those of the
-fit, the contact is the measured bank itself, and each cycle runs from a measured arrest to the next (:mod:`stickslip.simulation.shooting`).
+fit, the contact is the measured bank itself, and each cycle runs from a measured arrest to the next
+(:mod:`stickslip.simulation.shooting`).
 """
 
 from __future__ import annotations
