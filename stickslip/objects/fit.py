@@ -160,10 +160,9 @@ class Fit(Shown):
         for name in COORDINATES:
             unit = (VARIABLES | WAYS)[name]
             coords[name.replace(" ", "_")] = ("point", where[name], {"units": unit, "long_name": name})
-        held = found.slopes.held
         data = {
-            "measured": held + found.residual, "model": held, "residual": found.marginal, "floor": self._floor,
-            "stiffness": found.slopes.tangent,
+            "measured": found.slopes.measured, "model": found.slopes.held, "residual": found.marginal,
+            "floor": self._floor, "stiffness": found.slopes.tangent,
         }  # fmt: skip
         units = {"stiffness": "N/m"}
         made = {k: ("point", v, {"units": units.get(k, "N")}) for k, v in data.items()}

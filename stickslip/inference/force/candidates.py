@@ -21,11 +21,14 @@ from .signatures import Explained, signatures
 
 FREQUENCIES = 240  # of a periodic effect
 FEW = 12  # members of a family for which no program of their own is compiled
-STARTS = 4  # members of a family from which a refit is begun; each to its end, for after a few steps none leads yet
-SHORT = 12  # evaluations under the sizes of what is random in the model without the effect
+STARTS = 4  # members of a family from which a refit is begun
+SHORT = 6  # evaluations from each start, after which the better half of them goes on
 LARGE = 4.0  # times the promised amplitude: the model without the effect has taken a part of it, and laws may be bent
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 LONGEST = 1.5  # of a record: a longer wave is a trend
+
+
+Start = tuple[int, dict[str, float]]  # member of a family, and the values of the effect (SI)
 
 
 @dataclass(frozen=True)
@@ -156,8 +159,7 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
         # not at the bound either
         size = float(np.clip(size, 0.5 * (spec.lower - null), 0.5 * (spec.upper - null)))
         starts.append((i, {**members[i], effect.amplitude: null + size}))
-    ends = [(_refit(base, effect, start), i, start) for i, start in starts]
-    found, i, start = min(ends, key=lambda end: end[0].cost)
+    found, (i, start) = _raced(base, effect, starts)
     return Candidate(
         effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * float(errors[i]), start
     )  # fmt: skip
@@ -194,8 +196,26 @@ def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | N
     It is given sizes of its own of what is random: those of the base are as large as the lack of the effect makes them,
     and under them ends of a search that differ much look alike.
     """
+    return adapted(_begun(base, effect, values, turns))
+
+
+def _begun(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
     problem, free = with_start(base.problem, effect, values)
-    return adapted(refit(problem, _start(base, free, turns), base, SHORT))
+    return adapted(refit(problem, _start(base, free, turns), base, SHORT), rounds=0)
+
+
+def _raced(base: Fit, effect: Effect, starts: Sequence[Start]) -> tuple[Fit, Start]:
+    """The best of the refits from several starts, by successive halving (Karnin, Koren & Somekh 2013).
+
+    From each so many evaluations, then from the better half of them as many more, and from the best of all to the end.
+    """
+    ends = [(_begun(base, effect, start[1]), start) for start in starts]
+    while len(ends) > 1:
+        ends = sorted(ends, key=lambda end: end[0].cost)[: len(ends) // 2]
+        if len(ends) > 1:
+            ends = [(adapted(found, 1, SHORT), start) for found, start in ends]
+    found, start = ends[0]
+    return adapted(found), start
 
 
 def with_start(

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 from scipy.sparse import dia_array
 
@@ -17,7 +16,7 @@ from ...system.progress import breathe
 from ..fit.parameters import Free
 from .bank import placed, spacing
 from .problem import PULL, Point, Problem, Slopes
-from .scatter import Blocks, Known, Scatter, covariance, estimate, misfit
+from .scatter import Blocks, Known, Scatter, Whitening, covariance, estimate, misfit
 
 Array = NDArray[np.float64]
 BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean
@@ -63,7 +62,8 @@ class Fit:
     @cached_property
     def _judged(self) -> tuple[Array, float, Array]:
         """Found when asked for: a model that a hand moves is drawn, and judged when it stands still."""
-        system = _System(self.problem, self.point, self.slopes, self.scatter, self.known, self.blocks)
+        white = Whitening(self.scatter.sizes, self.known)
+        system = _System(self.problem, self.point, self.slopes, self.scatter, self.blocks, white)
         return system.likelihood(), float((system.target**2).sum()), system.covariance()
 
     @property
@@ -115,28 +115,22 @@ class Fit:
 class _System:
     """The linear system of one step."""
 
-    def __init__(self, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks):
-        self.problem, self.point, self.slopes = problem, point, slopes
-        # what the noise is carried by stays as it is, or costs would jump; derivatives in the events are those here
-        known = known.with_local(blocks(slopes.local))
-        self.known, self.blocks, self.scatter = known, blocks, scatter
-        plain, whole = (np.asarray(a) for a in covariance(scatter.sizes, known))
-        self.plain = np.linalg.cholesky(plain)
-        self.whole = np.linalg.cholesky(whole)
+    def __init__(
+        self, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, blocks: Blocks, white: Whitening
+    ):
+        self.problem, self.point, self.slopes, self.blocks = problem, point, slopes, blocks
         self.random = np.exp(2.0 * scatter.sizes[:3])
-        prior, target = prior_rows(problem, point)
-        self.prior, self.target = prior, target
-        local = blocks(slopes.local)
-        self.local = local
-        marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", local, point.events)
-        self.marginal = marginal
-        side = np.concatenate([blocks(slopes.shared), marginal[..., None]], axis=2)
-        white = solve_triangular(self.whole, side, lower=True)
-        self.rows, self.rest = white[..., :-1], white[..., -1]
+        self.prior, self.target = prior_rows(problem, point)
+        self.local = local = blocks(slopes.local)
+        self.plain, self.white = white.back, white.with_events(local)
+        self.shared = blocks(slopes.shared)
+        self.marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", local, point.events)
+        whitened = self.white(np.concatenate([self.shared, self.marginal[..., None]], axis=2))
+        self.rows, self.rest = whitened[..., :-1], whitened[..., -1]
 
     def objective(self, point: Point, slopes: Slopes) -> float:
         """Of residual, random effects and priors, with this covariance."""
-        white = solve_triangular(self.plain, self.blocks(slopes.residual)[..., None], lower=True)
+        white = self.plain @ self.blocks(slopes.residual)[..., None]
         _, target = prior_rows(self.problem, point)
         return float((white**2).sum() + (point.events**2 / self.random).sum() + (target**2).sum())
 
@@ -151,9 +145,7 @@ class _System:
         high = np.where(high - low > 1e-12, high, low + 1e-12)
         found = lsq_linear(root.T, -np.linalg.solve(root, right * scale), (low / scale, high / scale), method="bvls")
         change = found.x * scale
-        left = self.marginal + self.blocks(self.slopes.shared) @ change
-        white = solve_triangular(self.whole, left[..., None], lower=True)
-        weighted = solve_triangular(self.whole, white, lower=True, trans="T")[..., 0]
+        weighted = self.white.weighted(self.marginal + self.shared @ change)
         events = -self.random * np.einsum("eia,ei->ea", self.local, weighted)
         rest, prior = self.rest.ravel() + rows @ change, self.target + self.prior @ change
         return change, events, float(rest @ rest + prior @ prior)
@@ -171,8 +163,7 @@ class _System:
         return out
 
     def likelihood(self) -> Array:
-        logs = np.log(np.diagonal(self.whole, axis1=1, axis2=2))
-        return (self.rest**2).sum(axis=1) + 2.0 * np.where(self.known.there, logs, 0.0).sum(axis=1)
+        return np.asarray((self.rest**2).sum(axis=1) + self.white.logs)
 
 
 def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
@@ -371,22 +362,29 @@ def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
     return _found(problem, point, slopes, base.scatter, base.dropped, base.known, count + 1)
 
 
-def adapted(found: Fit) -> Fit:
+def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
     """A refit with sizes of its own of what is random; what carries the noise to a force stays that of its base.
 
     Under the sizes of a model that lacks an effect, events look as scattered as the effect makes them, and laws that
     describe it more or less well look alike.
+
+    Args:
+        found: where to go on from.
+        rounds: of the search, before each of which the sizes are estimated anew; with none they are estimated only.
+        steps: evaluations in a round.
     """
     problem, blocks = found.problem, found.blocks
     point, slopes, sizes, evaluations = found.point, found.slopes, found.scatter, found.evaluations
     radius = FARTHEST
-    for _ in range(ROUNDS):
+    for turn in range(rounds + 1):
         known = found.known.with_local(blocks(slopes.local))
         marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", known.local, point.events)
         before = misfit(sizes.sizes, marginal, known)
         sizes = estimate(sizes, marginal, known, NEWTON)
         fallen = before - misfit(sizes.sizes, marginal, known)
-        point, slopes, total, count, radius = descend(problem, point, slopes, sizes, known, blocks, STEPS, radius)
+        if turn == rounds:
+            break
+        point, slopes, total, count, radius = descend(problem, point, slopes, sizes, known, blocks, steps, radius)
         evaluations += count
         if fallen + total < 1.0:
             break
@@ -409,9 +407,11 @@ def descend(
     """
     here, count, failed, poor, above = (point, slopes), 0, 0, 0, False
     first = cost = np.nan
+    # what the noise is carried by stays as it is, or costs would jump; derivatives in the events are those here
+    white = Whitening(scatter.sizes, known)
     while count < most:
         breathe()
-        system = _System(problem, *here, scatter, known, blocks)
+        system = _System(problem, *here, scatter, blocks, white)
         now = system.objective(*here)
         if count == 0:
             first = cost = now

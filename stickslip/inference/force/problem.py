@@ -126,6 +126,10 @@ class Point:
 class Slopes:
     """Residual force and derivatives at a point.
 
+    A motion tells forces over the mass that moves. Where an effect adds mass, residuals, derivatives and stiffnesses
+    are therefore taken over it and times the block's own: else a model whose forces are all larger by one factor would
+    look worse, though no motion can tell it.
+
     Attributes:
         residual: measured force less the model's (N), shape (p,).
         shared: derivatives in z, phases of all runs, weights and what cycles share, shape (p, a + b R + k + c).
@@ -133,6 +137,7 @@ class Slopes:
         tangent: stiffness of what sticks (N/m), shape (p,).
         sticking: the same at the knots of every run, shape (n,) each.
         held: force that the model holds (N), shape (p,).
+        measured: force that the motion says (N), shape (p,).
     """
 
     residual: Array
@@ -141,6 +146,7 @@ class Slopes:
     tangent: Array
     sticking: tuple[Array, ...]
     held: Array
+    measured: Array
 
 
 class Problem:
@@ -226,6 +232,7 @@ class Problem:
         a, b, k, runs = len(shared), len(phases), point.weights.size, len(self.runs)
         size = self.at.size
         residual, tangents, held = np.zeros(size), np.zeros(size), np.zeros(size)
+        own_share = c.mass / mass
         cycles = self.cycles.shape[1]
         slopes, local = np.zeros((size, a + b * runs + k + cycles)), np.zeros((size, 3))
         sensed = any(isinstance(e, Sensor) for e in c.effects)
@@ -238,25 +245,27 @@ class Problem:
             mean, (first, second) = run.mean, run.smooth
             if sensed:
                 rate, acceleration = rate + first @ shift[r, :n], acceleration + second @ shift[r, :n]
-            residual[s] = mean @ q[r, :n] - mass[r] * acceleration - damping * rate
+            share = own_share[r]
+            residual[s] = share * (mean @ q[r, :n] - mass[r] * acceleration - damping * rate)
             moved = mean @ dq[r, :, :n].T - acceleration[:, None] * dmass[r]
             if sensed:
                 moved = moved - mass[r] * (second @ dshift[r, :, :n].T) - damping * (first @ dshift[r, :, :n].T)
+            moved = share * moved - residual[s, None] * (dmass[r] / mass[r])
             slopes[s, :a] = moved[:, :a]
             if at_damping is not None:
-                slopes[s, at_damping] -= damping * rate
+                slopes[s, at_damping] -= share * damping * rate
             for j in range(b):
                 slopes[s, a + j * runs + r] = moved[:, a + j]
             local[s] = moved[:, a + b :]
-            share = mean @ elements[r, :n]
-            slopes[s, a + b * runs : a + b * runs + k] = -share
-            held[s] = share @ weights
-            tangents[s] = mean @ tangent[r, :n]
+            held_by = mean @ elements[r, :n]
+            slopes[s, a + b * runs : a + b * runs + k] = -share * held_by
+            held[s] = held_by @ weights
+            tangents[s] = share * (mean @ tangent[r, :n])
             p += run.at.size
         slopes[:, a + b * runs + k :] = self._carried(tangents)
         residual += slopes[:, a + b * runs + k :] @ point.common
-        sticking = tuple(tangent[r, : k.t.size] for r, k in enumerate(self.runs))
-        return Slopes(residual, slopes, local, tangents, sticking, held)
+        sticking = tuple(own_share[r] * tangent[r, : k.t.size] for r, k in enumerate(self.runs))
+        return Slopes(residual, slopes, local, tangents, sticking, held, held + residual / own_share[self.run])
 
 
 def _room(size: int) -> int:

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dtrtri, dtrtrs
 
 from .knots import PHASES
 
@@ -117,57 +117,118 @@ class Known:
 
 def covariance(sizes: Array, k: Known) -> tuple[Array, Array]:
     """The covariance without and with the random effects (N^2), shape (E, n, n)."""
-    s = np.exp(sizes)
-    misfit, position, walk = _alike(s, k)
-    plain = misfit + position + walk + s[9] ** 2 * k.noise
-    at = np.arange(plain.shape[1])
-    plain[:, at, at] += np.where(k.there, k.dropped + (NUMERIC * k.strength) ** 2, 1.0)
-    scaled = k.local * s[:3]
+    plain, scaled = _plain(sizes, k), k.local * np.exp(sizes[:3])
     return plain, plain + scaled @ np.swapaxes(scaled, 1, 2)
 
 
-def _alike(s: Array, k: Known) -> tuple[Array, Array, Array]:
-    """Misfit by phase, errors of the position, and the walk (N^2), shape (E, n, n) each."""
-    own = np.where(k.there, s[3 + k.phase] * k.strength, 0.0)
+def _plain(sizes: Array, k: Known) -> Array:
+    s = np.exp(sizes)
     placed, walked = k.shifts
-    return own[:, :, None] * own[:, None, :] * k.near, s[7] ** 2 * placed, s[8] ** 2 * walked
+    out = _by_phase(s, k)
+    for size, part in ((s[7], placed), (s[8], walked), (s[9], k.noise)):
+        out += size**2 * part
+    at = np.arange(out.shape[1])
+    out[:, at, at] += np.where(k.there, k.dropped + (NUMERIC * k.strength) ** 2, 1.0)
+    return out
+
+
+def _by_phase(s: Array, k: Known) -> Array:
+    """Misfit (N^2), shape (E, n, n)."""
+    own = np.where(k.there, s[3 + k.phase] * k.strength, 0.0)
+    out = own[:, :, None] * k.near
+    out *= own[:, None, :]
+    return out
+
+
+class Whitening:
+    """Residuals to independent ones of unit variance, given the sizes; derivatives in the events' own may change.
+
+    The covariance without random effects is inverted once, what the events' own add is of rank three.
+    """
+
+    def __init__(self, sizes: Array, known: Known) -> None:
+        root = np.linalg.cholesky(_plain(sizes, known))
+        self.back = inverse(root)
+        self.logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+        self.size = np.exp(sizes[:3])
+
+    def with_events(self, local: Array) -> WithEvents:
+        """The same with events that differ; ``local`` are derivatives in what is their own, shape (E, n, 3)."""
+        return WithEvents(self.back, self.logs, local * self.size)
+
+
+class WithEvents:
+    """Residuals to independent ones of unit variance, random effects included."""
+
+    def __init__(self, back: Array, logs: Array, scaled: Array) -> None:
+        self.back = back
+        aside = back @ scaled
+        values, turn = np.linalg.eigh(np.swapaxes(aside, 1, 2) @ aside)
+        values = np.maximum(values, 0.0)
+        self.aside = aside @ turn
+        self.share = 1.0 / (1.0 + values + np.sqrt(1.0 + values))  # of (1 + U U')^(-1/2) = 1 - U share U'
+        self.logs = logs + np.log1p(values).sum(axis=1)
+
+    def _apart(self, white: Array) -> Array:
+        along = np.swapaxes(self.aside, 1, 2) @ white
+        return np.asarray(white - self.aside @ (self.share[..., None] * along))
+
+    def __call__(self, values: Array) -> Array:
+        """Whitened, shape (E, n, m)."""
+        return self._apart(self.back @ values)
+
+    def weighted(self, values: Array) -> Array:
+        """Times the inverse covariance, shape (E, n)."""
+        white = self._apart(self._apart(self.back @ values[..., None]))
+        return np.asarray((np.swapaxes(self.back, 1, 2) @ white)[..., 0])
+
+
+def inverse(root: Array) -> Array:
+    """Inverses of lower triangles, shape (E, n, n)."""
+    return np.stack([dtrtri(one, lower=1)[0] for one in root])
 
 
 def misfit(sizes: Array, residual: Array, k: Known) -> float:
     """Twice the negative logarithm of the likelihood of residuals (E, n), and of what is expected of the sizes."""
+    return _misfit(sizes, residual, k)[0]
+
+
+def _misfit(sizes: Array, residual: Array, k: Known) -> tuple[float, Array]:
+    """The same, and the root of the covariance."""
     try:
         root = np.linalg.cholesky(covariance(sizes, k)[1])
     except np.linalg.LinAlgError:
-        return np.inf
-    white = solve_triangular(root, residual[..., None], lower=True)
+        return np.inf, np.zeros(0)
+    white = np.stack([dtrtrs(one, r, lower=1)[0] for one, r in zip(root, residual, strict=True)])
     logs = np.log(np.diagonal(root, axis1=1, axis2=2)).sum()
-    return float((white**2).sum() + 2.0 * logs + (((sizes - CENTRES) / WIDTHS) ** 2).sum())
+    return float((white**2).sum() + 2.0 * logs + (((sizes - CENTRES) / WIDTHS) ** 2).sum()), root
 
 
-def _slopes(sizes: Array, residual: Array, k: Known) -> tuple[Array, Array]:
+def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array, Array]:
     """Gradient of the cost and its average information, shapes (10,) and (10, 10)."""
     s = np.exp(sizes)
-    misfit, position, walk = _alike(s, k)
-    inverse = np.linalg.inv(covariance(sizes, k)[1])
-    a = np.einsum("eij,ej->ei", inverse, residual)
-    inverse = np.where(k.there[:, :, None], inverse, 0.0)
+    back = inverse(root)
+    inverted = np.swapaxes(back, 1, 2) @ back
+    a = (inverted @ residual[..., None])[..., 0]
+    inverted *= k.there[:, :, None]
     gradient, moved = np.zeros(sizes.size), np.zeros((*residual.shape, sizes.size))
     for r in range(3):
         z = s[r] * k.local[..., r]
         along = np.einsum("ei,ei->e", z, a)
-        gradient[r] = 2.0 * (np.einsum("ei,eij,ej->", z, inverse, z, optimize=True) - (along**2).sum())
+        gradient[r] = 2.0 * (np.einsum("ei,ei->", z, (inverted @ z[..., None])[..., 0]) - (along**2).sum())
         moved[..., r] = 2.0 * z * along[:, None]
-    traces = np.einsum("eij,eij->ei", inverse, misfit)
-    pulled = np.einsum("eij,ej->ei", misfit, a)
+    misfit = _by_phase(s, k)
+    traces = np.einsum("eij,eij->ei", inverted, misfit)
+    own = (k.phase[..., None] == np.arange(len(PHASES))) & k.there[..., None]
+    pulled = misfit @ np.concatenate([a[..., None], own * a[..., None]], axis=2)
     for p in range(len(PHASES)):
-        own = (k.phase == p) & k.there
-        gradient[3 + p] = 2.0 * (traces - a * pulled)[own].sum()
-        moved[..., 3 + p] = own * pulled + np.einsum("eij,ej->ei", misfit, own * a)
-    for i, part in ((7, position), (8, walk), (9, s[9] ** 2 * k.noise)):
-        pulled = np.einsum("eij,ej->ei", part, a)
-        gradient[i] = 2.0 * (np.einsum("eij,eij->", inverse, part) - (a * pulled).sum())
-        moved[..., i] = 2.0 * pulled
-    information = np.einsum("eia,eij,ejb->ab", moved, inverse, moved, optimize=True)
+        gradient[3 + p] = 2.0 * (traces - a * pulled[..., 0])[own[..., p]].sum()
+        moved[..., 3 + p] = own[..., p] * pulled[..., 0] + pulled[..., 1 + p]
+    for i, part in zip((7, 8, 9), (*k.shifts, k.noise), strict=True):
+        pulled = (part @ a[..., None])[..., 0]
+        gradient[i] = 2.0 * s[i] ** 2 * (np.einsum("eij,eij->", inverted, part) - (a * pulled).sum())
+        moved[..., i] = 2.0 * s[i] ** 2 * pulled
+    information = np.einsum("eia,eib->ab", moved, inverted @ moved, optimize=True)
     gradient += 2.0 * (sizes - CENTRES) / WIDTHS**2
     return gradient, information + np.diag(2.0 / WIDTHS**2)
 
@@ -181,9 +242,9 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     low = np.append(CENTRES[:-1] - 5.0 * WIDTHS[:-1], -0.05)
     high = np.append(CENTRES[:-1] + 4.0 * WIDTHS[:-1], 1.0)
     sizes, damping = np.clip(start.sizes, low, high), 1e-2
-    cost = misfit(sizes, residual, known)
+    cost, root = _misfit(sizes, residual, known)
     for _ in range(steps):
-        gradient, information = _slopes(sizes, residual, known)
+        gradient, information = _slopes(sizes, residual, known, root)
         free = ~(((sizes <= low) & (gradient > 0.0)) | ((sizes >= high) & (gradient < 0.0)))
         fallen = 0.0
         for _ in range(DAMPINGS):
@@ -191,9 +252,9 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
             step = np.zeros(sizes.size)
             step[free] = -np.linalg.solve(matrix, gradient[free])
             trial = np.clip(sizes + np.clip(step, -FARTHEST, FARTHEST), low, high)
-            there = misfit(trial, residual, known)
+            there, other = _misfit(trial, residual, known)
             if there < cost:
-                fallen, cost, sizes, damping = cost - there, there, trial, max(0.1 * damping, 1e-6)
+                fallen, cost, sizes, root, damping = cost - there, there, trial, other, max(0.1 * damping, 1e-6)
                 break
             damping *= 10.0
         if fallen < SETTLED:
