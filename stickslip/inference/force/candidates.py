@@ -23,6 +23,7 @@ FREQUENCIES = 240  # of a periodic effect
 FEW = 12  # members of a family for which no program of their own is compiled
 STARTS = 4  # members of a family from which a refit is begun
 SHORT = 6  # evaluations from each start, after which the better half of them goes on
+EVEN = 1.0  # of two forms' costs: less is no reason to try one from where the other ended
 LARGE = 4.0  # times the promised amplitude: the model without the effect has taken a part of it, and laws may be bent
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 LONGEST = 1.5  # of a record: a longer wave is a trend
@@ -103,7 +104,7 @@ def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[s
         return made
     if catalogue.get(tag).periodic is None:
         own = {n.partition(".")[2]: v for n, v in best.fit.values.items() if n.startswith(f"{tag}.")}
-        made = [c if c is best or c.fit is None else _better(c, _from(base, c, own)) for c in made]
+        made = [c if c.fit is None or c.fit.cost < best.fit.cost + EVEN else _better(c, _from(base, c, own)) for c in made]
     return made
 
 
