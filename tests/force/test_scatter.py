@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from stickslip.inference.force.knots import PHASES
-from stickslip.inference.force.scatter import NAMES, Blocks, Known, Scatter, _slopes, covariance, estimate, misfit
+from stickslip.inference.force.scatter import (
+    NAMES,
+    Blocks,
+    Known,
+    Scatter,
+    Whitening,
+    _misfit,
+    _slopes,
+    covariance,
+    estimate,
+    misfit,
+)
 
 STRENGTH = 0.25  # N
 EVENTS, POINTS = 60, 48
@@ -58,6 +69,21 @@ def test_the_covariance_is_one(short, sizes):
         np.testing.assert_array_equal(whole[e][empty[e]], np.eye(POINTS)[empty[e]])
 
 
+@pytest.mark.parametrize("short", [False, True])
+def test_whitened_residuals_are_those_of_the_covariance(short):
+    """Against its solution by a dense factorisation, with derivatives in the events' own other than those it knew."""
+    known, rng = events(short), np.random.default_rng(5)
+    other = known.local * rng.uniform(0.5, 2.0, known.local.shape)
+    residual = 1e-3 * rng.standard_normal(known.there.shape) * known.there
+    white = Whitening(true(), known).with_events(other)
+    _, whole = covariance(true(), known.with_local(other))
+    weighted = np.linalg.solve(whole, residual[..., None])[..., 0]
+    np.testing.assert_allclose(white.weighted(residual), weighted, rtol=0.0, atol=1e-9 * np.abs(weighted).max())
+    squares = (white(residual[..., None])[..., 0] ** 2).sum(axis=1)
+    np.testing.assert_allclose(squares, (residual * weighted).sum(axis=1), rtol=1e-9)
+    np.testing.assert_allclose(white.logs, np.linalg.slogdet(whole)[1], rtol=1e-10)
+
+
 def test_every_size_has_its_own_part():
     known = events()
     plain, whole = (np.asarray(a) for a in covariance(true(), known))
@@ -89,7 +115,7 @@ def test_slopes_are_those_of_the_cost():
     known = events(short=True)
     residual = np.random.default_rng(3).standard_normal((EVENTS, POINTS)) * 1e-3 * STRENGTH * known.there
     at = true() + 0.3
-    gradient, information = _slopes(at, residual, known)
+    gradient, information = _slopes(at, residual, known, _misfit(at, residual, known)[1])
     for step in (1e-3, 1e-4, 1e-5):
         seen = [
             (misfit(at + d, residual, known) - misfit(at - d, residual, known)) / (2 * step) for d in step * np.eye(10)

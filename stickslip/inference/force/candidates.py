@@ -104,7 +104,9 @@ def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[s
         return made
     if catalogue.get(tag).periodic is None:
         own = {n.partition(".")[2]: v for n, v in best.fit.values.items() if n.startswith(f"{tag}.")}
-        made = [c if c.fit is None or c.fit.cost < best.fit.cost + EVEN else _better(c, _from(base, c, own)) for c in made]
+        made = [
+            c if c.fit is None or c.fit.cost < best.fit.cost + EVEN else _better(c, _from(base, c, own)) for c in made
+        ]
     return made
 
 
