@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ CAMPAIGN = "campaign.toml"
 TRACES = "[[trace]]"
 MOST = 40  # campaigns that are offered
 LARGEST = 1 << 20  # bytes of a campaign file
-EXAMPLE = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / CAMPAIGN  # of a clone
+EXAMPLE = Path("hidden-effect") / CAMPAIGN
 
 
 def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
@@ -24,14 +26,14 @@ def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
     Raises:
         InputError: as of :func:`stickslip.load_campaign`; a run folder whose campaign is not found.
     """
-    files = tuple(p.resolve() for p in effects)
+    own = tuple(p.resolve() for p in effects)
     if not path.is_dir():
-        return Session(campaign=load_campaign(path, files), effects=files)
+        return Session(campaign=load_campaign(path, own), effects=own)
     if (path / CAMPAIGN).is_file():
-        return Session(campaign=load_campaign(path / CAMPAIGN, files), effects=files)
+        return Session(campaign=load_campaign(path / CAMPAIGN, own), effects=own)
     result = read_result(path)
-    campaign = load_campaign(campaign_of(path, result), files)
-    session = Session(campaign=campaign, effects=files)
+    campaign = load_campaign(campaign_of(path, result), own)
+    session = Session(campaign=campaign, effects=own)
     if result.get("kind") == "diagnose":
         session.diagnosis = Diagnosis(campaign, None, result, {})
     return session
@@ -44,14 +46,15 @@ def campaign_of(folder: Path, result: dict[str, Any]) -> Path:
         InputError: there is none, or it is not there any more.
     """
     named = [Path(str(i.get("file", ""))) for i in result.get("inputs", ()) if isinstance(i, dict)]
-    files = [path for path in named if path.suffix == ".toml"]
-    for path in files:
+    campaigns = [path for path in named if path.suffix == ".toml"]
+    for path in campaigns:
         for base in (Path(), folder, *folder.resolve().parents):
             if (base / path).is_file() and is_campaign(base / path):
                 return base / path
     raise InputError(
         "the campaign that this run folder was made from is not found", file=folder / RESULT,
-        value=str(files[0]) if files else None, hint="open the campaign file itself: stickslip open campaign.toml",
+        value=str(campaigns[0]) if campaigns else None,
+        hint="open the campaign file itself: stickslip open campaign.toml",
     )  # fmt: skip
 
 
@@ -64,8 +67,22 @@ def is_campaign(path: Path) -> bool:
 
 
 def offered(folder: Path) -> list[Path]:
-    """Campaigns in a folder and in those in it, and the example of a clone."""
+    """Campaigns in a folder and in those in it, and the example that is shipped."""
     near = sorted({*folder.glob("*.toml"), *folder.glob("*/*.toml"), *folder.glob("scenarios/*/*.toml")})
     found = [path for path in near if is_campaign(path)][:MOST]
-    same = any(path.resolve() == EXAMPLE.resolve() for path in found)
-    return found if same or not EXAMPLE.is_file() else [*found, EXAMPLE]
+    shipped = example()
+    if shipped is None or any(path.resolve() == shipped.resolve() for path in found):
+        return found
+    return [*found, shipped]
+
+
+def example() -> Path | None:
+    """The campaign that is shipped: of a clone, or of the installed distribution; None where it was left out."""
+    of_clone = Path(__file__).parents[2] / "scenarios" / EXAMPLE
+    if of_clone.is_file():
+        return of_clone
+    with suppress(PackageNotFoundError):
+        for file in files("stickslip") or ():
+            if file.match(f"stickslip/{EXAMPLE.as_posix()}"):
+                return Path(str(file.locate())).resolve()
+    return None

@@ -8,14 +8,14 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pytest
 
 from stickslip.cli import run
 from stickslip.errors import InputError
 from stickslip.system.runstore import json_text
-from stickslip.workbench import own
+from stickslip.workbench import opening, own
 from stickslip.workbench.opening import campaign_of, offered, opened
 from stickslip.workbench.serve import _free
 from stickslip.workbench.session import Session
@@ -205,3 +205,23 @@ def test_an_effect_that_is_saved_is_loaded_anew(tmp_path, campaign):
     finally:
         ended.set()
     assert threading.active_count() < 50
+
+
+def test_the_example_is_offered_without_a_clone(tmp_path, monkeypatch):
+    """As a wheel installs it: beside the packages, known to the distribution's list of files."""
+    site = tmp_path / "lib" / "site-packages"
+    campaign = tmp_path / "share" / "stickslip" / "hidden-effect" / "campaign.toml"
+    campaign.parent.mkdir(parents=True)
+    campaign.write_text("[[trace]]\n")
+
+    class Installed(PurePosixPath):
+        def locate(self):
+            return site / self
+
+    listed = [Installed("stickslip/__init__.py"), Installed("../../share/stickslip/hidden-effect/campaign.toml")]
+    monkeypatch.setattr(opening, "__file__", str(site / "stickslip" / "workbench" / "opening.py"))
+    monkeypatch.setattr(opening, "files", lambda name: listed if name == "stickslip" else None)
+    (tmp_path / "empty").mkdir()
+    assert offered(tmp_path / "empty") == [campaign]
+    monkeypatch.setattr(opening, "files", lambda name: None)  # an editable install without its sources
+    assert offered(tmp_path / "empty") == []

@@ -147,7 +147,7 @@ class Whitening:
     """
 
     def __init__(self, sizes: Array, known: Known) -> None:
-        root = np.linalg.cholesky(_plain(sizes, known))
+        root = np.asarray(np.linalg.cholesky(_plain(sizes, known)), float)
         self.back = inverse(root)
         self.logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
         self.size = np.exp(sizes[:3])
@@ -196,7 +196,7 @@ def misfit(sizes: Array, residual: Array, k: Known) -> float:
 def _misfit(sizes: Array, residual: Array, k: Known) -> tuple[float, Array]:
     """The same, and the root of the covariance."""
     try:
-        root = np.linalg.cholesky(covariance(sizes, k)[1])
+        root = np.asarray(np.linalg.cholesky(covariance(sizes, k)[1]), float)
     except np.linalg.LinAlgError:
         return np.inf, np.zeros(0)
     white = np.stack([dtrtrs(one, r, lower=1)[0] for one, r in zip(root, residual, strict=True)])
