@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..errors import InputError, nearest
-from ..inference.diagnose.climb import Climbed, chosen, climb, extended, pinned, profiled, replaced, shortened
+from ..inference.diagnose.climb import Climbed, chosen, climb, extended, profiled, replaced, shortened
 from ..inference.diagnose.confirm import Confirmation
 from ..inference.diagnose.fitted import fitted_model
 from ..inference.diagnose.summary import fitted_sections
@@ -24,6 +24,7 @@ from ..inference.force.fit import fit as fit_force
 from ..inference.force.heldout import unseen
 from ..inference.force.knots import PHASES
 from ..inference.force.residual import VARIABLES, WAYS, coordinates
+from ..inference.force.valleys import pinned
 from ..physics.effects import catalogue
 from ..show.report.diagnosis_result import trace_sections
 from ..show.report.identifiability import identifiability

@@ -34,11 +34,12 @@ def kept(store: Store | None, key: str, problem: Problem, make: Callable[[], Fit
     found = store.load(key) if store is not None else None
     if found is not None:
         problem = problem.with_composition(replace(problem.composition, reach=np.asarray(found["reach"], float)))
-        return at(problem, _point(found), Scatter(found["sizes"]), found["dropped"].astype(bool))
+        fit = at(problem, _point(found), Scatter(found["sizes"]), found["dropped"].astype(bool))
+        return replace(fit, valleys=tuple(np.atleast_2d(found["valleys"]) if found["valleys"].size else ()))
     fit = make()
     if store is not None:
-        reach = fit.problem.composition.reach
-        store.save(key, {**_arrays(fit.point), "sizes": fit.scatter.sizes, "dropped": fit.dropped, "reach": reach})
+        facts = {"sizes": fit.scatter.sizes, "dropped": fit.dropped, "reach": fit.problem.composition.reach}
+        store.save(key, {**_arrays(fit.point), **facts, "valleys": np.array(fit.valleys)})
     return fit
 
 

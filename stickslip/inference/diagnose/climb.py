@@ -13,10 +13,10 @@ from ...physics.effects import catalogue
 from ...physics.effects.base import Effect
 from ...physics.params import specs, variants
 from ..force.candidates import shapes_backbone, try_effect
-from ..force.fit import Fit, deviations, fit, refit
+from ..force.fit import Fit, deviations, fit
 from ..force.heldout import unseen
-from ..force.problem import Problem
 from ..force.signatures import Explained
+from ..force.valleys import LEVEL, held, widened
 from ..uncertainty import Profile, profile
 from .confirm import Confirmation, confirm
 from .decide import DISPERSION
@@ -26,7 +26,6 @@ from .shape import shape_of
 from .trials import Tell
 
 Form = tuple[str, Mapping[str, str]]  # tag and variants of an effect
-PIN = 1e-3  # width of the prior that holds a profiled parameter, on the search scale
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,7 @@ def climb(prepared: Prepared, effects: Sequence[Form], tell: Tell) -> Climbed:
     for tag, form in effects:
         _acts(tag, form)
     tell("the base model", 0.0)
-    base = fit(prepared.problem, prepared.start)
+    base = widened(fit(prepared.problem, prepared.start), [LEVEL], DISPERSION)
     first = Rung(("static",), None, static_residual(base), None, None)
     done = Climbed(prepared, (first, _rung(("static", "inertia"), "inertia", base)), {})
     for i, (tag, form) in enumerate(effects):
@@ -157,15 +156,6 @@ def replaced(done: Climbed, found: Fit) -> Climbed:
     return replace(done, ladder=(*done.ladder[:-1], _rung(last.model, last.added, found, last.removed)))
 
 
-def pinned(found: Fit, values: Mapping[str, float], width: float = PIN) -> Problem:
-    """The problem with parameters held at values (on their search scale)."""
-    composition = found.problem.composition
-    free = tuple(
-        replace(f, prior=f.outward(values[f.name]), width=width) if f.name in values else f for f in composition.free
-    )
-    return found.problem.with_composition(replace(composition, free=free))
-
-
 def _acts(tag: str, form: Mapping[str, str]) -> None:
     """Refuse what only gives the backbone another shape."""
     if shapes_backbone(catalogue.get(tag)(**form)):
@@ -189,19 +179,10 @@ def profiled(found: Fit, name: str, tell: Tell) -> Profile:
         name: of one of its free parameters.
         tell: told how many values are done.
     """
-    free = found.free
-    k = [f.name for f in free].index(name)
-    f = free[k]
-
-    def cost(value: float) -> float:
-        z = found.point.z.copy()
-        z[k] = value
-        again = refit(pinned(found, {name: value}), replace(found.point, z=z), found)
-        own = 0.0 if not np.isfinite(f.width) else ((value - f.inward(f.prior)) / f.width) ** 2
-        return (again.cost - ((again.point.z[k] - value) / PIN) ** 2 + own) / DISPERSION
-
+    k = [f.name for f in found.free].index(name)
     std = float(np.sqrt(max(found.covariance[k, k], 0.0)))
     return profile(
-        name, float(found.point.z[k]), std, f.bounds, cost,
+        name, float(found.point.z[k]), std, found.free[k].bounds,
+        lambda value: held(found, name, value)[1] / DISPERSION,
         progress=lambda done, of: tell(f"profile of {name}: {done} of {of}", done / of),
     )  # fmt: skip

@@ -22,6 +22,7 @@ from ..force.problem import Point, Problem
 from ..force.residual import Structure, structures
 from ..force.rig import slips_finding, spring_freed
 from ..force.signatures import Explained
+from ..force.valleys import LEVEL, widened
 from .checkpoints import Store, kept, name_of
 from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named
@@ -195,6 +196,9 @@ def diagnose(
             search.add(done)
             if len(search.named) >= max_effects:
                 verdict = _end(search.named, Round(search.base, (), (), ()))
+    if not search.named:
+        search.base = kept(store, "wide", search.base.problem, lambda: widened(search.base, [LEVEL], DISPERSION))
+        ladder[-1] = replace(ladder[-1], fit=search.base)
     floor = deviations(search.base)
     tell("the laws of the backbone", 1.0)
     shape = shape_of(search.base, campaign.rig, tags)
@@ -321,14 +325,17 @@ def one_round(
 
 
 def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: str = "round") -> Fit:
-    """The model with an effect, what is random estimated anew."""
+    """The model with an effect, what is random estimated anew, and the deviations of its effects' amplitudes."""
     found = candidate.fit
     assert found is not None
     key = f"{name}-settled-{name_of(candidate.tag, candidate.form)}"
-    return kept(
-        store, key, found.problem,
-        lambda: fit(found.problem, found.point, found.scatter, dropped=base.dropped, first=True),
-    )  # fmt: skip
+    amplitudes = [f.name for f in found.free if f.amplitude]
+
+    def made() -> Fit:
+        again = fit(found.problem, found.point, found.scatter, dropped=base.dropped, first=True)
+        return widened(again, amplitudes, DISPERSION)
+
+    return kept(store, key, found.problem, made)
 
 
 def _end(named: Mapping[str, Round], last: Round) -> Verdict:

@@ -47,6 +47,8 @@ class Fit:
         blocks: points by event.
         strength: force of the contact at full strength (N).
         evaluations: of the model.
+        valleys: changes of all that is shared, one standard deviation each, that the derivatives do not show (see
+            :mod:`.valleys`).
     """
 
     problem: Problem
@@ -58,6 +60,7 @@ class Fit:
     blocks: Blocks
     strength: float
     evaluations: int
+    valleys: tuple[Array, ...] = ()
 
     @cached_property
     def _judged(self) -> tuple[Array, float, Array]:
@@ -78,8 +81,8 @@ class Fit:
 
     @property
     def covariance(self) -> Array:
-        """Of shared parameters, phases and weights, events marginalised."""
-        return self._judged[2]
+        """Of shared parameters, phases, weights and what cycles share, events marginalised."""
+        return self._judged[2] + sum(np.outer(v, v) for v in self.valleys)
 
     @property
     def cost(self) -> float:

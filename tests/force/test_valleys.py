@@ -1,0 +1,75 @@
+"""Deviations by profile: a rough valley is as wide as it is, a smooth one stays, and the truth lies in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.inference.force.fit import fit
+from stickslip.inference.force.valleys import LEVEL, _variance, held, widened
+
+
+@pytest.fixture(scope="module")
+def virgin(small):
+    """From the first loading on: the contact's strength is seen."""
+    return fit(small.problem, small.point)
+
+
+@pytest.fixture(scope="module")
+def used(begun):
+    """The spring stretched at the start by what nobody knows: of the strength only what is lost in a slip is seen."""
+    return fit(begun.problem, begun.point)
+
+
+@pytest.fixture(scope="module")
+def wide(used):
+    return widened(used, [LEVEL], 3.0)
+
+
+def deviation(found, direction) -> float:
+    return float(np.sqrt(direction @ found.covariance @ direction))
+
+
+@pytest.mark.parametrize("dent", [0.0, 3.0])
+def test_a_parabola_with_a_dent_is_as_wide_as_the_parabola(dent):
+    """The lowest point lies in a dent of the profile, whose curvature is that of another parabola."""
+    offset = np.array([-6.0, -2.0, -0.5, 0.0, 0.5, 2.0, 6.0])
+    rise = (offset / 2.5) ** 2 + np.where(offset == 0.0, 0.0, dent)
+    assert np.sqrt(_variance(offset, rise)) == pytest.approx(2.5, rel=1e-6 if dent == 0.0 else 0.15)
+
+
+def test_a_flat_profile_is_as_wide_as_one_looked():
+    offset = np.array([-30.0, -10.0, 0.0, 10.0, 30.0])
+    assert np.sqrt(_variance(offset, np.array([0.2, 0.0, 0.0, 0.3, 0.1]))) == pytest.approx(30.0)
+
+
+def test_held_parameters_cost_what_the_covariance_says_where_all_is_seen(virgin):
+    for k, f in enumerate(virgin.free):
+        sd = float(np.sqrt(virgin.covariance[k, k]))
+        for times in (-3.0, 3.0):
+            _, cost = held(virgin, f.name, float(virgin.point.z[k]) + times * sd)
+            assert cost - virgin.cost == pytest.approx(times**2, rel=0.05), f.name
+
+
+def test_where_all_is_seen_nothing_becomes_wider_than_the_dispersion(virgin):
+    wide = widened(virgin, [LEVEL], 3.0)
+    assert wide.std()[LEVEL] == pytest.approx(np.sqrt(3.0) * virgin.std()[LEVEL], rel=0.1)
+
+
+def test_only_what_the_profile_lets_go_becomes_wider(used, wide):
+    """The share that is lost is known less well than derivatives say; what is lost of the strength stays known."""
+    names = [f.name for f in used.free]
+    drop, weights = names.index(LEVEL), len(names) + used.point.phases.size
+    share = np.zeros(used.covariance.shape[0])
+    share[drop] = used.free[drop].slope(float(used.point.z[drop])) / used.values[LEVEL]
+    lost = share.copy()
+    lost[weights : weights + used.point.weights.size] = 1.0 / used.strength
+    assert deviation(wide, share) > 3.0 * deviation(used, share)
+    assert deviation(wide, lost) < 0.1 * deviation(wide, share)
+    assert wide.std()["rig.damping"] < 1.2 * used.std()["rig.damping"]
+
+
+def test_the_truth_lies_in_it(begun, wide):
+    rig = begun.truth["rig"]
+    true = 1.0 - rig["mu_k"] / rig["mu_s"]
+    assert abs(wide.values[LEVEL] - true) < 2.5 * wide.std()[LEVEL]
