@@ -1,4 +1,4 @@
-"""Measure static curve, solvers at equal accuracy, cost against size, Jacobian and batches: tables and results.
+"""Measure static curve, solvers at equal accuracy, cost against size, Jacobian, batches, workbench: tables and results.
 
 The tables are printed; docs/results/performance.json, from which docs/performance.md draws them, is written as well.
 """
@@ -17,7 +17,7 @@ from pathlib import Path
 from .measuring import head, keep, last_table, row, timed
 
 ROOT = Path(__file__).resolve().parents[2]
-PARTS = ("static", "solvers", "sizes", "springs", "drive", "events", "jacobian", "batches", "command-line")
+PARTS = ("static", "solvers", "sizes", "springs", "drive", "events", "jacobian", "batches", "command-line", "workbench")
 FACTOR = 3.0  # of tolerance, accurate enough at 256 springs (table of solvers)
 
 
@@ -98,6 +98,10 @@ def main() -> None:
         batches.report(FACTOR, 8 if small else arguments.sets, kept=not small)
     if only in (None, "command-line"):
         command_line(small)
+    if only in (None, "workbench"):
+        from . import workbench
+
+        workbench.report(small)
 
 
 if __name__ == "__main__":
