@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from datetime import date
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from stickslip import __version__
 
 RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results" / "performance.json"
+SLOWER = 1.5  # times what the rest of a part became, from which it is said
 _printed: list[list[str]] = []  # the rows of the last table, its head first
 
 
@@ -50,6 +53,8 @@ def last_table() -> dict[str, Any]:
 def keep(part: str, only: str, **found: Any) -> None:
     """Write a part among the results that docs/performance draws from, with version, date and processors."""
     known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
+    for line in slower(known.get(part, {}), found):
+        print(line, flush=True)
     known[part] = {
         "version": __version__,
         "date": date.today().isoformat(),
@@ -59,3 +64,43 @@ def keep(part: str, only: str, **found: Any) -> None:
     }
     RESULTS.parent.mkdir(exist_ok=True)
     RESULTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def slower(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """What takes longer than it did in the results of an earlier version, a line each.
+
+    Against the median of the part, so that a slower machine does not count.
+    """
+    old, new = times(before), times(now)
+    ratios = {name: new[name] / old[name] for name in new if old.get(name, 0.0) > 0.0 and new[name] > 0.0}
+    if not ratios:
+        return []
+    usual = median(ratios.values())
+    return [
+        f"slower than in the kept results: {name}, {old[name]:.3g} -> {new[name]:.3g} s "
+        f"({ratio / usual:.1f} times what the others became)"
+        for name, ratio in ratios.items()
+        if ratio > SLOWER * usual
+    ]
+
+
+def times(part: Any, path: str = "") -> dict[str, float]:
+    """Name -> seconds of everything in a part of the results that has a time: rows of tables, and runs."""
+    if isinstance(part, list):
+        return {k: v for item in part for k, v in times(item, path).items()}
+    if not isinstance(part, Mapping):
+        return {}
+    if "processor_s" in part:
+        what = [f"{key} {part[key]}" for key in ("solver", "size", "springs", "velocity", "events") if key in part]
+        return {" ".join([path, *what]).strip(): float(part["processor_s"] or 0.0)}
+    out = {}
+    for title, *cells in part["rows"] if "columns" in part else ():
+        for column, cell in zip(part["columns"][1:], cells, strict=True):
+            value, _, unit = cell.partition(" ")
+            with suppress(ValueError):
+                if unit == "s" or column.endswith(" s"):
+                    out[f"{title}, {column}"] = float(value)
+    for key, item in part.items():
+        if key not in ("rows", "columns"):
+            out |= times(item, key)
+    return out

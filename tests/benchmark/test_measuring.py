@@ -1,0 +1,28 @@
+"""What became slower is said, and a slower machine is not."""
+
+from __future__ import annotations
+
+from .measuring import slower, times
+
+TABLE = {
+    "columns": ["way", "processor s", "runs"],
+    "rows": [["one", "2.0", "5"], ["two", "0.5", "7"], ["three", "1", ""]],
+}
+RUNS = {"series": {"own": [{"size": 10, "processor_s": 0.1}, {"size": 20, "processor_s": 0.2}]}}
+
+
+def test_times_of_tables_and_runs_are_found():
+    assert times(TABLE) == {"one, processor s": 2.0, "two, processor s": 0.5, "three, processor s": 1.0}
+    assert times(RUNS) == {"own size 10": 0.1, "own size 20": 0.2}
+    assert times({"columns": ["way", "first"], "rows": [["drawn after", "3.5 s"], ["a second", "26"]]}) == {
+        "drawn after, first": 3.5
+    }
+
+
+def test_only_what_became_slower_than_the_rest_is_said():
+    twice = [[name, f"{2.0 * float(value)}", more] for name, value, more in TABLE["rows"]]
+    assert slower(TABLE, {**TABLE, "rows": twice}) == []
+    twice[1][1] = "4.0"
+    (line,) = slower(TABLE, {**TABLE, "rows": twice})
+    assert "two, processor s, 0.5 -> 4 s (4.0 times" in line
+    assert slower({}, TABLE) == []
