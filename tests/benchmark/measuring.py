@@ -15,6 +15,7 @@ from typing import Any
 from stickslip import __version__
 
 RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results" / "performance.json"
+UNITS = {"s": 1.0, "ms": 1e-3}
 SLOWER = 1.5  # times what the rest of a part became, from which it is said
 _printed: list[list[str]] = []  # the rows of the last table, its head first
 
@@ -97,9 +98,10 @@ def times(part: Any, path: str = "") -> dict[str, float]:
     for title, *cells in part["rows"] if "columns" in part else ():
         for column, cell in zip(part["columns"][1:], cells, strict=True):
             value, _, unit = cell.partition(" ")
+            size = UNITS.get(unit) or next((UNITS[word] for word in column.split() if word in UNITS), None)
             with suppress(ValueError):
-                if unit == "s" or column.endswith(" s"):
-                    out[f"{title}, {column}"] = float(value)
+                if size is not None:
+                    out[f"{title}, {column}"] = size * float(value)
     for key, item in part.items():
         if key not in ("rows", "columns"):
             out |= times(item, key)
