@@ -22,7 +22,7 @@ class _Callable(ModuleType):
         from .app import ready, view
         from .session import Session
 
-        ready()
+        ready(inline=True)
         session = Session(campaign=campaign, effects=campaign.effects)
         session.begin(keep=False)
         return view(session)

@@ -28,9 +28,9 @@ TABS = """
 """
 
 
-def ready() -> None:
-    """Panel as the workbench needs it: nothing from the network, one design."""
-    pn.extension(design="native", notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
+def ready(inline: bool = False) -> None:
+    """Panel as the workbench needs it: nothing from the network, one design; ``inline`` for a notebook."""
+    pn.extension(design="native", notifications=False, sizing_mode="stretch_width", raw_css=[STYLE], inline=inline)
 
 
 def modules() -> list[ModuleType]:

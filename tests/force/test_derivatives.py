@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.inference.fit.parameters import effect_parameters
-from stickslip.inference.force.problem import Point, Problem, is_own
+from stickslip.inference.force.problem import LOCAL, Point, Problem, is_own
 from stickslip.physics.effects import catalogue
 
 LADDER = 10.0 ** np.arange(-3.0, -7.5, -0.5)  # of each direction's own unit
@@ -40,7 +40,7 @@ def with_effects(case, chosen):
             phases = np.vstack([phases, np.array([0.7, -0.4]) / float(f.scale)])
     rng = np.random.default_rng(3)
     problem = case.problem.with_composition(composition)
-    events = rng.standard_normal((problem.events, 3)) * [3e-3, 3e-2, 3e-9]
+    events = rng.standard_normal((problem.events, 4)) * [3e-3, 3e-2, 3e-2, 3e-9]
     weights = case.point.weights * np.exp(0.1 * rng.standard_normal(case.point.weights.size)) + 1e-4
     common = np.zeros(case.point.common.size)
     return problem, Point(z, phases, weights, events, common)
@@ -143,11 +143,11 @@ def shared_by_two(problem) -> np.ndarray:
     return np.concatenate(reaches)
 
 
-@pytest.mark.parametrize("which", [0, 1, 2], ids=["strength", "stretch", "offset"])
+@pytest.mark.parametrize("which", [0, 1, 2, 3], ids=LOCAL)
 def test_an_event_moves_its_own_points_alone(placed, which):
     """The derivative in an event's own number, but for the few points that lie in two events."""
     problem, point, slopes = placed
-    unit = (1.0, 1.0, 1e-6)[which]
+    unit = (1.0, 1.0, 1.0, 1e-6)[which]
     both = shared_by_two(problem)
     assert both.sum() <= 5 * problem.events
     for e in (0, 2, 4, problem.events - 1):

@@ -22,7 +22,7 @@ from stickslip.inference.force.scatter import (
 STRENGTH = 0.25  # N
 EVENTS, POINTS = 60, 48
 TRUE = {
-    "strength": 3e-3, "stretch": 0.03, "offset": 3e-9, "creep": 1e-3, "nucleation": 3e-3, "slip": 2e-3,
+    "strength": 3e-3, "stretch": 0.03, "shape": 0.03, "offset": 3e-9, "creep": 1e-3, "nucleation": 3e-3, "slip": 2e-3,
     "ring-down": 1e-3, "position": 2e-9, "walk": 2e-9, "white": 1.0,
 }  # fmt: skip
 
@@ -36,7 +36,8 @@ def events(short: bool = False) -> Known:
     place = np.sort(rng.uniform(-10.0, 10.0, shape), axis=1)
     elapsed = np.sort(rng.uniform(0.0, 2.0, shape), axis=1)
     stretch = -STRENGTH * rng.uniform(0.0, 0.4, shape)
-    local = np.stack([np.full(shape, 0.9 * STRENGTH), stretch, -np.tile(tangent, (EVENTS, 1))], axis=2)
+    other = STRENGTH * rng.uniform(-0.2, 0.2, shape)
+    local = np.stack([np.full(shape, 0.9 * STRENGTH), stretch, other, -np.tile(tangent, (EVENTS, 1))], axis=2)
     there = np.ones(shape, bool)
     if short:
         there[::2, -7:] = False
@@ -62,8 +63,8 @@ def test_the_covariance_is_one(short, sizes):
     for matrix in (plain, whole):
         np.testing.assert_allclose(matrix, np.swapaxes(matrix, 1, 2), rtol=0.0, atol=1e-18)
         assert np.linalg.eigvalsh(matrix).min() > 0.5 * (1e-4 * STRENGTH) ** 2
-    added = whole - plain  # the random effects: three at most
-    assert np.linalg.eigvalsh(added)[:, :-3].max() < 1e-10 * np.linalg.eigvalsh(added).max()
+    added = whole - plain  # the random effects: four at most
+    assert np.linalg.eigvalsh(added)[:, :-4].max() < 1e-10 * np.linalg.eigvalsh(added).max()
     empty = ~known.there
     for e in np.flatnonzero(empty.any(axis=1)):
         np.testing.assert_array_equal(whole[e][empty[e]], np.eye(POINTS)[empty[e]])
@@ -118,7 +119,7 @@ def test_slopes_are_those_of_the_cost():
     gradient, information = _slopes(at, residual, known, _misfit(at, residual, known)[1])
     for step in (1e-3, 1e-4, 1e-5):
         seen = [
-            (misfit(at + d, residual, known) - misfit(at - d, residual, known)) / (2 * step) for d in step * np.eye(10)
+            (misfit(at + d, residual, known) - misfit(at - d, residual, known)) / (2 * step) for d in step * np.eye(len(NAMES))
         ]
         np.testing.assert_allclose(gradient, seen, rtol=2e-4, atol=1e-4 * np.abs(gradient).max())
     assert np.linalg.eigvalsh(information).min() > 0.0

@@ -28,11 +28,12 @@ from ..features.evaluate import of_tracks
 from ..features.measurement import Measurement
 from ..force.fit import Fit
 from ..force.free_run import run_freely
+from ..force.scatter import EVENTS
 from ..force.problem import Point, Problem
 
 Array = NDArray[np.float64]
 NAMES = ("recurrence", "cycle", "slip", "creep")
-STEPS = (0.01, 0.05, 2e-3)  # by which events are changed: ln strength, ln stretch, offset over the slip
+STEPS = (0.01, 0.05, 0.05, 2e-3)  # by which events are changed: ln strength, ln stretch, shape, offset over the slip
 
 
 @dataclass(frozen=True)
@@ -114,16 +115,16 @@ def scatter(m: Measurement, fit: Fit, runs: list[int]) -> Measures:
         runs: number in the problem of each run of the measurement.
     """
     size = fit.scatter.named()
-    sizes = (size["strength"], size["stretch"], size["offset"])
+    sizes = [size[name] for name in EVENTS]
     n = np.shape(m.cycles.start)[1]
     even = (np.arange(n) % 2 == 0).astype(float)
     usual = float(np.median(m.values[..., m.layout.slices()["size"].start][np.asarray(m.cycles.used)]))
-    steps = (STEPS[0], STEPS[1], STEPS[2] * usual)
-    plain = _all(m, fit, runs, np.zeros((n, 3)))
+    steps = (*STEPS[:-1], STEPS[-1] * usual)
+    plain = _all(m, fit, runs, np.zeros((n, len(EVENTS))))
     total = {k: a + b for (k, a), b in zip(_sensor(m).items(), _misfit(m, fit, runs), strict=True)}
     for j, (step, deviation) in enumerate(zip(steps, sizes, strict=True)):
         for own in (even, 1.0 - even):
-            change = np.zeros((n, 3))
+            change = np.zeros((n, len(EVENTS)))
             change[:, j] = step * own
             moved = _all(m, fit, runs, change)
             # the own event's influence where it was changed, that of the one before elsewhere
@@ -134,7 +135,7 @@ def scatter(m: Measurement, fit: Fit, runs: list[int]) -> Measures:
 def _all(m: Measurement, fit: Fit, runs: list[int], change: Array) -> Measures:
     features, arrests = np.zeros_like(m.values), np.zeros(np.shape(m.cycles.start))
     for r, run in enumerate(runs):
-        track, features[r], broken = simulated(m, fit.problem, fit.point, r, run, change[:, :2], change[:, 2])
+        track, features[r], broken = simulated(m, fit.problem, fit.point, r, run, change[:, :-1], change[:, -1])
         arrests[r] = track.arrest
         features[r, broken | ~track.arrested] = np.nan
     return measures(m, features, arrests)

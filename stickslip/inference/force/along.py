@@ -30,6 +30,7 @@ class Way(NamedTuple):
         drive: the load point as the drive was told (m).
         turn: from the knot before to the turning point within the increment (m); zero where there is none.
         strength, stretch: factors on caps and on yield displacements of all elements, which vary from event to event.
+        shape: power of an element's yield displacement, over the mean of all, by which it is stretched besides.
     """
 
     t: Any
@@ -39,6 +40,7 @@ class Way(NamedTuple):
     turn: Any
     strength: Any
     stretch: Any
+    shape: Any
 
 
 class Held(NamedTuple):
@@ -77,13 +79,14 @@ def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
     mass = model.mass()
     start = model.rest(way.t[0], way.x[0], way.v[0])
     dt, dx = jnp.diff(way.t, prepend=way.t[:1]), jnp.diff(way.x, prepend=way.x[:1])
-    items = (way.t, dt, way.x, dx, way.v, led, way.turn, way.strength, way.stretch)
+    items = (way.t, dt, way.x, dx, way.v, led, way.turn, way.strength, way.stretch, way.shape)
+    apart = departures(bank)
     share = 1.0 / jnp.where(bank.strength > 0.0, bank.strength, 1.0)
 
     def step(i: Array, carry: tuple[State, Array, Held]) -> tuple[State, Array, Held]:
         state, pull, held = carry
-        t, dt, x, dx, v, at, turn, strength, stretch = (a[i] for a in items)
-        own = Bank(bank.stiffness * (strength / stretch), bank.strength * strength)
+        t, dt, x, dx, v, at, turn, strength, stretch, shape = (a[i] for a in items)
+        own = Bank(bank.stiffness * (strength / stretch) * jnp.exp(-shape * apart), bank.strength * strength)
         contact = Contact(state.force, own.stiffness, own.strength, pull, state.cap, mass)
         motion = Motion(t, dt, x, v, turn, dx, at)
         state, forces = model.advance(state, own, contact, motion)
@@ -98,6 +101,12 @@ def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
         none.at[0].set(pull), none, none, jnp.zeros((n, share.size)), none.at[0].set(jnp.sum(bank.stiffness))
     )  # fmt: skip
     return jax.lax.fori_loop(1, n if knots is None else knots, step, (start, pull, first))[2]
+
+
+def departures(bank: Bank) -> Array:
+    """Logarithm of every element's yield displacement over the geometric mean of all, shape (k,)."""
+    reach = jnp.log(bank.strength / bank.stiffness)
+    return reach - jnp.mean(reach)
 
 
 def turning(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 from .problem import Point, Problem
 
 Array = NDArray[np.float64]
-EVEN = 0.25  # of the elements stay spread over the whole range
+EVEN = 0.15  # of the elements stay spread over the whole range
 FINE = 2000  # places at which the density is told
 SMOOTHED = 1.5  # spacings of the old elements over which it is smoothed
 CHORDS = 400  # displacements at which the new elements are to carry what the old ones did

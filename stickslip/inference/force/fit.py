@@ -16,7 +16,7 @@ from ...system.progress import breathe
 from ..fit.parameters import Free
 from .bank import placed, spacing
 from .problem import PULL, Point, Problem, Slopes
-from .scatter import Blocks, Known, Scatter, Whitening, covariance, estimate, misfit
+from .scatter import EVENTS, Blocks, Known, Scatter, Whitening, covariance, estimate, misfit
 
 Array = NDArray[np.float64]
 BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean
@@ -122,7 +122,7 @@ class _System:
         self, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, blocks: Blocks, white: Whitening
     ):
         self.problem, self.point, self.slopes, self.blocks = problem, point, slopes, blocks
-        self.random = np.exp(2.0 * scatter.sizes[:3])
+        self.random = np.exp(2.0 * scatter.sizes[: len(EVENTS)])
         self.prior, self.target = prior_rows(problem, point)
         self.local = local = blocks(slopes.local)
         self.plain, self.white = white.back, white.with_events(local)

@@ -21,6 +21,7 @@ from ...physics.model import LoadPoint, Model
 from ...simulation.shooting import MOST_STEPS, Cycles, Track, run_cycles
 from ...simulation.solve.stepper import Tolerance
 from ...system.traced import Program, of_this_package
+from .along import departures
 from .problem import EMPTY, PULL, Point, Problem, model_of
 
 FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)
@@ -34,11 +35,11 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
 
     Args:
         problem: its composition says which model.
-        point: its parameters; strengths, stretches and offsets of its events are not used.
+        point: its parameters; what differs from event to event is not used.
         run: number of the run in the problem, whose phases and pull at the start are taken.
         cycles: of that run, arrays (n,).
-        events: logarithms of factors on strength and on yield displacements in every cycle, shape (n, 2); default
-            all events alike.
+        events: logarithms of factors on strength and on yield displacements, and the power by which these are
+            stretched besides, in every cycle, shape (n, 3); default all events alike.
 
     Returns:
         The tracks, with a leading axis of cycles.
@@ -50,7 +51,7 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
     program = _program(tuple(values), jax.tree.structure(c.effects))
     found: Track = program(
         values, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), np.asarray(c.reach),
-        np.float64(np.nan if own is None else own), np.zeros((np.size(cycles.start), 2)) if events is None else events,
+        np.float64(np.nan if own is None else own), np.zeros((np.size(cycles.start), 3)) if events is None else events,
         cycles, FINE,
     )  # fmt: skip
     return found
@@ -66,7 +67,9 @@ def _program(names: tuple[str, ...], structure: Any) -> Program:
 
         def build(event: Any, nodes: Any) -> Model:
             strength, stretch = jnp.exp(event[0]), jnp.exp(event[1])
-            bank = Bank(weights / reach * (strength / stretch), weights * strength)
+            plain = Bank(weights / reach, weights)
+            own_reach = jnp.exp(-event[2] * departures(plain))
+            bank = Bank(plain.stiffness * (strength / stretch) * own_reach, weights * strength)
             model = model_of(values, effects, bank, own)
             begun = jnp.zeros(())
             if PULL in values:

@@ -46,7 +46,8 @@ NODES = (
     4.5,
     6.0,
 )  # of what cycles share, in units of the place
-LOCAL = ("strength", "stretch", "offset")  # of each event: two logarithms, and a length (m)
+LOCAL = ("strength", "stretch", "shape", "offset")  # of each event: two logarithms, a power, and a length (m)
+OWN = len(LOCAL)
 
 
 class Start(NamedTuple):
@@ -111,7 +112,7 @@ class Point:
         z: shared parameters on the search scale, shape (a,).
         phases: shape (b, R).
         weights: strength of every element (N), not negative, shape (k,).
-        events: :data:`LOCAL` of each event, shape (E, 3).
+        events: :data:`LOCAL` of each event, shape (E, 4).
         common: error of the position that all cycles share, as a function of the place in the cycle (m), shape (c,).
     """
 
@@ -133,7 +134,7 @@ class Slopes:
     Attributes:
         residual: measured force less the model's (N), shape (p,).
         shared: derivatives in z, phases of all runs, weights and what cycles share, shape (p, a + b R + k + c).
-        local: in the event's own, shape (p, 3).
+        local: in the event's own, shape (p, 4).
         tangent: stiffness of what sticks (N/m), shape (p,).
         sticking: the same at the knots of every run, shape (n,) each.
         held: force that the model holds (N), shape (p,).
@@ -224,7 +225,7 @@ class Problem:
             for a in program(
                 point.z, scales, point.phases.T * phase_scale, phase_scale, fixed, leaves,
                 np.maximum(point.weights, EMPTY), c.reach,
-                own, self.way, self._index, self._knots, np.concatenate([point.events, np.zeros((1, 3))]),
+                own, self.way, self._index, self._knots, np.concatenate([point.events, np.zeros((1, OWN))]),
             )
         )  # fmt: skip
         values = self.values(point)
@@ -234,7 +235,7 @@ class Problem:
         residual, tangents, held = np.zeros(size), np.zeros(size), np.zeros(size)
         own_share = c.mass / mass
         cycles = self.cycles.shape[1]
-        slopes, local = np.zeros((size, a + b * runs + k + cycles)), np.zeros((size, 3))
+        slopes, local = np.zeros((size, a + b * runs + k + cycles)), np.zeros((size, OWN))
         sensed = any(isinstance(e, Sensor) for e in c.effects)
         at_damping = next((i for i, f in enumerate(shared) if f.name == "rig.damping"), None)
         weights = np.maximum(point.weights, EMPTY)
@@ -290,6 +291,7 @@ def _padded(runs: Sequence[Knots], n: int) -> Way:
         np.zeros((len(runs), n)),  # turning points are knots
         ones,
         ones,
+        np.zeros((len(runs), n)),
     )
 
 
@@ -354,9 +356,10 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
             seen = undone(model, way, force, knots)
         shift = seen.x - way.x
         moved = seen._replace(
-            x=seen.x + event[by_arrest, 2],
+            x=seen.x + event[by_arrest, 3],
             strength=jnp.exp(event[by_event, 0]),
             stretch=jnp.exp(event[by_event, 1]),
+            shape=event[by_event, 2],
         )
         held = along(model, moved, knots)
         return (held.pull + held.body - held.contact, shift, model.mass()), (held.elements, held.tangent)
@@ -366,7 +369,7 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
         own: Any, way: Way, index: Any, knots: Any, event: Any,
     ) -> Any:  # fmt: skip
         effects = jax.tree.unflatten(structure, leaves)
-        size = a + b + 3
+        size = a + b + OWN
         rows = jnp.eye(size)
 
         def of_run(run: Any) -> Any:

@@ -5,7 +5,7 @@ Residuals of one event belong together, those of two events do not. The covarian
     S = N + diag(numeric) + Z D Z' + L K L',    K_ij = exp(-|s_i - s_j|)
 
 with the noise N of the sensor's samples carried to a force by stiffness and inertia together, random effects D
-(strength, yield displacements, position at the arrest), and misfit whose size L depends on the phase of the cycle and,
+(strength, yield displacements, shape of the backbone, position at the arrest), and misfit whose size L depends on the phase of the cycle and,
 for errors of the position, on the stiffness, and a random walk of the reading since the arrest. All sizes are estimated
 from the campaign itself by maximum likelihood.
 """
@@ -22,10 +22,13 @@ from scipy.linalg.lapack import dtrtri, dtrtrs
 from .knots import PHASES
 
 Array = NDArray[np.float64]
-NAMES = ("strength", "stretch", "offset", *PHASES, "position", "walk", "white")
+EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event to event
+NAMES = (*EVENTS, *PHASES, "position", "walk", "white")
+_OWN, _PHASE = len(EVENTS), slice(len(EVENTS), len(EVENTS) + len(PHASES))
+_POSITION, _WALK, _WHITE = range(len(NAMES) - 3, len(NAMES))
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
-CENTRES = np.log(np.array([1e-3, 2e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1.0]))
-WIDTHS = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 0.1])
+CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1.0]))
+WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 0.1])
 NUMERIC = 1e-4  # share of the strength below which nothing is claimed
 REACH = 1.0  # correlation length along the place
 FARTHEST = 1.5  # step of a size, in e-folds
@@ -42,7 +45,7 @@ class Scatter:
     @classmethod
     def wide(cls) -> Scatter:
         """What a fit begins with, so that no single kink of the model holds it."""
-        return cls(np.log(np.array([1e-2, 0.1, 5e-9, 0.02, 0.02, 0.02, 0.02, 2e-9, 1e-9, 1.0])))
+        return cls(np.log(np.array([1e-2, 0.1, 0.05, 5e-9, 0.02, 0.02, 0.02, 0.02, 2e-9, 1e-9, 1.0])))
 
     def named(self) -> dict[str, float]:
         """Name -> size: shares of strength and of yield displacement, metres of position."""
@@ -117,7 +120,7 @@ class Known:
 
 def covariance(sizes: Array, k: Known) -> tuple[Array, Array]:
     """The covariance without and with the random effects (N^2), shape (E, n, n)."""
-    plain, scaled = _plain(sizes, k), k.local * np.exp(sizes[:3])
+    plain, scaled = _plain(sizes, k), k.local * np.exp(sizes[:_OWN])
     return plain, plain + scaled @ np.swapaxes(scaled, 1, 2)
 
 
@@ -125,7 +128,7 @@ def _plain(sizes: Array, k: Known) -> Array:
     s = np.exp(sizes)
     placed, walked = k.shifts
     out = _by_phase(s, k)
-    for size, part in ((s[7], placed), (s[8], walked), (s[9], k.noise)):
+    for size, part in ((s[_POSITION], placed), (s[_WALK], walked), (s[_WHITE], k.noise)):
         out += size**2 * part
     at = np.arange(out.shape[1])
     out[:, at, at] += np.where(k.there, k.dropped + (NUMERIC * k.strength) ** 2, 1.0)
@@ -134,7 +137,7 @@ def _plain(sizes: Array, k: Known) -> Array:
 
 def _by_phase(s: Array, k: Known) -> Array:
     """Misfit (N^2), shape (E, n, n)."""
-    own = np.where(k.there, s[3 + k.phase] * k.strength, 0.0)
+    own = np.where(k.there, s[_PHASE][k.phase] * k.strength, 0.0)
     out = own[:, :, None] * k.near
     out *= own[:, None, :]
     return out
@@ -143,17 +146,17 @@ def _by_phase(s: Array, k: Known) -> Array:
 class Whitening:
     """Residuals to independent ones of unit variance, given the sizes; derivatives in the events' own may change.
 
-    The covariance without random effects is inverted once, what the events' own add is of rank three.
+    The covariance without random effects is inverted once, what the events' own add is of low rank.
     """
 
     def __init__(self, sizes: Array, known: Known) -> None:
         root = np.asarray(np.linalg.cholesky(_plain(sizes, known)), float)
         self.back = inverse(root)
         self.logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-        self.size = np.exp(sizes[:3])
+        self.size = np.exp(sizes[:_OWN])
 
     def with_events(self, local: Array) -> WithEvents:
-        """The same with events that differ; ``local`` are derivatives in what is their own, shape (E, n, 3)."""
+        """The same with events that differ; ``local`` are derivatives in what is their own, shape (E, n, 4)."""
         return WithEvents(self.back, self.logs, local * self.size)
 
 
@@ -205,14 +208,14 @@ def _misfit(sizes: Array, residual: Array, k: Known) -> tuple[float, Array]:
 
 
 def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array, Array]:
-    """Gradient of the cost and its average information, shapes (10,) and (10, 10)."""
+    """Gradient of the cost and its average information, one for each size."""
     s = np.exp(sizes)
     back = inverse(root)
     inverted = np.swapaxes(back, 1, 2) @ back
     a = (inverted @ residual[..., None])[..., 0]
     inverted *= k.there[:, :, None]
     gradient, moved = np.zeros(sizes.size), np.zeros((*residual.shape, sizes.size))
-    for r in range(3):
+    for r in range(_OWN):
         z = s[r] * k.local[..., r]
         along = np.einsum("ei,ei->e", z, a)
         gradient[r] = 2.0 * (np.einsum("ei,ei->", z, (inverted @ z[..., None])[..., 0]) - (along**2).sum())
@@ -222,9 +225,9 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
     own = (k.phase[..., None] == np.arange(len(PHASES))) & k.there[..., None]
     pulled = misfit @ np.concatenate([a[..., None], own * a[..., None]], axis=2)
     for p in range(len(PHASES)):
-        gradient[3 + p] = 2.0 * (traces - a * pulled[..., 0])[own[..., p]].sum()
-        moved[..., 3 + p] = own[..., p] * pulled[..., 0] + pulled[..., 1 + p]
-    for i, part in zip((7, 8, 9), (*k.shifts, k.noise), strict=True):
+        gradient[_OWN + p] = 2.0 * (traces - a * pulled[..., 0])[own[..., p]].sum()
+        moved[..., _OWN + p] = own[..., p] * pulled[..., 0] + pulled[..., 1 + p]
+    for i, part in zip((_POSITION, _WALK, _WHITE), (*k.shifts, k.noise), strict=True):
         pulled = (part @ a[..., None])[..., 0]
         gradient[i] = 2.0 * s[i] ** 2 * (np.einsum("eij,eij->", inverted, part) - (a * pulled).sum())
         moved[..., i] = 2.0 * s[i] ** 2 * pulled

@@ -16,7 +16,7 @@ from ...physics.params import specs
 from ...system.traced import Program, of_this_package
 from .along import Way, along, undone
 from .fit import Array, Fit
-from .problem import EMPTY, PROGRAMS, PULL, Problem, model_of
+from .problem import EMPTY, OWN, PROGRAMS, PULL, Problem, model_of
 from .scatter import covariance
 
 CHUNK = 64  # members evaluated at once
@@ -57,7 +57,7 @@ def _arguments(fit: Fit) -> tuple[Any, ...]:
     turned = {n: turns[:, j] for j, n in enumerate(names)}
     return (
         values, turned, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), c.reach, own, problem.way,
-        problem._index, problem._knots, np.concatenate([point.events, np.zeros((1, 3))]),
+        problem._index, problem._knots, np.concatenate([point.events, np.zeros((1, OWN))]),
     )  # fmt: skip
 
 
@@ -109,8 +109,8 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
                     seen = undone(model, moving, force, knots)
                 by_event, by_arrest = index
                 moved = seen._replace(
-                    x=seen.x + event[by_arrest, 2], strength=jnp.exp(event[by_event, 0]),
-                    stretch=jnp.exp(event[by_event, 1]),
+                    x=seen.x + event[by_arrest, 3], strength=jnp.exp(event[by_event, 0]),
+                    stretch=jnp.exp(event[by_event, 1]), shape=event[by_event, 2],
                 )  # fmt: skip
                 held = along(model, moved, knots)
                 return held.pull + held.body - held.contact, seen.x - way.x, model.mass()

@@ -16,10 +16,10 @@ from ...data.trace import Trace
 from ...errors import InputError
 from ..fit.parameters import Free, vector
 from .knots import Knots
-from .problem import PULL, Composition, Point, Problem
+from .problem import OWN, PULL, Composition, Point, Problem
 from .scales import Scales
 
-ELEMENTS = 40
+ELEMENTS = 64
 REACH = (1 / 60.0, 30.0)  # yield displacements, over strength/stiffness of the whole contact
 FALLBACK_STIFFNESS = 1000.0  # N/m
 
@@ -115,7 +115,7 @@ def begin(
     problem = Problem(composition, runs)
     flat = np.full(elements, strength / elements)
     point = Point(
-        vector(composition.shared), begun, flat, np.zeros((problem.events, 3)), np.zeros(problem.cycles.shape[1])
+        vector(composition.shared), begun, flat, np.zeros((problem.events, OWN)), np.zeros(problem.cycles.shape[1])
     )
     return problem, _weighed(problem, point, strength)
 
