@@ -105,7 +105,9 @@ def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> Way:
     t = np.concatenate([t, t[-1] + 1e-3 * np.arange(1, more + 1)])
     x, v = np.concatenate([x, np.full(more, x[-1])]), np.concatenate([v, np.zeros(more)])
     ones = np.ones(KNOTS)
-    return Way(*(jnp.asarray(a) for a in (t, x, v, np.interp(t, TIMES, POSITIONS), turning(t, v), ones, ones, 0.0 * ones)))
+    return Way(
+        *(jnp.asarray(a) for a in (t, x, v, np.interp(t, TIMES, POSITIONS), turning(t, v), ones, ones, 0.0 * ones))
+    )
 
 
 def held(slips: Slips, turns: bool = True) -> Held:

@@ -8,7 +8,8 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from stickslip.inference.fit.parameters import effect_parameters
+from stickslip.inference.fit.parameters import Free, effect_parameters
+from stickslip.inference.force.knots import PHASES
 from stickslip.inference.force.problem import LOCAL, Point, Problem, is_own
 from stickslip.physics.effects import catalogue
 
@@ -80,29 +81,43 @@ def test_shared_parameters(placed):
 
 def test_no_motion_tells_all_forces_and_the_mass_by_one_factor(small):
     """More mass, and spring, damping and contact stronger by as much: the same residuals, and the same likelihood."""
-    problem, point, factor = small.problem, small.point, 1.08
-    runs = [replace(k, stiffness=None) for k in problem.runs]
-    spring = float(problem.runs[0].stiffness or dict(problem.values(point))["rig.spring_stiffness"])
-    composition = problem.composition
+    factor, spring = 1.08, 950.0
+    free = Free("rig.spring_stiffness", "N/m", "log", spring, spring, np.inf, 1e2, 1e4)
+    composition = small.problem.composition
+    fixed = {name: value for name, value in composition.fixed.items() if name != free.name}
+    kept = tuple(f for f in composition.free if f.name != free.name)
     names = [f.name for f in composition.shared]
-    fixed = {**composition.fixed, **({} if "rig.spring_stiffness" in names else {"rig.spring_stiffness": spring})}
-    plain = Problem(replace(composition, fixed=fixed), runs)
-    heavier, _ = with_effects(replace(small, problem=plain), (("inertia", {}, {"share": factor - 1.0}),))
-    z = point.z.copy()
-    for name in ("rig.damping", "rig.spring_stiffness"):
-        if name in names:
-            f = composition.shared[names.index(name)]
-            z[names.index(name)] = f.inward(factor * f.outward(float(z[names.index(name)])))
-    stiffer = replace(
-        heavier.composition, fixed={k: v * (factor if k == "rig.spring_stiffness" else 1.0) for k, v in fixed.items()}
-    )
-    share = next(f for f in stiffer.shared if f.name == "inertia.share")
-    at = replace(point, z=np.append(z, share.inward(factor - 1.0)), weights=factor * point.weights)
-    one, other = plain.evaluate(point), heavier.with_composition(stiffer).evaluate(at)
+    z = np.array([z for name, z in zip(names, small.point.z, strict=True) if name != free.name])
+    runs = [replace(k, stiffness=None) for k in small.problem.runs]
+    plain = Problem(replace(composition, free=(*kept, free), fixed=fixed), runs)
+    point = replace(small.point, z=np.append(z, free.inward(spring)))
+    heavier, _ = with_effects(replace(small, problem=plain, point=point), (("inertia", {}, {"share": factor - 1.0}),))
+    moved_z = np.append(point.z, 0.0)
+    for i, f in enumerate(heavier.composition.shared):
+        if f.name in ("rig.damping", "rig.spring_stiffness"):
+            moved_z[i] = f.inward(factor * f.outward(float(moved_z[i])))
+        if f.name == "inertia.share":
+            moved_z[i] = f.inward(factor - 1.0)
+    one = plain.evaluate(point)
+    other = heavier.evaluate(replace(point, z=moved_z, weights=factor * point.weights))
     size = np.abs(one.residual).max()
     np.testing.assert_allclose(other.residual, one.residual, rtol=0.0, atol=1e-9 * size)
     np.testing.assert_allclose(other.local, one.local, rtol=0.0, atol=1e-9 * np.abs(one.local).max())
     np.testing.assert_allclose(other.measured, factor * one.measured, rtol=1e-9)
+
+
+def test_a_sensor_that_shows_less_makes_nothing_larger(small):
+    """What a reading of 0.95 of the displacement undoes is more of everything; per reading it is the same."""
+    plain, _ = with_effects(small, ())
+    sensed, _ = with_effects(small, (("sensor-gain", {}, {"gain": -0.05}),))
+    names = [f.name for f in sensed.composition.shared]
+    damping, gain = names.index("rig.damping"), names.index("sensor-gain.gain")
+    point = replace(small.point, z=np.append(small.point.z, sensed.composition.shared[gain].inward(-0.05)))
+    one, other = plain.evaluate(small.point), sensed.evaluate(point)
+    fast = plain.phase == PHASES.index("slip")
+    before, after = one.shared[fast, damping], other.shared[fast, damping]
+    np.testing.assert_allclose(after, before, rtol=0.0, atol=5e-3 * np.abs(before).max())
+    assert np.abs(other.measured - one.measured).max() > 0.01 * np.abs(one.measured).max()
 
 
 def test_phases_act_on_their_own_run(placed):
@@ -179,5 +194,7 @@ def test_the_held_force_is_the_sum_of_its_elements(placed):
     problem, point, slopes = placed
     first = point.z.size + point.phases.size
     shares = -slopes.shared[:, first : first + point.weights.size]
-    heavier = 1.0 + problem.values(point).get("inertia.share", 0.0)
-    np.testing.assert_allclose(heavier * shares @ point.weights, slopes.held, rtol=1e-12, atol=1e-14)
+    heavier = np.where(
+        problem.phase == PHASES.index("creep"), 1.0, 1.0 + problem.values(point).get("inertia.share", 0.0)
+    )
+    np.testing.assert_allclose(heavier * (shares @ point.weights), slopes.held, rtol=1e-12, atol=1e-14)

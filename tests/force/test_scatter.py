@@ -119,7 +119,8 @@ def test_slopes_are_those_of_the_cost():
     gradient, information = _slopes(at, residual, known, _misfit(at, residual, known)[1])
     for step in (1e-3, 1e-4, 1e-5):
         seen = [
-            (misfit(at + d, residual, known) - misfit(at - d, residual, known)) / (2 * step) for d in step * np.eye(len(NAMES))
+            (misfit(at + d, residual, known) - misfit(at - d, residual, known)) / (2 * step)
+            for d in step * np.eye(len(NAMES))
         ]
         np.testing.assert_allclose(gradient, seen, rtol=2e-4, atol=1e-4 * np.abs(gradient).max())
     assert np.linalg.eigvalsh(information).min() > 0.0

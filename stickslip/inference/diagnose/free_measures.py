@@ -28,8 +28,8 @@ from ..features.evaluate import of_tracks
 from ..features.measurement import Measurement
 from ..force.fit import Fit
 from ..force.free_run import run_freely
-from ..force.scatter import EVENTS
 from ..force.problem import Point, Problem
+from ..force.scatter import EVENTS
 
 Array = NDArray[np.float64]
 NAMES = ("recurrence", "cycle", "slip", "creep")

@@ -24,13 +24,14 @@ from ...physics.effects.base import Effect, Sensor
 from ...physics.model import Block, LoadPoint, Model, Weakening
 from ...system.traced import Program, of_this_package
 from ..fit.parameters import Free, to_si
-from .along import Way, along, undone
-from .knots import Knots
+from .along import Way, along, lead, undone
+from .knots import PHASES, Knots
 
 Array = NDArray[np.float64]
 PHASE = "phase"
 PULL = "start.pull"  # of the spring at the start of a record, where the contact is not virgin (N)
 PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
+CREEPING = PHASES.index("creep")
 EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
 NODES = (
     -8.0,
@@ -127,9 +128,11 @@ class Point:
 class Slopes:
     """Residual force and derivatives at a point.
 
-    A motion tells forces over the mass that moves. Where an effect adds mass, residuals, derivatives and stiffnesses
-    are therefore taken over it and times the block's own: else a model whose forces are all larger by one factor would
-    look worse, though no motion can tell it.
+    What is measured is a motion, and the likelihood is that of the motion: a model that makes forces smaller makes what
+    an error of the motion does to them smaller too, and must not gain by it. Residuals, derivatives and stiffnesses are
+    therefore taken over what a reading counts for in the model, times what it counts for as the rig is stated: the
+    mass that moves where the block is fast, the stiffness of the spring where it creeps (what the contact holds there
+    grows as the spring's force does), and everywhere the displacement over what the sensor shows of it.
 
     Attributes:
         residual: measured force less the model's (N), shape (p,).
@@ -220,7 +223,7 @@ class Problem:
         phase_scale = np.array([float(f.scale) for f in phases])
         leaves = tuple(jax.tree.leaves(c.effects))
         fixed = {n: np.float64(v) for n, v in {**c.fixed, "rig.mass": c.mass}.items()}
-        q, shift, mass, dq, dshift, dmass, elements, tangent = (
+        q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent = (
             np.asarray(a)
             for a in program(
                 point.z, scales, point.phases.T * phase_scale, phase_scale, fixed, leaves,
@@ -233,40 +236,48 @@ class Problem:
         a, b, k, runs = len(shared), len(phases), point.weights.size, len(self.runs)
         size = self.at.size
         residual, tangents, held = np.zeros(size), np.zeros(size), np.zeros(size)
-        own_share = c.mass / mass
+        starts = {**c.fixed, **{f.name: f.start for f in c.shared}}
+        slow = self.phase == CREEPING
+        share = np.ones(size)
         cycles = self.cycles.shape[1]
         slopes, local = np.zeros((size, a + b * runs + k + cycles)), np.zeros((size, OWN))
         sensed = any(isinstance(e, Sensor) for e in c.effects)
         at_damping = next((i for i, f in enumerate(shared) if f.name == "rig.damping"), None)
         weights = np.maximum(point.weights, EMPTY)
-        p = 0
+        p, sticking = 0, []
         for r, run in enumerate(self.runs):
             n, s = run.t.size, slice(p, p + run.at.size)
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             if sensed:
                 rate, acceleration = rate + first @ shift[r, :n], acceleration + second @ shift[r, :n]
-            share = own_share[r]
-            residual[s] = share * (mean @ q[r, :n] - mass[r] * acceleration - damping * rate)
+            spring = float(own[r] if np.isfinite(own[r]) else starts["rig.spring_stiffness"])
+            steep = mean @ slope[r, :n] / (mean @ np.ones(n))
+            counts = gain[r] * np.where(slow[s], steep / spring, mass[r] / c.mass)
+            share[s] = 1.0 / counts
+            residual[s] = share[s] * (mean @ q[r, :n] - mass[r] * acceleration - damping * rate)
             moved = mean @ dq[r, :, :n].T - acceleration[:, None] * dmass[r]
             if sensed:
                 moved = moved - mass[r] * (second @ dshift[r, :, :n].T) - damping * (first @ dshift[r, :, :n].T)
-            moved = share * moved - residual[s, None] * (dmass[r] / mass[r])
+            grown = np.where(
+                slow[s, None], (mean @ dslope[r, :, :n].T) / (mean @ slope[r, :n])[:, None], dmass[r] / mass[r]
+            )
+            moved = share[s, None] * moved - residual[s, None] * (grown + dgain[r] / gain[r])
             slopes[s, :a] = moved[:, :a]
             if at_damping is not None:
-                slopes[s, at_damping] -= share * damping * rate
+                slopes[s, at_damping] -= share[s] * damping * rate
             for j in range(b):
                 slopes[s, a + j * runs + r] = moved[:, a + j]
             local[s] = moved[:, a + b :]
             held_by = mean @ elements[r, :n]
-            slopes[s, a + b * runs : a + b * runs + k] = -share * held_by
+            slopes[s, a + b * runs : a + b * runs + k] = -share[s, None] * held_by
             held[s] = held_by @ weights
-            tangents[s] = share * (mean @ tangent[r, :n])
+            tangents[s] = share[s] * (mean @ tangent[r, :n])
+            sticking.append(tangent[r, :n] * np.interp(run.t, run.at, share[s]))
             p += run.at.size
         slopes[:, a + b * runs + k :] = self._carried(tangents)
         residual += slopes[:, a + b * runs + k :] @ point.common
-        sticking = tuple(own_share[r] * tangent[r, : k.t.size] for r, k in enumerate(self.runs))
-        return Slopes(residual, slopes, local, tangents, sticking, held, held + residual / own_share[self.run])
+        return Slopes(residual, slopes, local, tangents, tuple(sticking), held, held + residual / share)
 
 
 def _room(size: int) -> int:
@@ -362,7 +373,14 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
             shape=event[by_event, 2],
         )
         held = along(model, moved, knots)
-        return (held.pull + held.body - held.contact, shift, model.mass()), (held.elements, held.tangent)
+        steep = jax.vmap(jax.grad(model.pull))(lead(model, way.t, way.drive) - seen.x)
+        # how much the displacement changes where the reading does
+        steps = jnp.diff(way.x)
+        gain = 1.0 + jnp.sum(steps * jnp.diff(shift)) / jnp.sum(steps**2)
+        return (
+            (held.pull + held.body - held.contact, shift, model.mass(), steep, gain),
+            (held.elements, held.tangent),
+        )
 
     def whole(
         z: Any, scales: Any, turns: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any,
@@ -386,8 +404,8 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
                 )
                 return out, slope, aux
 
-            (q, shift, mass), (dq, dshift, dmass), (elements, tangent) = jax.vmap(moved, out_axes=(None, 0, None))(rows)
-            return q, shift, mass, dq, dshift, dmass, elements, tangent
+            out, slope, aux = jax.vmap(moved, out_axes=(None, 0, None))(rows)
+            return *out, *slope, *aux
 
         # one after the other: the shorter ones cost less then
         return jax.lax.map(of_run, (turns, own, way, index, knots))

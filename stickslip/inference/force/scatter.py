@@ -5,9 +5,9 @@ Residuals of one event belong together, those of two events do not. The covarian
     S = N + diag(numeric) + Z D Z' + L K L',    K_ij = exp(-|s_i - s_j|)
 
 with the noise N of the sensor's samples carried to a force by stiffness and inertia together, random effects D
-(strength, yield displacements, shape of the backbone, position at the arrest), and misfit whose size L depends on the phase of the cycle and,
-for errors of the position, on the stiffness, and a random walk of the reading since the arrest. All sizes are estimated
-from the campaign itself by maximum likelihood.
+(strength, yield displacements, shape of the backbone, position at the arrest), and misfit whose size L depends on the
+phase of the cycle and, for errors of the position, on the stiffness, and a random walk of the reading since the arrest.
+All sizes are estimated from the campaign itself by maximum likelihood.
 """
 
 from __future__ import annotations
