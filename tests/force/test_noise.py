@@ -37,7 +37,7 @@ def test_noise_of_the_samples_reaches_the_force_as_stated(small):
         if ringing.size < 10:
             continue
         # the error of the position at the arrest is an effect of its own in the model of what is random
-        offset = local[e, ringing, 2] / np.linalg.norm(local[e, ringing, 2])
+        offset = local[e, ringing, 3] / np.linalg.norm(local[e, ringing, 3])
         without = np.eye(ringing.size) - np.outer(offset, offset)
         shown, told = without @ seen[e][ringing], without @ stated[e][np.ix_(ringing, ringing)] @ without
         variances.append(np.mean(shown**2, axis=1) / np.diag(told))

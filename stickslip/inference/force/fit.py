@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
-from scipy.sparse import dia_array
+from scipy.sparse import coo_array, csr_array, dia_array
 
 from ...errors import FitError
 from ...system.progress import breathe
@@ -254,7 +254,8 @@ def noise(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks) -> Arr
     """Covariance of the residual force (N^2) by the noise of single samples, event by event, shape (E, n, n).
 
     A sample that is off by e changes the force of springs and contact by k e, that of inertia by m e'': together, so
-    that near the resonance of the contact, where the one nearly undoes the other, little noise is left.
+    that near the resonance of the contact, where the one nearly undoes the other, little noise is left. An element that
+    sticks counts from where it last slid, and holds the error of that reading until it slides again.
     """
     values = problem.values(point)
     event, place = np.zeros(problem.of.size, int), np.zeros(problem.of.size, int)
@@ -262,12 +263,18 @@ def noise(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks) -> Arr
     event[blocks.index[e, i]], place[blocks.index[e, i]] = e, i
     out = np.zeros((*blocks.there.shape, blocks.there.shape[1]))
     first = 0
-    for run, stiffness in zip(problem.runs, slopes.sticking, strict=True):
+    elements = point.weights / problem.composition.reach
+    for run, stiffness, slides in zip(problem.runs, slopes.sticking, slopes.slides, strict=True):
         own = slice(first, first + run.at.size)
         rate, acceleration = run.moving
         spring = values.get("rig.spring_stiffness", 0.0) if run.stiffness is None else run.stiffness
         stiff = dia_array((stiffness + spring, 0), shape=(stiffness.size, stiffness.size))
-        carried = run.mean @ (stiff @ run.reading) + values["rig.damping"] * rate + values["rig.mass"] * acceleration
+        since = remembered(elements, stiffness, slides)
+        carried = (
+            run.mean @ ((stiff - since) @ run.reading)
+            + values["rig.damping"] * rate
+            + values["rig.mass"] * acceleration
+        )
         pairs = (carried @ carried.T).tocoo()
         i, j = pairs.coords
         together = event[own][i] == event[own][j]
@@ -275,6 +282,22 @@ def noise(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks) -> Arr
         out[event[own][i], place[own][i], place[own][j]] = run.noise**2 * pairs.data[together]
         first += run.at.size
     return out
+
+
+def remembered(elements: Array, stiffness: Array, slides: NDArray[np.bool_]) -> csr_array:
+    """By how much the force at a knot falls for an error of the reading at an earlier one (N/m), shape (n, n).
+
+    Args:
+        elements: stiffness of every element (N/m), shape (k,).
+        stiffness: of all that stick at the knots, events by themselves (N/m), shape (n,).
+        slides: whether an element slides at a knot, shape (n, k).
+    """
+    n = len(slides)
+    last = np.maximum.accumulate(np.where(slides, np.arange(n)[:, None], -1), axis=0)
+    at, element = np.nonzero(~slides & (last >= 0))
+    plain = ~slides @ elements
+    own = np.divide(stiffness, plain, out=np.ones(n), where=plain > 0.0)
+    return coo_array((elements[element] * own[at], (at, last[at, element])), shape=(n, n)).tocsr()
 
 
 def fit(

@@ -140,6 +140,7 @@ class Slopes:
         local: in the event's own, shape (p, 4).
         tangent: stiffness of what sticks (N/m), shape (p,).
         sticking: the same at the knots of every run, shape (n,) each.
+        slides: whether an element slides there, shape (n, k) each.
         held: force that the model holds (N), shape (p,).
         measured: force that the motion says (N), shape (p,).
     """
@@ -149,6 +150,7 @@ class Slopes:
     local: Array
     tangent: Array
     sticking: tuple[Array, ...]
+    slides: tuple[NDArray[np.bool_], ...]
     held: Array
     measured: Array
 
@@ -223,7 +225,7 @@ class Problem:
         phase_scale = np.array([float(f.scale) for f in phases])
         leaves = tuple(jax.tree.leaves(c.effects))
         fixed = {n: np.float64(v) for n, v in {**c.fixed, "rig.mass": c.mass}.items()}
-        q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent = (
+        q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent, slides = (
             np.asarray(a)
             for a in program(
                 point.z, scales, point.phases.T * phase_scale, phase_scale, fixed, leaves,
@@ -277,7 +279,8 @@ class Problem:
             p += run.at.size
         slopes[:, a + b * runs + k :] = self._carried(tangents)
         residual += slopes[:, a + b * runs + k :] @ point.common
-        return Slopes(residual, slopes, local, tangents, tuple(sticking), held, held + residual / share)
+        sliding = tuple(slides[r, : k.t.size] for r, k in enumerate(self.runs))
+        return Slopes(residual, slopes, local, tangents, tuple(sticking), sliding, held, held + residual / share)
 
 
 def _room(size: int) -> int:
@@ -379,7 +382,7 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
         gain = 1.0 + jnp.sum(steps * jnp.diff(shift)) / jnp.sum(steps**2)
         return (
             (held.pull + held.body - held.contact, shift, model.mass(), steep, gain),
-            (held.elements, held.tangent),
+            (held.elements, held.tangent, held.slides),
         )
 
     def whole(
