@@ -110,3 +110,24 @@ def test_strength_and_stretch_of_an_event_are_those_of_its_elements(base):
     np.testing.assert_allclose(of_event.contact, of_bank.contact, rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(of_event.tangent[1:], of_bank.tangent[1:], rtol=1e-12)
     assert np.abs(of_event.contact - driven.march(base.model, base.way).contact).max() > 0.05 * driven.STRENGTH
+
+
+def test_the_shape_of_an_event_stretches_large_yield_displacements_more(base):
+    bank = base.model.bank
+    reach = np.asarray(bank.strength / bank.stiffness)
+    apart = np.log(reach) - np.log(reach).mean()
+    shaped = eqx.tree_at(lambda m: m.bank.stiffness, base.model, bank.stiffness * np.exp(-0.2 * apart))
+    of_event = driven.march(base.model, base.way._replace(shape=0.2 * base.way.strength))
+    of_bank = driven.march(shaped, base.way)
+    np.testing.assert_allclose(of_event.contact, of_bank.contact, rtol=0.0, atol=1e-13)
+    assert np.abs(of_event.contact - driven.march(base.model, base.way).contact).max() > 0.01 * driven.STRENGTH
+
+
+def test_elements_slide_where_they_carry_their_cap(base):
+    held = driven.march(base.model, base.way)
+    carried = np.abs(np.asarray(held.elements))
+    slides = np.asarray(held.slides)
+    assert slides.all(axis=1).any() and not slides[0].any()
+    assert carried[slides].min() > carried.max() * 0.7  # what weakening leaves of the cap
+    sticking = np.where(slides, 0.0, np.asarray(base.model.bank.stiffness)).sum(axis=1)
+    np.testing.assert_allclose(sticking[1:], held.tangent[1:], rtol=1e-12)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.inference.force.fit import fit, noise
+from stickslip.inference.force.fit import fit, noise, remembered
 from stickslip.inference.force.knots import RING, knots
 from stickslip.inference.force.problem import Problem
 from stickslip.inference.force.scatter import Blocks
@@ -59,3 +59,13 @@ def test_a_spring_of_the_run_counts_as_that_of_the_rig_does(small):
     own = Problem(replace(problem.composition, fixed=fixed), [replace(k, stiffness=stiffness) for k in problem.runs])
     shared = noise(problem, point, problem.evaluate(point), blocks)
     np.testing.assert_allclose(noise(own, point, own.evaluate(point), blocks), shared, rtol=1e-12, atol=0.0)
+
+
+def test_an_element_remembers_where_it_last_slid():
+    """Two elements there and back: the first slides at knots 1 and 4, the second never."""
+    slides = np.array([[False, False], [True, False], [False, False], [False, False], [True, False], [False, False]])
+    elements, stiffness = np.array([3.0, 5.0]), np.array([8.0, 5.0, 8.0, 16.0, 5.0, 8.0])
+    found = remembered(elements, stiffness, slides).toarray()
+    wanted = np.zeros((6, 6))
+    wanted[2, 1], wanted[3, 1], wanted[5, 4] = 3.0, 6.0, 3.0  # at knot 3 the event's elements are twice as stiff
+    np.testing.assert_allclose(found, wanted)
