@@ -14,18 +14,15 @@ class _Callable(ModuleType):
     """A package that can be called: its name is the function's."""
 
     def __call__(self, campaign: Any) -> Any:
-        """The pages of a campaign, for a notebook.
+        """The pages of a campaign, for a notebook on this machine: a frame onto a server in its kernel.
 
         Args:
-            campaign: a :class:`stickslip.Campaign`; its base model is fitted first (seconds).
+            campaign: a :class:`stickslip.Campaign`; its base model is fitted beside (seconds).
         """
-        from .app import ready, view
+        from .serve import Window
         from .session import Session
 
-        ready(inline=True)
-        session = Session(campaign=campaign, effects=campaign.effects)
-        session.begin(keep=False)
-        return view(session)
+        return Window(Session(campaign=campaign, effects=campaign.effects))
 
 
 sys.modules[__name__].__class__ = _Callable

@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 import panel as pn
+from panel.theme.native import Native
 
 from .controls import BUTTON, Frame, Message
 from .figures import dark, look
@@ -28,9 +29,9 @@ TABS = """
 """
 
 
-def ready(inline: bool = False) -> None:
-    """Panel as the workbench needs it: nothing from the network, one design; ``inline`` for a notebook."""
-    pn.extension(design="native", notifications=False, sizing_mode="stretch_width", raw_css=[STYLE], inline=inline)
+def ready() -> None:
+    """Panel as the workbench needs it: one design; not by its extension, which loads from the network in a notebook."""
+    pn.config.param.update(design=Native, notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
 
 
 def modules() -> list[ModuleType]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hmac
 import logging
+import queue
 import secrets
 import signal
 import socket
+import threading
 import webbrowser
 from collections.abc import Callable
 from typing import Any
@@ -55,7 +57,7 @@ class Door(Router):
 
 def serve(
     session: Session, *, port: int = 0, address: str = LOOPBACK, browser: bool = True,
-    tell: Callable[[str], None] = print, token: str | None = None,
+    tell: Callable[[str], None] = print, token: str | None = None, keep: bool = True,
 ) -> None:  # fmt: skip
     """Serve a session until interrupted.
 
@@ -66,6 +68,7 @@ def serve(
         browser: open it.
         tell: told the address.
         token: in the address; random unless given.
+        keep: the history beside the campaign's file.
 
     Raises:
         InputError: the port is taken, or the address is none of this machine.
@@ -85,12 +88,13 @@ def serve(
     )  # fmt: skip
     server._http.request_callback = Door(server._tornado, token)
     server.start()
-    signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
     url = f"http://{address}:{port}/{token}/"
     tell(url)
     watcher = own.watch(session, session.effects) if session.effects else None
     if session.campaign is not None:
-        session.begin()
+        session.begin(keep)
     if browser:
         server.io_loop.add_callback(webbrowser.open, url)
     try:
@@ -100,6 +104,44 @@ def serve(
             watcher.set()
         session.close()
         server.stop()
+
+
+class Window:
+    """A workbench in a notebook: a frame onto a server of its own, in a thread of the notebook's kernel.
+
+    Attributes:
+        url: its address, on this machine and with its token.
+        tall: pixels of the frame.
+
+    Args:
+        session: what it shows.
+        tall: of the frame.
+
+    Raises:
+        InputError: the server cannot listen.
+    """
+
+    def __init__(self, session: Session, tall: int = 1000) -> None:
+        self.tall = tall
+        told: queue.SimpleQueue[str | Exception] = queue.SimpleQueue()
+
+        def run() -> None:
+            try:
+                serve(session, browser=False, tell=told.put, keep=False)
+            except Exception as error:  # whoever waits is told
+                told.put(error)
+
+        threading.Thread(target=run, name="stickslip workbench", daemon=True).start()
+        found = told.get()
+        if isinstance(found, Exception):
+            raise found
+        self.url = found
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{self.url}" style="width: 100%; height: {self.tall}px; border: 0"></iframe>'
+
+    def __repr__(self) -> str:
+        return f"stickslip workbench: {self.url}"
 
 
 def _free(address: str, port: int) -> int:

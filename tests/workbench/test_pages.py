@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import urllib.error
+import urllib.request
+
 import numpy as np
 import pytest
 
@@ -200,14 +203,16 @@ def test_a_page_behind_another_follows_when_it_is_seen():
 
 
 def test_a_notebook_shows_the_same_pages(campaign, base, monkeypatch):
-    import panel
-
     import stickslip as ss
 
-    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+    monkeypatch.setattr(type(campaign), "fit", lambda self, **_: base)
     monkeypatch.setattr(Session, "list_promises", lambda self: None)
     shown = ss.workbench(campaign)
-    assert isinstance(shown, panel.Column)
+    assert f'<iframe src="{shown.url}"' in shown._repr_html_() and shown.url in repr(shown)
+    page = urllib.request.urlopen(shown.url, timeout=30).read().decode()
+    assert "<title>stickslip" in page and "cdn." not in page
+    with pytest.raises(urllib.error.HTTPError):  # without the token
+        urllib.request.urlopen(shown.url.rsplit("/", 2)[0] + "/", timeout=30)
 
 
 def test_of_many_steps_the_first_by_hand_are_forgotten(session, base, monkeypatch):
