@@ -257,7 +257,7 @@ class Fit(Shown):
                 raise InputError("out of range", key=name, value=value, allowed=allowed)
             z[known[name]] = f.inward(number)
         found = self._fit
-        moved = at(found.problem, replace(found.point, z=z, weights=weights), found.scatter, found.dropped, found.known)
+        moved = at(found.problem, replace(found.point, z=z, weights=weights), found.scatter, found)
         made = Fit(self.campaign, self._climbed, moved)
         if "rig.spring_stiffness" not in values:
             made.__dict__["_where"] = self._where
@@ -281,7 +281,7 @@ class Fit(Shown):
             free = again.problem.with_composition(
                 replace(again.problem.composition, free=found.problem.composition.free)
             )
-            again = at(free, again.point, again.scatter, again.dropped, again.known)
+            again = at(free, again.point, again.scatter, again)
         return Fit(self.campaign, replaced(self.climbed, again))
 
     def add(self, effect: str) -> Fit:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,15 +13,14 @@ from ..inference.force.candidates import with_start
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at
 from ..inference.force.heldout import unseen
-from ..inference.force.problem import Point, Problem
-from ..inference.force.scatter import Scatter
+from ..inference.force.problem import Problem
+from ..inference.force.stored import fit_arrays, fit_of
 from ..physics.effects import catalogue
 from ..physics.params import specs, variants
 from .campaign import Campaign
 from .fit import Fit
 
 Arrays = dict[str, np.ndarray]
-_POINT = ("z", "phases", "weights", "events", "common")
 
 
 def packed(fit: Fit, keep: Callable[[ForceFit, Arrays], str]) -> dict[str, Any]:
@@ -39,12 +37,12 @@ def packed(fit: Fit, keep: Callable[[ForceFit, Arrays], str]) -> dict[str, Any]:
             "added": rung.added,
             "removed": rung.removed,
             "effects": [_effect(e) for e in rung.fit.problem.composition.effects],
-            "arrays": keep(rung.fit, _arrays(rung.fit)),
+            "arrays": keep(rung.fit, fit_arrays(rung.fit)),
         }
         for rung in done.ladder
         if rung.fit is not None
     ]
-    moved = None if fit._moved is None else keep(fit._moved, _arrays(fit._moved))
+    moved = None if fit._moved is None else keep(fit._moved, fit_arrays(fit._moved))
     return {"rungs": rungs, "gains": dict(done.gains), "moved": moved}
 
 
@@ -65,7 +63,7 @@ def unpacked(campaign: Campaign, kept: Mapping[str, Any], load: Callable[[str], 
     problem = prepared.problem
     for row in kept["rungs"]:
         problem = _with(prepared.problem, row["effects"])
-        found = _again(problem, load(row["arrays"]))
+        found = fit_of(problem, load(row["arrays"]))
         if not ladder:
             ladder.append(Rung(("static",), None, static_residual(found), None, None))
         residual = unseen(found).residual
@@ -74,8 +72,8 @@ def unpacked(campaign: Campaign, kept: Mapping[str, Any], load: Callable[[str], 
     if kept["moved"]:
         last = ladder[-1].fit
         assert last is not None
-        moved = _again(problem, load(kept["moved"]))
-        moved = at(moved.problem, moved.point, moved.scatter, moved.dropped, last.known)
+        moved = fit_of(problem, load(kept["moved"]))
+        moved = at(moved.problem, moved.point, moved.scatter, last)
     return Fit(campaign, Climbed(prepared, tuple(ladder), dict(kept["gains"])), moved)
 
 
@@ -92,20 +90,3 @@ def _with(problem: Problem, effects: list[dict[str, Any]]) -> Problem:
         effect = catalogue.get(row["tag"])(**row["form"])
         problem, _ = with_start(problem, effect, row["values"])
     return problem
-
-
-def _arrays(found: ForceFit) -> Arrays:
-    point = {name: np.asarray(getattr(found.point, name)) for name in _POINT}
-    problem = found.problem
-    return {
-        **point, "sizes": found.scatter.sizes, "dropped": found.dropped,
-        "reach": np.asarray(problem.composition.reach), "carrier": np.asarray(problem.carrier),
-    }  # fmt: skip
-
-
-def _again(problem: Problem, arrays: Mapping[str, np.ndarray]) -> ForceFit:
-    composition = replace(problem.composition, reach=np.asarray(arrays["reach"], float))
-    point = Point(*(np.asarray(arrays[name], float) for name in _POINT))
-    dropped = np.asarray(arrays["dropped"], bool)
-    carried = problem.with_composition(composition).carried_by(np.asarray(arrays["carrier"], float))
-    return at(carried, point, Scatter(arrays["sizes"]), dropped)

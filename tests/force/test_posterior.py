@@ -1,5 +1,6 @@
 """The density that a sampler walks through: its gradient, and what it is near the optimum."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,8 @@ def aged():
 
 @pytest.fixture(scope="module")
 def way(aged):
-    return walked(aged._fit)
+    """Counted in the deviations of the derivatives, without what profiles add to them."""
+    return walked(replace(aged._fit, valleys=()))
 
 
 def test_the_gradient_is_that_of_the_density(way):
@@ -36,8 +38,8 @@ def test_near_the_optimum_it_is_the_normal_density_of_the_covariance(way):
     _, top, slope = way.at(np.zeros(way.size))
     assert np.linalg.norm(slope) < np.sqrt(SETTLED)  # a fit ends within that of its optimum
     for _ in range(5):
-        x = 0.1 * rng.standard_normal(way.size)
-        assert way.at(x)[1] - top == pytest.approx(slope @ x - 0.5 * x @ x, rel=0.1, abs=5e-3)
+        x = 0.03 * rng.standard_normal(way.size)  # farther out the valley bends
+        assert way.at(x)[1] - top == pytest.approx(slope @ x - 0.5 * x @ x, rel=0.1, abs=2e-4)
 
 
 def test_beyond_a_bound_it_falls_steeply(way):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -12,10 +11,10 @@ import numpy as np
 from ...physics.effects import catalogue
 from ..force.candidates import Candidate, with_start
 from ..force.fit import Fit, at
-from ..force.problem import Point, Problem
+from ..force.problem import Problem
 from ..force.scatter import Scatter
+from ..force.stored import fit_arrays, fit_of, point_arrays, point_of
 
-_POINT = ("z", "phases", "weights", "events", "common")
 _FACTS = ("tag", "form", "promise", "note", "members", "visible", "start")
 
 
@@ -33,13 +32,10 @@ def kept(store: Store | None, key: str, problem: Problem, make: Callable[[], Fit
     """A fit of the problem from the store, or made and kept there."""
     found = store.load(key) if store is not None else None
     if found is not None:
-        problem = problem.with_composition(replace(problem.composition, reach=np.asarray(found["reach"], float)))
-        fit = at(problem, _point(found), Scatter(found["sizes"]), found["dropped"].astype(bool))
-        return replace(fit, valleys=tuple(np.atleast_2d(found["valleys"]) if found["valleys"].size else ()))
+        return fit_of(problem, found)
     fit = make()
     if store is not None:
-        facts = {"sizes": fit.scatter.sizes, "dropped": fit.dropped, "reach": fit.problem.composition.reach}
-        store.save(key, {**_arrays(fit.point), **facts, "valleys": np.array(fit.valleys)})
+        store.save(key, fit_arrays(fit))
     return fit
 
 
@@ -52,7 +48,7 @@ def save_candidate(store: Store, key: str, candidate: Candidate) -> None:
     """Keep a candidate."""
     head = json.dumps({name: getattr(candidate, name) for name in _FACTS})
     fit = candidate.fit
-    point = {} if fit is None else {**_arrays(fit.point), "sizes": fit.scatter.sizes}
+    point = {} if fit is None else {**point_arrays(fit.point), "sizes": fit.scatter.sizes}
     store.save(key, {"head": np.array(head), **point})
 
 
@@ -66,12 +62,4 @@ def load_candidate(store: Store, key: str, base: Fit) -> Candidate | None:
         return Candidate(**head, fit=None)
     effect = catalogue.get(head["tag"])(**head["form"])
     problem, _ = with_start(base.problem, effect, head["start"])
-    return Candidate(**head, fit=at(problem, _point(found), Scatter(found["sizes"]), base.dropped, base.known))
-
-
-def _arrays(point: Point) -> dict[str, np.ndarray]:
-    return {name: np.asarray(getattr(point, name)) for name in _POINT}
-
-
-def _point(found: Mapping[str, np.ndarray]) -> Point:
-    return Point(*(np.asarray(found[name], float) for name in _POINT))
+    return Candidate(**head, fit=at(problem, point_of(found), Scatter(found["sizes"]), base))

@@ -32,6 +32,7 @@ STEPS = 4  # evaluations between
 NEWTON = 4  # steps of the sizes between
 BESIDE, ASIDE, SEED = 2, 0.02, 1  # fits begun anew beside the end of one, how far (on the search scale), and where
 SETTLED = 0.3  # fall of the cost (in units of chi-square) at which a round ends
+NONE = 1e-12  # share of the strength that the rounding of a step leaves in an element at its bound
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class Fit:
         scatter: sizes of what is random.
         dropped: points left out, for they lie beyond what else is random (a jump of the sensor), shape (p,).
         known: what the covariance is made of.
+        around: where the noise of the readings was carried to a force.
         blocks: points by event.
         strength: force of the contact at full strength (N).
         evaluations: of the model.
@@ -57,6 +59,7 @@ class Fit:
     scatter: Scatter
     dropped: NDArray[np.bool_]
     known: Known
+    around: Point
     blocks: Blocks
     strength: float
     evaluations: int
@@ -213,7 +216,8 @@ def moved(point: Point, change: Array, events: Array) -> Point:
     a, b = point.z.size, point.phases.size
     phases = point.phases + change[a : a + b].reshape(point.phases.shape)
     k = point.weights.size
-    weights = np.maximum(point.weights + change[a + b : a + b + k], 0.0)
+    weights = point.weights + change[a + b : a + b + k]
+    weights = np.where(weights > NONE * point.weights.sum(), weights, 0.0)
     return Point(point.z + change[:a], phases, weights, events, point.common + change[a + b + k :])
 
 
@@ -350,9 +354,9 @@ def fit(
         evaluations += count
         if turn > PLACED + 2 and total < 1.0:
             break
-    made = known_of(problem, point, slopes, blocks, out)
+    made, around = known_of(problem, point, slopes, blocks, out), point
     point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, blocks, LAST)
-    return _best(adapted(_found(problem, point, slopes, sizes, out, made, evaluations + count)))
+    return _best(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
 
 
 def _best(found: Fit) -> Fit:
@@ -385,7 +389,7 @@ def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
     if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
         raise FitError("the model gives no finite force along the motion")
     point, slopes, _, count, _ = descend(problem, point, slopes, base.scatter, base.known, blocks, last)
-    return _found(problem, point, slopes, base.scatter, base.dropped, base.known, count + 1)
+    return _like(base, problem, point, slopes, base.scatter, count + 1)
 
 
 def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
@@ -414,7 +418,7 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
         evaluations += count
         if fallen + total < 1.0:
             break
-    return _found(problem, point, slopes, sizes, found.dropped, found.known, evaluations)
+    return _like(found, problem, point, slopes, sizes, evaluations)
 
 
 def descend(
@@ -464,21 +468,31 @@ def descend(
     return point, slopes, first - cost, count, radius
 
 
-def at(problem: Problem, point: Point, scatter: Scatter, dropped: NDArray[np.bool_], known: Known | None = None) -> Fit:
-    """A fit that was made before, from where it ended; arguments as of :func:`fit`."""
+def at(problem: Problem, point: Point, scatter: Scatter, base: Fit) -> Fit:
+    """A model at a point, with what is known of the noise as in another fit of the same data."""
+    return _like(base, problem, point, problem.evaluate(point), scatter, 1)
+
+
+def again(
+    problem: Problem, point: Point, scatter: Scatter, dropped: NDArray[np.bool_], around: Point, evaluations: int
+) -> Fit:
+    """A fit that was made before, from where it ended; arguments as the attributes of :class:`Fit`."""
     blocks = Blocks.of(problem.of, problem.events)
-    slopes = problem.evaluate(point)
-    made = known or known_of(problem, point, slopes, blocks, dropped)
-    return _found(problem, point, slopes, scatter, dropped, made, 1)
+    known = known_of(problem, around, problem.evaluate(around), blocks, dropped)
+    return _found(problem, point, problem.evaluate(point), scatter, dropped, known, around, evaluations)
+
+
+def _like(base: Fit, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, evaluations: int) -> Fit:
+    return _found(problem, point, slopes, scatter, base.dropped, base.known, base.around, evaluations)
 
 
 def _found(
     problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, dropped: NDArray[np.bool_], known: Known,
-    evaluations: int,
+    around: Point, evaluations: int,
 ) -> Fit:  # fmt: skip
     blocks = Blocks.of(problem.of, problem.events)
     return Fit(
-        problem, point, slopes, scatter, dropped, known.with_local(blocks(slopes.local)), blocks,
+        problem, point, slopes, scatter, dropped, known.with_local(blocks(slopes.local)), around, blocks,
         float(point.weights.sum()), evaluations,
     )  # fmt: skip
 

@@ -142,7 +142,7 @@ class Slopes:
         sticking: the same at the knots of every run, shape (n,) each.
         slides: whether an element slides there, shape (n, k) each.
         held: force that the model holds (N), shape (p,).
-        measured: force that the motion says (N), shape (p,).
+        share: what a reading counts for as the rig is stated, over what it counts for in the model, shape (p,).
     """
 
     residual: Array
@@ -152,7 +152,12 @@ class Slopes:
     sticking: tuple[Array, ...]
     slides: tuple[NDArray[np.bool_], ...]
     held: Array
-    measured: Array
+    share: Array
+
+    @property
+    def measured(self) -> Array:
+        """Force that the motion says (N), shape (p,)."""
+        return np.asarray(self.held + self.residual / self.share)
 
 
 class Problem:
@@ -280,7 +285,7 @@ class Problem:
         slopes[:, a + b * runs + k :] = self._carried(tangents)
         residual += slopes[:, a + b * runs + k :] @ point.common
         sliding = tuple(slides[r, : k.t.size] for r, k in enumerate(self.runs))
-        return Slopes(residual, slopes, local, tangents, tuple(sticking), sliding, held, held + residual / share)
+        return Slopes(residual, slopes, local, tangents, tuple(sticking), sliding, held, share)
 
 
 def _room(size: int) -> int:

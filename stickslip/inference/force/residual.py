@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from .fit import Array, Fit
 from .knots import RING
+from .problem import CREEPING
 from .signatures import Explained
 
 NODES = 7
@@ -17,6 +18,8 @@ VARIABLES = {
     "time": "s", "displacement": "m", "velocity": "m/s", "spring force": "N", "time in contact": "s",
     "number of the event": "1",
 }  # fmt: skip
+PULLED = "spring force"
+BENT = ("velocity", "time in contact")  # over decades
 WAYS = {"slip path": "m", "load point": "m"}
 
 
@@ -55,21 +58,44 @@ def coordinates(fit: Fit) -> dict[str, Array]:
     return dict(zip((*VARIABLES, *WAYS), values, strict=True))
 
 
+def smooth_force(fit: Fit, name: str, values: Array) -> tuple[Array, Array]:
+    """A force that is a broken line over a variable.
+
+    Args:
+        fit: the model without it.
+        name, values: of the variable, shape (p,).
+
+    Returns:
+        Places of its nodes, shape (m,), and what one strength of the contact there changes of the residuals (N), shape
+        (p, m).
+    """
+    scaled = np.arcsinh(values / (0.02 * np.abs(values).max())) if name in BENT else values
+    nodes = np.unique(np.quantile(scaled, np.linspace(0.0, 1.0, NODES)))
+    hats = np.stack([np.interp(scaled, nodes, row) for row in np.eye(nodes.size)], axis=1)
+    columns = -fit.slopes.share[:, None] * hats
+    if name == PULLED and nodes.size > 1:  # it makes the spring another one, for which a reading counts differently
+        steeper = np.stack([_slope(scaled, nodes, row) for row in np.eye(nodes.size)], axis=1)
+        common = fit.point.common
+        forces = fit.residual - fit.slopes.shared[:, -common.size :] @ common
+        columns += steeper * (forces * (fit.problem.phase == CREEPING))[:, None]
+    return np.interp(nodes, np.sort(scaled), np.sort(values)), columns * fit.strength
+
+
 def structures(fit: Fit, explained: Explained, dispersion: float = 1.0) -> list[Structure]:
     """All variables, the most telling first."""
     out = []
     found = coordinates(fit)
     for name, unit in VARIABLES.items():
-        values = found[name]
-        scaled = (
-            np.arcsinh(values / (0.02 * np.abs(values).max())) if name in ("velocity", "time in contact") else values
-        )
-        nodes = np.unique(np.quantile(scaled, np.linspace(0.0, 1.0, NODES)))
-        if nodes.size < 3:
+        at, columns = smooth_force(fit, name, found[name])
+        if at.size < 3:
             continue
-        basis = np.stack([np.interp(scaled, nodes, row) for row in np.eye(nodes.size)], axis=1) * fit.strength
-        fall, sizes = explained.gain(-basis)
-        chance = float(chi2.sf(fall / dispersion, nodes.size) * len(VARIABLES))
-        at = np.interp(nodes, np.sort(scaled), np.sort(values))
+        fall, sizes = explained.gain(columns)
+        chance = float(chi2.sf(fall / dispersion, at.size) * len(VARIABLES))
         out.append(Structure(name, unit, fall, min(chance, 1.0), at, sizes * fit.strength))
     return sorted(out, key=lambda s: s.chance)
+
+
+def _slope(values: Array, nodes: Array, heights: Array) -> Array:
+    """Derivative of the broken line through nodes at some values."""
+    piece = np.clip(np.searchsorted(nodes, values, side="right") - 1, 0, nodes.size - 2)
+    return np.asarray(np.diff(heights) / np.diff(nodes))[piece]

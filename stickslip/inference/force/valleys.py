@@ -70,9 +70,11 @@ def widened(found: Fit, names: Sequence[str], dispersion: float) -> Fit:
             continue
         variance = _variance(offset, rise)
         if variance > own:
-            low, high = points[int(np.argmin(offset))][0], points[int(np.argmax(offset))][0]
-            along = (high - low) / (high[k] - low[k]) * np.sqrt(variance - own)
-            found = replace(found, valleys=(*found.valleys, along))
+            # the valley is bent: its direction at the optimum is that of a parabola along it
+            scale = float(np.abs(offset).max())
+            bent = np.stack([offset / scale, (offset / scale) ** 2], axis=1)
+            along = np.linalg.lstsq(bent, np.array([p for p, _ in points]), rcond=None)[0][0] / scale
+            found = replace(found, valleys=(*found.valleys, along * np.sqrt(variance - own)))
     return found
 
 

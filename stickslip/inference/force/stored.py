@@ -1,0 +1,61 @@
+"""A fit as plain arrays, from which it is there again, to the last digit, without being fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from .fit import Array, Fit, again
+from .problem import Point, Problem
+from .scatter import Scatter
+
+POINT = ("z", "phases", "weights", "events", "common")
+AROUND = "around_"
+
+
+def point_arrays(point: Point, prefix: str = "") -> dict[str, Array]:
+    """A point by name."""
+    return {prefix + name: np.asarray(getattr(point, name)) for name in POINT}
+
+
+def point_of(kept: Mapping[str, np.ndarray], prefix: str = "") -> Point:
+    """The point again."""
+    return Point(*(np.asarray(kept[prefix + name], float) for name in POINT))
+
+
+def fit_arrays(found: Fit) -> dict[str, np.ndarray]:
+    """A fit by name."""
+    problem = found.problem
+    return {
+        **point_arrays(found.point),
+        **point_arrays(found.around, AROUND),
+        "sizes": found.scatter.sizes,
+        "dropped": found.dropped,
+        "reach": np.asarray(problem.composition.reach),
+        "carrier": np.asarray([] if problem.carrier is None else problem.carrier),
+        "valleys": np.array(found.valleys),
+        "evaluations": np.array(found.evaluations),
+    }
+
+
+def fit_of(problem: Problem, kept: Mapping[str, np.ndarray]) -> Fit:
+    """The fit again.
+
+    Args:
+        problem: of the same data and with the same composition.
+        kept: what :func:`fit_arrays` returned.
+
+    Raises:
+        KeyError, ValueError: the arrays are damaged.
+    """
+    problem = problem.with_composition(replace(problem.composition, reach=np.asarray(kept["reach"], float)))
+    if kept["carrier"].size:
+        problem = problem.carried_by(np.asarray(kept["carrier"], float))
+    found = again(
+        problem, point_of(kept), Scatter(np.asarray(kept["sizes"], float)), np.asarray(kept["dropped"], bool),
+        point_of(kept, AROUND), int(kept["evaluations"]),
+    )  # fmt: skip
+    valleys = kept["valleys"]
+    return replace(found, valleys=tuple(np.asarray(valleys, float)) if valleys.size else ())
