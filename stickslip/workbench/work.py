@@ -20,6 +20,7 @@ from ..system.progress import Cancelled, cancellable
 
 Tell = Callable[[str, float], None]
 PATIENCE = 3.0  # s that a process has to end after it gave its answer; its own workers may wait for more work
+STEP = 10.0  # s that a step of a fit may take, the compilation of a program in it
 QUIET = "ignore::UserWarning:joblib.externals.loky.backend.resource_tracker"  # of workers that were ended
 
 
@@ -66,6 +67,13 @@ class Worker:
         with self._changed:
             self._jobs.clear()
             self._cancel = self._busy
+
+    def close(self) -> None:
+        """The same, and wait for that step: compiled code that still runs when the interpreter ends would abort it."""
+        self.cancel()
+        begun = time.monotonic()
+        while self._busy and time.monotonic() - begun < STEP:
+            time.sleep(0.02)
 
     def _run(self) -> None:
         while True:

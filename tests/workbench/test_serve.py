@@ -16,6 +16,7 @@ from stickslip.cli import run
 from stickslip.errors import InputError
 from stickslip.system.runstore import json_text
 from stickslip.workbench import opening, own
+from stickslip.workbench.journal import FOLDER
 from stickslip.workbench.opening import campaign_of, offered, opened
 from stickslip.workbench.serve import _free
 from stickslip.workbench.session import Session
@@ -50,6 +51,15 @@ class Pull(BodyForce):
 def served(folder):
     made = Served(folder / "campaign.toml")
     yield made
+    assert made.end() == 0
+
+
+@pytest.mark.parametrize("after", [0.3, 1.0])
+def test_it_ends_cleanly_in_the_midst_of_a_fit(folder, after):
+    for kept in (folder / FOLDER).glob("*"):
+        kept.unlink()
+    made = Served(folder / "campaign.toml")
+    time.sleep(after)
     assert made.end() == 0
 
 
