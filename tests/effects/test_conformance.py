@@ -36,6 +36,7 @@ TAGS = [
     "load-modulation",
     "tilt",
     "position-dependent-friction",
+    "wandering-friction",
     "wear",
     "flash-heating",
     "drive-ripple",

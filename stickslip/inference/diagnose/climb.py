@@ -157,7 +157,12 @@ def replaced(done: Climbed, found: Fit) -> Climbed:
 
 
 def _acts(tag: str, form: Mapping[str, str]) -> None:
-    """Refuse what only gives the backbone another shape."""
+    """Refuse what only gives the backbone another shape, and what is drawn at random."""
+    if catalogue.get(tag).drawn:
+        raise InputError(
+            "the course of this effect is a draw at random, of which only size and length can be measured",
+            key="--add", value=tag, hint="stickslip forecast tells both; events may differ in any model",
+        )  # fmt: skip
     if shapes_backbone(catalogue.get(tag)(**form)):
         raise InputError(
             "the effect only gives the contact's backbone another shape, which the fit measures as it is",

@@ -171,6 +171,8 @@ def diagnose(
     prepared = prepare(campaign, traces, segmentations, holdout)
     dropped = list(prepared.dropped)
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]
+    if candidates is not None:
+        dropped += [f"{t}: not tried, for its course is a draw at random" for t in tags if catalogue.get(t).drawn]
     if campaign.rig.contacts == 1 and SEVERAL in tags:
         tags.remove(SEVERAL)
         dropped.append(f"{SEVERAL}: not tried, for the rig has one contact")

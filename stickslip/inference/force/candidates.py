@@ -71,8 +71,10 @@ def shapes_backbone(effect: Effect) -> bool:
 def every_form(tags: Sequence[str]) -> list[tuple[str, dict[str, str]]]:
     """All forms of the effects that act along the motion."""
     out = []
-    for tag in tags:
-        cls = catalogue.get(tag)
+    for cls in map(catalogue.get, tags):
+        tag = cls.tag
+        if cls.drawn:  # another draw is another course: its events are what the scatter of the model describes
+            continue
         for form in catalogue.forms(cls):
             if not shapes_backbone(cls(**form)):
                 out.append((tag, form))

@@ -30,6 +30,7 @@ from . import (  # noqa: F401  (each module registers its effect)
     velocity_weakening,
     viscoelastic_contact,
     viscous_drag,
+    wandering_friction,
     wear,
 )
 from .base import (

@@ -108,6 +108,8 @@ class Effect(eqx.Module):
             put energy in; all others are held to be passive by the conformance suite.
         periodic: of a wave: the parameter that is its period (or "frequency"), and over what it is periodic: "time",
             "load point" or "displacement". A parameter called ``phase`` gets a value for each run.
+        drawn: whether its course is one draw at random. Such an effect is simulated; what a measurement says of it is
+            a size and a length (:meth:`stickslip.Campaign.levels`), and no course that could be fitted.
     """
 
     tag: ClassVar[str] = ""
@@ -121,6 +123,7 @@ class Effect(eqx.Module):
     exponents: ClassVar[tuple[str, ...]] = ()
     periodic: ClassVar[tuple[str, Literal["time", "load point", "displacement"]] | None] = None
     family: ClassVar[str] = "contact"
+    drawn: ClassVar[bool] = False
     symbols: ClassVar[dict[str, str]] = {}
 
     def formula(self) -> str:

@@ -1,0 +1,118 @@
+"""Friction whose level wanders."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from scipy.special import stdtrit
+
+from ..contact import Bank
+from ..params import parameter, variant
+from .base import Contact, Memory, Motion, Threshold
+from .catalogue import register
+
+WAVES = 128
+# even in the spectral density of the process (Student's t with three degrees of freedom), at places without a period
+_SHARE = (np.arange(WAVES) + np.mod(np.arange(1, WAVES + 1) * 0.5 * (np.sqrt(5.0) - 1.0), 1.0)) / WAVES
+FREQUENCY = stdtrit(3, 0.5 + 0.5 * _SHARE)
+# turned on by numbers without a common period, whatever the draw
+TURN = 2.0 * np.pi * np.mod(np.arange(1, WAVES + 1) ** 2 * np.sqrt(2.0), 1.0), np.sqrt(np.arange(2, WAVES + 2))
+
+
+@register
+class WanderingFriction(Memory, Threshold):
+    """The logarithm of the caps is one draw of a Gaussian process, along place, slip path or time.
+
+    Its covariance is Matern's, eps^2 (1 + sqrt(3) r) exp(-sqrt(3) r) at a distance of r correlation lengths. The draw
+    is a sum of waves of one size, spread as the spectral density of the process is (Shinozuka & Deodatis 1991), whose
+    phases the number of the draw turns.
+    """
+
+    tag = "wandering-friction"
+    summary = "the level of friction wanders along the track, with the slip path or in time"
+    equation = (
+        r"\mu \to \mu\,e^{w},\quad w = \varepsilon\,\sqrt{2/M}\,\sum_j \cos(q_j s/\ell + \varphi_j + n \gamma_j),"
+        r"\quad s = x \;\mathrm{or}\; \dot s = |\dot x| \;\mathrm{or}\; s = t,\ \ell = \tau"
+    )
+    symbols = {
+        "w": "logarithm of the level of friction (1)",
+        "s": "what the level goes with: place (m), slip path (m) or time (s)",
+        "M": "number of waves, 128",
+        "q_j": "wave numbers in correlation lengths, spread as the spectral density of the process is (1)",
+        r"\varphi_j": "phases of the first draw (rad)",
+        r"\gamma_j": "turn of a phase from draw to draw (rad)",
+    }
+    signature = "slips of irregular size: forces at onset and arrest vary together, and alike in slips near each other"
+    confused_with = {
+        "position-dependent-friction": "a longer track: a wave comes back after its length",
+        "wear": "a longer path: a run-in ends, a wander does not",
+    }
+    source = "Shinozuka & Deodatis, Appl. Mech. Rev. 44 (1991) 191; Hartikainen & Sarkka, MLSP (2010) 379"
+    amplitude = "size"
+    family = "friction"
+    drawn = True
+
+    size: Array = parameter(
+        0.0,
+        unit="1",
+        lower=0.0,
+        upper=0.5,
+        null=0.0,
+        symbol=r"\varepsilon",
+        doc="standard deviation of the logarithm of friction",
+    )
+    length: Array = parameter(
+        1e-4,
+        unit="m",
+        lower=1e-6,
+        upper=1.0,
+        log=True,
+        grid=(1e-4,),
+        symbol=r"\ell",
+        doc="correlation length along place or slip path",
+    )
+    time: Array = parameter(
+        10.0,
+        unit="s",
+        lower=1e-3,
+        upper=1e6,
+        log=True,
+        grid=(10.0,),
+        symbol=r"\tau",
+        doc="correlation time",
+    )
+    draw: Array = parameter(
+        0.0,
+        unit="1",
+        lower=0.0,
+        upper=30.0,
+        grid=(0.0,),
+        symbol="n",
+        doc="number of the draw: another one, half apart or more, is another course",
+    )
+    along: str = variant("place", ("place", "slip", "time"), "what the level goes with")
+
+    def formula(self) -> str:
+        goes = {"place": "s = x", "slip": r"\dot s = |\dot x|,\quad s(0) = 0", "time": "s = t"}[self.along]
+        length = r"\tau" if self.along == "time" else r"\ell"
+        return (
+            rf"\mu \to \mu\,e^{{w}},\quad w = \varepsilon\,\sqrt{{2/M}}\,\sum_j "
+            rf"\cos(q_j s/{length} + \varphi_j + n \gamma_j),\quad {goes}"
+        )
+
+    def start(self, bank: Bank) -> Array:
+        return jnp.zeros(())
+
+    def advance(self, state: Array, motion: Motion, contact: Contact) -> Array:
+        return state + motion.path
+
+    def course(self, s: Array) -> Array:
+        """Logarithm of the level at coordinates in correlation lengths, over its standard deviation; shape as ``s``."""
+        first, turns = TURN
+        waves = jnp.cos(FREQUENCY * jnp.asarray(s)[..., None] + (first + turns * self.draw))
+        return np.sqrt(2.0 / WAVES) * jnp.sum(waves, axis=-1)
+
+    def strength(self, state: Array, motion: Motion, contact: Contact) -> Array:
+        at = {"place": motion.x / self.length, "slip": state / self.length, "time": motion.t / self.time}[self.along]
+        return jnp.exp(self.size * self.course(at))

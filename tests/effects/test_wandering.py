@@ -1,0 +1,69 @@
+"""Friction that wanders: the process it is a draw of, and that a record simulated with it says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.data.segment import segment
+from stickslip.effects import make
+from stickslip.errors import InputError
+from stickslip.inference.force.candidates import every_form
+from stickslip.inference.forecast.levels import level_arrays
+from stickslip.inference.forecast.wander import Component, covariance, fit
+from stickslip.simulation.scenario import load_scenario
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SIZE, LENGTH = 0.1, 300e-6
+
+
+def test_a_course_has_the_covariance_of_the_process():
+    s = np.linspace(0.0, 2000.0, 80001)
+    for draw in (0.0, 1.0, 7.5):
+        w = np.asarray(make("wandering-friction", size=0.1, draw=draw).course(s))
+        assert abs(w.mean()) < 0.05
+        for lag in (0.25, 0.5, 1.0, 2.0):
+            k = round(lag / (s[1] - s[0]))
+            assert np.mean(w[k:] * w[:-k]) == pytest.approx(covariance("matern-3/2", lag, 1.0), abs=0.05)
+
+
+def test_draws_are_independent_and_normal():
+    s = np.arange(0.0, 400.0, 8.0)  # hardly correlated
+    w = np.stack([np.asarray(make("wandering-friction", size=0.1, draw=n / 2).course(s)) for n in range(60)])
+    apart = np.corrcoef(w)[np.triu_indices(60, 1)]
+    assert apart.std() == pytest.approx(s.size**-0.5, rel=0.2)  # as of independent ones
+    assert abs(apart.mean()) < 0.02
+    assert np.mean(w**4) / np.mean(w**2) ** 2 == pytest.approx(3.0, abs=0.2)
+
+
+def test_its_course_is_no_law_to_fit():
+    assert every_form(["wandering-friction"]) == []
+    with pytest.raises(InputError, match="draw at random"):
+        ss.load_campaign(SCENARIOS / "hidden-effect" / "campaign.toml").fit(["wandering-friction"])
+
+
+def test_what_is_simulated_is_found_in_the_levels_of_the_slips(tmp_path):
+    """Size and length of the wander from the forces at onset and arrest, by the forecast's law."""
+    text = (SCENARIOS / "paper_slider.toml").read_text(encoding="utf-8")
+    before, after = text.index("[[effect]]"), text.index("[sensor]")
+    own = f'[[effect]]\ntype = "wandering-friction"\nsize = {SIZE}\nlength = "300 um"\ndraw = 3\n\n'
+    path = tmp_path / "wander.toml"
+    path.write_text((text[:before] + own + text[after:]).replace('"40 s"', '"250 s"'), encoding="utf-8")
+    data = ss.simulate(load_scenario(path))
+    trace = ss.Trace.from_arrays(
+        "wander", time=data.time.values, displacement=data.displacement.values, drive_velocity="42 um/s"
+    )
+    found = segment(trace)
+    levels = level_arrays(found.events, 168.0, lambda t: 42e-6 * t)
+    assert levels["onset"].std() > 0.05 * levels["onset"].mean()
+    law = fit(levels, (Component("matern-3/2", "place"),))
+    (wander,) = law.components
+    std = dict(zip(("size", "ratio", "length"), law.std, strict=False))
+    strength = 0.32 * 0.301  # N
+    assert abs(np.log(wander.size[0] / (SIZE * strength))) < 3.0 * std["size"] < 0.6
+    assert abs(np.log(wander.length / LENGTH)) < 3.0 * std["length"] < 0.9
+    assert wander.size[0] > 5.0 * law.scatter[0]  # nothing else makes slips differ
+    assert fit(levels, ()).aic - law.aic > 50.0
