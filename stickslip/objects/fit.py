@@ -230,6 +230,32 @@ class Fit(Shown):
             attrs={"u_max": law.u_max, "p": law.p, "spread": law.spread, "misfit": law.misfit},
         )
 
+    @cached_property
+    def rough_line(self) -> xarray.Dataset | None:
+        """The rough lines nearest to the backbone, one for each contact; None where the rig says too little of them.
+
+        Returns:
+            ``force`` (N) over ``displacement`` (m); ``later`` and ``sooner``, one deviation to either side, by which
+            other contacts of the same surface differ. Attributes ``H``, ``h_rms`` (m) and their deviations, ``misfit``.
+        """
+        import xarray
+
+        from ..inference.diagnose.shape import shape_of
+
+        shape = shape_of(self._fit, self.campaign.rig, [])
+        line = shape.line
+        if line is None:
+            return None
+        curves = {"force": line.force, "later": line.scatter[0], "sooner": line.scatter[1]}
+        return xarray.Dataset(
+            {name: ("displacement", values, {"units": "N"}) for name, values in curves.items()},
+            coords={"displacement": ("displacement", shape.curve.displacement, {"units": "m"})},
+            attrs={
+                "H": line.hurst, "H_std": line.hurst_std, "h_rms": line.h_rms, "h_rms_std": line.h_rms_std,
+                "misfit": line.misfit,
+            },
+        )  # fmt: skip
+
     # what can be changed
 
     def with_values(self, values: Mapping[str, float | str]) -> Fit:
@@ -336,6 +362,22 @@ class Fit(Shown):
             },
             "run",
         )
+
+    def freely(self, run: str) -> xarray.Dataset:
+        """The model as it stands, run freely through a measured run, each cycle from the measured arrest before it.
+
+        Returns:
+            Over ``cycle`` and ``step``: ``time`` (s, of the record) and ``displacement`` (m, as the sensor shows it); a
+            shorter cycle repeats its last step. Over ``cycle``: when half of the slip is done (``half``, s), its size
+            (``slip``, m) and its end (``arrest``, s), NaN where it does not slip in time. Of the data:
+            ``measured_half``, ``_slip``, ``_onset``, ``_arrest``, and ``measured_place`` at the onset (m).
+
+        Raises:
+            InputError: no run of that name whose cycles can be run.
+        """
+        from .free_cycles import freely
+
+        return freely(self._climbed.prepared, self._fit, run)
 
     @cached_property
     def fitted(self) -> Fitted:

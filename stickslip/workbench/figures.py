@@ -20,6 +20,8 @@ from bokeh.plotting import figure as bokeh_figure
 
 from ..show.plots.style import scaled
 
+FEW = "canvas"  # what draws some hundred points quickest
+
 
 @dataclass(frozen=True)
 class Look:

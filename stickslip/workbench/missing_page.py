@@ -12,7 +12,7 @@ from bokeh.models.annotations import Span
 
 from ..errors import InputError
 from ..objects.picture import AGAINST, PARTS, WIDEST
-from ..system.units import to_si
+from ..system.units import shown, to_si
 from .controls import BUTTON, Catalogue, Message, Words
 from .evidence import best_forms, bins, rows
 from .figures import figure, label, legend, look, source, unit_of
@@ -303,13 +303,15 @@ def _table(every: Any) -> str:
 
 
 class _Backbone:
-    """The contact's backbone as measured, with its band, and the rough contact's law."""
+    """The contact's backbone as measured, with its band, a rough contact's law, and the nearest rough lines."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         theme = look()
         self._data = source(u=[], force=[], low=[], high=[], law=[])
+        self._line = source(u=[], force=[], low=[], high=[])
         self._of: Any = None
+        self._scale, self._told, self._widest = (1.0, 1.0), "", 0.0
         self.figure = figure("backbone of the contact", height=260, output_backend="canvas")
         self.figure.varea(
             "u",
@@ -325,9 +327,16 @@ class _Backbone:
             "u", "law", source=self._data, color=theme.model, line_width=2, line_dash="dashed",
             legend_label="rough contact: 1 - (1 - u/u_max)^p",
         )  # fmt: skip
+        for edge in ("low", "high"):
+            self.figure.line("u", edge, source=self._line, color=theme.soft, line_width=1, line_dash="dotted")
+        self.figure.line(
+            "u", "force", source=self._line, color=theme.runs[2], line_width=2, line_dash="dotdash",
+            legend_label="nearest rough lines",
+        )  # fmt: skip
         legend(self.figure)
         self.words = Words(sizing_mode="stretch_width", margin=(0, 0, 0, 12))
         watch(session, ["steps", "at"], self.update)
+        watch(session, ["rough"], self.draw_line)
         self.update()
 
     def update(self) -> None:
@@ -349,7 +358,29 @@ class _Backbone:
         }  # fmt: skip
         self.figure.xaxis.axis_label = label("displacement from the force-free contact", length)
         self.figure.yaxis.axis_label = label("force", unit)
-        self.words.text = f"u_max = {u_max * m:.3g} {length}, p = {float(data.attrs['p']):.2f}"
+        self._scale, self._told = (m, k), f"u_max = {u_max * m:.3g} {length}, p = {float(data.attrs['p']):.2f}"
+        self._widest = float(u[-1])
+        self.words.text = self._told
+        self._session.find_rough_line()
+        self.draw_line()
+
+    def draw_line(self) -> None:
+        """Draw the rough lines nearest to it, once they are found."""
+        fit, line = self._session.rough
+        if fit is None or fit is not self._of or line is None:
+            self._line.data = {"u": [], "force": [], "low": [], "high": []}
+            return
+        m, k = self._scale
+        own = line.isel(displacement=np.flatnonzero(line.displacement.values <= self._widest))
+        self._line.data = {
+            "u": own.displacement.values * m, "force": own.force.values * k, "low": own.later.values * k,
+            "high": own.sooner.values * k,
+        }  # fmt: skip
+        a = line.attrs
+        self.words.text = (
+            f"{self._told}; nearest rough lines: H = {a['H']:.2f} ± {a['H_std']:.2f}, h_rms = "
+            f"{shown(a['h_rms'], 'm', 2)} ± {shown(a['h_rms_std'], 'm', 2)} (dotted: how such contacts differ)"
+        )
 
 
 __all__ = ["TITLE", "page"]

@@ -14,13 +14,13 @@ from bokeh.models import HoverTool
 from ..objects import Fit
 from ..objects.picture import balanced
 from .controls import BUTTON, Knobs, Message, Words
-from .figures import crosshair, figure, label, legend, look, source, unit_of
+from .figures import FEW, crosshair, figure, label, legend, look, source, unit_of
+from .free_panel import Free
 from .knobs import Knob, knobs, rows
 from .selection import choose, cycles, selected, worst
 from .session import Session, watch
 
 TITLE = "Model against measurement"
-FEW = "canvas"  # what draws some hundred points quickest
 NOW = "as it stands"
 WORST = 2.0  # floors at which the heat map is at its darkest, at least
 
@@ -30,13 +30,19 @@ def page(session: Session) -> Any:
     sliders, buttons = _sliders(session), _buttons(session)
     cycle = _Cycle(session)
     heat = _Heat(session)
+    free = Free(session)
     left = pn.Column(buttons, sliders, width=350, sizing_mode="fixed", margin=(8, 12, 0, 0))
     right = pn.Column(
         cycle.chooser,
         pn.pane.Bokeh(cycle.force, sizing_mode="stretch_width"),
         pn.pane.Bokeh(cycle.residual, sizing_mode="stretch_width"),
         pn.Row(
-            pn.pane.Bokeh(cycle.creep, sizing_mode="stretch_width"),
+            pn.Column(
+                pn.pane.Bokeh(cycle.creep, sizing_mode="stretch_width"),
+                pn.pane.Bokeh(free.figure, sizing_mode="stretch_width"),
+                free.words,
+                sizing_mode="stretch_width",
+            ),
             pn.Column(heat.kind, pn.pane.Bokeh(heat.figure, sizing_mode="stretch_width"), sizing_mode="stretch_width"),
             sizing_mode="stretch_width",
         ),

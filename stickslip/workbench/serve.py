@@ -80,7 +80,7 @@ def serve(
     ready()
     token = token or secrets.token_urlsafe(16)
     port = _free(address, port)
-    session.worker = worker = Worker()
+    session.worker, session.aside = workers = Worker(), Worker()
     origins = ["*"] if address not in NAMES else [f"{name}:{port}" for name in NAMES]
     server: Any = get_server(
         {"/": lambda: view(session)}, port=port, address=address, prefix=f"/{token}", websocket_origin=origins,
@@ -104,7 +104,8 @@ def serve(
             watcher.set()
         session.close()
         server.stop()
-        worker.close()
+        for worker in workers:
+            worker.close()
 
 
 class Window:

@@ -71,6 +71,9 @@ class Session(param.Parameterized):
         promises: what every effect promises on top of the model as it stands; ``listed`` is how many were looked at.
         effects: Python files with effects of one's own; ``loaded`` counts how often they were.
         worker: does what takes longer than a hand would wait; the same thread unless a server gives another.
+        aside: does what no hand waits for, likewise.
+        rough: a fitted model, and the rough lines nearest to its backbone (None where the rig says too little of them).
+        free: a model, the name of a run, and that model run freely through it; None where that cannot be done.
     """
 
     campaign = param.ClassSelector(class_=Campaign)
@@ -91,6 +94,9 @@ class Session(param.Parameterized):
     effects = param.Parameter(())
     loaded = param.Integer(0)
     worker = param.Parameter(at_once)
+    aside = param.Parameter(at_once)
+    free = param.Parameter((None, "", None))
+    rough = param.Parameter((None, None))
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
@@ -324,6 +330,33 @@ class Session(param.Parameterized):
         """Leave a parameter as it is in the next fit, or not."""
         self.locked = self.locked | {name} if on else self.locked - {name}
         self.later()
+
+    def find_rough_line(self) -> None:
+        """The rough lines nearest to the backbone of the last fit."""
+
+        def job() -> None:
+            fit = self.fitted
+            if fit is not None and self.rough[0] is not fit:
+                try:
+                    self.rough = fit, fit.rough_line
+                except StickslipError:
+                    self.rough = fit, None
+
+        self.aside("rough", job, STILL)
+
+    def run_freely(self, run: str) -> None:
+        """The model as it stands through the cycles of a run, once no hand moves it."""
+
+        def job() -> None:
+            fit = self.fit
+            if fit is None or (self.free[0] is fit and self.free[1] == run):
+                return
+            try:
+                self.free = fit, run, fit.freely(run)
+            except StickslipError:
+                self.free = fit, run, None
+
+        self.aside("free", job, STILL)
 
     def cancel(self) -> None:
         """End the fit that is going on."""

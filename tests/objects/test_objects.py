@@ -229,3 +229,28 @@ def test_a_drive_in_pieces_is_that_of_the_file(campaign):
         drive=[(f"{end:.6f} s", f"{v * 1e6:.6f} um/s") for end, v in zip(ends, speeds, strict=True)],
     )  # fmt: skip
     assert np.abs(made.drive.position(run.time) - run.drive.position(run.time)).max() < 1e-9
+
+
+def test_with_the_hidden_effect_slips_come_when_they_were_measured(base, aged):
+    """Slips of the base come early by milliseconds, those of the model with ageing in time; sizes agree."""
+    late = {}
+    for name, fit in (("base", base), ("aged", aged)):
+        found = fit.freely("v050")
+        late[name] = (found.half - found.measured_half).values[1:]  # the first is that of a virgin contact
+        np.testing.assert_allclose(found.slip[1:], found.measured_slip[1:], rtol=0.02)
+        assert (found.measured_half > found.measured_onset).all() and (
+            found.measured_half < found.measured_arrest
+        ).all()
+    assert np.abs(late["base"]).min() > 3e-3
+    assert np.abs(late["aged"]).max() < 0.1 * np.abs(late["base"]).min()
+
+
+def test_every_cycle_begins_at_the_measured_arrest(base):
+    found = base.freely("v200")
+    np.testing.assert_allclose(found.time[1:, 0], found.measured_arrest[:-1], atol=1e-3)  # the top of the ringing
+    assert (np.diff(found.time, axis=1) >= 0.0).all()
+
+
+def test_a_run_that_is_none_is_refused(base):
+    with pytest.raises(InputError, match="v050"):
+        base.freely("v51")

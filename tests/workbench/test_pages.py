@@ -15,6 +15,7 @@ from stickslip.objects import Diagnosis
 from stickslip.workbench import app, missing_page, model_page
 from stickslip.workbench.evidence import best_forms, rows, signature
 from stickslip.workbench.figures import DARK, LIGHT
+from stickslip.workbench.free_panel import Free
 from stickslip.workbench.knobs import knobs
 from stickslip.workbench.knobs import rows as knob_rows
 from stickslip.workbench.session import Session
@@ -56,6 +57,28 @@ def test_the_pages_are_made_and_follow(session, base):
     assert model is not None and missing is not None
     session.by_hand({"weakening.drop": base.values["weakening.drop"] * 1.02})
     session.undo()
+
+
+def test_the_slip_is_run_freely_and_follows_the_model(session, base):
+    """With a larger drop of the strength slips are longer; what is drawn is the selected cycle on its measured clock."""
+    panel = Free(session)
+    assert "early" in panel.words.text
+    model, measured = (np.array(d.data["x"]) for d in (panel._model, panel._measured))
+    assert model.max() == pytest.approx(measured.max(), rel=0.02)
+    session.by_hand({"weakening.drop": base.values["weakening.drop"] * 1.05})
+    assert np.max(panel._model.data["x"]) > 1.03 * model.max()
+    assert session.free[0] is session.fit
+    session.run, session.event = "holds", 2
+    assert session.free[1] == "holds"
+    session.undo()
+    assert session.free[0] is base
+
+
+def test_the_nearest_rough_lines_are_drawn_beside_the_backbone(session, base):
+    made = missing_page._Backbone(session)
+    assert "H = " in made.words.text
+    drawn, curve = np.array(made._line.data["force"]), np.array(made._data.data["force"])
+    assert drawn.size == curve.size and np.abs(drawn - curve).max() < 0.2 * curve.max()
 
 
 def test_the_pages_are_made_before_there_is_a_model(campaign):

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features.measurement import Measurement, measure
-from ..fit.start import FALLBACK_PERIOD
+from ..features.measurement import Measurement
 from ..force.fit import Fit
 from ..force.heldout import folds, halves, points
 from .checkpoints import Store
@@ -26,7 +25,6 @@ from .prepare import Prepared
 from .trials import Tell
 
 Parts = tuple[str, ...]  # tags of what is in a model
-MOST_CYCLES = 40  # of a run
 
 
 @dataclass(frozen=True)
@@ -94,8 +92,7 @@ def confirm(
     found: dict[Parts, Freely] = {}
     unit, notes = None, []
     try:
-        ring = prepared.scales.ring or FALLBACK_PERIOD
-        m = measure(prepared.traces, prepared.segmentations, ring_period=ring, most_cycles=MOST_CYCLES)
+        m = prepared.measurement
     except Exception as error:  # the diagnosis stands without this
         return Confirmation(notes=(f"no free simulation: {_line(error)}",))
     runs = [names.index(name) for name in m.names]

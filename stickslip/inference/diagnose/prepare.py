@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from ...data.campaign import Campaign
 from ...data.segment import Segmentation
 from ...data.trace import Trace
 from ...errors import InputError, nearest
-from ..features.measurement import doubts
-from ..fit.start import ringing, shared_rig
+from ..features.measurement import Measurement, doubts, measure
+from ..fit.start import FALLBACK_PERIOD, ringing, shared_rig
 from ..force.knots import Knots, knots
 from ..force.problem import Point, Problem
 from ..force.scales import Scales, scales, too_coarse
 from ..force.starting_values import begin
 
 FEWEST = 2  # slips of a run that takes part
+MOST_CYCLES = 40  # of a run, that are run freely
 UNHEARD = "no ringing is heard after the slips, so the contact's stiffness is known from the creep alone"
 
 
@@ -42,6 +44,16 @@ class Prepared:
     def runs(self) -> tuple[Knots, ...]:
         """The runs at their knots."""
         return self.problem.runs
+
+    @cached_property
+    def measurement(self) -> Measurement:
+        """What a model that is run freely through the cycles is compared with (the first :data:`MOST_CYCLES` of a run).
+
+        Raises:
+            InputError: no cycle can be compared.
+        """
+        ring = self.scales.ring or FALLBACK_PERIOD
+        return measure(self.traces, self.segmentations, ring_period=ring, most_cycles=MOST_CYCLES)
 
 
 def prepare(
