@@ -60,7 +60,7 @@ def test_the_pages_are_made_and_follow(session, base):
 
 
 def test_the_slip_is_run_freely_and_follows_the_model(session, base):
-    """With a larger drop of the strength slips are longer; what is drawn is the selected cycle on its measured clock."""
+    """With a larger drop of the strength slips are longer; drawn is the selected cycle on its measured clock."""
     panel = Free(session)
     assert "early" in panel.words.text
     model, measured = (np.array(d.data["x"]) for d in (panel._model, panel._measured))
