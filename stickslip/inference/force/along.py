@@ -88,7 +88,7 @@ def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
     def step(i: Array, carry: tuple[State, Array, Held]) -> tuple[State, Array, Held]:
         state, pull, held = carry
         t, dt, x, dx, v, at, turn, strength, stretch, shape = (a[i] for a in items)
-        own = Bank(bank.stiffness * (strength / stretch) * jnp.exp(-shape * apart), bank.strength * strength)
+        own = Bank(bank.stiffness * jnp.exp(jnp.log(strength / stretch) - shape * apart), bank.strength * strength)
         contact = Contact(state.force, own.stiffness, own.strength, pull, state.cap, mass)
         motion = Motion(t, dt, x, v, turn, dx, at)
         state, forces = model.advance(state, own, contact, motion)

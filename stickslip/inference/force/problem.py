@@ -29,9 +29,11 @@ from .knots import PHASES, Knots
 
 Array = NDArray[np.float64]
 PHASE = "phase"
+DAMPING = "rig.damping"
 PULL = "start.pull"  # of the spring at the start of a record, where the contact is not virgin (N)
 PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
 CREEPING = PHASES.index("creep")
+LEAST_ROOM = 1024  # knots
 EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
 NODES = (
     -8.0,
@@ -49,6 +51,18 @@ NODES = (
 )  # of what cycles share, in units of the place
 LOCAL = ("strength", "stretch", "shape", "offset")  # of each event: two logarithms, a power, and a length (m)
 OWN = len(LOCAL)
+
+
+class Own(NamedTuple):
+    """What differs from event to event, at the knots of a run, shape (n, 4) each, in the order of :data:`LOCAL`.
+
+    Attributes:
+        value: of the event that a knot belongs to, zero where it belongs to none.
+        moves: 1 where it belongs to one, else 0.
+    """
+
+    value: Any
+    moves: Any
 
 
 class Start(NamedTuple):
@@ -167,8 +181,8 @@ class Problem:
         self.composition, self.runs = composition, tuple(runs)
         first = np.cumsum([0, *(k.events for k in runs)])
         self.first, self.events = first[:-1], int(first[-1])
-        n = _room(max(k.t.size for k in runs))
-        self.way = _padded(runs, n)
+        room = _room(max(k.t.size for k in runs))
+        self.ways = tuple(_padded(k, room) for k in runs)
         self.of = np.concatenate([k.of + f for k, f in zip(runs, first[:-1], strict=True)])
         self.run = np.concatenate([np.full(k.at.size, r) for r, k in enumerate(runs)])
         self.event_run = np.concatenate([np.full(k.events, r) for r, k in enumerate(runs)])
@@ -176,8 +190,7 @@ class Problem:
             np.concatenate([getattr(k, name) for k in runs]) for name in ("phase", "place", "at")
         )
         self.elapsed = np.concatenate([k.elapsed for k in runs])
-        self._index = _indices(runs, n, first)
-        self._knots = np.array([k.t.size for k in runs])
+        self._events = tuple(_events(k, room, int(f)) for k, f in zip(runs, first[:-1], strict=True))
         virgin = np.isin(self.of, [f for f, k in zip(first[:-1], runs, strict=True) if k.virgin])
         hats = _hats(self.place)
         # quantisation, filters and hum leave about as much alike in all cycles as the noise of one sample is
@@ -219,27 +232,34 @@ class Problem:
         c = self.composition
         return {**c.fixed, "rig.mass": c.mass, **to_si(c.shared, point.z)}
 
+    def own(self, point: Point) -> list[Own]:
+        """What differs from event to event, at the knots of every run."""
+        events = np.concatenate([point.events, np.zeros((1, OWN))])
+        columns = np.arange(OWN)
+        return [Own(events[index, columns], (index >= 0).astype(float)) for index in self._events]
+
+    def run_arguments(self, point: Point) -> list[tuple[Any, ...]]:
+        """Of every run: its own spring (N/m), way, number of knots, and what differs from event to event."""
+        springs = [np.float64(np.nan if k.stiffness is None else k.stiffness) for k in self.runs]
+        knots = [np.int64(k.t.size) for k in self.runs]
+        return list(zip(springs, self.ways, knots, self.own(point), strict=True))
+
     def evaluate(self, point: Point) -> Slopes:
         """Residuals and derivatives."""
         c = self.composition
         shared, phases = c.shared, c.phases
-        names = tuple(f.name for f in shared)
-        scales = np.array([0.0 if f.scale == "log" else float(f.scale) for f in shared])
-        program = _program(names, tuple(f.name for f in phases), jax.tree.structure(c.effects))
-        own = np.array([np.nan if k.stiffness is None else k.stiffness for k in self.runs])
+        # a damper is in proportion to the rate that is measured, and needs no model along the motion
+        bent = [i for i, f in enumerate(shared) if f.name != DAMPING]
+        scales = np.array([0.0 if shared[i].scale == "log" else float(shared[i].scale) for i in bent])
+        program = _program(
+            tuple(shared[i].name for i in bent), tuple(f.name for f in phases), jax.tree.structure(c.effects)
+        )
         phase_scale = np.array([float(f.scale) for f in phases])
         leaves = tuple(jax.tree.leaves(c.effects))
-        fixed = {n: np.float64(v) for n, v in {**c.fixed, "rig.mass": c.mass}.items()}
-        q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent, slides = (
-            np.asarray(a)
-            for a in program(
-                point.z, scales, point.phases.T * phase_scale, phase_scale, fixed, leaves,
-                np.maximum(point.weights, EMPTY), c.reach,
-                own, self.way, self._index, self._knots, np.concatenate([point.events, np.zeros((1, OWN))]),
-            )
-        )  # fmt: skip
         values = self.values(point)
-        damping = values["rig.damping"]
+        damping = values[DAMPING]
+        fixed = {n: np.float64(v) for n, v in {**c.fixed, "rig.mass": c.mass, DAMPING: damping}.items()}
+        weights = np.maximum(point.weights, EMPTY)
         a, b, k, runs = len(shared), len(phases), point.weights.size, len(self.runs)
         size = self.at.size
         residual, tangents, held = np.zeros(size), np.zeros(size), np.zeros(size)
@@ -249,69 +269,64 @@ class Problem:
         cycles = self.cycles.shape[1]
         slopes, local = np.zeros((size, a + b * runs + k + cycles)), np.zeros((size, OWN))
         sensed = any(isinstance(e, Sensor) for e in c.effects)
-        at_damping = next((i for i, f in enumerate(shared) if f.name == "rig.damping"), None)
-        weights = np.maximum(point.weights, EMPTY)
-        p, sticking = 0, []
-        for r, run in enumerate(self.runs):
+        common = scales, phase_scale, fixed, leaves, weights, c.reach
+        # all are under way before the first is waited for
+        found = [
+            program(point.z[bent], point.phases[:, r] * phase_scale, *common, *arguments)
+            for r, arguments in enumerate(self.run_arguments(point))
+        ]
+        p, sticking, sliding = 0, [], []
+        for r, (run, of_run) in enumerate(zip(self.runs, found, strict=True)):
             n, s = run.t.size, slice(p, p + run.at.size)
+            q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent, slides = map(
+                np.asarray, of_run
+            )
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             if sensed:
-                rate, acceleration = rate + first @ shift[r, :n], acceleration + second @ shift[r, :n]
-            spring = float(own[r] if np.isfinite(own[r]) else starts["rig.spring_stiffness"])
-            steep = mean @ slope[r, :n] / (mean @ np.ones(n))
-            counts = gain[r] * np.where(slow[s], steep / spring, mass[r] / c.mass)
+                rate, acceleration = rate + first @ shift[:n], acceleration + second @ shift[:n]
+            spring = starts["rig.spring_stiffness"] if run.stiffness is None else run.stiffness
+            steep = mean @ slope[:n] / (mean @ np.ones(n))
+            counts = gain * np.where(slow[s], steep / spring, mass / c.mass)
             share[s] = 1.0 / counts
-            residual[s] = share[s] * (mean @ q[r, :n] - mass[r] * acceleration - damping * rate)
-            moved = mean @ dq[r, :, :n].T - acceleration[:, None] * dmass[r]
+            residual[s] = share[s] * (mean @ q[:n] - mass * acceleration - damping * rate)
+            moved = mean @ dq[:, :n].T - acceleration[:, None] * dmass
             if sensed:
-                moved = moved - mass[r] * (second @ dshift[r, :, :n].T) - damping * (first @ dshift[r, :, :n].T)
-            grown = np.where(
-                slow[s, None], (mean @ dslope[r, :, :n].T) / (mean @ slope[r, :n])[:, None], dmass[r] / mass[r]
-            )
-            moved = share[s, None] * moved - residual[s, None] * (grown + dgain[r] / gain[r])
-            slopes[s, :a] = moved[:, :a]
-            if at_damping is not None:
-                slopes[s, at_damping] -= share[s] * damping * rate
+                moved = moved - mass * (second @ dshift[:, :n].T) - damping * (first @ dshift[:, :n].T)
+            grown = np.where(slow[s, None], (mean @ dslope[:, :n].T) / (mean @ slope[:n])[:, None], dmass / mass)
+            moved = share[s, None] * moved - residual[s, None] * (grown + dgain / gain)
+            slopes[s, bent] = moved[:, : len(bent)]
+            if len(bent) < a:
+                slopes[s, [i for i in range(a) if i not in bent]] = -share[s, None] * (damping * rate)[:, None]
             for j in range(b):
-                slopes[s, a + j * runs + r] = moved[:, a + j]
-            local[s] = moved[:, a + b :]
-            held_by = mean @ elements[r, :n]
+                slopes[s, a + j * runs + r] = moved[:, len(bent) + j]
+            local[s] = moved[:, len(bent) + b :]
+            held_by = mean @ elements[:n]
             slopes[s, a + b * runs : a + b * runs + k] = -share[s, None] * held_by
             held[s] = held_by @ weights
-            tangents[s] = share[s] * (mean @ tangent[r, :n])
-            sticking.append(tangent[r, :n] * np.interp(run.t, run.at, share[s]))
+            tangents[s] = share[s] * (mean @ tangent[:n])
+            sticking.append(tangent[:n] * np.interp(run.t, run.at, share[s]))
+            sliding.append(slides[:n])
             p += run.at.size
         slopes[:, a + b * runs + k :] = self._carried(tangents)
         residual += slopes[:, a + b * runs + k :] @ point.common
-        sliding = tuple(slides[r, : k.t.size] for r, k in enumerate(self.runs))
-        return Slopes(residual, slopes, local, tangents, tuple(sticking), sliding, held, share)
+        return Slopes(residual, slopes, local, tangents, tuple(sticking), tuple(sliding), held, share)
 
 
 def _room(size: int) -> int:
     """Knots that a compiled program has room for: few different numbers, so that campaigns share programs."""
-    least = 512
-    while least < size:
-        least = -(-least * 5 // 4 // 64) * 64
-    return least
+    return int(max(LEAST_ROOM, 2 ** int(np.ceil(np.log2(size)))))
 
 
-def _padded(runs: Sequence[Knots], n: int) -> Way:
+def _padded(k: Knots, n: int) -> Way:
     def grown(a: Array, step: float = 0.0) -> Array:
-        more = n - a.size
-        return np.concatenate([a, a[-1] + step * np.arange(1, more + 1)])
+        return np.concatenate([a, a[-1] + step * np.arange(1, n - a.size + 1)])
 
-    ones = np.ones((len(runs), n))
+    # turning points are knots
     return Way(
-        np.stack([grown(k.t, 1e-3) for k in runs]),
-        np.stack([grown(k.x) for k in runs]),
-        np.stack([np.concatenate([k.v, np.zeros(n - k.v.size)]) for k in runs]),
-        np.stack([grown(k.drive) for k in runs]),
-        np.zeros((len(runs), n)),  # turning points are knots
-        ones,
-        ones,
-        np.zeros((len(runs), n)),
-    )
+        grown(k.t, 1e-3), grown(k.x), np.concatenate([k.v, np.zeros(n - k.v.size)]), grown(k.drive), np.zeros(n),
+        np.ones(n), np.ones(n), np.zeros(n),
+    )  # fmt: skip
 
 
 def _hats(place: Array) -> Array:
@@ -319,22 +334,18 @@ def _hats(place: Array) -> Array:
     return np.stack([np.interp(place, NODES, row) for row in np.eye(len(NODES))], axis=1)
 
 
-def _indices(runs: Sequence[Knots], n: int, first: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Of each knot the event of its strength and stretch, and that of its offset; the last one stands for none."""
-    none = int(first[-1])
-    by_event, by_arrest = np.full((len(runs), n), none), np.full((len(runs), n), none)
-    for r, k in enumerate(runs):
-        own = (k.event >= 0) & (k.event < k.events)
-        by_event[r, : k.t.size] = np.where(own, k.event + first[r], none)
-        own = (k.arrest >= 0) & (k.arrest < k.events)
-        by_arrest[r, : k.t.size] = np.where(own, k.arrest + first[r], none)
-    return by_event, by_arrest
+def _events(k: Knots, n: int, first: int) -> NDArray[np.intp]:
+    """Of each knot the event of each of :data:`LOCAL`, shape (n, 4); the last one of all, -1, stands for none."""
+    out = np.full((n, OWN), -1)
+    for column, event in enumerate((k.event, k.event, k.event, k.arrest)):
+        out[: k.t.size, column] = np.where((event >= 0) & (event < k.events), event + first, -1)
+    return out
 
 
 def model_of(values: dict[str, Any], effects: tuple[Effect, ...], bank: Bank, own: Any) -> Model:
     """The model with these numbers; ``own`` is the spring of the run (N/m), nan where it has none."""
     spring = jnp.where(jnp.isnan(own), values["rig.spring_stiffness"], own)
-    block = Block(mass=values["rig.mass"], spring_stiffness=spring, damping=values["rig.damping"])
+    block = Block(mass=values["rig.mass"], spring_stiffness=spring, damping=values[DAMPING])
     weakening = Weakening(
         ratio=1.0 - values["weakening.drop"],
         slip_distance=values["weakening.slip_distance"],
@@ -354,33 +365,29 @@ def _set(effect: Effect, values: dict[str, Any]) -> Effect:
 
 @lru_cache(maxsize=PROGRAMS)
 def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) -> Program:
-    """The compiled forces at the knots, shape (R, n), with derivatives in shared, phases and locals."""
+    """The compiled forces at the knots of one run, shape (n,), with derivatives in shared, phases and locals.
+
+    Runs and events are not in its shapes, so that all campaigns share it.
+    """
     a, b = len(names), len(phases)
 
     def forces(
-        z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, own: Any,
-        way: Way, index: Any, knots: Any,
+        z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, spring: Any,
+        way: Way, knots: Any,
     ) -> Any:  # fmt: skip
         si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
         values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
         if PULL in values:
-            spring = jnp.where(jnp.isnan(own), values["rig.spring_stiffness"], own)
-            way = way._replace(drive=way.drive + values[PULL] / spring)
-        model = model_of(values, effects, Bank(weights / reach, weights), own)
-        by_event, by_arrest = index
+            stiffness = jnp.where(jnp.isnan(spring), values["rig.spring_stiffness"], spring)
+            way = way._replace(drive=way.drive + values[PULL] / stiffness)
+        model = model_of(values, effects, Bank(weights / reach, weights), spring)
         seen = way
         if any(isinstance(e, Sensor) for e in effects):
             # the measured force, near enough for a sensor that sees it
             force = model.block.spring_stiffness * (way.drive - way.x)
             seen = undone(model, way, force, knots)
         shift = seen.x - way.x
-        moved = seen._replace(
-            x=seen.x + event[by_arrest, 3],
-            strength=jnp.exp(event[by_event, 0]),
-            stretch=jnp.exp(event[by_event, 1]),
-            shape=event[by_event, 2],
-        )
-        held = along(model, moved, knots)
+        held = along(model, of_events(seen, event), knots)
         steep = jax.vmap(jax.grad(model.pull))(lead(model, way.t, way.drive) - seen.x)
         # how much the displacement changes where the reading does
         steps = jnp.diff(way.x)
@@ -391,31 +398,27 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
         )
 
     def whole(
-        z: Any, scales: Any, turns: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any,
-        own: Any, way: Way, index: Any, knots: Any, event: Any,
+        z: Any, turn: Any, scales: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any, spring: Any,
+        way: Way, knots: Any, own: Own,
     ) -> Any:  # fmt: skip
         effects = jax.tree.unflatten(structure, leaves)
-        size = a + b + OWN
-        rows = jnp.eye(size)
 
-        def of_run(run: Any) -> Any:
-            turn, own, way, index, knots = run
+        def moved(row: Any) -> Any:
+            def f(z: Any, turn: Any, event: Any) -> Any:
+                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots)
 
-            def moved(row: Any) -> Any:
-                def f(z: Any, turn: Any, event: Any) -> Any:
-                    return forces(z, turn, event, scales, fixed, effects, weights, reach, own, way, index, knots)
+            # all events are moved at once: each acts on its own points only
+            step = own.moves * row[a + b :]
+            return jax.jvp(f, (z, turn, own.value), (row[:a], row[a : a + b] * turn_scale, step), has_aux=True)
 
-                # all events, and the phase of whatever run, are moved at once: each acts on its own points only
-                step = jnp.broadcast_to(row[a + b :], event.shape).at[-1].set(0.0)
-                (out, slope, aux) = jax.jvp(
-                    f, (z, turn, event), (row[:a], row[a : a + b] * turn_scale, step), has_aux=True
-                )
-                return out, slope, aux
-
-            out, slope, aux = jax.vmap(moved, out_axes=(None, 0, None))(rows)
-            return *out, *slope, *aux
-
-        # one after the other: the shorter ones cost less then
-        return jax.lax.map(of_run, (turns, own, way, index, knots))
+        out, slope, aux = jax.vmap(moved, out_axes=(None, 0, None))(jnp.eye(a + b + OWN))
+        return *out, *slope, *aux
 
     return Program(whole, f"along {names} {phases} {structure}" if of_this_package(structure) else None)
+
+
+def of_events(way: Way, event: Any) -> Way:
+    """The way with what differs from event to event, shape (n, 4)."""
+    return way._replace(
+        x=way.x + event[:, 3], strength=jnp.exp(event[:, 0]), stretch=jnp.exp(event[:, 1]), shape=event[:, 2]
+    )

@@ -16,7 +16,7 @@ from ...physics.params import specs
 from ...system.traced import Program, of_this_package
 from .along import Way, along, undone
 from .fit import Array, Fit
-from .problem import EMPTY, OWN, PROGRAMS, PULL, Problem, model_of
+from .problem import EMPTY, PROGRAMS, PULL, Own, Problem, model_of, of_events
 from .scatter import covariance
 
 CHUNK = 64  # members evaluated at once
@@ -34,7 +34,7 @@ def signatures(fit: Fit, effect: Effect, members: Sequence[dict[str, float]]) ->
     program = _program(jax.tree.structure(problem.composition.effects), jax.tree.structure(effect), type(effect))
     names = tuple(specs(effect))
     out = []
-    arguments = _arguments(fit)
+    known, runs = _arguments(fit)
     for at in range(0, len(members), CHUNK):
         part = list(members[at : at + CHUNK])
         size = len(part)
@@ -42,36 +42,35 @@ def signatures(fit: Fit, effect: Effect, members: Sequence[dict[str, float]]) ->
             part += [part[-1]] * (CHUNK - size)
         values = {n: np.array([float(m.get(n, float(getattr(effect, n)))) for m in part]) for n in names}
         values[effect.amplitude] = np.full(len(part), specs(effect)[effect.amplitude].null or 0.0)
-        q, shift, mass = (np.asarray(a) for a in program(values, *arguments))
-        out.append(_at_points(problem, fit, q[:size], shift[:size], mass[:size], isinstance(effect, Sensor)))
+        found = [[np.asarray(a)[:size] for a in program(values, *known, *run)] for run in runs]
+        out.append(_at_points(problem, fit, found, isinstance(effect, Sensor)))
     return np.concatenate(out)
 
 
-def _arguments(fit: Fit) -> tuple[Any, ...]:
+def _arguments(fit: Fit) -> tuple[tuple[Any, ...], list[tuple[Any, ...]]]:
+    """What all runs share, and what each has of its own."""
     problem, point = fit.problem, fit.point
     c = problem.composition
-    own = np.array([np.nan if k.stiffness is None else k.stiffness for k in problem.runs])
-    turns = np.array([float(f.scale) * point.phases[j] for j, f in enumerate(c.phases)]).reshape(-1, len(own)).T
     values = {n: np.float64(v) for n, v in problem.values(point).items()}
-    names = tuple(f.name for f in c.phases)
-    turned = {n: turns[:, j] for j, n in enumerate(names)}
-    return (
-        values, turned, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), c.reach, own, problem.way,
-        problem._index, problem._knots, np.concatenate([point.events, np.zeros((1, OWN))]),
-    )  # fmt: skip
+    shared = values, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), c.reach
+    turned = [
+        {f.name: np.float64(float(f.scale) * point.phases[j, r]) for j, f in enumerate(c.phases)}
+        for r in range(len(problem.runs))
+    ]
+    return shared, [(turn, *own) for turn, own in zip(turned, problem.run_arguments(point), strict=True)]
 
 
-def _at_points(problem: Problem, fit: Fit, q: Array, shift: Array, mass: Array, sensed: bool) -> Array:
-    out = np.zeros((len(q), problem.at.size))
+def _at_points(problem: Problem, fit: Fit, found: Sequence[Sequence[Array]], sensed: bool) -> Array:
+    out = np.zeros((len(found[0][0]), problem.at.size))
     values = problem.values(fit.point)
     p = 0
-    for r, run in enumerate(problem.runs):
+    for run, (q, shift, mass) in zip(problem.runs, found, strict=True):
         n, s = run.t.size, slice(p, p + run.at.size)
-        moved = (run.mean @ q[:, r, :n].T).T - mass[:, r, None] * run.acceleration
+        moved = (run.mean @ q[:, :n].T).T - mass[:, None] * run.acceleration
         if sensed:
             first, second = run.smooth
-            moved = moved - values["rig.mass"] * (second @ shift[:, r, :n].T).T
-            moved = moved - values["rig.damping"] * (first @ shift[:, r, :n].T).T
+            moved = moved - values["rig.mass"] * (second @ shift[:, :n].T).T
+            moved = moved - values["rig.damping"] * (first @ shift[:, :n].T).T
         out[:, s] = moved
         p += run.at.size
     return out
@@ -83,44 +82,31 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
     place = names.index(cls.amplitude)
 
     def one(
-        values: Any, known: Any, turned: Any, leaves: Any, weights: Any, reach: Any, own: Any, way: Way, index: Any,
-        knots: Any, event: Any,
+        values: Any, known: Any, leaves: Any, weights: Any, reach: Any, turned: Any, spring: Any, way: Way, knots: Any,
+        own: Own,
     ) -> Any:  # fmt: skip
         effects = jax.tree.unflatten(base, leaves)
+        everything = {**known, **turned}
 
-        def of_run(run: Any) -> Any:
-            turned, own, way, index, knots = run
-            everything = {**known, **turned}
+        def forces(amplitude: Any) -> Any:
+            numbers = [values[n] for n in names]
+            numbers[place] = amplitude
+            effect = jax.tree.unflatten(structure, numbers)
+            model = model_of(everything, effects, Bank(weights / reach, weights), spring)
+            model = type(model)(model.block, model.bank, model.weakening, model.load_point, (*model.effects, effect))
+            moving = way
+            if PULL in everything:
+                moving = moving._replace(drive=moving.drive + everything[PULL] / model.block.spring_stiffness)
+            seen = moving
+            if any(isinstance(e, Sensor) for e in model.effects):
+                force = model.block.spring_stiffness * (moving.drive - moving.x)
+                seen = undone(model, moving, force, knots)
+            held = along(model, of_events(seen, own.value), knots)
+            return held.pull + held.body - held.contact, seen.x - way.x, model.mass()
 
-            def forces(amplitude: Any) -> Any:
-                numbers = [values[n] for n in names]
-                numbers[place] = amplitude
-                effect = jax.tree.unflatten(structure, numbers)
-                model = model_of(everything, effects, Bank(weights / reach, weights), own)
-                model = type(model)(
-                    model.block, model.bank, model.weakening, model.load_point, (*model.effects, effect)
-                )
-                moving = way
-                if PULL in everything:
-                    moving = moving._replace(drive=moving.drive + everything[PULL] / model.block.spring_stiffness)
-                seen = moving
-                if any(isinstance(e, Sensor) for e in model.effects):
-                    force = model.block.spring_stiffness * (moving.drive - moving.x)
-                    seen = undone(model, moving, force, knots)
-                by_event, by_arrest = index
-                moved = seen._replace(
-                    x=seen.x + event[by_arrest, 3], strength=jnp.exp(event[by_event, 0]),
-                    stretch=jnp.exp(event[by_event, 1]), shape=event[by_event, 2],
-                )  # fmt: skip
-                held = along(model, moved, knots)
-                return held.pull + held.body - held.contact, seen.x - way.x, model.mass()
+        return jax.jvp(forces, (values[names[place]],), (jnp.ones(()),))[1]
 
-            start = values[names[place]]
-            return jax.jvp(forces, (start,), (jnp.ones(()),))[1]
-
-        return jax.lax.map(of_run, (turned, own, way, index, knots))
-
-    every = jax.vmap(one, in_axes=(0, *[None] * 10))
+    every = jax.vmap(one, in_axes=(0, *[None] * 9))
     own = of_this_package(base) and cls.__module__.split(".")[0] == __name__.split(".")[0]
     return Program(every, f"signature {base} {structure}" if own else None)
 
