@@ -10,8 +10,9 @@ from cyclopts import Parameter
 
 from ..errors import InputError
 
-NEEDED = ("panel", "bokeh", "watchfiles")
+NEEDED = ("panel", "bokeh", "tsdownsample", "watchfiles")
 LOOPBACK = "127.0.0.1"
+OWN = (LOOPBACK, "localhost", "::1")
 
 
 def open(
@@ -64,7 +65,7 @@ def open(
         session = Session(offers=tuple(offered(Path())))
     else:
         session = opened(_simulated(campaign) if _is_scenario(campaign) else campaign, effect)
-    if address != LOOPBACK:
+    if address not in OWN:
         print(f"stickslip: the workbench is reached from other machines under {address}", flush=True)
     serve(session, port=port, address=address, browser=browser, tell=tell)
     return 0

@@ -41,12 +41,14 @@ class Diagnosis(Shown):
         found: the search and where it ended; None where only its result was kept.
         result: plain data, as in ``result.json``.
         variables: arrays behind the pictures, as ``(dimension, values, attributes)``.
+        folder: where only its result was kept, the run folder with the rest of it.
     """
 
     def __init__(
-        self, campaign: Campaign, found: Found | None, result: dict[str, Any], variables: dict[str, Any]
-    ) -> None:
-        self.campaign, self.found, self.result, self.variables = campaign, found, result, variables
+        self, campaign: Campaign, found: Found | None, result: dict[str, Any], variables: dict[str, Any],
+        folder: Path | None = None,
+    ) -> None:  # fmt: skip
+        self.campaign, self.found, self.result, self.variables, self.folder = campaign, found, result, variables, folder
 
     @property
     def verdict(self) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from ..inference.force.knots import PHASES
 from ..inference.force.residual import VARIABLES, WAYS, coordinates
 from ..inference.force.valleys import pinned
 from ..physics.effects import catalogue
+from ..physics.effects.named import with_form
 from ..show.report.diagnosis_result import trace_sections
 from ..show.report.identifiability import identifiability
 from ..simulation.conformance import try_laws
@@ -91,6 +92,11 @@ class Fit(Shown):
     def effects(self) -> tuple[str, ...]:
         """Tags of the effects that were added to the base."""
         return tuple(e.tag for e in self._fit.problem.composition.effects)
+
+    @property
+    def effect_forms(self) -> tuple[str, ...]:
+        """The same with the form of each law where it is not the usual one, as :meth:`add` takes them."""
+        return tuple(with_form(e) for e in self._fit.problem.composition.effects)
 
     @property
     def free(self) -> tuple[Free, ...]:

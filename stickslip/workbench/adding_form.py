@@ -96,7 +96,7 @@ class Form:
         self.dropped = None
         try:
             self._columns = look(name, content)
-        except InputError as error:
+        except (InputError, OSError, ValueError) as error:
             self.said.text = str(error)
             return
         self.dropped = (name, content)
@@ -134,6 +134,9 @@ class Form:
         """Store the file and put its table into the campaign."""
         campaign = self._session.campaign
         if self.dropped is None or self._columns is None or campaign is None:
+            return
+        if self._session.busy:
+            self.said.text = f"{self._session.busy}: add the run when that is done, or cancel it"
             return
         name, content = self.stored.value.strip(), self.dropped[1]
         try:

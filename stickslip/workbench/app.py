@@ -133,7 +133,7 @@ def frame(session: Session) -> Frame:
         step = f"   ({session.at + 1} of {len(session.steps)}: {session.taken[-1].text})" if session.taken else ""
         made.param.update(
             title=campaign.title if campaign is not None else "",
-            model="" if fit is None else " + ".join(fit.parts) + step,
+            model=_absent(session) if fit is None else " + ".join(fit.parts) + step,
             busy=session.busy,
             share=session.share,
             searching=f"Diagnose: {session.searching}" if session.searching else "",
@@ -154,3 +154,10 @@ def frame(session: Session) -> Frame:
     update()
     errors()
     return made
+
+
+def _absent(session: Session) -> str:
+    """What stands in the place of a model where there is none."""
+    if session.campaign is None or session.busy:
+        return ""
+    return "no model yet: Fit (Model against measurement) fits the base model"

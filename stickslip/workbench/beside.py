@@ -79,6 +79,11 @@ class Beside(param.Parameterized):
         if isinstance(self._worker, Worker):
             self._worker.cancel()
 
+    def close(self) -> None:
+        """End it, and wait for that step."""
+        if isinstance(self._worker, Worker):
+            self._worker.close()
+
 
 _kept: WeakKeyDictionary[Session, dict[str, Beside]] = WeakKeyDictionary()
 
@@ -89,3 +94,12 @@ def beside(session: Session, name: str) -> Beside:
     if name not in own:
         own[name] = Beside(isinstance(session.worker, Worker))
     return own[name]
+
+
+def close_all(session: Session) -> None:
+    """End all of that work of a session."""
+    every = list(_kept.get(session, {}).values())
+    for work in every:
+        work.cancel()
+    for work in every:
+        work.close()

@@ -102,6 +102,8 @@ def _row(
 
 
 def _in_model(fit: Fit, tag: str, chosen: str) -> dict[str, Any]:
+    if tag not in catalogue.tags():
+        return {**_empty(tag, chosen), "on": True, "share": 1.0, "gain": "in the model, and in no file any more"}
     name = f"{tag}.{catalogue.get(tag).amplitude}"
     free = {f.name: f for f in fit.free}
     unit = free[name].unit if name in free else "1"

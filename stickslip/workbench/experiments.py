@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..data.segment import Segmentation
-from ..errors import InputError
+from ..errors import InputError, StickslipError
 from ..objects import Campaign, Diagnosis, Fit
 from ..simulation.scenario import Scenario
 from ..simulation.scenario.recording import Recording
@@ -29,7 +28,8 @@ MEASURES = {"recurrence": "s", "slip": "m", "peak_velocity": "m/s", "creep_befor
 FEWEST, MOST = 2, 40  # runs of a sweep
 RATE = 10_000.0  # Hz at which a synthetic record is written
 COUNT = 7.91e-9  # m, where the campaign's runs have no count of their own
-HOLD = "10 s"  # where a proposed experiment names none
+LONGEST_HOLD = 300.0  # s; a record of one takes a gigabyte of memory
+EXACT = 1e-3  # scatter of an event, of its mean, below which none is believed
 STICKS = (1.6, 2.6)  # mean recurrences of drive before and after a hold, so that it begins and ends between slips
 
 
@@ -44,6 +44,7 @@ class Setting:
         spring: stiffness of the spring, such as "500 N/m".
         mass: of the block, such as "100 g".
         events: slips after which it ends, where a velocity is given; else it is as long as the measured run.
+        step: velocity that the load point goes on with from a stick on, such as "1 mm/s".
     """
 
     run: str
@@ -52,11 +53,12 @@ class Setting:
     spring: str = ""
     mass: str = ""
     events: int = 5
+    step: str = ""
 
     @property
     def as_measured(self) -> bool:
         """Whether the load point moves as in the measured run."""
-        return not self.velocity.strip() and not self.hold.strip()
+        return not any(text.strip() for text in (self.velocity, self.hold, self.step))
 
 
 def scenario(fit: Fit, setting: Setting) -> Scenario:
@@ -72,7 +74,7 @@ def scenario(fit: Fit, setting: Setting) -> Scenario:
         ("block.mass", setting.mass, "kg", "mass"),
     ):
         if text.strip():
-            changes.append((key, to_si(text, unit, key=words)))
+            changes.append((key, _positive(text, unit, words)))
     driven = next(run for run in fit.fitted.runs if run.name == setting.run)
     if not setting.as_measured:
         velocity = to_si(setting.velocity, "m/s", key="velocity") if setting.velocity.strip() else driven.velocity
@@ -80,16 +82,27 @@ def scenario(fit: Fit, setting: Setting) -> Scenario:
             raise InputError("a load point that stands still brings no slip", key="velocity", value=setting.velocity)
         changes = [("drive", {"velocity": velocity, "events": setting.events}), *changes]
     made = made.with_changes(changes)
-    if not setting.hold.strip():
+    hold = _positive(setting.hold, "s", "hold") if setting.hold.strip() else 0.0
+    if hold > LONGEST_HOLD:
+        raise InputError(
+            "too long to be shown here", key="hold", value=setting.hold, allowed=f"up to {LONGEST_HOLD:g} s",
+            hint="write it into a scenario for stickslip simulate",
+        )  # fmt: skip
+    if not hold and not setting.step.strip():
         return made
-    hold = to_si(setting.hold, "s", key="hold")
-    if not hold > 0.0:
-        raise InputError("out of range", key="hold", value=setting.hold, allowed="more than 0 s")
-    return made.with_changes([("drive", {"piece": _pieces(made, hold)})])
+    later = to_si(setting.step, "m/s", key="velocity after the step") if setting.step.strip() else None
+    return made.with_changes([("drive", {"piece": _pieces(made, hold, later)})])
 
 
-def _pieces(made: Scenario, hold: float) -> list[dict[str, float]]:
-    """Drive, a hold amid a stick, and drive again."""
+def _positive(text: str, unit: str, key: str) -> float:
+    found = to_si(text, unit, key=key)
+    if not found > 0.0:
+        raise InputError("out of range", key=key, value=text, allowed=f"more than 0 {unit}")
+    return found
+
+
+def _pieces(made: Scenario, hold: float, later: float | None) -> list[dict[str, float]]:
+    """Drive, a hold amid a stick where one is asked for, and drive again, at another velocity where there is one."""
     file = made.file
     velocity = float(file.drive.velocity or 0.0)
     block, contact = file.block, file.contact
@@ -97,10 +110,12 @@ def _pieces(made: Scenario, hold: float) -> list[dict[str, float]]:
     rate = block.spring_stiffness * abs(velocity)
     period = 2.0 * (1.0 - file.weakening.ratio) * strength / rate + np.pi * np.sqrt(block.mass / block.spring_stiffness)
     first = strength / rate + STICKS[0] * period
+    after = velocity if later is None else later
+    longer = max(abs(velocity / after), 0.1) if after else 1.0
     return [
         {"velocity": velocity, "duration": float(first)},
-        {"velocity": 0.0, "duration": hold},
-        {"velocity": velocity, "duration": float(STICKS[1] * period)},
+        *([{"velocity": 0.0, "duration": hold}] if hold else []),
+        {"velocity": after, "duration": float(STICKS[1] * period * longer)},
     ]
 
 
@@ -165,7 +180,7 @@ def sweep(
         raise InputError("the velocities must increase", key="velocities", value=f"{low} to {high}")
     if not FEWEST <= points <= MOST:
         raise InputError("out of range", key="number of velocities", value=points, allowed=f"{FEWEST} to {MOST}")
-    base = scenario(fit, Setting(setting.run, low, "", setting.spring, setting.mass, setting.events))
+    base = scenario(fit, replace(setting, velocity=low, hold="", step=""))
     series = SweepTable(key="drive.velocity", start=ends[0], stop=ends[1], points=points)
     members = scenarios_of(base, series)
     done: list[Any] = []
@@ -215,10 +230,28 @@ def undecided(diagnosis: Diagnosis | None) -> list[tuple[tuple[str, ...], str]]:
     return [(tuple(e["separates"]), str(e["text"])) for e in every if len(e.get("separates", ())) > 1]
 
 
-def proposed_hold(text: str) -> str:
-    """The longest hold that the words of a proposed experiment name, else one of 10 s."""
-    named = re.findall(r"\b(\d+(?:\.\d+)?) s\b", text)
-    return f"{max(map(float, named)):g} s" if named else HOLD
+def usual(setting: Setting, velocity: float, spring: float, mass: float) -> dict[str, Setting]:
+    """Experiments that are easily made on a rig, by what is done; the drive, the spring and the block as they are.
+
+    Args:
+        setting: what else is asked for.
+        velocity, spring, mass: as they are (m/s, N/m, kg).
+    """
+    plain = replace(setting, velocity=f"{velocity:.6g} m/s", hold="", step="")
+
+    def at(factor: float) -> str:
+        return f"{factor * velocity:.6g} m/s"
+
+    return {
+        "a hold of 1 s": replace(plain, hold="1 s"),
+        "a hold of 10 s": replace(plain, hold="10 s"),
+        "a hold of 100 s": replace(plain, hold="100 s"),
+        "a quarter of the velocity": replace(plain, velocity=at(0.25)),
+        "four times the velocity": replace(plain, velocity=at(4.0)),
+        "a step to ten times the velocity": replace(plain, step=at(10.0)),
+        "a block twice as heavy": replace(plain, mass=f"{2.0 * mass:.6g} kg"),
+        "a spring half as stiff": replace(plain, spring=f"{0.5 * spring:.6g} N/m"),
+    }
 
 
 def rivals(
@@ -256,24 +289,101 @@ def compare(fits: Mapping[str, Fit], setting: Setting, tell: Tell) -> dict[str, 
     return out
 
 
-def difference(found: Mapping[str, Recording]) -> str:
-    """By which measure the models differ most, in words."""
-    best, words = 0.0, "They do not differ in any event of this experiment."
+def farthest(found: Mapping[str, Recording]) -> tuple[str, int, float] | None:
+    """Measure and slip (from 0) in which some models differ most, and by how much of the mean; None where in none."""
+    best: tuple[str, int, float] | None = None
     for key in MEASURES:
         lists = [np.asarray(r[key].values, float) for r in found.values()]
-        count = min((v.size for v in lists), default=0)
-        for number in range(count):
+        for number in range(min((v.size for v in lists), default=0)):
             values = np.array([v[number] for v in lists])
             if not np.isfinite(values).all() or np.abs(values).max() == 0.0:
                 continue
             apart = float(np.ptp(values) / np.abs(values).mean())
-            if apart > best:
-                best = apart
-                words = (
-                    f"They differ most in the {key.replace('_', ' ')} of slip {number + 1}: by {100 * apart:.2g} % of "
-                    f"its mean."
-                )
+            if apart > (0.0 if best is None else best[2]):
+                best = (key, number, apart)
+    return best
+
+
+def difference(found: Mapping[str, Recording]) -> str:
+    """By which measure the models differ most, in words."""
+    best = farthest(found)
+    words = "They do not differ in any event of this experiment."
+    if best is not None:
+        key, number, apart = best
+        words = (
+            f"They differ most in the {key.replace('_', ' ')} of slip {number + 1}: by {100 * apart:.2g} % of its mean."
+        )
     if len({r.sizes["event"] for r in found.values()}) > 1:
         counts = ", ".join(f"{tag} {r.sizes['event']}" for tag, r in found.items())
         words += f" The number of slips differs: {counts}."
     return words
+
+
+def scatter(campaign: Campaign) -> dict[str, float]:
+    """Measure -> standard deviation of one event over its mean, the median over the steady runs; at least 0.1 %.
+
+    The creep before a slip counts as its slip does.
+    """
+    every = [values for _, values in steady_runs(campaign).values()]
+    out = {}
+    for key in ("recurrence", "slip", "peak_velocity"):
+        shares = [values[key][1] / abs(values[key][0]) for values in every if values[key][2] > 1 and values[key][0]]
+        out[key] = max(float(np.median(shares)), EXACT) if shares else EXACT
+    return {**out, "creep_before_slip": out["slip"]}
+
+
+@dataclass(frozen=True)
+class Telling:
+    """An experiment simulated for each of some models.
+
+    Attributes:
+        words: what is done.
+        setting: the same.
+        recordings: of every model; empty where it cannot be simulated.
+        measure, slip, share: where the models differ most, and by how much of the mean.
+        scatters: the same in scatters of one such event.
+        note: why there is nothing.
+    """
+
+    words: str
+    setting: Setting
+    recordings: Mapping[str, Recording]
+    measure: str = ""
+    slip: int = 0
+    share: float = 0.0
+    scatters: float = 0.0
+    note: str = ""
+
+
+def tell_apart(
+    fits: Mapping[str, Fit], options: Mapping[str, Setting], scatters: Mapping[str, float], tell: Tell,
+    show: Callable[[Sequence[Telling]], None] = lambda found: None,
+) -> list[Telling]:  # fmt: skip
+    """Every experiment simulated for every model; the one first in which they differ most beyond the scatter.
+
+    Args:
+        fits: the models.
+        options: the experiments.
+        scatters: as of :func:`scatter`.
+        tell, show: told the progress, and what there is so far.
+    """
+    out: list[Telling] = []
+    for i, (words, setting) in enumerate(options.items()):
+
+        def within(text: str, share: float, i: int = i, words: str = words) -> None:
+            tell(f"{words}, {text}", 0.5 + 0.5 * (i + 2.0 * (share - 0.5)) / len(options))
+
+        try:
+            found = compare(fits, setting, within)
+        except StickslipError as error:
+            out.append(Telling(words, setting, {}, note=str(error).split("\n")[0]))
+            continue
+        best = farthest(found)
+        if best is None:
+            out.append(Telling(words, setting, found, note="no event differs"))
+        else:
+            key, slip, share = best
+            out.append(Telling(words, setting, found, key, slip + 1, share, share / scatters[key]))
+        out.sort(key=lambda t: -t.scatters)
+        show(list(out))
+    return out

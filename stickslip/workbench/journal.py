@@ -1,7 +1,8 @@
 """The history of a workbench in a folder beside the campaign, so that a server that is started again is where it was.
 
-The folder ``.stickslip-workbench`` holds ``NAME.json`` (the steps, with the data and the version they belong to), the
-numbers of their models as plain arrays, and what the last diagnosis found. Nothing in it is ever run as code.
+The folder ``.stickslip-workbench`` holds ``NAME-DIGEST.json`` (the steps, with the data they belong to), the numbers of
+their models as plain arrays, and what the last diagnosis found. The digest is of the data: with another file or run in
+the campaign a history of its own begins. Nothing in the folder is ever run as code.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ class Journal:
         path = campaign.description.path
         self.campaign = campaign
         self.folder = path.parent / FOLDER
-        self.file = self.folder / f"{path.stem}.json"
-        self.diagnosis = self.folder / f"{path.stem}-diagnosis"
+        own = hashlib.sha256(" ".join(_digests(campaign.inputs())).encode()).hexdigest()[:8]
+        self.file = self.folder / f"{path.stem}-{own}.json"
+        self.diagnosis = self.folder / f"{path.stem}-{own}-diagnosis"
         self._names: dict[int, tuple[ForceFit, str]] = {}
         self._packed: dict[int, tuple[Fit, dict[str, Any]]] = {}
 
@@ -62,7 +64,7 @@ class Journal:
         """
         if not self.file.is_file():
             return [], [], {}
-        kept = json.loads(self.file.read_text())
+        kept = json.loads(self.file.read_text(encoding="utf-8"))
         if kept.get("schema") != SCHEMA or kept.get("inputs") != _digests(self.campaign.inputs()):
             return [], [], {}
         steps, fits = [], []
@@ -78,7 +80,7 @@ class Journal:
             return None
         result = read_result(self.diagnosis)
         same = _digests(result.get("inputs", ())) == _digests(self.campaign.inputs())
-        return Diagnosis(self.campaign, None, dict(result), {}) if same else None
+        return Diagnosis(self.campaign, None, dict(result), {}, self.diagnosis) if same else None
 
     def _of(self, fit: Fit) -> dict[str, Any]:
         if id(fit) not in self._packed:

@@ -70,14 +70,14 @@ def commands(session: Session) -> str:
     if campaign is None:
         return ""
     file = quote(campaign.description.path.name)
-    own = "".join(f" --effect {quote(path.name)}" for path in session.effects)
+    own = "".join(f" --effect {quote(session.shown(path))}" for path in session.effects)
     lines = []
     if fit is not None:
-        by_hand = any(step.changed for step in session.taken)
-        added = "".join(f" --add {tag}" for tag in fit.effects)
+        by_hand = any("with_values" in step.code or "refit" in step.code for step in session.taken)
+        added = "".join(f" --add {form}" for form in fit.effect_forms)
         lines.append(f"stickslip fit {file}{added}{own} --out fit")
         if by_hand:
-            lines.append("# what was set by hand has no command: the lines of Python have it")
+            lines.append("# what was set by hand or locked has no command: the lines of Python have it")
     lines.append(f"stickslip diagnose {file}{own} --out diagnosis")
     return "\n".join(lines)
 

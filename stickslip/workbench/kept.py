@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
@@ -99,11 +100,23 @@ def save(
     if not campaign.description.filed:
         raise InputError("this campaign has no folder", hint="only a campaign of a file has one")
     folder = new_place(campaign.description.folder, name, "name of the run folder")
-    if isinstance(found, Diagnosis) and not found.variables:
-        raise InputError("this diagnosis is in a run folder already", hint="it was opened from there")
+    if isinstance(found, Diagnosis) and found.folder is not None:
+        return _copied(found.folder, folder)
     if isinstance(found, Fit):
         found.confirm(tell)
     return found.save(folder)
+
+
+def _copied(folder: Path, to: Path) -> Path:
+    """A run folder once more, under another name; nothing half-written is left."""
+    aside = to.with_name(f".{to.name}.writing")
+    shutil.rmtree(aside, ignore_errors=True)
+    try:
+        shutil.copytree(folder, aside)
+        aside.rename(to)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+    return to
 
 
 def report(kept: Kept) -> str:

@@ -63,27 +63,31 @@ class _Residual:
         self._medians: dict[str, Any] = {}
         self._law = source(x=[], y=[])
         self.figure.add_layout(Span(location=0.0, dimension="width", line_color=theme.soft, line_width=1))
-        names = list(session.campaign.names) if session.campaign is not None else []
-        for i, name in enumerate(names):
-            colour = theme.runs[i % len(theme.runs)]
-            self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])
-            self.figure.scatter(
-                "x", "y", source=self._points[name], size=3, color=colour, alpha=0.35, legend_label=name[:24]
-            )
-            self.figure.line("x", "y", source=self._medians[name], color=colour, line_width=2.5, legend_label=name[:24])
         self.figure.line(
             "x", "y", source=self._law, color=theme.model, line_width=4, alpha=0.8, line_dash="dashed",
             legend_label="the chosen effect",
         )  # fmt: skip
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
         legend(self.figure, "below")
+        self._draw_runs()
         self.against.param.watch(lambda event: self.update(), "value")
         self.period.param.watch(lambda event: self.update(), "value")
-        watch(session, ["steps", "at", "promises"], self.update)
+        watch(session, ["steps", "at", "promises", "campaign"], self.update)
         self.update()
+
+    def _draw_runs(self) -> None:
+        """A colour for every run that has none yet."""
+        runs = look().runs
+        for name in self._session.campaign.names if self._session.campaign is not None else ():
+            if name not in self._points:
+                more = {"color": runs[len(self._points) % len(runs)], "legend_label": name[:24]}
+                self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])
+                self.figure.scatter("x", "y", source=self._points[name], size=3, alpha=0.35, **more)
+                self.figure.line("x", "y", source=self._medians[name], line_width=2.5, **more)
 
     def update(self) -> None:
         """Draw it anew; only numbers change."""
+        self._draw_runs()
         fit = self._session.fit
         if fit is None:
             return

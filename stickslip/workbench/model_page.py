@@ -68,12 +68,12 @@ def _buttons(session: Session) -> Any:
         found[name] = button
 
     def update() -> None:
-        found["Fit"].disabled = bool(session.busy) or session.fit is None
+        found["Fit"].disabled = bool(session.busy) or session.campaign is None
         found["Undo"].disabled = session.at <= 0
         found["Redo"].disabled = session.at >= len(session.steps) - 1
         found["Base"].disabled = session.at <= 0
 
-    watch(session, ["steps", "at", "busy"], update)
+    watch(session, ["steps", "at", "busy", "campaign"], update)
     update()
     return pn.Row(*found.values(), sizing_mode="fixed")
 

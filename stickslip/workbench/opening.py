@@ -35,7 +35,7 @@ def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
     campaign = load_campaign(campaign_of(path, result), own)
     session = Session(campaign=campaign, effects=own)
     if result.get("kind") == "diagnose":
-        session.diagnosis = Diagnosis(campaign, None, result, {})
+        session.diagnosis = Diagnosis(campaign, None, result, {}, path)
     return session
 
 

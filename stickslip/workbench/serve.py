@@ -21,6 +21,7 @@ from tornado.web import Application, RequestHandler
 from ..errors import InputError
 from . import own
 from .app import ready, view
+from .beside import close_all
 from .session import Session
 from .work import Worker
 
@@ -90,7 +91,7 @@ def serve(
     server.start()
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
-    url = f"http://{address}:{port}/{token}/"
+    url = f"http://{f'[{address}]' if ':' in address else address}:{port}/{token}/"
     tell(url)
     watcher = own.watch(session, session.effects) if session.effects else None
     if session.campaign is not None:
@@ -106,6 +107,7 @@ def serve(
         server.stop()
         for worker in workers:
             worker.close()
+        close_all(session)
 
 
 class Window:

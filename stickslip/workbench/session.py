@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ import param
 from ..errors import RunFolderError, StickslipError
 from ..inference.force.first_order import Promise
 from ..objects import Campaign, Diagnosis, Fit, load_campaign
+from ..physics.effects import catalogue
 from ..simulation.conformance import load_effects
 from ..system.progress import Cancelled
 from ..system.runstore import alone
@@ -164,6 +165,7 @@ class Session(param.Parameterized):
     def reopen(self, campaign: Campaign) -> None:
         """Another campaign in place of the open one, such as the same with a run more; the history begins anew."""
         self.stop()
+        self.cancel()
         keep = self._journal is not None
         with param.parameterized.batch_call_watchers(self):
             self.param.update(campaign=campaign, steps=(), at=-1, diagnosis=None, locked=frozenset(), run="", event=0)
@@ -183,18 +185,17 @@ class Session(param.Parameterized):
         try:
             rows, fits, more = self._journal.read()
             self.diagnosis = self._journal.diagnosed() or self.diagnosis
-        except (StickslipError, OSError, KeyError, ValueError, TypeError) as error:
+            if not rows:
+                return False
+            _complete(fits[-1])
+            steps = tuple(Step(**row, fit=fit) for row, fit in zip(rows, fits, strict=True))
+            at = min(int(more.get("at", len(steps) - 1)), len(steps) - 1)
+            locked = frozenset(map(str, more.get("locked", ())))
+            run, event = str(more.get("run", "")), int(more.get("event", 0))
+        except (StickslipError, OSError, KeyError, ValueError, TypeError, AttributeError) as error:
             self.said = f"what was open before cannot be shown again ({error}); it begins anew"
             return False
-        if not rows:
-            return False
-        _complete(fits[-1])
-        steps = [Step(**row, fit=fit) for row, fit in zip(rows, fits, strict=True)]
-        with param.parameterized.batch_call_watchers(self):
-            self.steps = tuple(steps)
-            self.at = min(int(more.get("at", len(steps) - 1)), len(steps) - 1)
-            self.locked = frozenset(more.get("locked", ()))
-            self.run, self.event = str(more.get("run", "")), int(more.get("event", 0))
+        self.param.update(steps=steps, at=at, locked=locked, run=run, event=event)
         return True
 
     def keep(self) -> None:
@@ -283,7 +284,10 @@ class Session(param.Parameterized):
         self.worker("keep", self.keep, STILL)
 
     def refit(self) -> None:
-        """Fitted anew, locked parameters as they are."""
+        """Fitted anew, locked parameters as they are; the base model, where that was cancelled."""
+        if self.fit is None and self.campaign is not None and not self.busy:
+            self.worker("", partial(self._begin, self.campaign))
+            return
         locked = sorted(self.locked)
         self._change(
             "fitting", lambda fit: fit.refit([n for n in locked if n in fit.values]), "fit",
@@ -294,7 +298,7 @@ class Session(param.Parameterized):
         """An effect more, fitted."""
 
         def command(fit: Fit) -> str:
-            every = (*fit.effects, effect)
+            every = (*fit.effect_forms, effect)
             return "stickslip fit campaign.toml " + " ".join(f"--add {e}" for e in every)
 
         self._change(
@@ -320,6 +324,8 @@ class Session(param.Parameterized):
             with self._long(busy):
                 made = make(fit)
                 _complete(made)
+                if self.campaign is not fit.campaign:  # another was opened meanwhile
+                    return
                 self.take(Step(text, made, code, command(fit)))
                 self.said = ""
             self.keep()
@@ -363,11 +369,18 @@ class Session(param.Parameterized):
         if isinstance(self.worker, Worker):
             self.worker.cancel()
 
+    def shown(self, path: Path) -> str:
+        """A path as it is written from the campaign's folder."""
+        assert self.campaign is not None
+        home = self.campaign.description.folder.resolve()
+        own = path.resolve()
+        return str(own.relative_to(home) if own.is_relative_to(home) else own)
+
     def code(self) -> str:
         """The lines of Python that lead to the model as it stands."""
         assert self.campaign is not None
         path = self.campaign.description.path.name
-        own = f", effects={[p.name for p in self.effects]!r}" if self.effects else ""
+        own = f", effects={[self.shown(p) for p in self.effects]!r}" if self.effects else ""
         first: Sequence[str] = ("import stickslip as ss", f"campaign = ss.load_campaign({path!r}{own})")
         return "\n".join([*first, *(s.code for s in self.taken)])
 
@@ -451,11 +464,15 @@ class Session(param.Parameterized):
                 tags = [cls.tag for cls in classes]
                 self.said = f"{path.name} was loaded anew: {', '.join(tags)}"
                 fit = self.fit
+                forms = {} if fit is None else dict(zip(fit.effects, fit.effect_forms, strict=True))
                 for tag in tags:
-                    if fit is not None and tag in fit.effects:
+                    if fit is not None and tag in forms:
                         with self._long(f"fitting with the new {tag}"):
-                            fit = fit.remove(tag).add(tag)
-                            self.take(Step(f"new {tag}", fit, f"fit = fit.remove({tag!r}).add({tag!r})"))
+                            fit = fit.remove(tag).add(forms[tag])
+                            self.take(Step(f"new {tag}", fit, f"fit = fit.remove({tag!r}).add({forms[tag]!r})"))
+                gone = [tag for tag in forms if tag not in catalogue.tags()]
+                if gone:
+                    self.said += f"; {', '.join(gone)} is in the model and in no file any more: switch it off"
                 self._promised = []
                 self.loaded += 1
 
@@ -496,10 +513,15 @@ class _Long:
 
 
 def _fewer(steps: tuple[Step, ...]) -> tuple[Step, ...]:
-    """The steps, without the first of those by hand where they are too many: each holds a model of some 10 MB."""
-    drop = len(steps) - MOST
-    first = [i for i, step in enumerate(steps) if step.changed][: max(drop, 0)]
-    return tuple(step for i, step in enumerate(steps) if i not in first)
+    """The steps, the first of those by hand in one with the next where they are too many: each holds some 10 MB."""
+    out = list(steps)
+    while len(out) > MOST:
+        at = next((i for i, step in enumerate(out[:-1]) if step.changed), None)
+        if at is None:
+            break
+        out[at + 1] = replace(out[at + 1], code=f"{out[at].code}\n{out[at + 1].code}")
+        del out[at]
+    return tuple(out)
 
 
 def _complete(fit: Fit) -> Fit:

@@ -11,22 +11,28 @@ import panel as pn
 from bokeh.models import FixedTicker
 
 from ..errors import InputError
+from ..inference.force.candidates import every_form
 from ..objects import Fit
+from ..physics.effects import catalogue
 from ..simulation.scenario.recording import Recording
-from ..system.units import shown
+from ..system.units import shown, to_si
 from . import experiments
 from .beside import Show, Tell, beside
-from .controls import BUTTON, Words
-from .experiments import MEASURES, Setting
+from .controls import BUTTON, Message, Words
+from .evidence import best_forms
+from .experiments import MEASURES, Setting, Telling
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .overview import record, reduced
-from .parts import Table, head, progress
+from .parts import Table, head, progress, row_of
 from .picked import chosen
 from .session import Session, watch
 
 TITLE = "Simulate"
 POINTS = 4000  # that are drawn of a curve
 LEFT = 76
+RIVALS = 4  # effects that are told apart at once
+FALLBACK = 1e-4  # m/s, where a run has no velocity of its own
+DONE = "Each is fitted, and run freely in experiments that are easily made."
 DASHES = ("solid", "dashed", "dotdash", "dotted")
 FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
 WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
@@ -39,14 +45,6 @@ class Simulated:
     fit: Fit
     setting: Setting
     recording: Recording
-
-
-@dataclass(frozen=True)
-class Rivals:
-    """One experiment simulated for each of some effects."""
-
-    setting: Setting
-    recordings: dict[str, Recording]
 
 
 def page(session: Session) -> Any:
@@ -73,11 +71,12 @@ class _Asked:
         self.run: Any = pn.widgets.Select(name="beside the run", options=[], width=170, margin=(0, 10, 0, 0), **FIXED)
         self.velocity = text(name="velocity of the drive")
         self.hold = text(name="a hold of", placeholder="none, such as 10 s")
+        self.step = text(name="a step to the velocity", placeholder="none, such as 1 mm/s")
         self.spring, self.mass = text(name="spring"), text(name="mass")
         self.events = pn.widgets.IntInput(
             name="slips, if at a velocity", value=7, start=1, end=100, width=150, margin=(0, 10, 0, 0), **FIXED
         )
-        asked = (self.run, self.velocity, self.hold, self.spring, self.mass, self.events)
+        asked = (self.run, self.velocity, self.hold, self.step, self.spring, self.mass, self.events)
         self.row = pn.FlexBox(*asked, gap="6px 0")
         self.view = pn.Column(head("What is left empty is as in the measured run."), self.row, **WIDE)
         self.run.param.watch(lambda event: self._placeholders(), "value")
@@ -113,7 +112,7 @@ class _Asked:
         """As it is written now."""
         return Setting(
             str(self.run.value), self.velocity.value, self.hold.value, self.spring.value, self.mass.value,
-            int(self.events.value or 1),
+            int(self.events.value or 1), self.step.value,
         )  # fmt: skip
 
 
@@ -344,80 +343,115 @@ class _Sweep:
 
 
 class _Experiment:
-    """Effects that the data cannot tell apart, each in the experiment that would."""
+    """Rival effects in every experiment that is easily made, so that one sees which would tell them apart."""
 
     def __init__(self, session: Session, asked: _Asked) -> None:
         self._session, self._asked = session, asked
         self._work = beside(session, "rivals")
         self._sets: list[tuple[tuple[str, ...], str]] = []
+        self._drawn: Telling | None = None
         self.which = pn.widgets.Select(
             name="effects that these data cannot tell apart", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
         )
+        self.effects: Any = pn.widgets.MultiChoice(
+            name="effects to tell apart, each in the model in place of the others", options=[], value=[],
+            max_items=RIVALS, width=420, margin=(0, 10, 0, 0), **FIXED,
+        )  # fmt: skip
         self._button = _button("Simulate each", self.start)
         self._said = Words(**WIDE)
-        self._words = Words(**WIDE)
+        self._table = Table(heard=self._heard, columns=[], rows=[], **WIDE)
         self._place = pn.Column(**WIDE)
         self.view = pn.Column(
             head("The experiment that would tell candidates apart"), self._said,
-            pn.FlexBox(self.which, self._button, gap="6px 10px"), progress(self._work), self._words, self._place,
-            **WIDE,
+            pn.FlexBox(self.which, self.effects, self._button, gap="6px 10px"), progress(self._work), self._table,
+            self._place, **WIDE,
         )  # fmt: skip
         self.which.param.watch(lambda event: self._propose(), "value")
-        watch(session, ["diagnosis"], self._offer)
+        watch(session, ["diagnosis", "promises", "loaded"], self._offer)
+        watch(session, ["campaign"], self._anew)
         watch(self._work, ["found", "doing"], self.update)
         self._offer()
         self.update()
+
+    def _anew(self) -> None:
+        self._work.found = None
+        self._drawn, self._place[:], self._table.rows = None, [], []
 
     def _offer(self) -> None:
         self._sets = experiments.undecided(self._session.diagnosis)
         options = {" or ".join(tags): i for i, (tags, _) in enumerate(self._sets)}
         self.which.param.update(options=options, value=0 if options else None)
-        self.which.visible = self._button.visible = bool(options)
+        self.which.visible = bool(options)
+        self.effects.options = sorted({tag for tag, _ in every_form(catalogue.tags())})
         self._propose()
 
     def _propose(self) -> None:
         if self._sets:
-            text = self._sets[int(self.which.value or 0)][1]
-            self._said.text = (
-                f"Proposed: {text}. What is asked for above is simulated; without a hold there, one of "
-                f"{experiments.proposed_hold(text)}."
-            )
-        elif self._session.diagnosis is None:
-            self._said.text = "Diagnose first (What is missing): where it ends in a set of effects, they are run here."
-        else:
-            self._said.text = "The diagnosis left nothing undecided between effects."
+            tags, text = self._sets[int(self.which.value or 0)]
+            self.effects.value = [tag for tag in tags if tag in self.effects.options][:RIVALS]
+            self._said.text = f"The diagnosis proposes: {text}. {DONE}"
+            return
+        if not self.effects.value:
+            best = [p.tag for p in best_forms(self._session.promises)][:2]
+            self.effects.value = [tag for tag in best if tag in self.effects.options]
+        self._said.text = f"The effects that promise most are offered; others can be chosen. {DONE}"
 
     def start(self) -> None:
-        """Fit each of them and simulate the experiment."""
-        if not self._sets or self._session.diagnosis is None:
+        """Fit the model with each effect and simulate every experiment."""
+        campaign, tags, asked = self._session.campaign, list(self.effects.value), self._asked.setting()
+        if campaign is None:
             return
-        tags, text = self._sets[int(self.which.value or 0)]
-        forms = self._session.diagnosis.verdict.get("forms", {})
-        s = self._asked.setting()
-        velocity = s.velocity
-        if not velocity.strip() and self._session.campaign is not None:
-            velocity = f"{self._session.campaign[s.run].drive_velocity or 1e-4:.6g} m/s"
-        setting = Setting(
-            s.run, velocity, s.hold if s.hold.strip() else experiments.proposed_hold(text), s.spring, s.mass, s.events
-        )
+        if len(tags) < 2:
+            self._work.said = "choose two effects at least"
+            return
+        told = {} if self._session.diagnosis is None else self._session.diagnosis.verdict.get("forms", {})
 
-        def make(tell: Tell, show: Show) -> Rivals:
-            fits = experiments.rivals(needed(self._session), tags, forms, tell)
-            return Rivals(setting, experiments.compare(fits, setting, tell))
+        def make(tell: Tell, show: Show) -> list[Telling]:
+            fit = needed(self._session)
+            scenario = experiments.scenario(fit, asked)
+            velocity = campaign[asked.run].drive_velocity or scenario.file.drive.velocity or FALLBACK
+            velocity = to_si(asked.velocity, "m/s", key="velocity") if asked.velocity.strip() else velocity
+            block = scenario.file.block
+            options = experiments.usual(asked, abs(velocity), block.spring_stiffness, block.mass)
+            if not asked.as_measured:
+                options = {"as asked for above": asked, **options}
+            fits = experiments.rivals(fit, tags, told, tell)
+            return experiments.tell_apart(fits, options, experiments.scatter(campaign), tell, show)
 
         self._work.do("fitting each of them", make)
 
+    def _heard(self, message: Message) -> None:
+        number = row_of(message, len(self._work.found or ()))
+        if number is not None:
+            self._draw(self._work.found[number])
+
     def update(self) -> None:
-        """Draw them side by side."""
+        """List the experiments, and draw the one in which they differ most."""
         self._button.disabled = bool(self._work.doing)
-        found: Rivals | None = self._work.found
-        if found is None:
+        found: list[Telling] | None = self._work.found
+        if not found:
             return
+        columns = ["experiment: a click draws it", "they differ most in", "by", "in scatters of one event"]
+        rows = [
+            [t.words, t.note or f"{t.measure.replace('_', ' ')} of slip {t.slip}",
+             "" if t.note else f"{100 * t.share:.2g} %", "" if t.note else f"{t.scatters:.2g}"]
+            for t in found
+        ]  # fmt: skip
+        self._table.param.update(columns=columns, rows=rows)
+        self._draw(found[0])
+
+    def _draw(self, telling: Telling) -> None:
+        """The models side by side in one experiment."""
+        found: list[Telling] = self._work.found
+        self._table.chosen = next((i for i, t in enumerate(found) if t is telling), -1)
+        if telling is self._drawn or not telling.recordings:
+            return
+        self._drawn = telling
         theme = look()
         made = [figure(name, height=280, output_backend="canvas") for name in ("displacement", "load point - block")]
-        moved = {tag: r["displacement"].values for tag, r in found.recordings.items()}
+        moved = {tag: r["displacement"].values for tag, r in telling.recordings.items()}
         k, unit = unit_of(np.concatenate([*moved.values()]), "m")
-        for i, (tag, r) in enumerate(found.recordings.items()):
+        for i, (tag, r) in enumerate(telling.recordings.items()):
             data = _thinned(r["time"].values, moved[tag] * k, (r["drive_position"].values - moved[tag]) * k)
             look_of = {
                 "color": theme.runs[i % len(theme.runs)], "line_width": 2, "line_dash": DASHES[i % len(DASHES)],
@@ -429,11 +463,13 @@ class _Experiment:
             own.xaxis.axis_label, own.yaxis.axis_label = label("time from the start", "s"), label(name, unit)
             legend(own)
         made[1].x_range = made[0].x_range
-        rows = [[tag, *_cells(experiments.simulated(r))] for tag, r in found.recordings.items()]
-        columns = ["means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)]
+        rows = [[tag, *_cells(experiments.simulated(r))] for tag, r in telling.recordings.items()]
+        columns = [
+            f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
+        ]  # fmt: skip
         table = Table(columns=columns, rows=rows, choosing=False, **WIDE)
-        self._words.text = experiments.difference(found.recordings)
-        self._place[:] = [pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in made), **WIDE), table]
+        words = Words(text=experiments.difference(telling.recordings), **WIDE)
+        self._place[:] = [words, pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in made), **WIDE), table]
 
 
 class _Synthetic:

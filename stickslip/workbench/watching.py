@@ -54,7 +54,8 @@ def watch(session: param.Parameterized, names: Sequence[str], call: Callable[[],
     """Call a function whenever some of these parameters of a session change.
 
     In a window it is called in its document, once for all changes since the last call, and later if its page is not
-    seen; else at once.
+    seen; else at once. What changes while the window is being made is followed when it is there: before, a document
+    loses what it is asked to call.
     """
     import panel as pn
 
@@ -62,19 +63,31 @@ def watch(session: param.Parameterized, names: Sequence[str], call: Callable[[],
     if doc is None or doc.session_context is None:
         session.param.watch(lambda *events: call(), list(names))
         return
-    waiting = threading.Event()
+    guard = threading.Lock()
+    loaded, waiting = False, False
 
     def run() -> None:
-        waiting.clear()
+        nonlocal waiting
+        with guard:
+            waiting = False
         if place is None:
             call()
         else:
             place.call(call)
 
     def changed(*events: Any) -> None:
-        if not waiting.is_set():
-            waiting.set()
+        nonlocal waiting
+        with guard:
+            ask, waiting = loaded and not waiting, True
+        if ask:
             doc.add_next_tick_callback(run)
+
+    def begin() -> None:
+        nonlocal loaded
+        with guard:
+            loaded, missed = True, waiting
+        if missed:
+            run()
 
     watcher = session.param.watch(changed, list(names))
 
@@ -83,3 +96,4 @@ def watch(session: param.Parameterized, names: Sequence[str], call: Callable[[],
             session.param.unwatch(watcher)
 
     doc.on_session_destroyed(gone)
+    pn.state.onload(begin)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.system.progress import Cancelled
 from stickslip.workbench.journal import FOLDER, Journal
 from stickslip.workbench.selection import choose, cycles, follow, selected, worst
 from stickslip.workbench.session import Session
@@ -105,13 +106,17 @@ def test_a_history_does_not_depend_on_how_its_path_is_written(campaign, base, se
     assert len(Journal(ss.load_campaign("campaign.toml")).read()[0]) == 2
 
 
-def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, folder, monkeypatch):
+def _elsewhere(kept):
+    kept["steps"][0]["fit"]["rungs"][0]["arrays"] = "../../etc/passwd"
+    return kept
+
+
+@pytest.mark.parametrize("damage", [_elsewhere, lambda kept: [], lambda kept: {**kept, "event": None}])
+def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, monkeypatch, damage):
     session._journal = Journal(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
-    path = folder / FOLDER / "campaign.json"
-    kept = json.loads(path.read_text())
-    kept["steps"][0]["fit"]["rungs"][0]["arrays"] = "../../etc/passwd"
-    path.write_text(json.dumps(kept))
+    path = session._journal.file
+    path.write_text(json.dumps(damage(json.loads(path.read_text()))))
     monkeypatch.setattr(type(campaign), "fit", lambda self: base)
     again = Session(campaign=campaign)
     again.begin()
@@ -119,14 +124,50 @@ def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, folde
     assert "begins anew" in again.said and again.fit is base
 
 
-def test_a_history_of_other_data_is_left_alone(campaign, base, session, folder, monkeypatch):
+def test_a_history_of_other_data_is_left_alone(campaign, base, session, folder):
     session._journal = Journal(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
-    path = folder / FOLDER / "campaign.json"
-    kept = json.loads(path.read_text())
-    kept["inputs"][0] = "0"
-    path.write_text(json.dumps(kept))
-    assert Journal(campaign).read() == ([], [], {})
+    file = folder / "campaign.toml"
+    text = file.read_text()
+    try:
+        file.write_text(text + "# another day\n")
+        other = Journal(ss.load_campaign(file))
+        assert other.read() == ([], [], {})
+        other.write([{"text": "base"}], [base], {})
+        assert len(other.read()[0]) == 1
+    finally:
+        file.write_text(text)
+    assert len(Journal(campaign).read()[0]) == 2
+
+
+def test_a_base_that_was_cancelled_can_be_fitted(campaign, base, monkeypatch):
+    def cancelled(self):
+        raise Cancelled
+
+    session = Session(campaign=campaign)
+    monkeypatch.setattr(type(campaign), "fit", cancelled)
+    session.begin(keep=False)
+    assert session.fit is None and "cancelled" in session.said
+    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+    session.refit()
+    assert session.fit is base
+
+
+def test_a_fit_of_a_campaign_that_is_not_open_any_more_is_no_step(base, session):
+    def slow(fit):
+        session.campaign = None
+        return fit
+
+    session._change("fitting", slow, "text", "code")
+    assert len(session.steps) == 1
+
+
+def test_steps_that_are_dropped_leave_their_lines(base, session, monkeypatch):
+    monkeypatch.setattr("stickslip.workbench.session.MOST", 3)
+    for share in (1.01, 1.02, 1.03, 1.04):
+        session.by_hand({DROP: base.values[DROP] * share})
+    assert len(session.steps) == 4
+    assert [line.count("with_values") for line in session.code().splitlines()] == [0, 0, 0, 1, 1, 1, 1]
 
 
 def test_models_of_forgotten_steps_are_removed(campaign, base, session, folder):

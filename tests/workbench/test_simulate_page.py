@@ -56,6 +56,8 @@ def test_velocity_spring_and_mass_are_taken_with_their_units(base):
         (Setting("v100", "0.3"), "velocity"),
         (Setting("v100", "0 m/s"), "velocity"),
         (Setting("v100", hold="-1 s"), "hold"),
+        (Setting("v100", hold="1 h"), "hold"),
+        (Setting("v100", mass="0 kg"), "mass"),
         (Setting("v100", mass="3 N"), "mass"),
     ):
         with pytest.raises(InputError, match=key):
@@ -148,19 +150,52 @@ def test_a_synthetic_record_can_be_opened(campaign, base, folder):
             experiments.write(base, Setting("v400"), campaign, name, _silent)
 
 
-def test_rivals_are_simulated_in_one_experiment(session, base, undecided):
+def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(session, base, campaign, undecided):
     session.diagnosis = undecided
     assert experiments.undecided(undecided) == [(RIVALS, "holds of 1 s and 10 s")]
     fits = experiments.rivals(base, RIVALS, {}, _silent)
     assert {tag: fit.effects for tag, fit in fits.items()} == {tag: (tag,) for tag in RIVALS}
-    found = experiments.compare(fits, Setting("v200", "200 um/s", "10 s"), _silent)
-    assert set(found) == set(RIVALS)
-    text = experiments.difference(found)
-    assert "%" in text and "slip" in text
+    set_to = {"contact-ageing": {"contact-ageing.rate": 0.03}, "viscous-drag": {"viscous-drag.drag": 1e-6}}
+    fits = {tag: fit.with_values(set_to[tag]) for tag, fit in fits.items()}
+    plain = Setting("v200", "200 um/s", events=3)
+    hold, wrong = Setting("v200", "200 um/s", "10 s"), Setting("v200", "200 um/s", mass="0 kg")
+    options = {"as driven": plain, "a hold of 10 s": hold, "wrong": wrong}
+    shown = []
+    found = experiments.tell_apart(fits, options, experiments.scatter(campaign), _silent, shown.append)
+    assert [t.words for t in found] == ["a hold of 10 s", "as driven", "wrong"] and len(shown) == 2
+    assert found[0].scatters > 3.0 * found[1].scatters > 0.0 and "mass" in found[2].note and not found[2].recordings
+    assert set(found[0].recordings) == set(RIVALS)
     made = simulate_page._Experiment(session, simulate_page._Asked(session))
-    assert "holds of 1 s and 10 s" in made._said.text
-    beside(session, "rivals").found = simulate_page.Rivals(Setting("v200"), found)
-    assert made._words.text == text and made._place[1].rows[0][0] == "contact-ageing"
+    assert "holds of 1 s and 10 s" in made._said.text and made.effects.value == list(RIVALS)
+    beside(session, "rivals").found = found
+    assert made._table.rows[0][0] == "a hold of 10 s" and made._table.chosen == 0
+    words, _, table = made._place
+    assert words.text == experiments.difference(found[0].recordings) and table.rows[0][0] == "contact-ageing"
+    made._heard({"kind": "row", "row": 1})
+    assert made._table.chosen == 1 and made._drawn is found[1]
+
+
+def test_usual_experiments_change_one_thing_each(base):
+    options = experiments.usual(Setting("v200", events=2), 2e-4, 1000.0, 0.1)
+    made = {words: experiments.scenario(base, setting).file for words, setting in options.items()}
+    assert [p.velocity for p in made["a hold of 10 s"].drive.piece] == pytest.approx([2e-4, 0.0, 2e-4])
+    assert [p.velocity for p in made["a step to ten times the velocity"].drive.piece] == pytest.approx([2e-4, 2e-3])
+    assert made["a quarter of the velocity"].drive.velocity == pytest.approx(5e-5)
+    assert made["a block twice as heavy"].block.mass == pytest.approx(0.2)
+    assert made["a spring half as stiff"].block.spring_stiffness == pytest.approx(500.0)
+
+
+def test_where_nothing_was_proposed_effects_can_be_chosen(session):
+    made = simulate_page._Experiment(session, simulate_page._Asked(session))
+    assert "can be chosen" in made._said.text and {"wear", *RIVALS} <= set(made.effects.options)
+    made.effects.value = ["wear"]
+    made.start()
+    assert "two effects" in beside(session, "rivals").said
+
+
+def test_models_that_differ_in_nothing_are_said_to(base):
+    same = experiments.run(experiments.scenario(base, Setting("v400", "400 um/s", events=2)))
+    assert experiments.farthest({"a": same, "b": same}) is None
 
 
 def test_an_effect_that_is_in_the_model_stays_and_the_other_takes_its_place():
@@ -178,11 +213,6 @@ def test_an_effect_that_is_in_the_model_stays_and_the_other_takes_its_place():
     found = experiments.rivals(fit, RIVALS, {"viscous-drag": {"law": "linear"}}, _silent)
     assert found["contact-ageing"] is fit
     assert found["viscous-drag"].effects == ("wear", "viscous-drag:law=linear")
-
-
-def test_the_longest_hold_that_is_proposed_is_simulated():
-    assert experiments.proposed_hold("holds of 1 s and 25 s: only ageing remembers them") == "25 s"
-    assert experiments.proposed_hold("holds at one elongation of the spring") == "10 s"
 
 
 def test_the_ticks_of_a_logarithmic_axis_are_plain_numbers():

@@ -69,6 +69,14 @@ def _made(tag: str, options: Sequence[str]) -> Effect:
     return catalogue.make(tag, **values)
 
 
+def with_form(effect: Effect) -> str:
+    """Tag of an effect with the form of its law, ``tag:name=value,name=value``; the tag alone for the usual form."""
+    usual = type(effect)()
+    own = {name: getattr(effect, name) for name in variants(effect)}
+    form = ",".join(f"{name}={value}" for name, value in own.items() if value != getattr(usual, name))
+    return f"{effect.tag}:{form}" if form else effect.tag
+
+
 def _number(text: str) -> Any:
     """A number in SI as such; a quantity with its unit as text."""
     try:
