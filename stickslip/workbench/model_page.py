@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import panel as pn
 from bokeh.events import Tap
-from bokeh.models import HoverTool
+from bokeh.models import CustomJSTickFormatter, HoverTool
 
 from ..objects import Fit
 from ..objects.picture import balanced
+from ..system.units import shown
 from .controls import BUTTON, Knobs, Message, Words
 from .figures import FEW, crosshair, figure, label, legend, look, source, unit_of
 from .free_panel import Free
@@ -221,7 +222,7 @@ class _Cycle:
 
 
 class _Heat:
-    """Error by phase of the cycle and run; a click selects the worst cycle there."""
+    """Error by phase of the cycle and run, the slowest first; a click selects the worst cycle there."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -248,6 +249,8 @@ class _Heat:
         self.figure.name = "heat figure"
         self.figure.grid.grid_line_color = None
         self.figure.xaxis.major_label_orientation = 0.6
+        self._labels = CustomJSTickFormatter(args={"labels": {}}, code="return labels[tick] || tick")
+        self.figure.xaxis.formatter = self._labels
         self.figure.toolbar_location = None
         self.figure.on_event(Tap, self._tapped)
         self.kind.param.watch(lambda event: self.update(), "value")
@@ -271,7 +274,11 @@ class _Heat:
         if fit is None or fitted is None:
             return
         table = fit.errors if self.kind.value == NOW else fitted.unseen_errors
-        runs, phases = list(table.columns), list(table.index)[::-1]
+        speeds = self._speeds(list(table.columns))
+        runs, phases = sorted(table.columns, key=lambda run: speeds.get(run, np.inf)), list(table.index)[::-1]
+        labels = {run: f"{run}, {shown(speed, 'm/s', 2)}" for run, speed in speeds.items()}
+        if self._labels.args["labels"] != labels:
+            self._labels.args = {"labels": labels}
         if list(self.figure.x_range.factors) != runs or list(self.figure.y_range.factors) != phases:
             self.figure.x_range.factors, self.figure.y_range.factors = runs, phases
         values = table.to_numpy(float)
@@ -283,6 +290,13 @@ class _Heat:
             "text": ["" if np.isnan(c[2]) else f"{c[2]:.2f}" for c in cells],
             "colour": colours, "ink": [ink(c) for c in colours],
         }  # fmt: skip
+
+    def _speeds(self, runs: list[str]) -> dict[str, float]:
+        """Run -> velocity of its drive (m/s), for those that have one."""
+        campaign = self._session.campaign
+        known = set() if campaign is None else set(campaign.names) & set(runs)
+        speeds = {run: campaign[run].drive_velocity for run in runs if run in known}  # type: ignore[index]
+        return {run: abs(speed) for run, speed in speeds.items() if speed}
 
 
 def heat(value: float, top: float) -> str:

@@ -10,6 +10,8 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.system.progress import Cancelled, breathe
+from stickslip.workbench.beside import beside, close_all
+from stickslip.workbench.session import Session
 from stickslip.workbench.work import Search, Worker
 
 
@@ -160,3 +162,20 @@ def test_a_process_that_does_not_end_after_its_answer_is_ended():
     search = Search(_lingers, (), lambda *a: None, found.append, lambda text: None)
     until(lambda: found, 60)
     until(lambda: not search._process.is_alive(), 20)
+
+
+def test_work_beside_ends_with_the_server(campaign):
+    session = Session(campaign=campaign, worker=Worker())
+    begun = threading.Event()
+
+    def endless(tell, show):
+        begun.set()
+        while True:
+            tell("turning", 0.5)
+            time.sleep(0.01)
+
+    work = beside(session, "simulation")
+    work.do("turning", endless)
+    begun.wait()
+    close_all(session)
+    assert work.doing == "" and work.said == "cancelled"
