@@ -25,6 +25,7 @@ from ..system.runstore import json_text, open_run, refuse_existing, versions
 from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .fit import Fit
+from .forecast import wander, wander_sentence
 from .run import Tell, dataset, head, save
 from .shown import Shown, facts, table
 
@@ -226,11 +227,17 @@ def _made(campaign: Campaign, done: Found, able: Any, seconds: float) -> Diagnos
     sections, variables = summary(done, campaign.rig)
     traces, segmentations = campaign.displaced[0], campaign.scaled[0]
     described, pictured = trace_sections(traces, segmentations)
+    follows = wander(campaign)
     result: dict[str, Any] = {
         **head(campaign, "diagnose"),
         **sections,
         "rig": [f.plain() for f in dict.fromkeys((*campaign.findings, *done.wrong))],
-        "notes": [*campaign.scaled[1], *campaign.displaced[1]],
+        "wander": follows,
+        "notes": [
+            *campaign.scaled[1],
+            *campaign.displaced[1],
+            *([] if follows is None else [wander_sentence(follows)]),
+        ],
         "can": list(able.can),
         "cannot": list(able.cannot),
         "dropped": [*campaign.lost, *sections["dropped"]],

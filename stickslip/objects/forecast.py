@@ -10,10 +10,11 @@ import numpy as np
 
 from ..errors import InputError, nearest
 from ..inference.forecast.levels import levels, wandering
-from ..inference.forecast.predict import METHODS, Compared, Forecaster, goes_back, training_slips
+from ..inference.forecast.predict import METHODS, Compared, Forecaster, compare, goes_back, training_slips
 from ..inference.forecast.rolling import SHARES, Rolled, choose, prepare, roll
 from ..inference.forecast.telling import told
 from ..inference.forecast.wander import Wander
+from ..system.units import shown
 from .run import Tell, dataset, head, save
 from .shown import Shown, facts, table
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from ..inference.forecast.past import Past
     from .campaign import Campaign
 
+MANY = 30  # slips from which on a diagnosis says what their level follows
+LEARNED = 0.7  # of them, from which that is learned
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
@@ -178,6 +181,53 @@ def forecast(
         "notes": _notes(past, at, law, rise),
     }
     return Forecast(campaign, past, laws, rolled, result)
+
+
+def wander(campaign: Campaign) -> dict[str, Any] | None:
+    """What the level of friction follows from slip to slip, in the run with the most slips.
+
+    Laws are compared as for a forecast, with the last part of the slips left for prediction.
+
+    Returns:
+        ``run``, ``slips``, ``coordinate``, ``weights`` and ``text`` (see
+        :func:`stickslip.inference.forecast.telling.told`), the best law with ``size`` (share of the mean level) and
+        ``length``; None where fewer than :data:`MANY` slips, or no level, can be had.
+    """
+    number = _chosen(campaign, None)
+    trace, found = campaign.traces[number], campaign.scaled[0][number]
+    if len(found.events) < MANY:
+        return None
+    try:
+        data = levels(trace, found)
+    except InputError:
+        return None
+    arrays = {str(name): np.asarray(data[name].values, float) for name in data.data_vars}
+    laws = compare(arrays, int(LEARNED * len(found.events)))
+    best, mean = laws[0].law, abs(float(arrays["onset"].mean()))
+    return {
+        "run": trace.name,
+        "slips": len(found.events),
+        **told(laws, goes_back(arrays["direction"])),
+        "law": [
+            {"kernel": c.kernel, "coordinate": c.coordinate, "size": abs(c.size[0]) / mean, "length": c.length,
+             "unit": "s" if c.coordinate == "time" else "m"}
+            for c in best.components
+        ],
+        "scatter": best.scatter[0] / mean,
+    }  # fmt: skip
+
+
+def wander_sentence(found: dict[str, Any]) -> str:
+    """The same in a sentence."""
+    parts = [
+        f"{100 * c['size']:.2g} % along the {c['coordinate']} with a length of {shown(c['length'], c['unit'], 2)}"
+        for c in found["law"]
+    ]
+    best = f"Best law: {' and '.join(parts)}, " if parts else "Best law: "
+    return (
+        f"{found['run']}, {found['slips']} slips: {found['text']} {best}and a scatter of "
+        f"{100 * found['scatter']:.2g} % from slip to slip."
+    )
 
 
 def _chosen(campaign: Campaign, run: str | None) -> int:

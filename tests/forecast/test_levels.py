@@ -8,8 +8,9 @@ from stickslip.data.segment import segment
 from stickslip.data.trace import Trace
 from stickslip.errors import InputError
 from stickslip.inference.forecast.levels import levels, wandering
+from stickslip.objects.forecast import wander, wander_sentence
 
-from .synthetic import MEANS, SPEED, STIFFNESS, record
+from .synthetic import LAW, MEANS, SPEED, STIFFNESS, record
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +82,18 @@ def test_a_campaign_gives_levels(trace):
     assert campaign.levels().sizes == levels(trace, segment(trace)).sizes
     with pytest.raises(InputError, match="no trace 'other'"):
         campaign.levels("other")
+
+
+def test_a_diagnosis_says_what_the_level_follows_and_how_far():
+    found = wander(ss.Campaign.from_traces([record(400, 3)]))
+    assert found is not None and found["slips"] > 350 and found["weights"]["nothing"] < 0.01
+    assert "slip path" in found["text"] and found["weights"]["slip path"] > 0.5
+    # a rough wander that is shorter than a slip is scatter, so only the two together can be held against the truth
+    together = np.hypot(found["scatter"], np.linalg.norm([c["size"] for c in found["law"]]))
+    assert together == pytest.approx(np.hypot(LAW.components[0].size[0], LAW.scatter[0]) / MEANS[0], rel=0.5)
+    said = wander_sentence(found)
+    assert said.startswith("synthetic, ") and f"{100 * found['scatter']:.2g} %" in said
+
+
+def test_of_few_slips_it_says_nothing():
+    assert wander(ss.Campaign.from_traces([record(20, 3)])) is None
