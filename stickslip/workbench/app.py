@@ -12,13 +12,14 @@ from typing import Any
 import panel as pn
 from panel.theme.native import Native
 
-from .controls import BUTTON, Frame, Message
+from .controls import BUTTON, Frame, Message, Words
 from .figures import dark, look
 from .selection import follow
 from .session import Session, watch
 from .watching import Place, placed
 
 PAGES = ("data_page", "model_page", "missing_page", "simulate_page", "keep_page")
+DRAWN = "This page is being drawn."  # in place of a page until it is there
 STYLE = """
 body { margin: 0; padding: 12px 18px; font-family: system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
 """
@@ -78,7 +79,9 @@ def _opened(session: Session, number: int, event: Any) -> None:
 def tabs(session: Session) -> pn.Tabs:
     """The pages, each made when it is first looked at."""
     every = modules()
-    places = [pn.Column(sizing_mode="stretch_width", min_height=500) for _ in every]
+    wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
+    places = [pn.Column(Words(text=DRAWN, margin=(24, 0), **wide), min_height=500, **wide) for _ in every]
+    made_at: set[int] = set()
     made = pn.Tabs(
         *((module.TITLE, place) for module, place in zip(every, places, strict=True)),
         sizing_mode="stretch_width", stylesheets=[TABS],
@@ -93,9 +96,10 @@ def tabs(session: Session) -> pn.Tabs:
             if i != made.active:
                 place.hide()
         seen[made.active].show()
-        if not places[made.active].objects:
+        if made.active not in made_at:
+            made_at.add(made.active)
             with placed(seen[made.active]):
-                places[made.active].append(_made(every[made.active], session))
+                places[made.active][:] = [_made(every[made.active], session)]
 
     show()
     made.param.watch(show, "active")

@@ -9,6 +9,7 @@ import numpy as np
 import panel as pn
 from bokeh.models import BasicTicker, FixedTicker, HoverTool
 from bokeh.models.annotations import Span
+from scipy.interpolate import make_smoothing_spline
 
 from ..errors import InputError
 from ..objects.picture import AGAINST, PARTS, WIDEST
@@ -23,6 +24,7 @@ WORDS = {"age": "time in contact", "place": "displacement", "event": "number of 
 MANY = 4  # models of a ladder, above which their names are written aslant
 BENT = ("age", "velocity")  # variables whose small values matter as much as their large ones
 WAYS = ("time", "place", "slip path", "load point")  # along which something may come back
+KNOTS, FEWEST = 40, 5  # medians of the smooth curve, and how many different ones it needs
 CARD = "background: var(--wb-surface); border: 1px solid var(--wb-line); border-radius: 4px; padding: 8px 12px;"
 
 
@@ -44,7 +46,7 @@ def page(session: Session) -> Any:
 
 
 class _Residual:
-    """Residual force over its floor against a variable, by run, with running medians and the chosen effect's law."""
+    """Residual force over its floor against a variable, by run, with the smooth curve of all and the effect's law."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -61,14 +63,17 @@ class _Residual:
         self.figure = figure(y="residual force / floor", height=330)
         self._points: dict[str, Any] = {}
         self._medians: dict[str, Any] = {}
-        self._law = source(x=[], y=[])
+        self._law, self._smooth = source(x=[], y=[]), source(x=[], y=[])
         self.figure.add_layout(Span(location=0.0, dimension="width", line_color=theme.soft, line_width=1))
         self.figure.line(
             "x", "y", source=self._law, color=theme.model, line_width=4, alpha=0.8, line_dash="dashed",
             legend_label="the chosen effect",
         )  # fmt: skip
+        self.figure.line(
+            "x", "y", source=self._smooth, color=theme.text, line_width=3.5, legend_label="what all runs ask for",
+        )  # fmt: skip
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
-        legend(self.figure, "below")
+        legend(self.figure, "below", ncols=4)
         self._draw_runs()
         self.against.param.watch(lambda event: self.update(), "value")
         self.period.param.watch(lambda event: self.update(), "value")
@@ -112,6 +117,7 @@ class _Residual:
             self._medians[run].data = {
                 "x": np.array([np.median(axis[p]) for p in parts]), "y": np.array([np.median(z[p]) for p in parts]),
             }  # fmt: skip
+        self._smooth.data = dict(zip("xy", smooth(axis[use], z[use]), strict=True))
         words = WORDS.get(against, against) if period is None else f"phase of {WORDS.get(against, against)}"
         self.figure.xaxis.axis_label = label(words, text)
         if against in BENT:
@@ -146,6 +152,18 @@ class _Residual:
             self._session.said = "a period is larger than zero"
             return None
         return found
+
+
+def smooth(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A smooth curve through medians of y over x, by generalised cross-validation; empty where there is too little."""
+    parts = [p for p in np.array_split(np.argsort(x, kind="stable"), KNOTS) if p.size]
+    at = np.array([np.median(x[p]) for p in parts])
+    middle = np.array([np.median(y[p]) for p in parts])
+    apart = np.unique(np.round(at / max(np.ptp(at), 1e-300), 4), return_index=True)[1] if at.size else at.astype(int)
+    if apart.size < FEWEST:
+        return np.zeros(0), np.zeros(0)
+    along = np.linspace(at[apart[0]], at[apart[-1]], 200)
+    return along, make_smoothing_spline(at[apart], middle[apart])(along)
 
 
 def _parts(x: np.ndarray, use: np.ndarray) -> list[np.ndarray]:
@@ -337,7 +355,7 @@ class _Backbone:
             "u", "force", source=self._line, color=theme.runs[2], line_width=2, line_dash="dotdash",
             legend_label="nearest rough lines",
         )  # fmt: skip
-        legend(self.figure)
+        legend(self.figure, ncols=2)
         self.words = Words(sizing_mode="stretch_width", margin=(0, 0, 0, 12))
         watch(session, ["steps", "at"], self.update)
         watch(session, ["rough"], self.draw_line)

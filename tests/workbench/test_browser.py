@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import time
 from pathlib import Path
 
 import pytest
+
+from stickslip.cli import run
 
 from .browser import DEEP, Browser, Served
 from .conftest import SCENARIO
@@ -179,6 +182,16 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         browser.wait(lambda: abs(browser.unseen_error() - base) < 1e-9)
         browser.press("button", "Redo")
         browser.wait(lambda: browser.unseen_error() < CAUGHT)
+        browser.tab("Keep")
+        browser.wait(lambda: browser.js("return seen('input[placeholder=first]').length"))
+        browser.js("""
+            const field = seen('input[placeholder=first]')[0]
+            field.value = 'mine'
+            for (const kind of ['input', 'change']) field.dispatchEvent(new Event(kind, {bubbles: true}))
+        """)
+        time.sleep(PAUSE)
+        browser.press("button", "Save")
+        browser.wait(lambda: (tmp_path / "mine" / "result.json").is_file(), 300)
 
         browser.open(served.url)  # a reload
         browser.idle()
@@ -196,6 +209,10 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         browser.tab("Model")
         browser.press("button", "Base")
         browser.wait(lambda: abs(browser.unseen_error() - base) < 2e-3)
+        command = ["fit", str(path), "--model", "inertial", "--add", "contact-ageing", "--out", str(tmp_path / "its")]
+        assert run(command) == 0
+        mine, its = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("mine", "its"))
+        assert mine["parameters"] == its["parameters"] and mine["ladder"] == its["ladder"]
         assert not browser.complaints()
         assert not browser.elsewhere()
     finally:

@@ -244,3 +244,19 @@ def test_of_many_steps_the_first_by_hand_are_forgotten(session, base, monkeypatc
         session.by_hand({"weakening.drop": base.values["weakening.drop"] * share})
     assert len(session.steps) == 4 and session.steps[0].fit is base
     assert session.fit.values["weakening.drop"] == pytest.approx(1.05 * base.values["weakening.drop"])
+
+
+def test_the_smooth_curve_is_that_of_the_law_and_not_of_the_noise():
+    rng = np.random.default_rng(0)
+    x = rng.uniform(0.0, 6.0, 4000)
+    at, curve = missing_page.smooth(x, np.sin(x) + rng.normal(size=x.size))
+    assert np.sqrt(np.mean((curve - np.sin(at)) ** 2)) < 0.08 and at.size == 200
+    assert missing_page.smooth(np.ones(100), np.ones(100))[0].size == 0
+    assert missing_page.smooth(np.zeros(0), np.zeros(0))[0].size == 0
+
+
+def test_what_all_runs_ask_for_is_drawn(session):
+    part = missing_page._Residual(session)
+    for against in ("age", "velocity", "event", "time"):
+        part.against.value = against
+        assert np.isfinite(part._smooth.data["y"]).all() and len(part._smooth.data["x"]) == 200
