@@ -1,4 +1,6 @@
-"""Linear algebra in one thread, set through environment variables before numpy is imported.
+"""Threads: one for linear algebra, and as many as there are processors for pieces of compiled work side by side.
+
+The former is set through environment variables before numpy is imported.
 
 The matrices of a fit are a thousand by a hundred. On two processors their singular values took 24 to 97 ms with the
 two threads that OpenBLAS takes, and 6 to 7 ms with one: threads that wait for each other, and for other work on the
@@ -8,7 +10,13 @@ machine, cost more than they share. It also makes last digits independent of how
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from typing import TypeVar
 
+T = TypeVar("T")
+Found = TypeVar("Found")
 LIBRARIES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
@@ -16,3 +24,25 @@ def one_for_linear_algebra() -> None:
     """Have this process, and those it starts, do linear algebra in one thread, unless the user has said otherwise."""
     for name in LIBRARIES:
         os.environ.setdefault(name, "1")
+
+
+@lru_cache(maxsize=1)
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="side by side")
+
+
+def side_by_side(call: Callable[[T], Found], items: Iterable[T]) -> list[Found]:
+    """What a function gives for each item; it must spend its time in compiled code, and not call this again.
+
+    In a process among others that share the processors (see :func:`alone`) one after the other.
+    """
+    return list(_pool().map(call, items)) if _ALONE else [call(item) for item in items]
+
+
+_ALONE = (os.cpu_count() or 1) > 1
+
+
+def alone(yes: bool) -> None:
+    """Say whether this process has the processors for itself."""
+    global _ALONE
+    _ALONE = yes and (os.cpu_count() or 1) > 1

@@ -52,16 +52,25 @@ class Program:
 
     def __call__(self, *args: Any) -> Any:
         """The function's result."""
-        folder = None if self.name is None else _folder()
-        if folder is None:
-            return self._traced(*args)
         leaves, structure = jax.tree.flatten(args)
         kinds = structure, tuple((np.shape(a), str(getattr(a, "dtype", type(a)))) for a in leaves)
-        with self._lock:
-            if kinds not in self._ready:
-                path = folder / hashlib.sha256(f"{self.name} {kinds}".encode()).hexdigest()
-                self._ready[kinds] = self._restored(leaves, structure, path)
+        if kinds not in self._ready:
+            with self._lock:  # of several threads one compiles, and the others wait for it
+                if kinds not in self._ready:
+                    made = self._made(kinds, leaves, structure)
+                    found = made(*leaves)
+                    self._ready[kinds] = made
+                    return found
         return self._ready[kinds](*leaves)
+
+    def _made(self, kinds: Any, leaves: list[Any], structure: Any) -> Callable[..., Any]:
+        """The function of its arguments' leaves."""
+        folder = None if self.name is None else _folder()
+        if folder is None:
+            return lambda *leaves: self._traced(*jax.tree.unflatten(structure, leaves))
+        return self._restored(
+            leaves, structure, folder / hashlib.sha256(f"{self.name} {kinds}".encode()).hexdigest()
+        )  # fmt: skip
 
     def _restored(self, leaves: list[Any], structure: Any, path: Path) -> Callable[..., Any]:
         """The function of its arguments' leaves, from its trace on disk; that is made where it is not there."""

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections import namedtuple
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import jax
@@ -17,7 +18,7 @@ import pytest
 from stickslip.inference.force.problem import _program
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Effect
-from stickslip.system import traced
+from stickslip.system import threads, traced
 from stickslip.system.traced import Program
 
 
@@ -186,3 +187,22 @@ def test_a_force_is_the_same_from_a_kept_trace(folder, small):
     assert len(list(folder.iterdir())) == 1
     for name in ("residual", "shared", "local"):
         np.testing.assert_array_equal(getattr(again, name), getattr(first, name))
+
+
+def test_of_many_threads_one_compiles_and_all_get_the_same(folder):
+    function = Counted()
+    program = Program(function, "one")
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda factor: np.asarray(program(PARTS, factor)), np.linspace(0.0, 1.0, 40)))
+    assert function.times == 1
+    exact = [np.sin(PARTS["a"]) * f + 2.0 for f in np.linspace(0.0, 1.0, 40)]
+    np.testing.assert_allclose(found, exact, rtol=1e-14)
+
+
+def test_runs_side_by_side_give_the_same_numbers_as_one_after_the_other(small):
+    found = []
+    for alone in (False, True):
+        threads.alone(alone)
+        found.append(small.problem.evaluate(small.point))
+    for name in ("residual", "shared", "local", "tangent"):
+        np.testing.assert_array_equal(getattr(found[0], name), getattr(found[1], name))

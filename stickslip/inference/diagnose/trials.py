@@ -103,10 +103,11 @@ _kept: dict[int, tuple[Fit, Explained]] = {}
 
 def _in_worker(job: bytes, tag: str, forms: list[dict[str, str]], files: tuple[str, ...], parent: int) -> Any:
     """One effect in a worker, which loads the user's files first and keeps the base of its last job."""
-    from ...system import cache
+    from ...system import cache, threads
     from ...system.lifeline import end_with
 
     end_with(parent)
+    threads.alone(False)
     cache.enable()
     for file in files:
         if not any(str(m.__file__) == file for m in catalogue.user_modules()):

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ...physics.contact import Bank
 from ...physics.effects.base import Effect, Sensor
 from ...physics.model import Block, LoadPoint, Model, Weakening
+from ...system.threads import side_by_side
 from ...system.traced import Program, of_this_package
 from ..fit.parameters import Free, to_si
 from .along import Way, along, lead, undone
@@ -270,17 +271,18 @@ class Problem:
         slopes, local = np.zeros((size, a + b * runs + k + cycles)), np.zeros((size, OWN))
         sensed = any(isinstance(e, Sensor) for e in c.effects)
         common = scales, phase_scale, fixed, leaves, weights, c.reach
-        # all are under way before the first is waited for
-        found = [
-            program(point.z[bent], point.phases[:, r] * phase_scale, *common, *arguments)
-            for r, arguments in enumerate(self.run_arguments(point))
-        ]
+
+        def of_run(numbered: tuple[int, tuple[Any, ...]]) -> list[Any]:
+            r, arguments = numbered
+            return [
+                np.asarray(a) for a in program(point.z[bent], point.phases[:, r] * phase_scale, *common, *arguments)
+            ]
+
+        found = side_by_side(of_run, enumerate(self.run_arguments(point)))
         p, sticking, sliding = 0, [], []
-        for r, (run, of_run) in enumerate(zip(self.runs, found, strict=True)):
+        for r, (run, parts) in enumerate(zip(self.runs, found, strict=True)):
             n, s = run.t.size, slice(p, p + run.at.size)
-            q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent, slides = map(
-                np.asarray, of_run
-            )
+            q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent, slides = parts
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             if sensed:
