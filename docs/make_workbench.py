@@ -43,6 +43,7 @@ def main() -> None:
             browser.press('.effect-row[data-tag="contact-ageing"] button', "Switch on")
             browser.wait(lambda: "contact-ageing" in browser.text(".model"), 120)
             browser.tab("Model")
+            browser.wait(lambda: browser.js("return seen('.knob').length"))
             browser.idle()
             time.sleep(SETTLED)
             browser.driver.save_screenshot(str(IMAGES / "workbench-model.png"))

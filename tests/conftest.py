@@ -6,9 +6,10 @@ import sys
 
 import pytest
 
-from stickslip.system.threads import one_for_linear_algebra
+from stickslip.system.threads import alone, one_for_linear_algebra
 
 one_for_linear_algebra()
+alone(False)  # tests run in processes side by side
 
 
 @pytest.fixture(autouse=True, scope="module")

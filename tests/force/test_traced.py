@@ -199,10 +199,10 @@ def test_of_many_threads_one_compiles_and_all_get_the_same(folder):
     np.testing.assert_allclose(found, exact, rtol=1e-14)
 
 
-def test_runs_side_by_side_give_the_same_numbers_as_one_after_the_other(small):
+def test_runs_side_by_side_give_the_same_numbers_as_one_after_the_other(small, monkeypatch):
     found = []
     for alone in (False, True):
-        threads.alone(alone)
+        monkeypatch.setattr(threads, "_ALONE", alone)
         found.append(small.problem.evaluate(small.point))
     for name in ("residual", "shared", "local", "tangent"):
         np.testing.assert_array_equal(getattr(found[0], name), getattr(found[1], name))
