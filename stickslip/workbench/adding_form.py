@@ -135,15 +135,15 @@ class Form:
         campaign = self._session.campaign
         if self.dropped is None or self._columns is None or campaign is None:
             return
-        if self._session.busy:
-            self.said.text = f"{self._session.busy}: add the run when that is done, or cancel it"
-            return
         name, content = self.stored.value.strip(), self.dropped[1]
         try:
             new_place(campaign.description.folder, name, "stored as")
             text = entry_text(name, self.choice(), self._columns.units)
         except InputError as error:
             self.said.text = str(error)
+            return
+        if self._session.busy:
+            self.said.text = f"{self._session.busy}: add the run when that is done, or cancel it"
             return
 
         def make(tell: Tell, show: Show) -> Campaign:
