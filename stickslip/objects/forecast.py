@@ -223,11 +223,8 @@ def wander_sentence(found: dict[str, Any]) -> str:
         f"{100 * c['size']:.2g} % along the {c['coordinate']} with a length of {shown(c['length'], c['unit'], 2)}"
         for c in found["law"]
     ]
-    best = f"Best law: {' and '.join(parts)}, " if parts else "Best law: "
-    return (
-        f"{found['run']}, {found['slips']} slips: {found['text']} {best}and a scatter of "
-        f"{100 * found['scatter']:.2g} % from slip to slip."
-    )
+    parts.append(f"a scatter of {100 * found['scatter']:.2g} % from slip to slip")
+    return f"{found['run']}, {found['slips']} slips: {found['text']} Best law: {' and '.join(parts)}."
 
 
 def _chosen(campaign: Campaign, run: str | None) -> int:

@@ -296,7 +296,7 @@ class Model(eqx.Module):
 
 def _return_map(trial: Array, stiffness: Array, cap: Array, mean_cap: Array) -> tuple[Array, Array]:
     """The cap on the elastic trial forces, and the energy lost in sliding against the mean cap of the increment (J)."""
-    # not jnp.clip, whose derivative weighs ties: a loop of derivatives takes twice as long with it
+    # not jnp.clip, whose derivative weighs ties: a loop of derivatives takes a tenth longer with it
     clipped = jnp.where(trial > cap, cap, jnp.where(trial < -cap, -cap, trial))
     return clipped, jnp.sum(abs(trial - clipped) * _compliance(stiffness) * mean_cap)
 

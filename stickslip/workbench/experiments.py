@@ -289,9 +289,15 @@ def compare(fits: Mapping[str, Fit], setting: Setting, tell: Tell) -> dict[str, 
     return out
 
 
-def farthest(found: Mapping[str, Recording]) -> tuple[str, int, float] | None:
-    """Measure and slip (from 0) in which some models differ most, and by how much of the mean; None where in none."""
+def farthest(
+    found: Mapping[str, Recording], scatters: Mapping[str, float] | None = None
+) -> tuple[str, int, float] | None:
+    """Measure and slip (from 0) in which some models differ most, and by how much of the mean; None where in none.
+
+    Most is counted in scatters, where they are given (see :func:`scatter`), else in shares of the mean.
+    """
     best: tuple[str, int, float] | None = None
+    top = 0.0
     for key in MEASURES:
         lists = [np.asarray(r[key].values, float) for r in found.values()]
         for number in range(min((v.size for v in lists), default=0)):
@@ -299,8 +305,9 @@ def farthest(found: Mapping[str, Recording]) -> tuple[str, int, float] | None:
             if not np.isfinite(values).all() or np.abs(values).max() == 0.0:
                 continue
             apart = float(np.ptp(values) / np.abs(values).mean())
-            if apart > (0.0 if best is None else best[2]):
-                best = (key, number, apart)
+            weight = apart if scatters is None else apart / scatters[key]
+            if weight > top:
+                best, top = (key, number, apart), weight
     return best
 
 
@@ -378,7 +385,7 @@ def tell_apart(
         except StickslipError as error:
             out.append(Telling(words, setting, {}, note=str(error).split("\n")[0]))
             continue
-        best = farthest(found)
+        best = farthest(found, scatters)
         if best is None:
             out.append(Telling(words, setting, found, note="no event differs"))
         else:
