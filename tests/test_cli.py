@@ -60,6 +60,14 @@ def shell(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=300, **options)
 
 
+def _spent(run, *arguments, **options) -> float:
+    """Processor time of a command (s): what others do on this machine does not count."""
+    before = os.times()
+    assert run(*arguments, **options).returncode == 0
+    after = os.times()
+    return after.children_user + after.children_system - before.children_user - before.children_system
+
+
 def test_help_is_quick_and_imports_nothing_heavy():
     code = (
         "import sys; from stickslip.cli import run; run(['--help'])\n"
@@ -71,11 +79,10 @@ def test_help_is_quick_and_imports_nothing_heavy():
     assert found.returncode == 0
     for name in COMMANDS:
         assert name in found.stdout
-    before = os.times()
-    assert shell("--help").returncode == 0
-    after = os.times()
-    spent = after.children_user + after.children_system - before.children_user - before.children_system
-    assert spent < 0.3  # processor time: what others do on this machine does not count
+    parser = [sys.executable, "-c", "import cyclopts, rich.console, rich.table"]
+    assert min(_spent(shell, "--help") for _ in range(3)) < 3.0 * min(
+        _spent(subprocess.run, parser, check=True) for _ in range(3)
+    )
 
 
 @pytest.mark.parametrize("name", COMMANDS)

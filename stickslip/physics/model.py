@@ -296,8 +296,9 @@ class Model(eqx.Module):
 
 def _return_map(trial: Array, stiffness: Array, cap: Array, mean_cap: Array) -> tuple[Array, Array]:
     """The cap on the elastic trial forces, and the energy lost in sliding against the mean cap of the increment (J)."""
-    # not jnp.clip, whose derivative weighs ties: a loop of derivatives takes a tenth longer with it
-    clipped = jnp.where(trial > cap, cap, jnp.where(trial < -cap, -cap, trial))
+    # not jnp.clip, whose derivative weighs ties: a loop of derivatives takes a tenth longer with it;
+    # asked so that a cap that is no number gives a force that is none
+    clipped = jnp.where(jnp.abs(trial) <= cap, trial, jnp.sign(trial) * cap)
     return clipped, jnp.sum(abs(trial - clipped) * _compliance(stiffness) * mean_cap)
 
 
