@@ -16,17 +16,16 @@ from ...physics.effects.base import Effect, Geometry
 from ...physics.params import Spec, specs
 from ..fit.parameters import Free, effect_parameters
 from .fit import Array, Fit, adapted, refit
+from .periodogram import best_wave, waves
 from .problem import Point, Problem, is_own
 from .signatures import Explained, signatures
 
-FREQUENCIES = 240  # of a periodic effect
 FEW = 12  # members of a family for which no program of their own is compiled
 STARTS = 4  # members of a family from which a refit is begun
 SHORT = 6  # evaluations from each start, after which the better half of them goes on
 EVEN = 1.0  # of two forms' costs: less is no reason to try one from where the other ended
 LARGE = 4.0  # times the promised amplitude: the model without the effect has taken a part of it, and laws may be bent
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
-LONGEST = 1.5  # of a record: a longer wave is a trend
 
 
 Start = tuple[int, dict[str, float]]  # member of a family, and the values of the effect (SI)
@@ -115,7 +114,7 @@ def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[s
 def _tried(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> Candidate:
     effect = catalogue.get(tag)(**form)
     try:
-        if effect.periodic is not None and hasattr(effect, "phase"):
+        if waves(effect):
             return _periodic(base, explained, effect, form)
         return _plain(base, explained, effect, form)
     except StickslipError as error:
@@ -254,51 +253,14 @@ def _start(base: Fit, free: Sequence[Free], turns: Array | None) -> Point:
 
 
 def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]) -> Candidate:
-    """An effect with a period and a phase for each run: the period of a periodogram on top of everything."""
-    name, variable = effect.periodic
-    spec = specs(effect)[name]
-    if getattr(effect, "form", None) == "trend":
-        return _plain(base, explained, effect, form)
-    frequencies = resolved(base, variable, spec, name)
-    if frequencies.size == 0:
+    """An effect with a period and a phase for each run: from the period of a periodogram on top of everything."""
+    wave = best_wave(base, explained, effect)
+    if wave is None:
         return Candidate(effect.tag, form, 0.0, None, "the records are too short for a period")
-    values = frequencies if name == "frequency" else 1.0 / frequencies
-    runs = base.problem.run
-    number = len(base.problem.runs)
-    members = [{name: float(v), "phase": turn} for v in values for turn in (0.0, 0.5 * np.pi)]
-    columns = signatures(base, effect, members)
-    best, top, at = -np.inf, np.zeros(0), 0
-    for i in range(values.size):
-        pair = columns[2 * i : 2 * i + 2]
-        split = np.zeros((runs.size, 2 * number))
-        for r in range(number):
-            split[runs == r, 2 * r : 2 * r + 2] = pair[:, runs == r].T
-        fall, sizes = explained.gain(split)
-        if fall > best:
-            best, top, at = fall, sizes, i
-    waves = top.reshape(number, 2)
-    size = np.hypot(waves[:, 0], waves[:, 1])
-    amplitude = float(np.sqrt(np.mean(size**2)))
     limit = specs(effect)[effect.amplitude]
-    amplitude = float(np.clip(amplitude, 1e-3 * limit.upper, 0.9 * limit.upper))
-    turns = np.arctan2(waves[:, 1], waves[:, 0])
-    start = {name: float(values[at]), effect.amplitude: amplitude}
-    found = _refit(base, effect, start, turns)
+    amplitude = float(np.clip(wave.amplitude, 1e-3 * limit.upper, 0.9 * limit.upper))
+    start = {effect.periodic[0]: wave.value, effect.amplitude: amplitude}
+    found = _refit(base, effect, start, wave.phases)
     # in the mean over runs and phases a wave is seen as each of its two parts is
-    seen = explained.singly(explained.apart(columns[2 * at : 2 * at + 2].T))[2]
-    return Candidate(effect.tag, form, best, found, "", int(values.size), 5.0 * float(np.mean(seen)), start)
-
-
-def resolved(base: Fit, variable: str, spec: Spec, name: str) -> Array:
-    """Frequencies that the records resolve, within the bounds of the parameter."""
-    runs = base.problem.runs
-    way = {"time": "t", "load point": "drive", "displacement": "x"}[variable]
-    spans = np.array([np.ptp(getattr(k, way)) for k in runs])
-    low, high = (spec.lower, spec.upper) if name == "frequency" else (1.0 / spec.upper, 1.0 / spec.lower)
-    low = max(low, 1.0 / (LONGEST * spans.max()))
-    events = [k.events / max(np.ptp(getattr(k, way)), 1e-300) for k in runs]
-    # beyond some periods a stick the windows of the creep see nothing of it
-    high = min(high, 60.0 * max(events))
-    if high <= low:
-        return np.zeros(0)
-    return np.geomspace(low, high, FREQUENCIES)
+    seen = explained.singly(explained.apart(wave.columns.T))[2]
+    return Candidate(effect.tag, form, wave.fall, found, "", wave.tried, 5.0 * float(np.mean(seen)), start)

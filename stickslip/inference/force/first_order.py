@@ -9,11 +9,10 @@ import numpy as np
 
 from ...physics.effects import catalogue
 from ...physics.params import specs
-from .candidates import grid, resolved
+from .candidates import grid
 from .fit import Array, Fit
+from .periodogram import best_wave, waves
 from .signatures import Explained, signatures
-
-COARSE = 6  # every so many frequencies of a periodic effect are tried
 
 
 @dataclass(frozen=True)
@@ -43,17 +42,13 @@ def promise(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> 
     effect = catalogue.get(tag)(**form)
     spec = specs(effect)[effect.amplitude]
     nothing = Promise(tag, form, 0.0, 0.0, float("inf"), spec.unit, None)
-    waves = effect.periodic is not None and hasattr(effect, "phase") and getattr(effect, "form", None) != "trend"
-    members = _waves(base, effect) if waves else grid(effect)
-    if not members:
-        return nothing
-    columns = signatures(base, effect, members)
+    if waves(effect):
+        return _wave(base, explained, nothing, effect)
+    columns = signatures(base, effect, grid(effect))
     usable = np.isfinite(columns).all(axis=1) & (np.abs(columns).max(axis=1) > 0.0)
     if not usable.any():
         return nothing
     columns = columns[usable]
-    if waves:
-        return _wave(base, explained, nothing, columns)
     falls, sizes, errors = explained.singly(explained.apart(columns.T))
     null = spec.null or 0.0
     inside = np.clip(sizes, spec.lower - null, spec.upper - null)
@@ -64,25 +59,13 @@ def promise(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> 
     return Promise(tag, form, float(falls[best]), float(inside[best]), float(errors[best]), spec.unit, force)
 
 
-def _waves(base: Fit, effect: Any) -> list[dict[str, float]]:
-    name, variable = effect.periodic
-    found = resolved(base, variable, specs(effect)[name], name)[::COARSE]
-    return [
-        {name: float(f if name == "frequency" else 1.0 / f), "phase": turn} for f in found for turn in (0.0, np.pi / 2)
-    ]
-
-
-def _wave(base: Fit, explained: Explained, nothing: Promise, columns: Array) -> Promise:
-    """Of the frequencies the best, with a sine and a cosine for each run."""
-    runs, number = base.problem.run, len(base.problem.runs)
-    best = nothing
-    for i in range(0, len(columns) - 1, 2):
-        split = np.zeros((runs.size, 2 * number))
-        for r in range(number):
-            split[runs == r, 2 * r : 2 * r + 2] = columns[i : i + 2, runs == r].T
-        fall, sizes = explained.gain(split)
-        if fall > best.fall:
-            amplitude = float(np.sqrt(np.mean(sizes**2) * 2.0))
-            error = float(np.mean(explained.singly(explained.apart(columns[i : i + 2].T))[2]))
-            best = Promise(nothing.tag, nothing.form, fall, amplitude, error, nothing.unit, -(split @ sizes))
-    return best if best.force is None else replace(best, force=explained.left(best.force[:, None])[:, 0])
+def _wave(base: Fit, explained: Explained, nothing: Promise, effect: Any) -> Promise:
+    """Of the periods the best, with an amplitude and a phase of each run."""
+    wave = best_wave(base, explained, effect)
+    if wave is None or wave.fall <= 0.0:
+        return nothing
+    run = base.problem.run
+    force = -(wave.columns[0] * wave.sine[run] + wave.columns[1] * wave.cosine[run])
+    error = float(np.mean(explained.singly(explained.apart(wave.columns.T))[2]))
+    force = explained.left(force[:, None])[:, 0]
+    return replace(nothing, fall=wave.fall, amplitude=wave.amplitude, std=error, force=force)

@@ -142,6 +142,16 @@ class Explained:
         white = np.vstack([self._white(columns), np.zeros((self.extra, columns.shape[1]))])
         return white - self.basis @ (self.basis.T @ white)
 
+    def by_event(self, columns: Array) -> tuple[Array, Array, Array]:
+        """Columns (p, m) whitened by event, what lies along the model's own k directions, the rest of the residuals.
+
+        Shapes (E, n, m), (E, k, m) and (E, n).
+        """
+        e, n = self.fit.blocks.index.shape
+        white = self.inverse @ self.fit.blocks(columns)
+        own = self.basis[: e * n].reshape(e, n, -1)
+        return white, np.einsum("enk,enm->ekm", own, white, optimize=True), self.rest[: e * n].reshape(e, n)
+
     def left(self, columns: Array) -> Array:
         """Forces (p, m) less what the model's own parameters would take of them (N)."""
         white = np.vstack([self._white(columns), np.zeros((self.extra, columns.shape[1]))])
