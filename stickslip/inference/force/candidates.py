@@ -22,7 +22,7 @@ from .signatures import Explained, signatures
 
 FEW = 12  # members of a family for which no program of their own is compiled
 STARTS = 4  # members of a family from which a refit is begun
-SHORT = 6  # evaluations from each start, after which the better half of them goes on
+SHORT = 6  # evaluations from each start, after which the better half of them goes to its end
 EVEN = 1.0  # of two forms' costs: less is no reason to try one from where the other ended
 LARGE = 4.0  # times the promised amplitude: the model without the effect has taken a part of it, and laws may be bent
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
@@ -155,14 +155,16 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     share = np.where(sizes != 0.0, inside / np.where(sizes != 0.0, sizes, 1.0), 0.0)
     falls = falls * (1.0 - (1.0 - share) ** 2)
     unlike = _unlike(apart, falls)
-    starts = []
+    starts: list[Start] = []
     for i, times in ((unlike[0], 1.0), *((i, LARGE) for i in unlike)):
         size, least = times * float(inside[i]), 0.3 * float(errors[i])  # at the null itself inner parameters do nothing
         if abs(size) < least:
             size = least if size >= 0.0 and spec.upper > null else -least
         # not at the bound either
         size = float(np.clip(size, 0.5 * (spec.lower - null), 0.5 * (spec.upper - null)))
-        starts.append((i, {**members[i], effect.amplitude: null + size}))
+        start = i, {**members[i], effect.amplitude: null + size}
+        if start not in starts:
+            starts.append(start)
     found, (i, start) = _raced(base, effect, starts)
     return Candidate(
         effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * float(errors[i]), start
@@ -209,17 +211,13 @@ def _begun(base: Fit, effect: Effect, values: dict[str, float], turns: Array | N
 
 
 def _raced(base: Fit, effect: Effect, starts: Sequence[Start]) -> tuple[Fit, Start]:
-    """The best of the refits from several starts, by successive halving (Karnin, Koren & Somekh 2013).
+    """The best of the refits from several starts: a few evaluations from each, and the better half goes to its end.
 
-    From each so many evaluations, then from the better half of them as many more, and from the best of all to the end.
+    Early costs say which starts lead nowhere, not which of the others lead furthest.
     """
-    ends = [(_begun(base, effect, start[1]), start) for start in starts]
-    while len(ends) > 1:
-        ends = sorted(ends, key=lambda end: end[0].cost)[: len(ends) // 2]
-        if len(ends) > 1:
-            ends = [(adapted(found, 1, SHORT), start) for found, start in ends]
-    found, start = ends[0]
-    return adapted(found), start
+    ends = sorted(((_begun(base, effect, start[1]), start) for start in starts), key=lambda end: end[0].cost)
+    finished = ((adapted(found), start) for found, start in ends[: (len(ends) + 1) // 2])
+    return min(finished, key=lambda end: end[0].cost)
 
 
 def with_start(
