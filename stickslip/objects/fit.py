@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -194,6 +194,16 @@ class Fit(Shown):
         """The same on runs that are left out of the fit, each in turn."""
         return self._errors(unseen(self._fit).residual)
 
+    @cached_property
+    def error_deviations(self) -> pandas.DataFrame:
+        """Standard deviations of :attr:`errors`, by how much events differ, for residuals within one go together."""
+        return self._table(self._fit.marginal, self._deviation)
+
+    @cached_property
+    def unseen_error_deviations(self) -> pandas.DataFrame:
+        """The same of :attr:`unseen_errors`."""
+        return self._table(unseen(self._fit).residual, self._deviation)
+
     @property
     def error(self) -> float:
         """Of all points together."""
@@ -206,7 +216,10 @@ class Fit(Shown):
 
     @cached_property
     def ladder(self) -> pandas.DataFrame:
-        """A row for each model on the way here: fitted and unseen error in floors, and by how much its effect helps."""
+        """A row for each model on the way here: fitted and unseen error in floors, and by how much its effect helps.
+
+        ``error std`` and ``unseen std`` are their standard deviations, by how much events differ.
+        """
         rows: dict[Any, dict[str, Any]] = {}
         for rung in self.climbed.ladder:
             what = f"without {rung.removed}" if rung.removed else rung.added or "static"
@@ -214,7 +227,9 @@ class Fit(Shown):
                 "model": " + ".join(rung.model),
                 "step": what if rung.removed or rung.added is None else f"+ {what}",
                 "error": self._error(rung.residual),
+                "error std": self._deviation(rung.residual),
                 "unseen error": np.nan if rung.unseen is None else self._error(rung.unseen),
+                "unseen std": np.nan if rung.unseen is None else self._deviation(rung.unseen),
                 "gain": self.climbed.gains.get(rung.added or "", np.nan),
             }
         return table(rows, "rung")
@@ -546,12 +561,28 @@ class Fit(Shown):
         use = ~self._fit.dropped if where is None else where & ~self._fit.dropped
         return float(np.sqrt(np.mean((residual[use] / self._floor[use]) ** 2))) if use.any() else float("nan")
 
+    def _deviation(self, residual: np.ndarray, where: np.ndarray | None = None) -> float:
+        """Standard deviation of :meth:`_error`: that of a ratio of sums over events, which are independent."""
+        use = ~self._fit.dropped if where is None else where & ~self._fit.dropped
+        event = self._fit.problem.of[use]
+        numbers = np.bincount(event)
+        events = np.count_nonzero(numbers)
+        if events < 2:
+            return float("nan")
+        squares = np.bincount(event, (residual[use] / self._floor[use]) ** 2)
+        mean = squares.sum() / numbers.sum()
+        spread = np.sqrt(((squares - mean * numbers) ** 2).sum() * events / (events - 1)) / numbers.sum()
+        return float(spread / (2.0 * np.sqrt(mean)))
+
     def _errors(self, residual: np.ndarray) -> pandas.DataFrame:
+        return self._table(residual, self._error)
+
+    def _table(self, residual: np.ndarray, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:
         problem = self._fit.problem
         every = np.ones(problem.run.size, bool)
         runs = {"all": every, **{k.name: problem.run == r for r, k in enumerate(problem.runs)}}
         phases = {"all": every, **{name: problem.phase == i for i, name in enumerate(PHASES)}}
-        rows = {p: {r: self._error(residual, a & b) for r, b in runs.items()} for p, a in phases.items() if a.any()}
+        rows = {p: {r: measure(residual, a & b) for r, b in runs.items()} for p, a in phases.items() if a.any()}
         return table(rows, "phase")
 
     def _parts(self) -> list[Any]:

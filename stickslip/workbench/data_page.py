@@ -93,8 +93,12 @@ def run_rows(campaign: Campaign) -> tuple[list[str], list[list[str]]]:
 
 
 def event_rows(found: Looked, run: str) -> tuple[list[str], list[list[str]]]:
-    """Columns and rows of the table of events of a run: what is known of them so far."""
+    """Columns and rows of the table of events of a run: what is known of them so far.
+
+    A column's head holds the standard deviation of its values by the sensor's noise, once that is known.
+    """
     number = found.campaign.names.index(run)
+    sensor: dict[str, float] = {}
     if found.inspection is None:
         unit = found.events[number].settings.unit
         units = {"t_onset": "s", "recurrence": "s", "hold_time": "s", "slip": unit, "peak_velocity": f"{unit}/s"}
@@ -102,9 +106,15 @@ def event_rows(found: Looked, run: str) -> tuple[list[str], list[list[str]]]:
     else:
         trace = found.inspection.result["traces"][number]
         units, events = trace["units"], trace["events"]
+        sensor = {key: f["sensor"] for key, f in trace["features"].items() if _finite(f["sensor"])}
+        if "recurrence" in sensor:  # of two onsets
+            sensor["t_onset"] = sensor["recurrence"] / np.sqrt(2.0)
     known = [key for key in MEASURES if key in units and any(_finite(e[key]) for e in events)]
     rows = [[str(i + 1), *(_text(e[key], units[key]) for key in known)] for i, e in enumerate(events)]
-    return ["event", *(MEASURES[key] for key in known)], rows
+    heads = [
+        f"{MEASURES[key]} ± {shown(sensor[key], units[key], 2)}" if key in sensor else MEASURES[key] for key in known
+    ]
+    return ["event", *heads], rows
 
 
 def _finite(value: Any) -> bool:

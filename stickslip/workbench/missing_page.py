@@ -317,11 +317,18 @@ def _table(every: Any) -> str:
     head = "".join(f'<th style="{cell}">{name}</th>' for name in ("fitted", "unseen", "gain"))
     lines = [f'<tr><th style="text-align: left">model</th>{head}</tr>']
     for _, row in every.iterrows():
-        values = (row["error"], row["unseen error"], row["gain"])
-        texts = ["" if not np.isfinite(v) else f"{v:.3f}" if i < 2 else f"{v:.0f}" for i, v in enumerate(values)]
+        texts = [_pair(row["error"], row["error std"]), _pair(row["unseen error"], row["unseen std"])]
+        texts.append(f"{row['gain']:.0f}" if np.isfinite(row["gain"]) else "")
         numbers = "".join(f'<td style="{cell}">{t}</td>' for t in texts)
         lines.append(f'<tr><td style="padding-right: 14px">{escape(str(row["step"]))}</td>{numbers}</tr>')
     return f'<div style="{CARD} color: var(--wb-text); font-size: 13px"><table>{"".join(lines)}</table></div>'
+
+
+def _pair(value: float, std: float) -> str:
+    """An error in floors with its deviation."""
+    if not np.isfinite(value):
+        return ""
+    return f"{value:.3f} ± {std:.3f}" if np.isfinite(std) else f"{value:.3f}"
 
 
 class _Backbone:

@@ -234,7 +234,7 @@ class _Heat:
             sizing_mode="fixed",
             margin=(0, 0, 0, 70),
         )
-        self._data = source(run=[], phase=[], error=[], text=[], colour=[], ink=[])
+        self._data = source(run=[], phase=[], error=[], std=[], text=[], colour=[], ink=[])
         self._data.name = "heat"
         self.figure = figure("error in floors; a click shows the worst cycle", height=264,
                              x_range=["all"], y_range=["all"], output_backend=FEW)  # fmt: skip
@@ -245,7 +245,9 @@ class _Heat:
             "run", "phase", text="text", text_color="ink", text_align="center", text_baseline="middle",
             text_font_size="12px", source=self._data,
         )  # fmt: skip
-        self.figure.add_tools(HoverTool(tooltips=[("run", "@run"), ("phase", "@phase"), ("error", "@text floors")]))
+        self.figure.add_tools(
+            HoverTool(tooltips=[("run", "@run"), ("phase", "@phase"), ("error", "@error{0.000} ± @std{0.000} floors")])
+        )
         self.figure.name = "heat figure"
         self.figure.grid.grid_line_color = None
         self.figure.xaxis.major_label_orientation = 0.6
@@ -273,7 +275,9 @@ class _Heat:
         fit, fitted = self._session.fit, self._session.fitted
         if fit is None or fitted is None:
             return
-        table = fit.errors if self.kind.value == NOW else fitted.unseen_errors
+        now = self.kind.value == NOW
+        table = fit.errors if now else fitted.unseen_errors
+        spread = fit.error_deviations if now else fitted.unseen_error_deviations
         speeds = self._speeds(list(table.columns))
         runs, phases = sorted(table.columns, key=lambda run: speeds.get(run, np.inf)), list(table.index)[::-1]
         labels = {run: f"{run}, {shown(speed, 'm/s', 2)}" for run, speed in speeds.items()}
@@ -287,6 +291,7 @@ class _Heat:
         colours = [heat(v, top) for _, _, v in cells]
         self._data.data = {
             "run": [c[0] for c in cells], "phase": [c[1] for c in cells], "error": [c[2] for c in cells],
+            "std": [float(spread.loc[p, r]) for r, p, _ in cells],
             "text": ["" if np.isnan(c[2]) else f"{c[2]:.2f}" for c in cells],
             "colour": colours, "ink": [ink(c) for c in colours],
         }  # fmt: skip

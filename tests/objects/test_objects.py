@@ -67,6 +67,17 @@ def test_errors_are_those_of_the_residuals(base):
             assert base.errors.loc[phase, run] == pytest.approx(np.sqrt(np.mean(z[own] ** 2)), rel=1e-12)
 
 
+def test_deviations_of_errors_are_those_of_leaving_out_events(base):
+    """Against the jackknife over events."""
+    data = base.force
+    kept = ~data.left_out.values
+    z, event = base.residuals.values[kept], base._fit.problem.of[kept]
+    left = np.array([np.sqrt(np.mean(z[event != e] ** 2)) for e in np.unique(event)])
+    jackknife = np.sqrt((left.size - 1) / left.size * np.sum((left - left.mean()) ** 2))
+    assert base.error_deviations.loc["all", "all"] == pytest.approx(jackknife, rel=0.1)
+    assert base.ladder["error std"].iloc[-1] == base.error_deviations.loc["all", "all"]
+
+
 def test_values_set_by_hand_move_the_force_as_the_derivatives_say(base):
     """A step in a parameter, small against where the force bends, against the slopes of the fit."""
     name, step = "weakening.drop", 1e-5

@@ -117,7 +117,8 @@ def test_a_hand_sends_at_most_ten_places_a_second_and_the_last_one(browser):
     )
     assert 3 <= count <= 10 * seconds + 3
     last = pytest.approx(0.7, abs=0.002)
-    browser.wait(lambda: float(browser.js("return all('.knob[data-name=\"weakening.drop\"] .slider')[0].value")) == last)
+    shown = "return all('.knob[data-name=\"weakening.drop\"] .slider')[0].value"
+    browser.wait(lambda: float(browser.js(shown)) == last)
     browser.press("button", "Base")
 
 

@@ -162,9 +162,9 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
             size = least if size >= 0.0 and spec.upper > null else -least
         # not at the bound either
         size = float(np.clip(size, 0.5 * (spec.lower - null), 0.5 * (spec.upper - null)))
-        start = i, {**members[i], effect.amplitude: null + size}
-        if start not in starts:
-            starts.append(start)
+        place = i, {**members[i], effect.amplitude: null + size}
+        if place not in starts:
+            starts.append(place)
     found, (i, start) = _raced(base, effect, starts)
     return Candidate(
         effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * float(errors[i]), start
