@@ -95,6 +95,7 @@ def _row(
         "form": name_of(found),
         "share": _share(found.fall, top),
         "gain": f"promises {found.fall:.0f}" if found.fall > LEAST else "promises nothing",
+        "unseen": f"on unseen runs {found.unseen:.0f} ± {found.unseen_std:.0f}" if found.fall > LEAST else "",
         "amplitude": size,
         "picture": signature(fit, found.force, parts) if found.fall > LEAST else [],
     }

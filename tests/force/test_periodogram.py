@@ -64,7 +64,7 @@ def test_turned_columns_explain_what_columns_at_their_own_frequency_do(base):
     fine, falls = periodogram._turned(base, explained, columns, grid[one : one + 1], edges, step, "t")
     at = int(np.argmin(np.abs(fine - frequency)))
     pair = periodogram._Frequencies(base, effect)(fine[at : at + 1])
-    exact, _ = explained.gain(periodogram._by_run(base, pair))
+    exact, _ = explained.gain(periodogram.by_run(base, pair))
     assert falls[at] == pytest.approx(exact, rel=0.15)
 
 

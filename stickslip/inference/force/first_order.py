@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...physics.effects import catalogue
 from ...physics.params import specs
 from .candidates import grid
 from .fit import Array, Fit
-from .periodogram import best_wave, waves
+from .heldout import folds, halves
+from .periodogram import best_wave, by_run, waves
 from .signatures import Explained, signatures
 
 
@@ -24,6 +27,8 @@ class Promise:
         fall: of the cost (chi-square), to first order; no more than the bounds of the amplitude allow.
         amplitude, std: the size that promises it, and its standard deviation (SI, distance from the null).
         unit: of the amplitude.
+        unseen, unseen_std: fall of the cost on runs that are left out of the amplitude, and its standard deviation, by
+            how much events differ. The model's other parameters have seen them.
         force: what it would take off the residual force (N), all other parameters fitted anew, shape (p,); None where
             it does nothing.
     """
@@ -35,6 +40,8 @@ class Promise:
     std: float
     unit: str
     force: Array | None
+    unseen: float = 0.0
+    unseen_std: float = float("nan")
 
 
 def promise(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> Promise:
@@ -56,7 +63,16 @@ def promise(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> 
     falls = falls * (1.0 - (1.0 - share) ** 2)
     best = int(np.argmax(falls))
     force = explained.left(-inside[best] * columns[best][:, None])[:, 0]
-    return Promise(tag, form, float(falls[best]), float(inside[best]), float(errors[best]), spec.unit, force)
+    unseen = _unseen(base, explained, columns[best][:, None], folds(base))
+    return Promise(tag, form, float(falls[best]), float(inside[best]), float(errors[best]), spec.unit, force, *unseen)
+
+
+def _unseen(
+    base: Fit, explained: Explained, columns: Array, left_out: Sequence[NDArray[np.intp]]
+) -> tuple[float, float]:
+    """Fall of the cost on what is left out, and its standard deviation."""
+    each = explained.unseen(columns, left_out)
+    return float(each.sum()), float(np.sqrt(each.size) * each.std(ddof=1)) if each.size > 1 else float("nan")
 
 
 def _wave(base: Fit, explained: Explained, nothing: Promise, effect: Any) -> Promise:
@@ -68,4 +84,7 @@ def _wave(base: Fit, explained: Explained, nothing: Promise, effect: Any) -> Pro
     force = -(wave.columns[0] * wave.sine[run] + wave.columns[1] * wave.cosine[run])
     error = float(np.mean(explained.singly(explained.apart(wave.columns.T))[2]))
     force = explained.left(force[:, None])[:, 0]
-    return replace(nothing, fall=wave.fall, amplitude=wave.amplitude, std=error, force=force)
+    unseen, std = _unseen(base, explained, by_run(base, wave.columns), halves(base))
+    return replace(
+        nothing, fall=wave.fall, amplitude=wave.amplitude, std=error, force=force, unseen=unseen, unseen_std=std
+    )  # fmt: skip

@@ -80,7 +80,7 @@ def best_wave(base: Fit, explained: Explained, effect: Any) -> Wave | None:
     near = np.concatenate([peak + step * NEARER for peak in _peaks(fine, falls, step)])
     best: Wave | None = None
     for frequency, pair in zip(near, frequencies(near).reshape(near.size, 2, -1), strict=True):
-        fall, sizes = explained.gain(_by_run(base, pair))
+        fall, sizes = explained.gain(by_run(base, pair))
         if best is None or fall > best.fall:
             value = frequencies.value(frequency)
             best = Wave(value, fall, sizes[0::2], sizes[1::2], pair, max(round(fine.size / FINE), 1))
@@ -123,7 +123,7 @@ def _grid(base: Fit, along: str, spec: Any, name: str) -> tuple[Array, float]:
     return np.concatenate([slow, fast]), 1.0 / float(spans.max())
 
 
-def _by_run(base: Fit, pair: Array) -> Array:
+def by_run(base: Fit, pair: Array) -> Array:
     """The two columns of every run by themselves, shape (p, 2 R)."""
     number = len(base.problem.runs)
     out = np.zeros((pair.shape[1], 2 * number))

@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
 from ...physics.contact import Bank
 from ...physics.effects.base import Effect, Sensor
@@ -165,6 +166,19 @@ class Explained:
         found, *_ = np.linalg.lstsq(apart / scale, -self.rest, rcond=1e-8)
         left = self.rest + (apart / scale) @ found
         return float((self.rest**2).sum() - (left**2).sum()), found / scale
+
+    def unseen(self, columns: Array, left_out: Sequence[NDArray[np.intp]]) -> Array:
+        """Fall of each event's cost with the columns (p, m), their coefficients from the other folds, shape (E,)."""
+        e, n = self.fit.blocks.index.shape
+        rows = self.apart(columns)[: e * n].reshape(e, n, -1)
+        rest = self.rest[: e * n].reshape(e, n)
+        each, upon = np.einsum("enp,enq->epq", rows, rows), np.einsum("enp,en->ep", rows, rest)
+        out = np.zeros(e)
+        for part in left_out:
+            matrix, right = each.sum(axis=0) - each[part].sum(axis=0), upon.sum(axis=0) - upon[part].sum(axis=0)
+            found, *_ = np.linalg.lstsq(matrix, -right, rcond=1e-10)
+            out[part] = -(2.0 * upon[part] @ found + np.einsum("epq,p,q->e", each[part], found, found))
+        return out
 
     def singly(self, apart: Array) -> tuple[Array, Array, Array]:
         """The same for each column of :meth:`apart` by itself: falls, coefficients, their deviations, each (m,)."""
