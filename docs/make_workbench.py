@@ -2,7 +2,8 @@
 
     python docs/make_workbench.py
 
-Writes workbench-model.png and workbench-missing.png into docs/images, from the shipped campaign in a folder of its own.
+Writes workbench-data.png, -missing.png, -model.png, -simulate.png and -keep.png into docs/images, from the shipped campaign
+in a folder of its own.
 """
 
 from __future__ import annotations
@@ -23,6 +24,21 @@ SIZE = 1280, 1100
 SETTLED = 1.5  # s after the last change until all is drawn
 
 
+WRITE = """
+const field = seen('input').find((e) => e.placeholder.startsWith('first'))
+if (!field) return false
+field.value = arguments[0]
+for (const kind of ['input', 'change']) field.dispatchEvent(new Event(kind, { bubbles: true }))
+return true
+"""
+
+
+def picture(browser: Browser, name: str) -> None:
+    """Save the page as it stands."""
+    time.sleep(SETTLED)
+    browser.driver.save_screenshot(str(IMAGES / f"workbench-{name}.png"))
+
+
 def main() -> None:
     """Open, look, switch the effect on, look."""
     with tempfile.TemporaryDirectory() as folder:
@@ -32,21 +48,33 @@ def main() -> None:
         served = Served(Path(folder) / "campaign.toml")
         browser = Browser(str(shutil.which("chromium")), str(shutil.which("chromedriver")), *SIZE)
         try:
-            browser.open(served.url, "What is missing")
+            browser.open(served.url, "Data")
             browser.idle()
+            browser.wait(lambda: "Can tell" in browser.text("h3, h4, .head, .group"), 120)
+            picture(browser, "data")
+            browser.tab("What is missing")
             browser.wait(
                 lambda: browser.js("return seen('.line').some((e) => e.textContent.startsWith('by the fall'))"), 300
             )
             browser.js("seen('.effect-row[data-tag=\"contact-ageing\"]')[0].click()")
-            time.sleep(SETTLED)
-            browser.driver.save_screenshot(str(IMAGES / "workbench-missing.png"))
+            picture(browser, "missing")
             browser.press('.effect-row[data-tag="contact-ageing"] button', "Switch on")
             browser.wait(lambda: "contact-ageing" in browser.text(".model"), 120)
             browser.tab("Model")
             browser.wait(lambda: browser.js("return seen('.knob').length"))
             browser.idle()
-            time.sleep(SETTLED)
-            browser.driver.save_screenshot(str(IMAGES / "workbench-model.png"))
+            picture(browser, "model")
+            browser.tab("Simulate")
+            browser.press("button", "Simulate")
+            browser.wait(lambda: "model" in browser.text("td"), 120)
+            picture(browser, "simulate")
+            browser.tab("Keep")
+            browser.wait(lambda: browser.js(WRITE, "first"))
+            browser.press("button", "Save")
+            browser.wait(lambda: "first" in browser.text("td"), 200)
+            browser.js("seen('.choosing tbody tr').find((e) => e.cells[0].textContent === 'first').click()")
+            browser.wait(lambda: browser.js("return seen('iframe').length"))
+            picture(browser, "keep")
         finally:
             browser.close()
             served.end()
