@@ -25,6 +25,7 @@ STARTS = 4  # members of a family from which a refit is begun
 SHORT = 6  # evaluations from each start, after which the better half of them goes to its end
 EVEN = 1.0  # of two forms' costs: less is no reason to try one from where the other ended
 LARGE = 4.0  # times the promised amplitude: the model without the effect has taken a part of it, and laws may be bent
+PROMISING = 3.0  # fall of the cost that chance alone promises; where no more is, one start serves
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 
 
@@ -156,7 +157,7 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     falls = falls * (1.0 - (1.0 - share) ** 2)
     unlike = _unlike(apart, falls)
     starts: list[Start] = []
-    for i, times in ((unlike[0], 1.0), *((i, LARGE) for i in unlike)):
+    for i, times in ((unlike[0], 1.0), *((i, LARGE) for i in unlike if falls[i] > PROMISING)):
         size, least = times * float(inside[i]), 0.3 * float(errors[i])  # at the null itself inner parameters do nothing
         if abs(size) < least:
             size = least if size >= 0.0 and spec.upper > null else -least
