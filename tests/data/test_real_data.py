@@ -1,11 +1,48 @@
 """Measured records of others: what is known of them must be found. Skipped where the data are not there."""
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.readers import read_columns
 from stickslip.data.segment import segment
+from stickslip.errors import InputError
+
+CAMPAIGNS = Path(__file__).parents[2] / "scenarios" / "real"
+
+
+@pytest.fixture
+def shipped(tmp_path, real_data):
+    """The traces of a campaign file of scenarios/real, laid beside its records as its comment says."""
+
+    def run(name, folder):
+        path = shutil.copy(CAMPAIGNS / f"{name}.toml", tmp_path)
+        for file in wanted(Path(path)):
+            shutil.copy(real_data / folder / file, tmp_path)
+        return load_traces(load_campaign(path))
+
+    return run
+
+
+def wanted(path):
+    """Names of the files that a campaign file wants beside it."""
+    import tomllib
+
+    entries = tomllib.loads(path.read_text(encoding="utf-8"))["trace"]
+    channels = [c for e in entries for c in e.values() if isinstance(c, dict) and "file" in c]
+    return {e["file"] for e in entries} | {c["file"] for c in channels}
+
+
+@pytest.mark.parametrize("path", sorted(CAMPAIGNS.glob("*.toml")), ids=lambda p: p.stem)
+def test_a_campaign_of_others_records_says_where_they_are(path):
+    """Without the record the error names the file that is missing, and the campaign's head where it is had."""
+    with pytest.raises(InputError, match="the file is not there") as said:
+        load_traces(load_campaign(path))
+    assert any(name in str(said.value) for name in wanted(path))
+    assert "GitHub" in path.read_text(encoding="utf-8").partition("schema")[0]
 
 
 @pytest.fixture
@@ -57,10 +94,8 @@ def test_paper_slider_at_high_speed_is_read_and_named(load, stiffness, speed):
     assert found.reason
 
 
-def test_laboratory_fault(load):
-    body = 'time = { column = "Time", unit = "s" }\ndrive_position = { column = "LPDisp", unit = "um" }\n'
-    body += 'spring_force = { column = "ShearStress", unit = "1 MPa * 25 cm^2" }'
-    trace = load("psu-stickslip-p5198/newDF_TimeToFailure_from_6600_to_6900_WITHOUT_subwindows.csv", body)
+def test_laboratory_fault(shipped):
+    (trace,) = shipped("laboratory-fault", "psu-stickslip-p5198")
     assert trace.drive.speed == pytest.approx(9.97e-6, rel=0.05)
     found = segment(trace)
     assert len(found.events) == 46
@@ -69,13 +104,13 @@ def test_laboratory_fault(load):
     assert found.settings.gain == pytest.approx(4.1e3 * 25e-4 / 1e-6, rel=0.15)
 
 
-def test_reciprocating_loops(load):
+def test_reciprocating_loops(load, shipped):
     body = 'time = { column = "Time" }\nnormal_load = { column = "Normal" }\ndrive_position = { column = "Position" }\n'
     file = "reciprocating-loops-200Hz/test_data_2.txt"
     trace = load(file, body + 'spring_force = { column = "Friction" }')
     assert {repair.kind: repair.count for repair in trace.repairs}["dropped-samples"] == 179
     assert "sign opposite" in trace.warnings[0]
-    trace = load(file, body + 'spring_force = { column = "Friction", unit = "-1 uN" }')
+    (trace,) = shipped("reciprocating-loops", "reciprocating-loops-200Hz")
     assert trace.warnings == ()
     found = segment(trace)
     assert found.events == ()
@@ -83,18 +118,15 @@ def test_reciprocating_loops(load):
     assert 98 <= len(long) <= 102
 
 
-@pytest.mark.parametrize("run", range(1, 5))
-def test_robot_ramps(load, real_data, run):
-    body = 'time = { column = 1, unit = "s" }\ndisplacement = { column = 2, unit = "mm" }\n'
-    other = real_data / f"robot-breakaway-creep/test1/est_tau1_05_exp{run}_gan.t"
-    body += f'spring_force = {{ column = 2, unit = "N", file = "{other}" }}\nstop = "25 s"\nminimum_slip = "0.03 mm"'
-    found = segment(load(f"robot-breakaway-creep/test1/est_pos1_05_exp{run}_gan.t", body))
-    assert found.events
-    assert 18 < found.events[0].t_onset < 22
+def test_robot_ramps(shipped):
+    for trace in shipped("robot-joint", "robot-breakaway-creep/test1"):
+        found = segment(trace)
+        assert found.events
+        assert 18 < found.events[0].t_onset < 22
 
 
-def test_classroom_force_without_a_clock(load, real_data):
-    trace = load("classroom-slider/Force7.txt", 'sampling_rate = "4 Hz"\nspring_force = { column = 1, unit = "N" }')
+def test_classroom_force_without_a_clock(shipped):
+    (trace,) = shipped("classroom-slider", "classroom-slider")
     assert trace.time.size == 4261
     assert {repair.kind: repair.count for repair in trace.repairs} == {"nan": 1, "dropped-samples": 1}
     found = segment(trace)
@@ -102,17 +134,19 @@ def test_classroom_force_without_a_clock(load, real_data):
     assert 120 < len(found.events) < 180  # 168 drops above 0.5 N
 
 
-def test_rock_steps_slide(load):
-    for file, load_unit in (
-        ("velstep4_BRAVA_expb819_basalt.txt", "20 MN"),
-        ("velstep3_TR2_exp013_sepiolite.txt", "30 MN"),
-    ):
-        body = 'time = { column = "Time" }\ndrive_position = { column = "Displ" }\n'
-        body += f'spring_force = {{ column = "Friction", unit = "{load_unit}" }}'
-        trace = load("rock-velocity-steps/" + file, body)
-        found = segment(trace)
-        assert found.regime in ("continuous sliding", "no slip")
-        assert found.events == ()
+@pytest.mark.parametrize("name", ["rock-basalt", "rock-sepiolite"])
+def test_rock_steps_slide(shipped, name):
+    (trace,) = shipped(name, "rock-velocity-steps")
+    found = segment(trace)
+    assert found.regime in ("continuous sliding", "no slip")
+    assert found.events == ()
+
+
+def test_a_drill_string_sticks_and_slips(shipped):
+    (trace,) = shipped("drill-string", "torsional-rig-drillstring")
+    found = segment(trace)
+    assert 130 <= len(found.events) <= 145  # 140 peaks of the speed
+    assert np.median([e.recurrence for e in found.events[1:]]) == pytest.approx(0.36, abs=0.02)
 
 
 def test_matlab_and_text_exports_agree(real_data):
