@@ -187,22 +187,22 @@ class Fit(Shown):
     @cached_property
     def errors(self) -> pandas.DataFrame:
         """Root mean square of the residual force over its floor: a row for each phase of the cycle, a column a run."""
-        return self._errors(self._fit.marginal)
+        return self._table(self._fit.marginal, _error)
 
     @cached_property
     def unseen_errors(self) -> pandas.DataFrame:
         """The same on runs that are left out of the fit, each in turn."""
-        return self._errors(unseen(self._fit).residual)
+        return self._table(unseen(self._fit).residual, _error)
 
     @cached_property
     def error_deviations(self) -> pandas.DataFrame:
         """Standard deviations of :attr:`errors`, by how much events differ, for residuals within one go together."""
-        return self._table(self._fit.marginal, self._deviation)
+        return self._table(self._fit.marginal, _deviation)
 
     @cached_property
     def unseen_error_deviations(self) -> pandas.DataFrame:
         """The same of :attr:`unseen_errors`."""
-        return self._table(unseen(self._fit).residual, self._deviation)
+        return self._table(unseen(self._fit).residual, _deviation)
 
     @property
     def error(self) -> float:
@@ -226,10 +226,8 @@ class Fit(Shown):
             rows[len(rows)] = {
                 "model": " + ".join(rung.model),
                 "step": what if rung.removed or rung.added is None else f"+ {what}",
-                "error": self._error(rung.residual),
-                "error std": self._deviation(rung.residual),
-                "unseen error": np.nan if rung.unseen is None else self._error(rung.unseen),
-                "unseen std": np.nan if rung.unseen is None else self._deviation(rung.unseen),
+                **self._of_all(rung.residual, "error", "error std"),
+                **self._of_all(rung.unseen, "unseen error", "unseen std"),
                 "gain": self.climbed.gains.get(rung.added or "", np.nan),
             }
         return table(rows, "rung")
@@ -557,32 +555,31 @@ class Fit(Shown):
             raise InputError("no free parameter of that name", key=name, hint=nearest(name, list(known)))
         return known[name]
 
-    def _error(self, residual: np.ndarray, where: np.ndarray | None = None) -> float:
-        use = ~self._fit.dropped if where is None else where & ~self._fit.dropped
-        return float(np.sqrt(np.mean((residual[use] / self._floor[use]) ** 2))) if use.any() else float("nan")
+    def _sums(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Sums of squared residuals over their floors, and numbers of points, by event and phase, each (E, phases)."""
+        problem, use = self._fit.problem, ~self._fit.dropped
+        shape = problem.event_run.size, len(PHASES)
+        cell = problem.of[use] * shape[1] + problem.phase[use]
+        squares = np.bincount(cell, (residual[use] / self._floor[use]) ** 2, shape[0] * shape[1])
+        return squares.reshape(shape), np.bincount(cell, minlength=squares.size).reshape(shape)
 
-    def _deviation(self, residual: np.ndarray, where: np.ndarray | None = None) -> float:
-        """Standard deviation of :meth:`_error`: that of a ratio of sums over events, which are independent."""
-        use = ~self._fit.dropped if where is None else where & ~self._fit.dropped
-        event = self._fit.problem.of[use]
-        numbers = np.bincount(event)
-        events = np.count_nonzero(numbers)
-        if events < 2:
-            return float("nan")
-        squares = np.bincount(event, (residual[use] / self._floor[use]) ** 2)
-        mean = squares.sum() / numbers.sum()
-        spread = np.sqrt(((squares - mean * numbers) ** 2).sum() * events / (events - 1)) / numbers.sum()
-        return float(spread / (2.0 * np.sqrt(mean)))
-
-    def _errors(self, residual: np.ndarray) -> pandas.DataFrame:
-        return self._table(residual, self._error)
+    def _of_all(self, residual: np.ndarray | None, error: str, std: str) -> dict[str, float]:
+        """Error of all points together and its deviation, by these names."""
+        if residual is None:
+            return {error: np.nan, std: np.nan}
+        squares, numbers = (a.sum(axis=1) for a in self._sums(residual))
+        return {error: _error(squares, numbers), std: _deviation(squares, numbers)}
 
     def _table(self, residual: np.ndarray, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:
+        """What sums over the points of events say (see :meth:`_sums`): a row for each phase, a column for each run."""
+        squares, numbers = self._sums(residual)
         problem = self._fit.problem
-        every = np.ones(problem.run.size, bool)
-        runs = {"all": every, **{k.name: problem.run == r for r, k in enumerate(problem.runs)}}
-        phases = {"all": every, **{name: problem.phase == i for i, name in enumerate(PHASES)}}
-        rows = {p: {r: measure(residual, a & b) for r, b in runs.items()} for p, a in phases.items() if a.any()}
+        runs = {"all": slice(None), **{k.name: problem.event_run == r for r, k in enumerate(problem.runs)}}
+        phases = {"all": slice(None), **{name: [i] for i, name in enumerate(PHASES) if numbers[:, i].any()}}
+        rows = {
+            p: {r: measure(*(a[own][:, some].sum(axis=1) for a in (squares, numbers))) for r, own in runs.items()}
+            for p, some in phases.items()
+        }
         return table(rows, "phase")
 
     def _parts(self) -> list[Any]:
@@ -594,6 +591,21 @@ class Fit(Shown):
             "parameters": "set by hand" if self.by_hand else None,
         }
         return [facts(what), self.parameters[["value", "std", "unit"]], self.errors]
+
+
+def _error(squares: np.ndarray, numbers: np.ndarray) -> float:
+    """Root mean square of residuals over their floors, from sums and numbers of points by event."""
+    return float(np.sqrt(squares.sum() / numbers.sum())) if numbers.any() else float("nan")
+
+
+def _deviation(squares: np.ndarray, numbers: np.ndarray) -> float:
+    """Standard deviation of :func:`_error`: that of a ratio of sums over events, which are independent."""
+    events = np.count_nonzero(numbers)
+    if events < 2:
+        return float("nan")
+    mean = squares.sum() / numbers.sum()
+    spread = np.sqrt(((squares - mean * numbers) ** 2).sum() * events / (events - 1)) / numbers.sum()
+    return float(spread / (2.0 * np.sqrt(mean)))
 
 
 class StaticFit(Shown):
