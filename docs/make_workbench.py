@@ -2,8 +2,8 @@
 
     python docs/make_workbench.py
 
-Writes workbench-data.png, -missing.png, -model.png, -simulate.png and -keep.png into docs/images, from the shipped campaign
-in a folder of its own.
+Writes workbench-data.png, -missing.png, -model.png, -simulate.png and -keep.png into docs/images, from the shipped
+campaign in a folder of its own.
 """
 
 from __future__ import annotations
