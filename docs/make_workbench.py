@@ -36,7 +36,7 @@ return true
 def picture(browser: Browser, name: str) -> None:
     """Save the page as it stands."""
     time.sleep(SETTLED)
-    browser.driver.save_screenshot(str(IMAGES / f"workbench-{name}.png"))
+    browser.driver.save_screenshot(str(IMAGES / f"{name}.png"))
 
 
 def main() -> None:
@@ -51,30 +51,30 @@ def main() -> None:
             browser.open(served.url, "Data")
             browser.idle()
             browser.wait(lambda: "Can tell" in browser.text("h3, h4, .head, .group"), 120)
-            picture(browser, "data")
+            picture(browser, "workbench-data")
             browser.tab("What is missing")
             browser.wait(
                 lambda: browser.js("return seen('.line').some((e) => e.textContent.startsWith('by the fall'))"), 300
             )
             browser.js("seen('.effect-row[data-tag=\"contact-ageing\"]')[0].click()")
-            picture(browser, "missing")
+            picture(browser, "workbench-missing")
             browser.press('.effect-row[data-tag="contact-ageing"] button', "Switch on")
             browser.wait(lambda: "contact-ageing" in browser.text(".model"), 120)
             browser.tab("Model")
             browser.wait(lambda: browser.js("return seen('.knob').length"))
             browser.idle()
-            picture(browser, "model")
+            picture(browser, "workbench-model")
             browser.tab("Simulate")
             browser.press("button", "Simulate")
             browser.wait(lambda: "model" in browser.text("td"), 120)
-            picture(browser, "simulate")
+            picture(browser, "workbench-simulate")
             browser.tab("Keep")
             browser.wait(lambda: browser.js(WRITE, "first"))
             browser.press("button", "Save")
             browser.wait(lambda: "first" in browser.text("td"), 200)
             browser.js("seen('.choosing tbody tr').find((e) => e.cells[0].textContent === 'first').click()")
             browser.wait(lambda: browser.js("return seen('iframe').length"))
-            picture(browser, "keep")
+            picture(browser, "workbench-keep")
         finally:
             browser.close()
             served.end()
