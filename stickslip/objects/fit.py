@@ -192,7 +192,7 @@ class Fit(Shown):
     @cached_property
     def unseen_errors(self) -> pandas.DataFrame:
         """The same on runs that are left out of the fit, each in turn."""
-        return self._table(unseen(self._fit).residual, _error)
+        return self._table(self._unseen, _error)
 
     @cached_property
     def error_deviations(self) -> pandas.DataFrame:
@@ -202,7 +202,7 @@ class Fit(Shown):
     @cached_property
     def unseen_error_deviations(self) -> pandas.DataFrame:
         """The same of :attr:`unseen_errors`."""
-        return self._table(unseen(self._fit).residual, _deviation)
+        return self._table(self._unseen, _deviation)
 
     @property
     def error(self) -> float:
@@ -545,6 +545,11 @@ class Fit(Shown):
     @cached_property
     def _where(self) -> dict[str, np.ndarray]:
         return coordinates(self._fit)
+
+    @cached_property
+    def _unseen(self) -> np.ndarray:
+        """Residual force on runs that are left out (N), shape (p,)."""
+        return unseen(self._fit).residual
 
     @cached_property
     def _floor(self) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Measured records of others: what is known of them must be found. Skipped where the data are not there."""
 
 import shutil
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -29,8 +30,6 @@ def shipped(tmp_path, real_data):
 
 def wanted(path):
     """Names of the files that a campaign file wants beside it."""
-    import tomllib
-
     entries = tomllib.loads(path.read_text(encoding="utf-8"))["trace"]
     channels = [c for e in entries for c in e.values() if isinstance(c, dict) and "file" in c]
     return {e["file"] for e in entries} | {c["file"] for c in channels}

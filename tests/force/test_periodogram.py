@@ -11,6 +11,7 @@ from stickslip.inference.force.fit import fit
 from stickslip.inference.force.periodogram import best_wave, waves
 from stickslip.inference.force.signatures import Explained, signatures
 from stickslip.physics.effects import catalogue
+from stickslip.physics.params import specs
 
 from .conftest import made, seen
 
@@ -57,7 +58,7 @@ def test_turned_columns_explain_what_columns_at_their_own_frequency_do(base):
     frequency = 31.7
     explained = laid_over(base, wave(base, frequency, np.array([0.4, -2.1])))
     effect = catalogue.get("load-modulation")()
-    grid, step = periodogram._grid(base, "t", effect_spec(effect), "frequency")
+    grid, step = periodogram._grid(base, "t", specs(effect)["frequency"], "frequency")
     one = np.searchsorted(grid, frequency)
     columns = periodogram._Frequencies(base, effect)(grid[one : one + 1])
     edges = np.array([grid[one - 1], grid[one]])  # up to a whole spacing away
@@ -66,12 +67,6 @@ def test_turned_columns_explain_what_columns_at_their_own_frequency_do(base):
     pair = periodogram._Frequencies(base, effect)(fine[at : at + 1])
     exact, _ = explained.gain(periodogram.by_run(base, pair))
     assert falls[at] == pytest.approx(exact, rel=0.15)
-
-
-def effect_spec(effect):
-    from stickslip.physics.params import specs
-
-    return specs(effect)["frequency"]
 
 
 def test_a_trend_has_no_period():

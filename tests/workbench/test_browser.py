@@ -119,6 +119,8 @@ def test_a_hand_sends_at_most_ten_places_a_second_and_the_last_one(browser):
     last = pytest.approx(0.7, abs=0.002)
     shown = "return all('.knob[data-name=\"weakening.drop\"] .slider')[0].value"
     browser.wait(lambda: float(browser.js(shown)) == last)
+    time.sleep(PAUSE)
+    assert float(browser.js(shown)) == last  # and stays
     browser.press("button", "Base")
 
 
@@ -148,12 +150,12 @@ def test_the_keyboard_goes_to_the_next_cycle(browser):
     browser.tab("Model")
     browser.js("document.activeElement && document.activeElement.blur()")
     ActionChains(browser.driver).send_keys(Keys.ARROW_LEFT * 12).perform()
-    browser.wait(lambda: "cycle 1 of" in browser.text(".line"))
+    assert browser.wait(lambda: "cycle 1 of" in browser.text(".line"))
     ActionChains(browser.driver).send_keys(Keys.ARROW_RIGHT).perform()
-    browser.wait(lambda: "cycle 2 of" in browser.text(".line"))
+    assert browser.wait(lambda: "cycle 2 of" in browser.text(".line"))
     run = browser.js("return seen('select')[0].value")
     ActionChains(browser.driver).send_keys(Keys.ARROW_DOWN).perform()
-    browser.wait(lambda: browser.js("return seen('select')[0].value") != run)
+    assert browser.wait(lambda: browser.js("return seen('select')[0].value") != run)
 
 
 @pytest.mark.slow

@@ -166,7 +166,7 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
         place = i, {**members[i], effect.amplitude: null + size}
         if place not in starts:
             starts.append(place)
-    found, (i, start) = _raced(base, effect, starts)
+    found, (i, start) = _best_of(base, effect, starts)
     return Candidate(
         effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * float(errors[i]), start
     )  # fmt: skip
@@ -211,7 +211,7 @@ def _begun(base: Fit, effect: Effect, values: dict[str, float], turns: Array | N
     return adapted(refit(problem, _start(base, free, turns), base, SHORT), rounds=0)
 
 
-def _raced(base: Fit, effect: Effect, starts: Sequence[Start]) -> tuple[Fit, Start]:
+def _best_of(base: Fit, effect: Effect, starts: Sequence[Start]) -> tuple[Fit, Start]:
     """The best of the refits from several starts: a few evaluations from each, and the better half goes to its end.
 
     Early costs say which starts lead nowhere, not which of the others lead furthest.

@@ -78,6 +78,7 @@ def best_wave(base: Fit, explained: Explained, effect: Any) -> Wave | None:
         found.append(_turned(base, explained, frequencies(part), part, edges[at : at + part.size + 1], step, along))
     fine, falls = (np.concatenate(parts) for parts in zip(*found, strict=True))
     near = np.concatenate([peak + step * NEARER for peak in _peaks(fine, falls, step)])
+    near = np.clip(near, grid[0], grid[-1])  # where the parameter's bounds are
     best: Wave | None = None
     for frequency, pair in zip(near, frequencies(near).reshape(near.size, 2, -1), strict=True):
         fall, sizes = explained.gain(by_run(base, pair))
@@ -141,26 +142,20 @@ def _turned(
     Run by run: what two runs have in common through the model's own parameters is left out.
     """
     white, onto, rest = explained.by_event(columns.T)
-    events = white.shape[0]
-    place, run_of = _places(base, along, columns), _runs(base)
+    place, run_of = _places(base, along, columns), base.problem.event_run
     fine, falls = [], []
     for i, centre in enumerate(grid):
         number = max(int(np.ceil(FINE * (edges[i + 1] - edges[i]) / step)), 1)
         near = edges[i] + (np.arange(number) + 0.5) * (edges[i + 1] - edges[i]) / number
-        pair = white[:, :, 2 * i : 2 * i + 2]
-        held = onto[:, :, 2 * i : 2 * i + 2]
-        # the pair as one complex column z = sine - i cosine: a turn by theta multiplies it by exp(i theta)
+        # the pair as one complex column, sine - i cosine: a turn by theta multiplies it by exp(i theta)
+        column = white[:, :, 2 * i] - 1j * white[:, :, 2 * i + 1]
+        bent = onto[:, :, 2 * i] - 1j * onto[:, :, 2 * i + 1]
         turn = np.exp(2j * np.pi * np.outer(near - centre, place[:, i]))
-        sine, cosine = pair[..., 0], pair[..., 1]
-        square = np.einsum("en,en->e", sine, sine) + np.einsum("en,en->e", cosine, cosine)
-        twice = (np.einsum("en,en->e", sine, sine) - np.einsum("en,en->e", cosine, cosine)) - 2j * np.einsum(
-            "en,en->e", sine, cosine
-        )
-        upon = np.einsum("en,en->e", sine, rest) - 1j * np.einsum("en,en->e", cosine, rest)
-        bent = held[..., 0] - 1j * held[..., 1]
+        square, twice = (np.abs(column) ** 2).sum(axis=1), (column**2).sum(axis=1)
+        upon = (column * rest).sum(axis=1)
         total = np.zeros(number)
         for r in range(len(base.problem.runs)):
-            own = np.arange(events)[run_of == r]
+            own = np.flatnonzero(run_of == r)
             if own.size == 0:
                 continue
             t = turn[:, own]
@@ -194,11 +189,6 @@ def _places(base: Fit, along: str, columns: Array) -> Array:
     places = base.blocks(at)
     shares = base.blocks(weights.T)
     return np.einsum("en,enf->ef", places, shares) / (shares.sum(axis=1) + 1e-300)
-
-
-def _runs(base: Fit) -> Array:
-    """The run of each event, shape (E,)."""
-    return base.problem.run[base.blocks.index[:, 0]]
 
 
 def _peaks(fine: Array, falls: Array, step: float) -> list[float]:
