@@ -14,8 +14,14 @@ from .base import Contact, Flow, Memory, Motion, Threshold
 from .catalogue import register
 from .sliding import filled
 
-Four = tuple[Array, Array, Array, Array]
 YOUNG = 7  # classes of age below that at which a junction reaches its cap; one more holds all older ones
+
+
+class Renewal(NamedTuple):
+    """Share of a class that is replaced within an increment, and the mean share over the increment; shape (n,) each."""
+
+    gone: Array
+    fresh: Array
 
 
 class Junctions(NamedTuple):
@@ -83,29 +89,26 @@ class ContactRenewal(Memory, Threshold, Flow):
         cap = filled(contact.cap / filled(own))
         width = filled(contact.strength / filled(contact.stiffness)) / YOUNG  # of a young class, in age (m)
         dies, rates = _ages(width, self.rate)
-        first, middle, last = (_decay(rate * motion.path) for rate in rates)
-        step = contact.stiffness * motion.dx
-        plain = contact.force + step  # with no renewal
+        plain = contact.force + contact.stiffness * motion.dx  # with no renewal
         capped = jnp.clip(plain, -cap, cap)
-        aged = [first, *[middle] * (YOUNG - 1), last]
+        force = contact.force + state.spread
+        youngest, young, oldest = (_renewal(rate * motion.path) for rate in rates)
+        step = contact.stiffness * motion.dx
 
-        def older(younger: Four, own: Four) -> tuple[Four, Array]:
-            before, after, survives, change = younger
-            gone, mean, share, spread = own
-            force = contact.force + spread
-            # written as a difference, so that it vanishes exactly where the rate does
-            renewed = -force * gone - step * (1.0 - mean) + after * (1.0 - mean) + before * (mean - 1.0 + gone)
-            other = jnp.clip(plain + (spread + renewed), -cap, cap)
-            off = other - capped
-            return (force, other, survives * (1.0 - dies), change + survives * share * off), off
+        # written as differences, so that they vanish exactly where the rate does
+        def own(renewal: Renewal, spread: Array, force: Array, younger: Array | float) -> Array:
+            return plain + (spread - renewal.gone * (force - younger) - renewal.fresh * (step + younger))
 
-        zero = jnp.zeros_like(step)
-        gone, mean = (jnp.stack([pair[i] for pair in aged]) for i in range(2))
-        shares = jnp.stack([*[dies] * YOUNG, jnp.ones_like(dies)])
-        newborn = (zero, zero, jnp.ones_like(dies), zero)
-        (_, _, _, change), offs = jax.lax.scan(older, newborn, (gone, mean, shares, state.spread))
-        spread = offs - change
-        return Junctions(spread, -change, -change * capped / cap**2)
+        def aged(younger: Array, own: Array) -> tuple[Array, Array]:
+            ended = jnp.clip(own + young.fresh * younger, -cap, cap)
+            return ended, ended
+
+        first = jnp.clip(own(youngest, state.spread[0], force[0], 0.0), -cap, cap)
+        last, middle = jax.lax.scan(aged, first, own(young, state.spread[1:-1], force[1:-1], force[:-2]))
+        last = jnp.clip(own(oldest, state.spread[-1], force[-1], force[-2]) + oldest.fresh * last, -cap, cap)
+        offs = jnp.concatenate([first[None], middle, last[None]]) - capped
+        change, _ = jax.lax.scan(lambda older, off: (older + dies * (off - older), None), offs[-1], offs[:-1], reverse=True)
+        return Junctions(offs - change, -change, -change * capped / cap**2)
 
     def strength(self, state: Junctions, motion: Motion, contact: Contact) -> Array:
         return 1.0 - state.deficit
@@ -128,8 +131,8 @@ def _ages(width: Array, rate: Array) -> tuple[Array, tuple[Array, ...]]:
     return -jnp.expm1(-x), (1.0 / (width * centre), 1.0 / width, oldest)
 
 
-def _decay(z: Array) -> tuple[Array, Array]:
-    """1 - exp(-z), and the mean (1 - exp(-z))/z of exp over the increment."""
+def _renewal(z: Array) -> Renewal:
+    """What an increment makes of a class whose junctions leave it at the rate z per increment."""
     gone = -jnp.expm1(-z)
     small = z < 1e-4
-    return gone, jnp.where(small, 1.0 - 0.5 * z + z**2 / 6.0, gone / jnp.where(small, 1.0, z))
+    return Renewal(gone, jnp.where(small, 0.5 * z - z**2 / 6.0, 1.0 - gone / jnp.where(small, 1.0, z)))
