@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
@@ -29,7 +29,20 @@ PROMISING = 3.0  # fall of the cost that chance alone promises; where no more is
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 
 
-Start = tuple[int, dict[str, float]]  # member of a family, and the values of the effect (SI)
+class Start(NamedTuple):
+    """Where a refit begins.
+
+    Attributes:
+        values: of the effect (SI).
+        base: of the model without it, which has made room for the effect.
+        turns: a phase for each run, shape (R,), where the effect has one.
+        error: standard deviation of the amplitude there (SI).
+    """
+
+    values: dict[str, float]
+    base: Point
+    turns: Array | None = None
+    error: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -105,9 +118,9 @@ def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[s
     if best.fit is None:
         return made
     if catalogue.get(tag).periodic is None:
-        own = {n.partition(".")[2]: v for n, v in best.fit.values.items() if n.startswith(f"{tag}.")}
         made = [
-            c if c.fit is None or c.fit.cost < best.fit.cost + EVEN else _better(c, _from(base, c, own)) for c in made
+            c if c.fit is None or c.fit.cost < best.fit.cost + EVEN else _better(c, _from(base, c, best.fit))
+            for c in made
         ]
     return made
 
@@ -130,12 +143,15 @@ def _better(one: Candidate, other: Candidate) -> Candidate:
     return other if _cost(other) < _cost(one) else one
 
 
-def _from(base: Fit, c: Candidate, values: dict[str, float]) -> Candidate:
-    """The candidate refitted from other values of its parameters (SI)."""
-    effect = catalogue.get(c.tag)(**c.form)
-    start = {name: values.get(name, value) for name, value in c.start.items()}
+def _from(base: Fit, c: Candidate, other: Fit) -> Candidate:
+    """The candidate refitted from where another form of it ended."""
+    effect, values = catalogue.get(c.tag)(**c.form), other.values
+    start = {name: values.get(f"{c.tag}.{name}", value) for name, value in c.start.items()}
+    point = replace(
+        other.point, z=other.point.z[: base.point.z.size], phases=other.point.phases[: len(base.point.phases)]
+    )
     try:
-        return replace(c, fit=_refit(base, effect, start), start=start)
+        return replace(c, fit=adapted(_begun(base, effect, Start(start, point))), start=start)
     except StickslipError:
         return replace(c, fit=None)
 
@@ -163,12 +179,13 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
             size = least if size >= 0.0 and spec.upper > null else -least
         # not at the bound either
         size = float(np.clip(size, 0.5 * (spec.lower - null), 0.5 * (spec.upper - null)))
-        place = i, {**members[i], effect.amplitude: null + size}
-        if place not in starts:
-            starts.append(place)
-    found, (i, start) = _best_of(base, effect, starts)
+        point, share = base.yielding(size * columns[usable][i])
+        values = {**members[i], effect.amplitude: null + share * size}
+        if values not in (s.values for s in starts):
+            starts.append(Start(values, point, None, float(errors[i])))
+    found, start = _best_of(base, effect, starts)
     return Candidate(
-        effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * float(errors[i]), start
+        effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * start.error, start.values
     )  # fmt: skip
 
 
@@ -192,23 +209,19 @@ def _columns(base: Fit, effect: Effect, members: Sequence[dict[str, float]]) -> 
         problem, free = with_start(base.problem, effect, {**member, effect.amplitude: null}, inside=False)
         name = f"{effect.tag}.{effect.amplitude}"
         at, own = next((i, f) for i, f in enumerate(problem.composition.shared) if f.name == name)
-        slopes = problem.evaluate(_start(base, free, None))
+        slopes = problem.evaluate(_at(base.problem, free, Start(member, base.point)))
         out.append(slopes.shared[:, at] / own.slope(own.inward(null)))
     return np.stack(out)
 
 
-def _refit(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
-    """The model refitted with an effect that starts with these values; ``turns`` are phases, shape (R,).
+def _begun(base: Fit, effect: Effect, start: Start) -> Fit:
+    """The model refitted with an effect in a few evaluations.
 
     It is given sizes of its own of what is random: those of the base are as large as the lack of the effect makes them,
     and under them ends of a search that differ much look alike.
     """
-    return adapted(_begun(base, effect, values, turns))
-
-
-def _begun(base: Fit, effect: Effect, values: dict[str, float], turns: Array | None = None) -> Fit:
-    problem, free = with_start(base.problem, effect, values)
-    return adapted(refit(problem, _start(base, free, turns), base, SHORT), rounds=0)
+    problem, free = with_start(base.problem, effect, start.values)
+    return adapted(refit(problem, _at(base.problem, free, start), base, SHORT), rounds=0)
 
 
 def _best_of(base: Fit, effect: Effect, starts: Sequence[Start]) -> tuple[Fit, Start]:
@@ -216,7 +229,7 @@ def _best_of(base: Fit, effect: Effect, starts: Sequence[Start]) -> tuple[Fit, S
 
     Early costs say which starts lead nowhere, not which of the others lead furthest.
     """
-    ends = sorted(((_begun(base, effect, start[1]), start) for start in starts), key=lambda end: end[0].cost)
+    ends = sorted(((_begun(base, effect, start), start) for start in starts), key=lambda end: end[0].cost)
     finished = ((adapted(found), start) for found, start in ends[: (len(ends) + 1) // 2])
     return min(finished, key=lambda end: end[0].cost)
 
@@ -240,15 +253,15 @@ def _kept(f: Free, values: dict[str, float]) -> Free:
     return f.starting(values[own]) if own in values else f
 
 
-def _start(base: Fit, free: Sequence[Free], turns: Array | None) -> Point:
+def _at(problem: Problem, free: Sequence[Free], start: Start) -> Point:
     own = [f for f in free if not is_own(f.name)]
-    z = np.concatenate([base.point.z, [f.inward(f.start) for f in own]])
-    phases = base.point.phases
+    z = np.concatenate([start.base.z, [f.inward(f.start) for f in own]])
+    phases = start.base.phases
     for f in free:
         if is_own(f.name):
-            at = np.full(len(base.problem.runs), f.start) if turns is None else turns
+            at = np.full(len(problem.runs), f.start) if start.turns is None else start.turns
             phases = np.vstack([phases, at / float(f.scale)])
-    return replace(base.point, z=z, phases=phases)
+    return replace(start.base, z=z, phases=phases)
 
 
 def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]) -> Candidate:
@@ -257,9 +270,10 @@ def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]
     if wave is None:
         return Candidate(effect.tag, form, 0.0, None, "the records are too short for a period")
     limit = specs(effect)[effect.amplitude]
-    amplitude = float(np.clip(wave.amplitude, 1e-3 * limit.upper, 0.9 * limit.upper))
-    start = {effect.periodic[0]: wave.value, effect.amplitude: amplitude}
-    found = _refit(base, effect, start, wave.phases)
+    amplitude = min(wave.amplitude, 0.9 * limit.upper)
+    point, share = base.yielding(amplitude * wave.column(base.problem.run))
+    start = {effect.periodic[0]: wave.value, effect.amplitude: share * amplitude}
+    found = adapted(_begun(base, effect, Start(start, point, wave.phases)))
     # in the mean over runs and phases a wave is seen as each of its two parts is
     seen = explained.singly(explained.apart(wave.columns.T))[2]
     return Candidate(effect.tag, form, wave.fall, found, "", wave.tried, 5.0 * float(np.mean(seen)), start)

@@ -80,8 +80,7 @@ def _wave(base: Fit, explained: Explained, nothing: Promise, effect: Any) -> Pro
     wave = best_wave(base, explained, effect)
     if wave is None or wave.fall <= 0.0:
         return nothing
-    run = base.problem.run
-    force = -(wave.columns[0] * wave.sine[run] + wave.columns[1] * wave.cosine[run])
+    force = -wave.amplitude * wave.column(base.problem.run)
     error = float(np.mean(explained.singly(explained.apart(wave.columns.T))[2]))
     force = explained.left(force[:, None])[:, 0]
     unseen, std = _unseen(base, explained, by_run(base, wave.columns), halves(base))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,13 +25,14 @@ FARTHEST = 1.5  # step of a parameter on the search scale
 PLACED = 2  # rounds after which the bank's elements are put where the strength is
 ROUNDS = 10  # times that the scatter is estimated anew
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
-REGIONS = 3  # trust regions tried, each within the one before, until a step lowers the cost
-SHRUNK = 0.3  # size of a trust region over that of the step that failed in the one before
-GOOD = 0.7  # share of the expected fall of the cost above which the trust region grows
+FAILED = 4  # steps in turn that do not lower the cost, after which the search ends
+DAMPING, LEAST = 1e-6, 1e-9  # of the first step, and of any: over the curvature of the cost in each parameter
+GOOD, POOR = 0.7, 0.25  # shares of the expected fall of the cost, above and below which the damping changes
+EASED, STIFFENED, RAISED = 0.1, 3.0, 30.0  # change of the damping after a good, a poor and a failed step
 LAST = 30  # evaluations with the covariance as it was found
 STEPS = 4  # evaluations between
 NEWTON = 4  # steps of the sizes between
-BESIDE, ASIDE, SEED = 2, 0.02, 1  # fits begun anew beside the end of one, how far (on the search scale), and where
+BESIDE, SEED = 2, 1  # fits begun anew about the end of one, and where
 SETTLED = 0.3  # fall of the cost (in units of chi-square) at which a round ends
 NONE = 1e-12  # share of the strength that the rounding of a step leaves in an element at its bound
 
@@ -66,11 +68,36 @@ class Fit:
     valleys: tuple[Array, ...] = ()
 
     @cached_property
-    def _judged(self) -> tuple[Array, float, Array]:
+    def _system(self) -> _System:
         """Found when asked for: a model that a hand moves is drawn, and judged when it stands still."""
         white = Whitening(self.scatter.sizes, self.known)
-        system = _System(self.problem, self.point, self.slopes, self.scatter, self.blocks, white)
+        return _System(self.problem, self.point, self.slopes, self.scatter, self.blocks, white)
+
+    @cached_property
+    def _judged(self) -> tuple[Array, float, Array]:
+        system = self._system
         return system.likelihood(), float((system.target**2).sum()), system.covariance()
+
+    def yielding(self, forces: Array) -> tuple[Point, float]:
+        """Where the model's own parameters go to make room for forces, to first order.
+
+        Args:
+            forces: that come to the residual (N), shape (p,).
+
+        Returns:
+            The point, and the share of the forces for which it is: less than 1 where all of them would take a
+            parameter further than a step of a fit goes.
+        """
+        change, events, _ = self._system.alone(forces).step(DAMPING, np.inf)
+        far = float(np.abs(change[: self.point.z.size]).max(initial=0.0))
+        share = min(1.0, FARTHEST / far) if far > 0.0 else 1.0
+        return moved(self.problem, self.point, share * change, self.point.events + share * events), share
+
+    def drawn(self, rng: np.random.Generator) -> Point:
+        """A point of the posterior as the derivatives have it, events at their best there."""
+        values, turn = np.linalg.eigh(self.covariance)
+        change = turn @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(values.size))
+        return moved(self.problem, self.point, change, self._system.events_after(change))
 
     @property
     def likelihood(self) -> Array:
@@ -134,27 +161,44 @@ class _System:
         whitened = self.white(np.concatenate([self.shared, self.marginal[..., None]], axis=2))
         self.rows, self.rest = whitened[..., :-1], whitened[..., -1]
 
+    def alone(self, forces: Array) -> _System:
+        """The same with forces (N), shape (p,), in place of the residual, and priors that are met."""
+        other = copy(self)
+        other.marginal = self.blocks(forces)
+        other.rest = self.white(other.marginal[..., None])[..., 0]
+        other.target = np.zeros_like(self.target)
+        return other
+
     def objective(self, point: Point, slopes: Slopes) -> float:
         """Of residual, random effects and priors, with this covariance."""
         white = self.plain @ self.blocks(slopes.residual)[..., None]
         _, target = prior_rows(self.problem, point)
         return float((white**2).sum() + (point.events**2 / self.random).sum() + (target**2).sum())
 
-    def step(self, radius: float) -> tuple[Array, Array, float]:
-        """Changes of what is shared within a trust region, the events' own values after it, and the cost expected."""
+    def step(self, damping: float = 0.0, farthest: float = FARTHEST) -> tuple[Array, Array, float]:
+        """Changes of what is shared, the events' own values after them, and the cost expected.
+
+        Args:
+            damping: over the curvature of the cost in each parameter (Marquardt 1963).
+            farthest: change of a parameter on the search scale.
+        """
         rows = self.rows.reshape(-1, self.rows.shape[-1])
         normal = rows.T @ rows + self.prior.T @ self.prior
         right = rows.T @ self.rest.ravel() + self.prior.T @ self.target
         scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        root = np.linalg.cholesky(normal * scale[:, None] * scale + 1e-11 * np.eye(len(normal)))
-        low, high = reach(self.problem, self.point, radius)
+        root = np.linalg.cholesky(normal * scale[:, None] * scale + (damping + 1e-11) * np.eye(len(normal)))
+        low, high = reach(self.problem, self.point, farthest)
         high = np.where(high - low > 1e-12, high, low + 1e-12)
         found = lsq_linear(root.T, -np.linalg.solve(root, right * scale), (low / scale, high / scale), method="bvls")
         change = found.x * scale
-        weighted = self.white.weighted(self.marginal + self.shared @ change)
-        events = -self.random * np.einsum("eia,ei->ea", self.local, weighted)
+        events = self.events_after(change)
         rest, prior = self.rest.ravel() + rows @ change, self.target + self.prior @ change
         return change, events, float(rest @ rest + prior @ prior)
+
+    def events_after(self, change: Array) -> Array:
+        """The events' own values where what is shared is changed, shape (E, 4)."""
+        weighted = self.white.weighted(self.marginal + self.shared @ change)
+        return np.asarray(-self.random * np.einsum("eia,ei->ea", self.local, weighted))
 
     def covariance(self) -> Array:
         """Of the shared parameters; what stands at a bound does not move."""
@@ -211,25 +255,26 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
     )
 
 
-def moved(point: Point, change: Array, events: Array) -> Point:
+def moved(problem: Problem, point: Point, change: Array, events: Array) -> Point:
     """The point after a step, within the bounds."""
     a, b = point.z.size, point.phases.size
+    low, high = np.array([f.bounds for f in problem.composition.shared]).reshape(-1, 2).T
     phases = point.phases + change[a : a + b].reshape(point.phases.shape)
     k = point.weights.size
     weights = point.weights + change[a + b : a + b + k]
     weights = np.where(weights > NONE * point.weights.sum(), weights, 0.0)
-    return Point(point.z + change[:a], phases, weights, events, point.common + change[a + b + k :])
+    return Point(np.clip(point.z + change[:a], low, high), phases, weights, events, point.common + change[a + b + k :])
 
 
-def reach(problem: Problem, point: Point, radius: float = FARTHEST) -> tuple[Array, Array]:
-    """The least and the largest change of everything shared; ``radius`` of the trust region on the search scale.
+def reach(problem: Problem, point: Point, farthest: float = FARTHEST) -> tuple[Array, Array]:
+    """The least and the largest change of everything shared; ``farthest`` on the search scale.
 
-    The force is linear in the weights, which need no such region.
+    The force is linear in the weights, which need no such bound.
     """
     shared = problem.composition.shared
-    b = np.full(point.phases.size, 4.0 * radius if radius < FARTHEST else np.inf)
+    b = np.full(point.phases.size, np.inf)
     bounds = np.array([f.bounds for f in shared]).reshape(-1, 2).T
-    low, high = np.maximum(bounds[0] - point.z, -radius), np.minimum(bounds[1] - point.z, radius)
+    low, high = np.maximum(bounds[0] - point.z, -farthest), np.minimum(bounds[1] - point.z, farthest)
     more, c = np.full(point.weights.size, np.inf), np.full(point.common.size, np.inf)
     return np.concatenate([low, -b, -point.weights, -c]), np.concatenate([high, b, more, c])
 
@@ -332,7 +377,7 @@ def fit(
     sizes = Scatter.wide() if scatter is None else scatter
     out = np.zeros(problem.of.size, bool) if dropped is None else dropped
     slopes = problem.evaluate(point)
-    evaluations, radius = 1, FARTHEST
+    evaluations, damping = 1, DAMPING
     if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
         raise FitError("the model gives no finite force along the motion")
     for turn in range(rounds):
@@ -350,7 +395,7 @@ def fit(
                 out = out | more
                 made = known_of(problem, point, slopes, blocks, out)
                 sizes = estimate(sizes, marginal, made, NEWTON)
-        point, slopes, total, count, radius = descend(problem, point, slopes, sizes, made, blocks, steps, radius)
+        point, slopes, total, count, damping = descend(problem, point, slopes, sizes, made, blocks, steps, damping)
         evaluations += count
         if turn > PLACED + 2 and total < 1.0:
             break
@@ -360,18 +405,16 @@ def fit(
 
 
 def _best(found: Fit) -> Fit:
-    """The best of a fit and of those begun beside its end.
+    """The best of a fit and of those begun about its end, as far off as the data allow.
 
-    Where an element begins to slide the force has a kink, and at one of them the search may stand still before it has
-    arrived: then every law that is added gains by leaving it.
+    Where an element begins to slide the force has a kink, and the floor of the valley is rough: in one of its dents the
+    search may stand still before it has arrived, and then every law that is added gains by leaving it.
     """
     rng = np.random.default_rng(SEED)
     best, evaluations = found, found.evaluations
     for _ in range(BESIDE):
-        z = found.point.z + ASIDE * rng.standard_normal(found.point.z.size)
-        low, high = np.array([f.bounds for f in found.free]).reshape(-1, 2).T
         with suppress(FitError):
-            other = adapted(refit(found.problem, replace(found.point, z=np.clip(z, low, high)), found))
+            other = adapted(refit(found.problem, best.drawn(rng), found))
             evaluations += other.evaluations
             best = min(best, other, key=lambda f: f.cost)
     return replace(best, evaluations=evaluations)
@@ -405,7 +448,7 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
     """
     problem, blocks = found.problem, found.blocks
     point, slopes, sizes, evaluations = found.point, found.slopes, found.scatter, found.evaluations
-    radius = FARTHEST
+    damping = DAMPING
     for turn in range(rounds + 1):
         known = found.known.with_local(blocks(slopes.local))
         marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", known.local, point.events)
@@ -414,7 +457,7 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
         fallen = before - misfit(sizes.sizes, marginal, known)
         if turn == rounds:
             break
-        point, slopes, total, count, radius = descend(problem, point, slopes, sizes, known, blocks, steps, radius)
+        point, slopes, total, count, damping = descend(problem, point, slopes, sizes, known, blocks, steps, damping)
         evaluations += count
         if fallen + total < 1.0:
             break
@@ -423,17 +466,17 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
 
 def descend(
     problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks, most: int,
-    radius: float = FARTHEST,
+    damping: float = DAMPING,
 ) -> tuple[Point, Slopes, float, int, float]:  # fmt: skip
-    """Gauss-Newton steps in a trust region, with the covariance as it is, until the cost falls no more.
+    """Damped Gauss-Newton steps, with the covariance as it is, until the cost falls no more (Levenberg 1944).
 
-    The region is a box on the search scale (Conn, Gould & Toint 2000): what the data hardly determine is held back, and
-    not the whole step with it. The valley of the cost is bent, so that a step along it may lead up its side and the
-    next one down to its bottom again: one step after which the cost is higher is gone on from (the watchdog of
-    Chamberlain, Powell, Lemarechal & Pedersen 1982) before the region shrinks.
+    The valley of the cost is long and bent. Damping over the curvature in each parameter (Marquardt 1963) holds back
+    what leads along it and lets a step go straight down its sides. A step along it may lead up its side and the next
+    one down to its bottom again: one step after which the cost is higher is gone on from (the watchdog of Chamberlain,
+    Powell, Lemarechal & Pedersen 1982) before the damping is raised.
 
     Returns:
-        The point and the slopes there, by how much the cost fell, how often the model was evaluated, and the radius.
+        The point and the slopes there, by how much the cost fell, how often the model was evaluated, and the damping.
     """
     here, count, failed, poor, above = (point, slopes), 0, 0, 0, False
     first = cost = np.nan
@@ -445,27 +488,27 @@ def descend(
         now = system.objective(*here)
         if count == 0:
             first = cost = now
-        change, events, expected = system.step(radius)
+        change, events, expected = system.step(damping)
         if not above and now - expected < SETTLED:
             break
-        far = float(np.abs(change[: point.z.size]).max(initial=0.0))
-        trial = moved(here[0], change, events)
+        trial = moved(problem, here[0], change, events)
         there = problem.evaluate(trial)
         count += 1
         held = np.isfinite(there.residual).all() and trial.weights.sum() > 0.0
         then = system.objective(trial, there) if held else np.inf
         if then < cost:
             poor = poor + 1 if cost - then < SETTLED else 0
-            if not above and (now - then) > GOOD * (now - expected):
-                radius = min(max(radius, 2.0 * far), FARTHEST)
+            if not above:
+                share = (now - then) / (now - expected)
+                damping = max(damping * (EASED if share > GOOD else STIFFENED if share < POOR else 1.0), LEAST)
             here, point, slopes, cost, above, failed = (trial, there), trial, there, then, False, 0
         elif np.isfinite(then) and not above:
             here, above = (trial, there), True
         else:
-            here, above, failed, radius = (point, slopes), False, failed + 1, SHRUNK * min(radius, far)
-        if failed == REGIONS or poor == 2:
+            here, above, failed, damping = (point, slopes), False, failed + 1, RAISED * damping
+        if failed == FAILED or poor == 2:
             break
-    return point, slopes, first - cost, count, radius
+    return point, slopes, first - cost, count, damping
 
 
 def at(problem: Problem, point: Point, scatter: Scatter, base: Fit) -> Fit:

@@ -8,10 +8,11 @@ event's pair of columns (sine and cosine) is turned by the phase that it gains s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...physics.params import specs
 from .fit import Array, Fit
@@ -24,6 +25,7 @@ FINE = 3.0  # frequencies for each one that a run resolves
 CLOSE = 0.5  # of one over the median stick: spacing of the coarse grid
 PEAKS = 6  # the highest are evaluated without turning
 NEARER = np.array([-0.5, -0.25, 0.0, 0.25, 0.5])  # about each of them, in units of what the longest run resolves
+LEAST = 0.3  # of its standard deviation that a wave's amplitude is: with none it has no phase
 TOGETHER = CHUNK // 2  # frequencies whose signatures are taken at once
 
 
@@ -33,8 +35,9 @@ class Wave:
 
     Attributes:
         value: of the effect's period or frequency (SI).
-        fall: of the cost, with an amplitude and a phase for each run.
+        fall: of the cost, with one amplitude and a phase for each run.
         sine, cosine: their amplitudes, each of shape (R,).
+        amplitude: of all runs together, at the phases of each.
         columns: derivatives of the residual force in the two, shape (2, p).
         tried: how many frequencies the records resolve.
     """
@@ -43,18 +46,23 @@ class Wave:
     fall: float
     sine: Array
     cosine: Array
+    amplitude: float
     columns: Array
     tried: int
-
-    @property
-    def amplitude(self) -> float:
-        """Root mean square over the runs of their waves' amplitudes."""
-        return float(np.sqrt(np.mean(self.sine**2 + self.cosine**2)))
 
     @property
     def phases(self) -> Array:
         """Of the runs (rad), shape (R,)."""
         return np.arctan2(self.cosine, self.sine)
+
+    def column(self, run: NDArray[np.intp]) -> Array:
+        """Derivative of the residual force in one amplitude of all runs, at the phase of each, shape (p,).
+
+        ``run`` is that of each point, shape (p,).
+        """
+        return np.asarray(
+            self.columns[0] * np.cos(self.phases)[run] + self.columns[1] * np.sin(self.phases)[run]
+        )
 
 
 def waves(effect: Any) -> bool:
@@ -79,13 +87,18 @@ def best_wave(base: Fit, explained: Explained, effect: Any) -> Wave | None:
     fine, falls = (np.concatenate(parts) for parts in zip(*found, strict=True))
     near = np.concatenate([peak + step * NEARER for peak in _peaks(fine, falls, step)])
     near = np.clip(near, grid[0], grid[-1])  # where the parameter's bounds are
-    best: Wave | None = None
-    for frequency, pair in zip(near, frequencies(near).reshape(near.size, 2, -1), strict=True):
-        fall, sizes = explained.gain(by_run(base, pair))
-        if best is None or fall > best.fall:
-            value = frequencies.value(frequency)
-            best = Wave(value, fall, sizes[0::2], sizes[1::2], pair, max(round(fine.size / FINE), 1))
-    return best
+    pairs = frequencies(near).reshape(near.size, 2, -1)
+    tried = max(round(fine.size / FINE), 1)
+    waves = [_wave(base, explained, frequencies.value(f), p, tried) for f, p in zip(near, pairs, strict=True)]
+    return max(waves, key=lambda wave: wave.fall)
+
+
+def _wave(base: Fit, explained: Explained, value: float, pair: Array, tried: int) -> Wave:
+    """The wave of one period; a run that hardly sees it has a phase, and says little of the amplitude."""
+    sizes = explained.gain(by_run(base, pair))[1]
+    wave = Wave(value, 0.0, sizes[0::2], sizes[1::2], 0.0, pair, tried)
+    (fall,), (size,), (error,) = explained.singly(explained.apart(wave.column(base.problem.run)[:, None]))
+    return replace(wave, fall=float(fall), amplitude=max(float(size), LEAST * float(error)))
 
 
 class _Frequencies:

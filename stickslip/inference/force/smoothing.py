@@ -7,9 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import correlate1d, uniform_filter1d
 from scipy.optimize import isotonic_regression
-from scipy.signal import savgol_filter
 from scipy.sparse import coo_array, csr_array
 
 from ...data.segment import Event
@@ -96,32 +95,43 @@ class Smoother:
 def smoothed(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, Array, Smoother]:
     """Displacement and velocity where every sample counts, and how the former is made of the samples.
 
-    Slow motion by a parabola over a ringing period, on top of it what a parabola over a third of it adds, shrunk by as
-    much as noise adds to it in squares: the noise of one sample, taken for motion, would be a path that weakens the
-    contact and makes it young.
+    At every sample a parabola and a ringing that grows or decays, over two of its periods (where none is heard, a
+    parabola alone); on top of them what a polynomial of the fourth degree over half a period adds, shrunk by as much as
+    noise adds to it in squares. The noise of one sample, taken for motion, would be a path that weakens the contact and
+    makes it young; a ringing that is smoothed away would be a force of the contact, which is stiff.
     """
-    period = times.ring or times.half
-    wide, narrow = (max(round(width * rate) // 2 * 2 + 1, 3) for width in (period, period / 3.0))
-    if wide < 5:
+    period = (times.ring or times.half) * rate
+    long = round(2.0 * period if times.ring else period) // 2 * 2 + 1
+    short = round(0.5 * period) // 2 * 2 + 1
+    if long < 5:
         return x, np.gradient(x) * rate, Smoother(np.ones(1), np.zeros(1), np.zeros(x.size))
-
-    def parabola(y: Array, length: int, derivative: int = 0) -> Array:
-        if length < 5:
-            return y if derivative == 0 else np.gradient(y) * rate
-        return savgol_filter(y, length, 2, deriv=derivative, delta=1.0 / rate)
-
-    slow = parabola(x, wide)
-    fast = parabola(x, narrow) - slow
-    pulse = np.zeros(2 * wide + 1)
-    pulse[wide] = 1.0
-    still = parabola(pulse, wide)
-    more = parabola(pulse, narrow) - still
-    level = noise**2 * float((more**2).sum())
-    seen = np.maximum(uniform_filter1d(fast**2, wide), 1e-300)
+    slow, drift = _local(long, 2, period if times.ring else None)
+    close, run = _local(short, 4) if short >= 7 else _local(3, 2)
+    pad = (long - close.size) // 2
+    fast, rush = np.pad(close, pad) - slow, np.pad(run, pad) - drift
+    added = correlate1d(x, fast, mode="nearest")
+    level = noise**2 * float((fast**2).sum())
+    seen = np.maximum(uniform_filter1d(added**2, round(period) // 2 * 2 + 1), 1e-300)
     gain = np.sqrt(np.maximum(1.0 - level / seen, 0.0))
-    own = slice(wide - wide // 2, wide + wide // 2 + 1)
-    smoother = Smoother(still[own], more[own], gain)
-    return slow + gain * fast, parabola(x, wide, 1) + gain * (parabola(x, narrow, 1) - parabola(x, wide, 1)), smoother
+    x, v = (correlate1d(x, w, mode="nearest") + gain * correlate1d(x, more, mode="nearest")
+            for w, more in ((slow, fast), (drift, rush)))  # fmt: skip
+    return x, v * rate, Smoother(slow, fast, gain)
+
+
+def _local(length: int, degree: int, period: float | None = None) -> tuple[Array, Array]:
+    """Weights of the samples around one in the value and the slope (1/sample) there of a function fitted to them.
+
+    A polynomial, and with a period (in samples) a wave whose amplitude changes linearly besides.
+    """
+    i = np.arange(length) - length // 2
+    columns = [i.astype(float) ** k for k in range(degree + 1)]
+    value, slope = np.eye(degree + 1)[:2]
+    if period is not None:
+        turn = 2.0 * np.pi / period
+        columns += [np.cos(turn * i), np.sin(turn * i), i * np.cos(turn * i), i * np.sin(turn * i)]
+        value, slope = np.append(value, [1.0, 0.0, 0.0, 0.0]), np.append(slope, [0.0, turn, 1.0, 0.0])
+    solved = np.linalg.pinv(np.stack(columns, axis=1) / (scale := np.array([np.abs(c).max() for c in columns])))
+    return np.asarray((value / scale) @ solved), np.asarray((slope / scale) @ solved)
 
 
 def onward(x: Array, weight: Array, slow: NDArray[np.bool_], event: Index, noise: float) -> Array:

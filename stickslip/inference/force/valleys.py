@@ -37,14 +37,12 @@ def held(found: Fit, name: str, value: float, start: Fit | None = None) -> tuple
 
     Args:
         found: an optimum. name: of one of its shared parameters. value: of it.
-        start: where to begin, default there.
+        start: from where its prior draws it, default there.
     """
     k = [f.name for f in found.free].index(name)
     f, point = found.free[k], (start or found).point
     width = PIN * max(float(np.sqrt(max(found.covariance[k, k], 0.0))), LEAST)
-    z = point.z.copy()
-    z[k] = value
-    again = refit(pinned(found, {name: value}, width), replace(point, z=z), found)
+    again = refit(pinned(found, {name: value}, width), point, found)
     at = float(again.point.z[k])
     own = 0.0 if not np.isfinite(f.width) else ((at - f.inward(f.prior)) / f.width) ** 2
     return again, again.cost - ((at - value) / width) ** 2 + own
