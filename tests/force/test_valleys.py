@@ -46,9 +46,9 @@ def test_a_flat_profile_is_as_wide_as_one_looked():
 def test_held_parameters_cost_what_the_covariance_says_where_all_is_seen(virgin):
     for k, f in enumerate(virgin.free):
         sd = float(np.sqrt(virgin.covariance[k, k]))
-        # the mean of both sides: what is odd is no curvature
-        costs = [held(virgin, f.name, float(virgin.point.z[k]) + times * sd)[1] for times in (-3.0, 3.0)]
-        assert np.mean(costs) - virgin.cost == pytest.approx(9.0, rel=0.03), f.name
+        # the mean of both sides: what is odd is no curvature; so far out that the end of a search does not count
+        costs = [held(virgin, f.name, float(virgin.point.z[k]) + times * sd)[1] for times in (-6.0, 6.0)]
+        assert np.mean(costs) - virgin.cost == pytest.approx(36.0, rel=0.03), f.name
 
 
 def test_where_all_is_seen_nothing_becomes_wider_than_the_dispersion(virgin):

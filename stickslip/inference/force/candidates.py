@@ -179,9 +179,9 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
             size = least if size >= 0.0 and spec.upper > null else -least
         # not at the bound either
         size = float(np.clip(size, 0.5 * (spec.lower - null), 0.5 * (spec.upper - null)))
-        point, share = base.yielding(size * columns[usable][i])
-        values = {**members[i], effect.amplitude: null + share * size}
-        if values not in (s.values for s in starts):
+        point, part = base.yielding(size * columns[usable][i])
+        values = {**members[i], effect.amplitude: null + part * size}
+        if values not in [s.values for s in starts]:
             starts.append(Start(values, point, None, float(errors[i])))
     found, start = _best_of(base, effect, starts)
     return Candidate(

@@ -91,13 +91,14 @@ class Fit:
         change, events, _ = self._system.alone(forces).step(DAMPING, np.inf)
         far = float(np.abs(change[: self.point.z.size]).max(initial=0.0))
         share = min(1.0, FARTHEST / far) if far > 0.0 else 1.0
-        return moved(self.problem, self.point, share * change, self.point.events + share * events), share
+        return moved(self.point, share * change, self.point.events + share * events), share
 
     def drawn(self, rng: np.random.Generator) -> Point:
         """A point of the posterior as the derivatives have it, events at their best there."""
         values, turn = np.linalg.eigh(self.covariance)
         change = turn @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(values.size))
-        return moved(self.problem, self.point, change, self._system.events_after(change))
+        change = np.clip(change, *reach(self.problem, self.point))
+        return moved(self.point, change, self._system.events_after(change))
 
     @property
     def likelihood(self) -> Array:
@@ -255,15 +256,14 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
     )
 
 
-def moved(problem: Problem, point: Point, change: Array, events: Array) -> Point:
+def moved(point: Point, change: Array, events: Array) -> Point:
     """The point after a step, within the bounds."""
     a, b = point.z.size, point.phases.size
-    low, high = np.array([f.bounds for f in problem.composition.shared]).reshape(-1, 2).T
     phases = point.phases + change[a : a + b].reshape(point.phases.shape)
     k = point.weights.size
     weights = point.weights + change[a + b : a + b + k]
     weights = np.where(weights > NONE * point.weights.sum(), weights, 0.0)
-    return Point(np.clip(point.z + change[:a], low, high), phases, weights, events, point.common + change[a + b + k :])
+    return Point(point.z + change[:a], phases, weights, events, point.common + change[a + b + k :])
 
 
 def reach(problem: Problem, point: Point, farthest: float = FARTHEST) -> tuple[Array, Array]:
@@ -491,7 +491,7 @@ def descend(
         change, events, expected = system.step(damping)
         if not above and now - expected < SETTLED:
             break
-        trial = moved(problem, here[0], change, events)
+        trial = moved(here[0], change, events)
         there = problem.evaluate(trial)
         count += 1
         held = np.isfinite(there.residual).all() and trial.weights.sum() > 0.0

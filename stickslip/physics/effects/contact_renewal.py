@@ -107,7 +107,11 @@ class ContactRenewal(Memory, Threshold, Flow):
         last, middle = jax.lax.scan(aged, first, own(young, state.spread[1:-1], force[1:-1], force[:-2]))
         last = jnp.clip(own(oldest, state.spread[-1], force[-1], force[-2]) + oldest.fresh * last, -cap, cap)
         offs = jnp.concatenate([first[None], middle, last[None]]) - capped
-        change, _ = jax.lax.scan(lambda older, off: (older + dies * (off - older), None), offs[-1], offs[:-1], reverse=True)
+
+        def joined(older: Array, off: Array) -> tuple[Array, None]:
+            return older + dies * (off - older), None
+
+        change, _ = jax.lax.scan(joined, offs[-1], offs[:-1], reverse=True)
         return Junctions(offs - change, -change, -change * capped / cap**2)
 
     def strength(self, state: Junctions, motion: Motion, contact: Contact) -> Array:
