@@ -60,9 +60,7 @@ class Wave:
 
         ``run`` is that of each point, shape (p,).
         """
-        return np.asarray(
-            self.columns[0] * np.cos(self.phases)[run] + self.columns[1] * np.sin(self.phases)[run]
-        )
+        return np.asarray(self.columns[0] * np.cos(self.phases)[run] + self.columns[1] * np.sin(self.phases)[run])
 
 
 def waves(effect: Any) -> bool:

@@ -96,16 +96,16 @@ class ContactRenewal(Memory, Threshold, Flow):
         step = contact.stiffness * motion.dx
 
         # written as differences, so that they vanish exactly where the rate does
-        def own(renewal: Renewal, spread: Array, force: Array, younger: Array | float) -> Array:
+        def driven(renewal: Renewal, spread: Array, force: Array, younger: Array | float) -> Array:
             return plain + (spread - renewal.gone * (force - younger) - renewal.fresh * (step + younger))
 
         def aged(younger: Array, own: Array) -> tuple[Array, Array]:
             ended = jnp.clip(own + young.fresh * younger, -cap, cap)
             return ended, ended
 
-        first = jnp.clip(own(youngest, state.spread[0], force[0], 0.0), -cap, cap)
-        last, middle = jax.lax.scan(aged, first, own(young, state.spread[1:-1], force[1:-1], force[:-2]))
-        last = jnp.clip(own(oldest, state.spread[-1], force[-1], force[-2]) + oldest.fresh * last, -cap, cap)
+        first = jnp.clip(driven(youngest, state.spread[0], force[0], 0.0), -cap, cap)
+        last, middle = jax.lax.scan(aged, first, driven(young, state.spread[1:-1], force[1:-1], force[:-2]))
+        last = jnp.clip(driven(oldest, state.spread[-1], force[-1], force[-2]) + oldest.fresh * last, -cap, cap)
         offs = jnp.concatenate([first[None], middle, last[None]]) - capped
 
         def joined(older: Array, off: Array) -> tuple[Array, None]:

@@ -1,0 +1,64 @@
+"""Searches: begun on the floor of the valley, they end where the first look promises, or lower."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from stickslip.inference.force.candidates import Start, _at, _columns, try_effect, with_start
+from stickslip.inference.force.fit import _System, descend, fit
+from stickslip.inference.force.scatter import Whitening
+from stickslip.inference.force.signatures import Explained
+from stickslip.physics.effects import catalogue
+
+
+@pytest.fixture(scope="module")
+def base(begun):
+    """With a stretched spring at the start and its stiffness unknown, the valley is as flat as it gets."""
+    return fit(begun.problem, begun.point)
+
+
+def objective(base, problem, point) -> float:
+    white = Whitening(base.scatter.sizes, base.known)
+    slopes = problem.evaluate(point)
+    return _System(problem, point, slopes, base.scatter, base.blocks, white).objective(point, slopes)
+
+
+@pytest.mark.parametrize("tag, size", [("tilt", 1e-3), ("inertia", 2e-3)])
+def test_a_model_that_makes_room_stays_near_its_optimum(base, tag, size):
+    """To first order what is left of an effect is what the model's own parameters cannot take."""
+    cls = catalogue.get(tag)
+    effect = cls(**next(iter(catalogue.forms(cls))))
+    null = float(getattr(effect, effect.amplitude))
+    (column,) = _columns(base, effect, [{}])
+    left = Explained(base).apart(size * column[:, None])
+    point, share = base.yielding(size * column)
+    assert share == 1.0
+    problem, free = with_start(base.problem, effect, {effect.amplitude: null + size})
+    carried = problem.carried_by(base.slopes.tangent)
+    room, none = (objective(base, carried, _at(problem, free, Start({}, p))) for p in (point, base.point))
+    start = objective(base, base.problem.carried_by(base.slopes.tangent), base.point)
+    assert room - start < 0.1 * (none - start)
+    assert none - start > 10.0 * float((left**2).sum())
+
+
+@pytest.mark.parametrize("tag", ["tilt", "inertia", "sensor-gain"])
+def test_a_refit_ends_no_higher_than_the_first_look_promises(base, tag):
+    cls = catalogue.get(tag)
+    for found in try_effect(base, Explained(base), tag, list(catalogue.forms(cls))):
+        assert base.cost - found.fit.cost > 0.7 * found.promise - 2.0
+
+
+def test_a_search_comes_back_from_the_side_of_the_valley(base):
+    """Off by a tenth of the strength that a slip loses the cost is thousands higher; all of it is found again."""
+    names = [f.name for f in base.free]
+    z = base.point.z.copy()
+    z[names.index("weakening.drop")] += 0.1
+    point = replace(base.point, z=z)
+    slopes = base.problem.evaluate(point)
+    _, _, fallen, count, _ = descend(base.problem, point, slopes, base.scatter, base.known, base.blocks, 30)
+    start = objective(base, base.problem, point) - objective(base, base.problem, base.point)
+    assert start > 1e4
+    assert fallen > start - 3.0
+    assert count < 30
