@@ -158,6 +158,21 @@ class Drive:
         weight = np.cumsum(lengths[moving][order])
         return float(speeds[moving][order][np.searchsorted(weight, 0.5 * weight[-1])])
 
+    def speeds(self, apart: float, share: float = 0.05) -> list[float]:
+        """The speeds at which the drive moves for a share of the time that it moves (m/s), the least first.
+
+        Args:
+            apart: pieces whose speeds are closer than this factor count as one speed, their mean over time.
+            share: of the time.
+        """
+        lengths = np.diff(self.times)
+        speeds = np.abs(np.diff(self.positions) / lengths)
+        moving = np.flatnonzero(speeds > 0.05 * self.speed)
+        moving = moving[np.argsort(speeds[moving])]
+        edges = np.flatnonzero(speeds[moving][1:] > apart * speeds[moving][:-1]) + 1
+        groups = [g for g in np.split(moving, edges) if lengths[g].sum() > share * lengths[moving].sum()]
+        return [float(np.average(speeds[g], weights=lengths[g])) for g in groups]
+
     def holds(self, start: float, stop: float, fraction: float = 0.05) -> list[tuple[float, float]]:
         """Stretches (s, s) within [start, stop] where the drive is slower than ``fraction`` of its usual speed."""
         limit = fraction * self.speed

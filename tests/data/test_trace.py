@@ -65,6 +65,14 @@ def test_sampled_drive_stays_within_its_tolerance_and_is_short():
     assert rippled.times.size > 20 / 0.15
 
 
+def test_speeds_are_those_that_last():
+    """Steps between two speeds, one of them a little unsteady; a hold and a short jump back are none."""
+    drive = Drive.from_pieces([10.0, 20.0, 30.0, 40.0, 50.0, 50.5], [1e-5, 1e-4, 1.1e-5, 0.0, 1e-4, -1e-3])
+    assert drive.speeds(1.25) == pytest.approx([1.05e-5, 1e-4])
+    assert Drive.constant(3e-6).speeds(1.25) == pytest.approx([3e-6])
+    assert Drive.from_pieces([1.0, 2.0], [0.0, 0.0]).speeds(1.25) == []
+
+
 def test_usual_speed_leaves_holds_out():
     assert Drive.from_pieces([1.0, 100.0], [3e-6, 0.0]).speed == pytest.approx(3e-6)
     assert Drive.constant(-2e-6).speed == pytest.approx(2e-6)

@@ -54,7 +54,7 @@ Verdict = tuple[list[str], list[str]]
 
 
 def _velocities(pairs: Pairs, slipping: Pairs) -> Verdict:
-    speeds = sorted({float(t.drive_velocity) for t, _ in pairs if t.drive_velocity})
+    speeds = sorted({v for t, _ in pairs if t.drive is not None for v in t.drive.speeds(_NEAR)})
     groups: list[float] = []
     for v in speeds:
         if not groups or v > _NEAR * groups[-1]:
