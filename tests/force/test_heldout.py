@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.inference.force.fit import fit, prior_rows, reach, refit
+from stickslip.inference.force.fit import fit, refit
 from stickslip.inference.force.heldout import folds, unseen
+from stickslip.inference.force.linearised import prior_rows, reach
 from stickslip.inference.force.scatter import covariance
 
 from .test_derivatives import EFFECTS, with_effects

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.inference.force.fit import fit, noise, remembered
+from stickslip.inference.force.fit import fit
 from stickslip.inference.force.knots import RING, knots
+from stickslip.inference.force.noise import noise, remembered
 from stickslip.inference.force.problem import Problem
 from stickslip.inference.force.scatter import Blocks
 

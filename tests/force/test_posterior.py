@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.inference.force.fit import SETTLED
+from stickslip.inference.force.descent import SETTLED
 from stickslip.inference.force.posterior import walked
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"

@@ -7,7 +7,9 @@ from dataclasses import replace
 import pytest
 
 from stickslip.inference.force.candidates import Start, _at, _columns, try_effect, with_start
-from stickslip.inference.force.fit import _System, descend, fit
+from stickslip.inference.force.descent import descend
+from stickslip.inference.force.fit import fit
+from stickslip.inference.force.linearised import Linearised
 from stickslip.inference.force.scatter import Whitening
 from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
@@ -22,7 +24,7 @@ def base(begun):
 def objective(base, problem, point) -> float:
     white = Whitening(base.scatter.sizes, base.known)
     slopes = problem.evaluate(point)
-    return _System(problem, point, slopes, base.scatter, base.blocks, white).objective(point, slopes)
+    return Linearised(problem, point, slopes, base.scatter, base.blocks, white).objective(point, slopes)
 
 
 @pytest.mark.parametrize("tag, size", [("tilt", 1e-3), ("inertia", 2e-3)])

@@ -24,8 +24,9 @@ from scipy.stats import chi2
 from ...physics.effects import catalogue
 from ..fit.parameters import Free
 from ..force.candidates import Candidate
-from ..force.fit import Array, Fit
+from ..force.fit import Fit
 from ..force.heldout import folds, halves, unseen
+from ..force.linearised import Array
 
 CHANCE = 1e-3  # of any effect at all being seen where nothing is missing
 ERRORS = 2.5  # standard errors

@@ -16,8 +16,9 @@ from ...data.segment import Segmentation, segment
 from ...data.trace import Trace
 from ...physics.effects import catalogue
 from ..force.candidates import Candidate, every_form
-from ..force.fit import Array, Fit, deviations, fit
+from ..force.fit import Fit, deviations, fit
 from ..force.heldout import unseen
+from ..force.linearised import Array
 from ..force.problem import Point, Problem
 from ..force.residual import Structure, structures
 from ..force.rig import slips_finding, spring_freed

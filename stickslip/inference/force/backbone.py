@@ -8,7 +8,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ...physics.contact import power_law_bank
-from .fit import Array, Fit
+from .fit import Fit
+from .linearised import Array
 
 LEAST = 2e-3  # of the strength: what no law of a rough contact describes better
 BINS = 96

@@ -15,7 +15,8 @@ from ...physics.effects import catalogue
 from ...physics.effects.base import Effect, Geometry
 from ...physics.params import Spec, specs
 from ..fit.parameters import Free, effect_parameters
-from .fit import Array, Fit, adapted, refit
+from .fit import Fit, adapted, refit
+from .linearised import Array
 from .periodogram import best_wave, waves
 from .problem import Point, Problem, is_own
 from .signatures import Explained, signatures

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ...physics.effects import catalogue
 from ...physics.params import specs
 from .candidates import grid
-from .fit import Array, Fit
+from .fit import Fit
 from .heldout import folds, halves
+from .linearised import Array
 from .periodogram import best_wave, by_run, waves
 from .signatures import Explained, signatures
 

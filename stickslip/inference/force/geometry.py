@@ -30,7 +30,7 @@ from ..fit.parameters import Free, effect_parameters, to_si, vector
 from ..fit.static_table import HURST, StaticRig
 from .backbone import Backbone
 from .candidates import grid, shapes_backbone
-from .fit import Array
+from .linearised import Array
 from .rough_contacts import rough_contacts
 
 COMPARED = (0.02, 0.98)  # shares of the strength between which curves are compared

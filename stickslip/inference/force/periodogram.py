@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...physics.params import specs
-from .fit import Array, Fit
+from .fit import Fit
+from .linearised import Array
 from .signatures import CHUNK, Explained, signatures
 
 LONGEST = 1.5  # of a record: a longer wave is a trend

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 
-from .fit import Array, Fit, moved, prior_rows, reach
+from .fit import Fit
+from .linearised import Array, moved, prior_rows, reach
 from .problem import Point
 from .scatter import covariance
 

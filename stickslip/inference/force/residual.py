@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from .fit import Array, Fit
+from .fit import Fit
 from .knots import RING
+from .linearised import Array
 from .problem import CREEPING
 from .signatures import Explained
 

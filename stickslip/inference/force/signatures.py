@@ -16,7 +16,8 @@ from ...physics.effects.base import Effect, Sensor
 from ...physics.params import specs
 from ...system.traced import Program, of_this_package
 from .along import Way, along, undone
-from .fit import Array, Fit
+from .fit import Fit
+from .linearised import Array, prior_rows, reach
 from .problem import EMPTY, PROGRAMS, PULL, Own, Problem, model_of, of_events
 from .scatter import covariance
 
@@ -121,8 +122,6 @@ class Explained:
         self.root = np.linalg.cholesky(np.asarray(whole))
         self.inverse = np.linalg.inv(self.root)
         rows = self._white(fit.slopes.shared)
-        from .fit import prior_rows, reach
-
         low, high = reach(fit.problem, fit.point)
         free = (low < 0.0) & (high > 0.0)
         prior, target = prior_rows(fit.problem, fit.point)

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .fit import Array, Fit, again
+from .fit import Fit, again
+from .linearised import Array
 from .problem import Point, Problem
 from .scatter import Scatter
 

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import FitError
-from .fit import Array, Fit, refit
+from .fit import Fit, refit
+from .linearised import Array
 from .problem import Problem
 
 LEVEL = "weakening.drop"  # with the contact's strength known by its product alone, where no contact is virgin
