@@ -76,7 +76,7 @@ def fit(
     """
     from ..objects import load_campaign
     from ..objects.fit import fit as fit_dynamic
-    from ..objects.fit import fit_static
+    from ..objects.static_fit import fit_static
 
     speed = to_si(v_lim, "m/s", key="--v-lim")
     dynamic = {"--add": add, "--profile": profile, "--holdout": holdout}

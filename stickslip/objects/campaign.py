@@ -24,10 +24,11 @@ if TYPE_CHECKING:
 
     from ..inference.diagnose.prepare import Prepared
     from .diagnosis import Diagnosis
-    from .fit import Fit, StaticFit
+    from .fit import Fit
     from .forecast import Forecast
     from .inspection import Inspection
     from .run import Tell
+    from .static_fit import StaticFit
 
 
 class Campaign(Shown):
@@ -172,7 +173,8 @@ class Campaign(Shown):
             InputError: no run can take part, an effect that is not known or only shapes the backbone.
             FitError: no finite model.
         """
-        from .fit import fit, fit_static
+        from .fit import fit
+        from .static_fit import fit_static
 
         if model == "static":
             if effects:

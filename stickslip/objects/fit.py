@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,8 +31,9 @@ from ..show.report.diagnosis_result import trace_sections
 from ..show.report.identifiability import identifiability
 from ..simulation.conformance import try_laws
 from ..system.units import shown, to_si
+from .error_tables import by_phase, deviation, error, of_all, sums
 from .picture import FitPlots
-from .run import Tell, dataset, head, save
+from .run import Tell, dataset, head, save, silent
 from .shown import Shown, facts, table
 
 if TYPE_CHECKING:
@@ -45,10 +46,6 @@ if TYPE_CHECKING:
 STRENGTH = "contact.strength"
 MEANINGS = {STRENGTH: "friction force of all contacts at full strength", "rig.mass": "mass of the block"}
 COORDINATES = ("displacement", "velocity", "spring force", "time in contact", *WAYS)
-
-
-def _silent(text: str, share: float) -> None:
-    """Nobody listens."""
 
 
 class Fit(Shown):
@@ -187,22 +184,22 @@ class Fit(Shown):
     @cached_property
     def errors(self) -> pandas.DataFrame:
         """Root mean square of the residual force over its floor: a row for each phase of the cycle, a column a run."""
-        return self._table(self._fit.marginal, _error)
+        return self._table(self._fit.marginal, error)
 
     @cached_property
     def unseen_errors(self) -> pandas.DataFrame:
         """The same on runs that are left out of the fit, each in turn."""
-        return self._table(self._unseen, _error)
+        return self._table(self._unseen, error)
 
     @cached_property
     def error_deviations(self) -> pandas.DataFrame:
         """Standard deviations of :attr:`errors`, by how much events differ, for residuals within one go together."""
-        return self._table(self._fit.marginal, _deviation)
+        return self._table(self._fit.marginal, deviation)
 
     @cached_property
     def unseen_error_deviations(self) -> pandas.DataFrame:
         """The same of :attr:`unseen_errors`."""
-        return self._table(self._unseen, _deviation)
+        return self._table(self._unseen, deviation)
 
     @property
     def error(self) -> float:
@@ -435,7 +432,7 @@ class Fit(Shown):
         """
         known = {f.name: i for i, f in enumerate(self.free)}
         f = self.free[self._index(name, known)]
-        found = profiled(self._fit, name, progress or _silent)
+        found = profiled(self._fit, name, progress or silent)
         low, high = (f.outward(v) if np.isfinite(v) else None for v in found.interval)
         low_text, high_text = ("-" if v is None else shown(v, f.unit, 3) for v in (low, high))
         return {
@@ -473,7 +470,7 @@ class Fit(Shown):
     def confirm(self, progress: Tell | None = None) -> Confirmation:
         """Base and last model run freely through the measured cycles; simulated once."""
         if self._confirmation is None:
-            self._confirmation = self.climbed.confirmed(progress or _silent)
+            self._confirmation = self.climbed.confirmed(progress or silent)
         return self._confirmation
 
     @cached_property
@@ -560,32 +557,13 @@ class Fit(Shown):
             raise InputError("no free parameter of that name", key=name, hint=nearest(name, list(known)))
         return known[name]
 
-    def _sums(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Sums of squared residuals over their floors, and numbers of points, by event and phase, each (E, phases)."""
-        problem, use = self._fit.problem, ~self._fit.dropped
-        shape = problem.event_run.size, len(PHASES)
-        cell = problem.of[use] * shape[1] + problem.phase[use]
-        squares = np.bincount(cell, (residual[use] / self._floor[use]) ** 2, shape[0] * shape[1])
-        return squares.reshape(shape), np.bincount(cell, minlength=squares.size).reshape(shape)
-
-    def _of_all(self, residual: np.ndarray | None, error: str, std: str) -> dict[str, float]:
+    def _of_all(self, residual: np.ndarray | None, *names: str) -> dict[str, float]:
         """Error of all points together and its deviation, by these names."""
-        if residual is None:
-            return {error: np.nan, std: np.nan}
-        squares, numbers = (a.sum(axis=1) for a in self._sums(residual))
-        return {error: _error(squares, numbers), std: _deviation(squares, numbers)}
+        values = (np.nan, np.nan) if residual is None else of_all(sums(self._fit, residual, self._floor))
+        return dict(zip(names, values, strict=True))
 
     def _table(self, residual: np.ndarray, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:
-        """What sums over the points of events say (see :meth:`_sums`): a row for each phase, a column for each run."""
-        squares, numbers = self._sums(residual)
-        problem = self._fit.problem
-        runs = {"all": slice(None), **{k.name: problem.event_run == r for r, k in enumerate(problem.runs)}}
-        phases = {"all": slice(None), **{name: [i] for i, name in enumerate(PHASES) if numbers[:, i].any()}}
-        rows = {
-            p: {r: measure(*(a[own][:, some].sum(axis=1) for a in (squares, numbers))) for r, own in runs.items()}
-            for p, some in phases.items()
-        }
-        return table(rows, "phase")
+        return by_phase(self._fit, sums(self._fit, residual, self._floor), measure)
 
     def _parts(self) -> list[Any]:
         what = {
@@ -596,43 +574,6 @@ class Fit(Shown):
             "parameters": "set by hand" if self.by_hand else None,
         }
         return [facts(what), self.parameters[["value", "std", "unit"]], self.errors]
-
-
-def _error(squares: np.ndarray, numbers: np.ndarray) -> float:
-    """Root mean square of residuals over their floors, from sums and numbers of points by event."""
-    return float(np.sqrt(squares.sum() / numbers.sum())) if numbers.any() else float("nan")
-
-
-def _deviation(squares: np.ndarray, numbers: np.ndarray) -> float:
-    """Standard deviation of :func:`_error`: that of a ratio of sums over events, which are independent."""
-    events = np.count_nonzero(numbers)
-    if events < 2:
-        return float("nan")
-    mean = squares.sum() / numbers.sum()
-    spread = np.sqrt(((squares - mean * numbers) ** 2).sum() * events / (events - 1)) / numbers.sum()
-    return float(spread / (2.0 * np.sqrt(mean)))
-
-
-class StaticFit(Shown):
-    """The paper's static model, every creep process fitted by itself.
-
-    Attributes:
-        campaign: what was fitted.
-        result: plain data, as in ``result.json``.
-        arrays: measured and fitted creep.
-    """
-
-    def __init__(self, campaign: Campaign, result: dict[str, Any], variables: dict[str, Any]) -> None:
-        self.campaign, self.result = campaign, result
-        self.arrays = dataset(variables, campaign.title)
-
-    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder; as :meth:`Fit.save`."""
-        return save(self, folder, force, **more)
-
-    def _parts(self) -> list[Any]:
-        said = [self.result[key]["text"] for key in ("static", "ramps") if self.result.get(key)]
-        return [facts({"campaign": self.campaign.title, "model": "static"}), *said]
 
 
 def fit(
@@ -657,73 +598,7 @@ def fit(
     for name in profiles:
         if name not in known:
             raise InputError("no free parameter of that name", key="--profile", value=name, hint=nearest(name, known))
-    return Fit(campaign, climb(prepared, forms, progress or _silent))
-
-
-def fit_static(
-    campaign: Campaign,
-    *,
-    align: Literal["consistent", "paper"] = "consistent",
-    time: Literal["exact", "paper"] = "exact",
-    v_lim: float | str = 1e-6,
-    sampling: Literal["log", "uniform"] = "log",
-    progress: Tell | None = None,
-) -> StaticFit:
-    """Fit the static model to every creep process (see :meth:`Campaign.fit`).
-
-    Args:
-        campaign: the runs.
-        align: what is laid on the measured passage of ``v_lim``, the model's passage or ("paper") its end.
-        time: virtual time with the block's own motion ("exact") or without it ("paper").
-        v_lim: speed of the block at which a creep process ends (m/s, or text with a unit).
-        sampling: windows even in the logarithm of the time left ("log"), or in time as in the paper ("uniform").
-        progress: told the stage and the share of it done.
-
-    Raises:
-        InputError: nothing in the runs can be compared with the static model, or the rig lacks what it takes.
-    """
-    from ..data.trace import Trace
-    from ..inference.fit.static_table import StaticRig
-    from ..show.report import describe_trace, trace_pieces
-    from ..show.report.static_result import static_result
-
-    tell, file = progress or _silent, campaign.description.path
-    traces, found = campaign.traces, campaign.scaled[0]
-
-    def rig_of(trace: Trace) -> StaticRig:
-        return StaticRig.of(campaign.description.rig_of(trace.name), spring_stiffness=trace.spring_stiffness)
-
-    try:
-        result, variables = static_result(
-            traces,
-            found,
-            rig_of,
-            align=align,
-            form=time,
-            v_lim=to_si(v_lim, "m/s", key="v_lim"),
-            sampling=sampling,
-            springs=campaign.rig.springs,
-            progress=lambda done, of: tell(f"{done} of {of} fitted", done / of),
-        )
-    except InputError as error:
-        raise error.at(file=file) from None
-    notes = list(campaign.scaled[1])
-    if kept := [t.name for t in traces if t.role == "held-out"]:
-        notes.append(
-            f"creep of held-out runs ({', '.join(kept)}) is fitted as well: every creep process is fitted by itself"
-        )
-    for i, (t, s) in enumerate(zip(traces, found, strict=True)):
-        variables |= trace_pieces(t, s, i)
-    whole = {
-        **head(campaign, "fit"),
-        "model": "static",
-        **result,
-        "traces": [describe_trace(t, s) for t, s in zip(traces, found, strict=True)],
-        "rig": [finding.plain() for finding in campaign.findings],
-        "notes": notes,
-        "dropped": [*campaign.lost, *result["dropped"]],
-    }
-    return StaticFit(campaign, whole, variables)
+    return Fit(campaign, climb(prepared, forms, progress or silent))
 
 
 def _unit_of(name: str) -> str:

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 Tell = Callable[[str, float], None]
 
 
+def silent(text: str, share: float) -> None:
+    """Progress that nobody is told."""
+
+
 def head(campaign: Campaign, kind: str) -> dict[str, Any]:
     """What every ``result.json`` made from a campaign begins with."""
     return {

@@ -1,0 +1,102 @@
+"""The paper's static model, fitted to every creep process by itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from ..errors import InputError
+from ..system.units import to_si
+from .run import Tell, dataset, head, save, silent
+from .shown import Shown, facts
+
+if TYPE_CHECKING:
+    from .campaign import Campaign
+
+
+class StaticFit(Shown):
+    """The paper's static model, every creep process fitted by itself.
+
+    Attributes:
+        campaign: what was fitted.
+        result: plain data, as in ``result.json``.
+        arrays: measured and fitted creep.
+    """
+
+    def __init__(self, campaign: Campaign, result: dict[str, Any], variables: dict[str, Any]) -> None:
+        self.campaign, self.result = campaign, result
+        self.arrays = dataset(variables, campaign.title)
+
+    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
+        """Keep it as a run folder; as :meth:`Fit.save`."""
+        return save(self, folder, force, **more)
+
+    def _parts(self) -> list[Any]:
+        said = [self.result[key]["text"] for key in ("static", "ramps") if self.result.get(key)]
+        return [facts({"campaign": self.campaign.title, "model": "static"}), *said]
+
+
+def fit_static(
+    campaign: Campaign,
+    *,
+    align: Literal["consistent", "paper"] = "consistent",
+    time: Literal["exact", "paper"] = "exact",
+    v_lim: float | str = 1e-6,
+    sampling: Literal["log", "uniform"] = "log",
+    progress: Tell | None = None,
+) -> StaticFit:
+    """Fit the static model to every creep process (see :meth:`Campaign.fit`).
+
+    Args:
+        campaign: the runs.
+        align: what is laid on the measured passage of ``v_lim``, the model's passage or ("paper") its end.
+        time: virtual time with the block's own motion ("exact") or without it ("paper").
+        v_lim: speed of the block at which a creep process ends (m/s, or text with a unit).
+        sampling: windows even in the logarithm of the time left ("log"), or in time as in the paper ("uniform").
+        progress: told the stage and the share of it done.
+
+    Raises:
+        InputError: nothing in the runs can be compared with the static model, or the rig lacks what it takes.
+    """
+    from ..data.trace import Trace
+    from ..inference.fit.static_table import StaticRig
+    from ..show.report import describe_trace, trace_pieces
+    from ..show.report.static_result import static_result
+
+    tell, file = progress or silent, campaign.description.path
+    traces, found = campaign.traces, campaign.scaled[0]
+
+    def rig_of(trace: Trace) -> StaticRig:
+        return StaticRig.of(campaign.description.rig_of(trace.name), spring_stiffness=trace.spring_stiffness)
+
+    try:
+        result, variables = static_result(
+            traces,
+            found,
+            rig_of,
+            align=align,
+            form=time,
+            v_lim=to_si(v_lim, "m/s", key="v_lim"),
+            sampling=sampling,
+            springs=campaign.rig.springs,
+            progress=lambda done, of: tell(f"{done} of {of} fitted", done / of),
+        )
+    except InputError as error:
+        raise error.at(file=file) from None
+    notes = list(campaign.scaled[1])
+    if kept := [t.name for t in traces if t.role == "held-out"]:
+        notes.append(
+            f"creep of held-out runs ({', '.join(kept)}) is fitted as well: every creep process is fitted by itself"
+        )
+    for i, (t, s) in enumerate(zip(traces, found, strict=True)):
+        variables |= trace_pieces(t, s, i)
+    whole = {
+        **head(campaign, "fit"),
+        "model": "static",
+        **result,
+        "traces": [describe_trace(t, s) for t, s in zip(traces, found, strict=True)],
+        "rig": [finding.plain() for finding in campaign.findings],
+        "notes": notes,
+        "dropped": [*campaign.lost, *result["dropped"]],
+    }
+    return StaticFit(campaign, whole, variables)
