@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, dia_array
 
 from .problem import Point, Problem, Slopes
-from .scatter import Blocks, Known, Scatter, covariance
+from .scatter import Blocks, Known, Scatter, covariance, inverse
 
 Array = NDArray[np.float64]
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
@@ -16,8 +16,10 @@ FAR = 5.0  # standard deviations from what the rest of an event lets expect, fro
 def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size: int) -> NDArray[np.bool_]:
     """Points that what else is known of their event would not let expect, shape (p,)."""
     _, whole = covariance(scatter.sizes, known)
-    inverse = np.linalg.inv(np.asarray(whole))
-    z = np.einsum("eij,ej->ei", inverse, marginal) / np.sqrt(np.diagonal(inverse, axis1=1, axis2=2))
+    # by its root: where a record has next to no noise, a plain inverse is no covariance any more
+    back = inverse(np.linalg.cholesky(np.asarray(whole)))
+    weighted = np.swapaxes(back, 1, 2) @ (back @ marginal[..., None])
+    z = weighted[..., 0] / np.sqrt((back**2).sum(axis=1))
     out = np.zeros(size, bool)
     out[blocks.index[blocks.there]] = np.abs(z[blocks.there]) > FAR
     return out
