@@ -56,3 +56,13 @@ def test_noise_is_less_than_half_of_that_of_a_sample():
     assert np.std(followed[INNER]) < 0.5 * NOISE
     index = np.arange(300, 1700)
     assert smoother.matrix(index) @ noise == pytest.approx(followed[index], abs=1e-3 * NOISE)
+
+
+@pytest.mark.parametrize("samples", [2.0, 2.6, 3.4])
+def test_a_ringing_of_a_few_samples_is_left_as_it_is(samples):
+    """A parabola and a ringing are seven numbers, and two periods hold no more samples."""
+    x, _, times = ringing(samples)
+    followed, speed, smoother = smoothed(x, NOISE, RATE, times)
+    assert np.array_equal(followed, x)
+    assert np.isfinite(speed).all()
+    assert (smoother.matrix(np.arange(x.size)) @ x == x).all()

@@ -88,8 +88,8 @@ def best_wave(base: Fit, explained: Explained, effect: Any) -> Wave | None:
     near = np.clip(near, grid[0], grid[-1])  # where the parameter's bounds are
     pairs = frequencies(near).reshape(near.size, 2, -1)
     tried = max(round(fine.size / FINE), 1)
-    waves = [_wave(base, explained, frequencies.value(f), p, tried) for f, p in zip(near, pairs, strict=True)]
-    return max(waves, key=lambda wave: wave.fall)
+    highest = (_wave(base, explained, frequencies.value(f), p, tried) for f, p in zip(near, pairs, strict=True))
+    return max(highest, key=lambda wave: wave.fall)
 
 
 def _wave(base: Fit, explained: Explained, value: float, pair: Array, tried: int) -> Wave:

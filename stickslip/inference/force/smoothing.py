@@ -103,7 +103,7 @@ def smoothed(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array,
     period = (times.ring or times.half) * rate
     long = round(2.0 * period if times.ring else period) // 2 * 2 + 1
     short = round(0.5 * period) // 2 * 2 + 1
-    if long < 5:
+    if long < (9 if times.ring else 5):  # too few samples for what would be fitted to them
         return x, np.gradient(x) * rate, Smoother(np.ones(1), np.zeros(1), np.zeros(x.size))
     slow, drift = _local(long, 2, period if times.ring else None)
     close, run = _local(short, 4) if short >= 7 else _local(3, 2)
@@ -113,9 +113,9 @@ def smoothed(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array,
     level = noise**2 * float((fast**2).sum())
     seen = np.maximum(uniform_filter1d(added**2, round(period) // 2 * 2 + 1), 1e-300)
     gain = np.sqrt(np.maximum(1.0 - level / seen, 0.0))
-    x, v = (correlate1d(x, w, mode="nearest") + gain * correlate1d(x, more, mode="nearest")
-            for w, more in ((slow, fast), (drift, rush)))  # fmt: skip
-    return x, v * rate, Smoother(slow, fast, gain)
+    followed = correlate1d(x, slow, mode="nearest") + gain * added
+    speed = correlate1d(x, drift, mode="nearest") + gain * correlate1d(x, rush, mode="nearest")
+    return followed, speed * rate, Smoother(slow, fast, gain)
 
 
 def _local(length: int, degree: int, period: float | None = None) -> tuple[Array, Array]:
@@ -130,7 +130,9 @@ def _local(length: int, degree: int, period: float | None = None) -> tuple[Array
         turn = 2.0 * np.pi / period
         columns += [np.cos(turn * i), np.sin(turn * i), i * np.cos(turn * i), i * np.sin(turn * i)]
         value, slope = np.append(value, [1.0, 0.0, 0.0, 0.0]), np.append(slope, [0.0, turn, 1.0, 0.0])
-    solved = np.linalg.pinv(np.stack(columns, axis=1) / (scale := np.array([np.abs(c).max() for c in columns])))
+    matrix = np.stack(columns, axis=1)
+    scale = np.abs(matrix).max(axis=0)
+    solved = np.linalg.pinv(matrix / scale)
     return np.asarray((value / scale) @ solved), np.asarray((slope / scale) @ solved)
 
 
