@@ -8,6 +8,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from contextlib import closing
 from pathlib import Path, PurePosixPath
 
 import pytest
@@ -177,12 +178,12 @@ def test_one_of_what_is_offered_is_opened_and_nothing_else(folder, monkeypatch, 
     from stickslip.objects import Campaign
 
     monkeypatch.setattr(Campaign, "fit", lambda self: base)
-    session = Session(offers=(folder / "campaign.toml",))
-    session.open(1)
-    session.open(-1)
-    assert session.campaign is None
-    session.open(0)
-    assert session.campaign is not None and session.fit is not None
+    with closing(Session(offers=(folder / "campaign.toml",))) as session:
+        session.open(1)
+        session.open(-1)
+        assert session.campaign is None
+        session.open(0)
+        assert session.campaign is not None and session.fit is not None
 
 
 def _until(true, seconds=20.0):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -81,19 +82,18 @@ def test_what_was_open_comes_back(campaign, base, session, monkeypatch):
     session.by_hand({DROP: base.values[DROP] * 1.02})
     session.lock(DROP, True)
     choose(session, "v200", 3)
-    again = Session(campaign=campaign)
-    again.begin()
-    assert [s.text for s in again.steps] == [s.text for s in session.steps]
-    assert again.locked == {DROP} and (again.run, again.event) == ("v200", 3)
-    assert again.fit.by_hand and again.fit.values[DROP] == pytest.approx(base.values[DROP] * 1.02)
-    np.testing.assert_allclose(again.fit.force.residual, session.fit.force.residual, rtol=1e-9)
-    assert again.fit.error == pytest.approx(session.fit.error, rel=1e-6)
-    assert again.fitted.unseen_error == pytest.approx(base.unseen_error, rel=1e-3)
-    third = Session(campaign=campaign)
-    monkeypatch.setattr(type(campaign), "fit", lambda self: base)
-    third.begin()
-    assert "another workbench" in third.said and len(third.steps) == 1
-    again.close()
+    with closing(Session(campaign=campaign)) as again:
+        again.begin()
+        assert [s.text for s in again.steps] == [s.text for s in session.steps]
+        assert again.locked == {DROP} and (again.run, again.event) == ("v200", 3)
+        assert again.fit.by_hand and again.fit.values[DROP] == pytest.approx(base.values[DROP] * 1.02)
+        np.testing.assert_allclose(again.fit.force.residual, session.fit.force.residual, rtol=1e-9)
+        assert again.fit.error == pytest.approx(session.fit.error, rel=1e-6)
+        assert again.fitted.unseen_error == pytest.approx(base.unseen_error, rel=1e-3)
+        third = Session(campaign=campaign)
+        monkeypatch.setattr(type(campaign), "fit", lambda self: base)
+        third.begin()
+        assert "another workbench" in third.said and len(third.steps) == 1
     again.undo()
     assert again.fit.error == pytest.approx(base.error, rel=1e-6)
     assert again.code() == session.code().rsplit("\n", 1)[0]
@@ -118,9 +118,8 @@ def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, monke
     path = session._journal.file
     path.write_text(json.dumps(damage(json.loads(path.read_text()))))
     monkeypatch.setattr(type(campaign), "fit", lambda self: base)
-    again = Session(campaign=campaign)
-    again.begin()
-    again.close()
+    with closing(Session(campaign=campaign)) as again:
+        again.begin()
     assert "begins anew" in again.said and again.fit is base
 
 
@@ -216,8 +215,7 @@ def test_a_refit_leaves_what_is_locked(session, base):
 
 def test_a_campaign_can_be_begun_again(campaign, base, monkeypatch):
     monkeypatch.setattr(type(campaign), "fit", lambda self: base)
-    session = Session(campaign=campaign)
-    session.begin()
-    session.begin()
-    assert session._journal is not None and "another workbench" not in session.said
-    session.close()
+    with closing(Session(campaign=campaign)) as session:
+        session.begin()
+        session.begin()
+        assert session._journal is not None and "another workbench" not in session.said
