@@ -20,10 +20,16 @@ from stickslip.inference.force.scatter import (
     covariance,
     estimate,
     misfit,
+    weigh,
 )
+from stickslip.inference.force.sensor_walk import grown
+
+from .whole import dense
 
 STRENGTH = 0.25  # N
 EVENTS, POINTS = 60, 48
+RUN = 20  # events
+SPRING = 2e5  # N/m
 TRUE = {
     "strength": 3e-3, "stretch": 0.03, "shape": 0.03, "offset": 3e-9, "creep": 4e-3, "nucleation": 3e-3, "slip": 2e-3,
     "ring-down": 1e-3, "position": 2e-9, "walk": 2e-9, "white": 1.0,
@@ -37,7 +43,8 @@ def events(short: bool = False) -> Known:
     tangent = np.interp(np.arange(POINTS), [0, 24, 36, 47], [1e6, 1e5, 0.0, 8e5])
     shape = (EVENTS, POINTS)
     place = np.sort(rng.uniform(-10.0, 10.0, shape), axis=1)
-    elapsed = np.sort(rng.uniform(0.0, 2.0, shape), axis=1)
+    lasting = rng.uniform(1.0, 3.0, EVENTS)
+    elapsed = np.sort(rng.uniform(0.0, 1.0, shape), axis=1) * lasting[:, None]
     stretch = -STRENGTH * rng.uniform(0.0, 0.4, shape)
     other = STRENGTH * rng.uniform(-0.2, 0.2, shape)
     local = np.stack([np.full(shape, 0.9 * STRENGTH), stretch, other, -np.tile(tangent, (EVENTS, 1))], axis=2)
@@ -48,8 +55,9 @@ def events(short: bool = False) -> Known:
     near = np.exp(-np.abs(np.subtract.outer(np.arange(POINTS), np.arange(POINTS))) / 0.5)
     noise = (1e-4 * STRENGTH) ** 2 * near * there[:, :, None] * there[:, None, :]
     return Known(
-        noise, np.zeros(shape), local, np.tile(phase, (EVENTS, 1)), np.tile(tangent, (EVENTS, 1)), place,
-        elapsed, there, STRENGTH,
+        noise, np.zeros(shape), local, np.tile(phase, (EVENTS, 1)),
+        np.full(shape, SPRING), np.tile(tangent, (EVENTS, 1)), place, elapsed,
+        lasting, np.arange(EVENTS) % RUN == 0, there, STRENGTH,
     )  # fmt: skip
 
 
@@ -73,6 +81,12 @@ def test_the_covariance_is_one(short, sizes):
         np.testing.assert_array_equal(whole[e][empty[e]], np.eye(POINTS)[empty[e]])
 
 
+def drawn(sizes: np.ndarray, known: Known, seed: int) -> np.ndarray:
+    draws = np.random.default_rng(seed).standard_normal(EVENTS * POINTS)
+    residual = (np.linalg.cholesky(dense(sizes, known)) @ draws).reshape(EVENTS, POINTS)
+    return np.where(known.there, residual, 0.0)
+
+
 @pytest.mark.parametrize("short", [False, True])
 def test_whitened_residuals_are_those_of_the_covariance(short):
     """Against its solution by a dense factorisation, with derivatives in the events' own other than those it knew."""
@@ -80,12 +94,42 @@ def test_whitened_residuals_are_those_of_the_covariance(short):
     other = known.local * rng.uniform(0.5, 2.0, known.local.shape)
     residual = 1e-3 * rng.standard_normal(known.there.shape) * known.there
     white = Whitening(true(), known).with_events(other)
-    _, whole = covariance(true(), known.with_local(other))
-    weighted = np.linalg.solve(whole, residual[..., None])[..., 0]
+    whole = dense(true(), known.with_local(other))
+    weighted = np.linalg.solve(whole, residual.ravel()).reshape(residual.shape)
     np.testing.assert_allclose(white.weighted(residual), weighted, rtol=0.0, atol=1e-9 * np.abs(weighted).max())
     squares = (white(residual[..., None])[..., 0] ** 2).sum(axis=1)
-    np.testing.assert_allclose(squares, (residual * weighted).sum(axis=1), rtol=1e-9)
-    np.testing.assert_allclose(white.logs, np.linalg.slogdet(whole)[1], rtol=1e-10)
+    for run in range(EVENTS // RUN):  # of a run they add up to those of all its residuals together
+        own = slice(run * RUN, (run + 1) * RUN)
+        assert squares[own].sum() == pytest.approx((residual * weighted)[own].sum(), rel=1e-9)
+    assert white.logs.sum() == pytest.approx(np.linalg.slogdet(whole)[1], rel=1e-10)
+    found = weigh(true(), residual, known.with_local(other))
+    np.testing.assert_allclose(found.weighted, weighted, rtol=0.0, atol=1e-9 * np.abs(weighted).max())
+    inverted = np.linalg.inv(whole).reshape(EVENTS, POINTS, EVENTS, POINTS)
+    for e in range(EVENTS):
+        np.testing.assert_allclose(found.inverted[e], inverted[e, :, e], rtol=0.0, atol=1e-9 * inverted[e, :, e].max())
+
+
+def test_the_walk_is_found_where_it_went():
+    known, sizes = events(), true()
+    sizes[NAMES.index("walk")] = np.log(2e-8)
+    residual = drawn(sizes, known, 11)
+    walk = weigh(sizes, residual, known).walk
+    before, after = grown(known.spread(sizes), known.first)
+    begun = known.first
+    assert np.abs(before[begun]).max() < 1e-12 * after.max()
+    assert before[~begun] == pytest.approx(after[:-1][~begun[1:]], rel=1e-12)
+    assert after[RUN - 1] == pytest.approx(4e-16 * known.lasting[:RUN].sum(), rel=1e-12)
+    left = walk.covariance()[:, 1, 1]
+    assert np.all(left < after) and left[RUN - 1] < 0.1 * after[RUN - 1]  # known better than without the residuals
+
+
+def test_residuals_without_a_walk_leave_none():
+    """Where the spring alone is off by a level of every event, drawn anew each time, it is no walk."""
+    known, sizes = events(), true()
+    sizes[NAMES.index("walk")] = np.log(1e-12)
+    found = estimate(Scatter(true()), drawn(sizes, known, 13), known, steps=200)
+    assert found.sizes[NAMES.index("walk")] < np.log(3e-10)
+    assert found.sizes[0] == pytest.approx(sizes[0], abs=0.3)
 
 
 def test_every_size_has_its_own_part():
@@ -105,14 +149,12 @@ def test_every_size_has_its_own_part():
 
 def test_sizes_are_found_in_what_was_drawn_from_them():
     known = events(short=True)
-    _, whole = (np.asarray(a) for a in covariance(true(), known))
-    draws = np.random.default_rng(7).standard_normal((EVENTS, POINTS))
-    residual = np.einsum("eij,ej->ei", np.linalg.cholesky(whole), draws)
-    residual[~known.there] = 0.0
+    residual = drawn(true(), known, 7)
     found = estimate(Scatter.wide(), residual, known, steps=200)
-    off = dict(zip(NAMES, found.sizes - true(), strict=True))
-    for name in NAMES:
-        assert abs(off[name]) < (0.5 if name in ("walk", "position", "offset") else 0.3), (name, off)
+    _, information = _slopes(found.sizes, residual, known, _misfit(found.sizes, residual, known)[1])
+    sd = np.sqrt(np.diag(2.0 * np.linalg.inv(information)))
+    for name, off, one in zip(NAMES, found.sizes - true(), sd, strict=True):
+        assert abs(off) < 3.0 * one and one < 0.3, (name, off, one)
 
 
 def test_slopes_are_those_of_the_cost():

@@ -16,7 +16,8 @@ from .descent import DAMPING, descend
 from .linearised import FARTHEST, Array, Linearised, moved, reach
 from .noise import beyond, known_of
 from .problem import Point, Problem, Slopes
-from .scatter import Blocks, Known, Scatter, Whitening, covariance, estimate, misfit
+from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
+from .sensor_walk import grown
 
 PLACED = 2  # rounds after which the bank's elements are put where the strength is
 ROUNDS = 10  # times that the scatter is estimated anew
@@ -61,6 +62,11 @@ class Fit:
         """Found when asked for: a model that a hand moves is drawn, and judged when it stands still."""
         white = Whitening(self.scatter.sizes, self.known)
         return Linearised(self.problem, self.point, self.slopes, self.scatter, self.blocks, white)
+
+    @property
+    def white(self) -> WithEvents:
+        """Whitens residuals of its events, what is their own marginalised."""
+        return self._system.white
 
     @cached_property
     def _judged(self) -> tuple[Array, float, Array]:
@@ -281,8 +287,11 @@ def _found(
 
 def deviations(found: Fit) -> Array:
     """Standard deviation of the residual at every point: noise and scatter (N), shape (p,)."""
-    _, whole = covariance(found.scatter.sizes, found.known)
-    sd = np.sqrt(np.diagonal(np.asarray(whole), axis1=1, axis2=2))
+    sizes, known = found.scatter.sizes, found.known
+    before, after = (v[:, None] for v in grown(known.spread(sizes), known.first))
+    (first, second), (_, whole) = np.moveaxis(known.nodes, 2, 0), covariance(sizes, known)
+    walked = first * (first + 2.0 * second) * before + second**2 * after  # the later node goes on from the earlier
+    sd = np.sqrt(np.diagonal(whole, axis1=1, axis2=2) + walked)
     out = np.zeros(found.problem.of.size)
     out[found.blocks.index[found.blocks.there]] = sd[found.blocks.there]
     return out

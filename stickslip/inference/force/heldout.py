@@ -11,13 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 
 from .fit import Fit
 from .linearised import Array, moved, prior_rows, reach
 from .problem import Point
-from .scatter import covariance
 
 
 @dataclass(frozen=True)
@@ -54,21 +52,20 @@ class _Parts:
 
     def __init__(self, fit: Fit) -> None:
         self.fit = fit
-        _, whole = covariance(fit.scatter.sizes, fit.known)
-        root = np.linalg.cholesky(np.asarray(whole))
+        white = fit.white
         self.low, self.high = reach(fit.problem, fit.point)
         self.free = np.flatnonzero((self.low < 0.0) & (self.high > 0.0))
         blocks = fit.blocks
         side = np.concatenate([blocks(fit.slopes.shared)[..., self.free], blocks(fit.marginal)[..., None]], axis=2)
-        white = solve_triangular(root, side, lower=True)
-        self.rows, self.rest = white[..., :-1], white[..., -1]
+        together = white(side)
+        self.rows, self.rest = together[..., :-1], together[..., -1]
         prior, target = prior_rows(fit.problem, fit.point)
         prior = prior[:, self.free]
         self.each = np.einsum("eip,eiq->epq", self.rows, self.rows)
         self.slope = np.einsum("eip,ei->ep", self.rows, self.rest)
         self.normal = self.each.sum(axis=0) + prior.T @ prior
         self.right = self.slope.sum(axis=0) + prior.T @ target
-        self.logs = 2.0 * np.where(fit.known.there, np.log(np.diagonal(root, axis1=1, axis2=2)), 0.0).sum(axis=1)
+        self.logs = white.logs
         self.scale = 1.0 / np.sqrt(np.maximum(np.diag(self.normal), 1e-300))
 
     def without(self, part: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -55,6 +55,7 @@ class Knots:
         moving: (p, N) from the samples to rate and acceleration at the points.
         place: coordinate along which misfits are alike, one unit apart little (1).
         elapsed: time since the arrest before, or the start (s).
+        lasting: time of every event from the arrest before, or the start, to its own (s), shape (E,).
         noise: standard deviation of one sample (m).
         stiffness: of the driving spring, where this run has its own (N/m).
         virgin: whether the contact is force-free at the start.
@@ -78,6 +79,7 @@ class Knots:
     moving: tuple[csr_array, csr_array]
     place: Array
     elapsed: Array
+    lasting: Array
     noise: float
     stiffness: float | None
     virgin: bool
@@ -282,6 +284,7 @@ class _Pieces:
         # of a contact that was loaded before the record begins nothing is known until all of it slides
         keep = (of < len(events)) & ((of > 0) | trace.virgin)
         reading = self._reading(smoother, (knot_t.size, t.size))
+        begun = np.array([float(t[0]), *(e.t_arrest for e in events)])
         knot_t, x, v, d = (
             turns.joined(y, own) for y, own in zip((knot_t, x, v, d), turns.at(knot_t, x, d), strict=True)
         )
@@ -290,7 +293,7 @@ class _Pieces:
             trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
             made["at"], phase, of, made["rate"], made["acceleration"],
             turns.rows(reading), (moving[0], moving[1]),
-            _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, events, float(t[0])),
+            _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, begun), np.diff(begun),
             noise, trace.spring_stiffness, trace.virgin,
         )  # fmt: skip
         return selected(knots_made, keep)
@@ -340,9 +343,8 @@ def _arrests(t: Array, events: tuple[Event, ...], times: Scales) -> Index:
     return out
 
 
-def _elapsed(at: Array, of: Index, events: tuple[Event, ...], start: float) -> Array:
-    begun = np.array([start, *(e.t_arrest for e in events)])
-    return np.maximum(at - begun[np.minimum(of, len(events))], 0.0)
+def _elapsed(at: Array, of: Index, begun: Array) -> Array:
+    return np.maximum(at - begun[of.clip(max=begun.size - 1)], 0.0)
 
 
 def _places(at: Array, phase: Index, of: Index, events: tuple[Event, ...], times: Scales) -> Array:

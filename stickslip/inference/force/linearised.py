@@ -33,7 +33,7 @@ class Linearised:
         self.random = np.exp(2.0 * scatter.sizes[: len(EVENTS)])
         self.prior, self.target = prior_rows(problem, point)
         self.local = local = blocks(slopes.local)
-        self.plain, self.white = white.back, white.with_events(local)
+        self.plain, self.white = white, white.with_events(local)
         self.shared = blocks(slopes.shared)
         self.marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", local, point.events)
         whitened = self.white(np.concatenate([self.shared, self.marginal[..., None]], axis=2))
@@ -49,7 +49,7 @@ class Linearised:
 
     def objective(self, point: Point, slopes: Slopes) -> float:
         """Of residual, random effects and priors, with this covariance."""
-        white = self.plain @ self.blocks(slopes.residual)[..., None]
+        white = self.plain(self.blocks(slopes.residual)[..., None])
         _, target = prior_rows(self.problem, point)
         return float((white**2).sum() + (point.events**2 / self.random).sum() + (target**2).sum())
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, dia_array
 
 from .problem import Point, Problem, Slopes
-from .scatter import Blocks, Known, Scatter, covariance, inverse
+from .scatter import Blocks, Known, Scatter, weigh
 
 Array = NDArray[np.float64]
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
@@ -15,11 +15,8 @@ FAR = 5.0  # standard deviations from what the rest of an event lets expect, fro
 
 def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size: int) -> NDArray[np.bool_]:
     """Points that what else is known of their event would not let expect, shape (p,)."""
-    _, whole = covariance(scatter.sizes, known)
-    # by its root: where a record has next to no noise, a plain inverse is no covariance any more
-    back = inverse(np.linalg.cholesky(np.asarray(whole)))
-    weighted = np.swapaxes(back, 1, 2) @ (back @ marginal[..., None])
-    z = weighted[..., 0] / np.sqrt((back**2).sum(axis=1))
+    found = weigh(scatter.sizes, marginal, known)
+    z = found.weighted / np.sqrt(np.diagonal(found.inverted, axis1=1, axis2=2))
     out = np.zeros(size, bool)
     out[blocks.index[blocks.there]] = np.abs(z[blocks.there]) > FAR
     return out
@@ -30,8 +27,8 @@ def known_of(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks, dro
     strength = float(point.weights.sum())
     return Known(
         noise(problem, point, slopes, blocks), blocks(np.where(dropped, strength**2, 0.0)), blocks(slopes.local),
-        blocks(problem.phase), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed), blocks.there,
-        strength,
+        blocks(problem.phase), blocks(slopes.spring), blocks(slopes.tangent), blocks(problem.place),
+        blocks(problem.elapsed), problem.lasting, problem.begins, blocks.there, strength,
     )  # fmt: skip
 
 

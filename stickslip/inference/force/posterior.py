@@ -11,13 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.optimize import lsq_linear
 
 from .fit import Fit
 from .linearised import Array, moved, prior_rows, reach
 from .problem import Point
-from .scatter import covariance
+from .scatter import WithEvents
 
 
 @dataclass(frozen=True)
@@ -27,12 +26,12 @@ class Walked:
     Attributes:
         fit: the optimum.
         root: from whitened coordinates to changes of the shared parameters, shape (a, a).
-        whitener: Cholesky factor of the residuals' covariance, shape (E, n, n).
+        white: the residuals' covariance, events marginalised.
     """
 
     fit: Fit
     root: Array
-    whitener: Array
+    white: WithEvents
 
     @property
     def size(self) -> int:
@@ -55,7 +54,7 @@ class Walked:
             raise FloatingPointError("the model gives no finite force here")
         rest = found.blocks(slopes.residual) - np.einsum("eia,ea->ei", found.known.local, start.events)
         together = np.concatenate([found.blocks(slopes.shared), rest[..., None]], axis=2)
-        white = solve_triangular(self.whitener, together, lower=True).reshape(-1, together.shape[2])
+        white = self.white(together).reshape(-1, together.shape[2])
         prior, target = prior_rows(found.problem, start)
         rows, rest = np.vstack([white[:, :-1], prior]), np.concatenate([white[:, -1], target])
         change = self._best(rows[:, a:], rest, start)
@@ -92,5 +91,4 @@ def walked(fit: Fit) -> Walked:
         if part[i, i] <= 0.0:
             low, high = f.bounds
             part[i, i] = min(f.width, 0.1 * (high - low)) ** 2
-    _, whole = covariance(fit.scatter.sizes, fit.known)
-    return Walked(fit, np.asarray(np.linalg.cholesky(part)), np.asarray(np.linalg.cholesky(np.asarray(whole))))
+    return Walked(fit, np.asarray(np.linalg.cholesky(part)), fit.white)

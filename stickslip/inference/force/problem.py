@@ -153,6 +153,7 @@ class Slopes:
         residual: measured force less the model's (N), shape (p,).
         shared: derivatives in z, phases of all runs, weights and what cycles share, shape (p, a + b R + k + c).
         local: in the event's own, shape (p, 4).
+        spring: stiffness of the spring (N/m), shape (p,).
         tangent: stiffness of what sticks (N/m), shape (p,).
         sticking: the same at the knots of every run, shape (n,) each.
         slides: whether an element slides there, shape (n, k) each.
@@ -163,6 +164,7 @@ class Slopes:
     residual: Array
     shared: Array
     local: Array
+    spring: Array
     tangent: Array
     sticking: tuple[Array, ...]
     slides: tuple[NDArray[np.bool_], ...]
@@ -191,6 +193,8 @@ class Problem:
             np.concatenate([getattr(k, name) for k in runs]) for name in ("phase", "place", "at")
         )
         self.elapsed = np.concatenate([k.elapsed for k in runs])
+        self.lasting = np.concatenate([k.lasting[: k.events] for k in runs])
+        self.begins = np.isin(np.arange(self.events), self.first)
         self._events = tuple(_events(k, room, int(f)) for k, f in zip(runs, first[:-1], strict=True))
         virgin = np.isin(self.of, [f for f, k in zip(first[:-1], runs, strict=True) if k.virgin])
         hats = _hats(self.place)
@@ -263,7 +267,7 @@ class Problem:
         weights = np.maximum(point.weights, EMPTY)
         a, b, k, runs = len(shared), len(phases), point.weights.size, len(self.runs)
         size = self.at.size
-        residual, tangents, held = np.zeros(size), np.zeros(size), np.zeros(size)
+        residual, springs, tangents, held = (np.zeros(size) for _ in range(4))
         starts = {**c.fixed, **{f.name: f.start for f in c.shared}}
         slow = self.phase == CREEPING
         share = np.ones(size)
@@ -306,13 +310,14 @@ class Problem:
             held_by = mean @ elements[:n]
             slopes[s, a + b * runs : a + b * runs + k] = -share[s, None] * held_by
             held[s] = held_by @ weights
+            springs[s] = share[s] * (mean @ slope[:n])
             tangents[s] = share[s] * (mean @ tangent[:n])
             sticking.append(tangent[:n] * np.interp(run.t, run.at, share[s]))
             sliding.append(slides[:n])
             p += run.at.size
         slopes[:, a + b * runs + k :] = self._carried(tangents)
         residual += slopes[:, a + b * runs + k :] @ point.common
-        return Slopes(residual, slopes, local, tangents, tuple(sticking), tuple(sliding), held, share)
+        return Slopes(residual, slopes, local, springs, tangents, tuple(sticking), tuple(sliding), held, share)
 
 
 def _room(size: int) -> int:

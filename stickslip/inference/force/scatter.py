@@ -1,12 +1,13 @@
 """What is random: noise of the sensor, events that differ, and misfit that is alike from point to point.
 
-Residuals of one event belong together, those of two events do not. The covariance of an event's residuals is
+But for a walk of the sensor, which goes on from event to event (:mod:`.sensor_walk`), residuals of one event belong
+together and those of two events do not. The covariance of an event's residuals is
 
     S = N + diag(numeric) + Z D Z' + L K L',    K_ij = exp(-|s_i - s_j|)
 
 with the noise N of the sensor's samples carried to a force by stiffness and inertia together, random effects D
 (strength, yield displacements, shape of the backbone, position at the arrest), and misfit whose size L depends on the
-phase of the cycle and, for errors of the position, on the stiffness, and a random walk of the reading since the arrest.
+phase of the cycle and, for errors of the position, on the stiffness, and the bridge of the sensor's walk.
 All sizes are estimated from the campaign itself by maximum likelihood.
 """
 
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dtrtri, dtrtrs
 
 from .knots import PHASES
+from .sensor_walk import SensorWalk, nodes
 
 Array = NDArray[np.float64]
 EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event to event
@@ -86,23 +88,28 @@ class Known:
     """What the covariance is made of, at the points of every event, shape (E, n).
 
     ``noise`` is the covariance (N^2) by the noise of samples, shape (E, n, n); ``dropped`` a variance (N^2) that takes
-    a point's weight.
+    a point's weight; ``spring`` and ``tangent`` are stiffnesses of the spring and of what sticks (N/m); ``elapsed`` is
+    the time since the arrest before, of ``lasting``, shape (E,), to the one after (s); ``first`` tells the first events
+    of the runs, shape (E,).
     """
 
     noise: Array
     dropped: Array
     local: Array
     phase: Array
+    spring: Array
     tangent: Array
     place: Array
     elapsed: Array
+    lasting: Array
+    first: NDArray[np.bool_]
     there: NDArray[np.bool_]
     strength: float
 
     def with_local(self, local: Array) -> Known:
         """The same with other derivatives in the events' own."""
         other = replace(self, local=local)
-        other.__dict__.update(near=self.near, shifts=self.shifts)  # which do not depend on them
+        other.__dict__.update(near=self.near, shifts=self.shifts, nodes=self.nodes)  # which do not depend on them
         return other
 
     @cached_property
@@ -111,15 +118,35 @@ class Known:
         return np.exp(-np.abs(self.place[:, :, None] - self.place[:, None, :]) / REACH)
 
     @cached_property
+    def _over(self) -> Array:
+        """Share of the time between the arrests that is over, shape (E, n)."""
+        return np.asarray(np.clip(self.elapsed / self.lasting[:, None], 0.0, 1.0))
+
+    @cached_property
     def shifts(self) -> tuple[Array, Array]:
-        """Covariance (N^2) by errors of the position of 1 m, alike where near, and by a walk of 1 m/s^0.5."""
-        moved = np.where(self.there, self.tangent, 0.0)
+        """Covariance (N^2) by errors of the position of 1 m, alike where near, and by a bridge of 1 m/s^0.5."""
+        moved, over = np.where(self.there, self.spring + self.tangent, 0.0), self._over
         pairs = moved[:, :, None] * moved[:, None, :]
-        return pairs * self.near, pairs * np.minimum(self.elapsed[:, :, None], self.elapsed[:, None, :])
+        least = np.minimum(over[:, :, None], over[:, None, :])
+        bridge = self.lasting[:, None, None] * (least - over[:, :, None] * over[:, None, :])
+        return pairs * self.near, pairs * bridge
+
+    @cached_property
+    def nodes(self) -> Array:
+        """What the nodes of the sensor's walk do to the residual force (N/m), shape (E, n, 2)."""
+        return nodes(self.spring, self.tangent, self._over) * self.there[..., None]
+
+    def walk(self, sizes: Array, white: Array) -> SensorWalk:
+        """The nodes of the sensor's walk, given them whitened by what events have of their own."""
+        return SensorWalk(white, self.spread(sizes), self.first)
+
+    def spread(self, sizes: Array) -> Array:
+        """Standard deviation of the sensor's walk over each event (m), shape (E,)."""
+        return np.asarray(np.exp(sizes[_WALK]) * np.sqrt(self.lasting))
 
 
 def covariance(sizes: Array, k: Known) -> tuple[Array, Array]:
-    """The covariance without and with the random effects (N^2), shape (E, n, n)."""
+    """The covariance of events without and with the random effects (N^2), shape (E, n, n), the walk's nodes known."""
     plain, scaled = _plain(sizes, k), k.local * np.exp(sizes[:_OWN])
     return plain, plain + scaled @ np.swapaxes(scaled, 1, 2)
 
@@ -150,39 +177,46 @@ class Whitening:
     """
 
     def __init__(self, sizes: Array, known: Known) -> None:
+        self.sizes, self.known = sizes, known
         root = np.asarray(np.linalg.cholesky(_plain(sizes, known)), float)
         self.back = inverse(root)
         self.logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-        self.size = np.exp(sizes[:_OWN])
+        self.nodes = self.back @ known.nodes
+        self.walk = known.walk(sizes, self.nodes)
+
+    def __call__(self, values: Array) -> Array:
+        """Whitened where what is the events' own is given: shape (E, n, m) to (E, n + 1, m)."""
+        return self.walk.apart(self.back @ values)
 
     def with_events(self, local: Array) -> WithEvents:
         """The same with events that differ; ``local`` are derivatives in what is their own, shape (E, n, 4)."""
-        return WithEvents(self.back, self.logs, local * self.size)
+        return WithEvents(self, local)
 
 
 class WithEvents:
     """Residuals to independent ones of unit variance, random effects included."""
 
-    def __init__(self, back: Array, logs: Array, scaled: Array) -> None:
-        self.back = back
-        aside = back @ scaled
+    def __init__(self, plain: Whitening, local: Array) -> None:
+        self.back = plain.back
+        aside = self.back @ (local * np.exp(plain.sizes[:_OWN]))
         values, turn = np.linalg.eigh(np.swapaxes(aside, 1, 2) @ aside)
         values = np.maximum(values, 0.0)
         self.aside = aside @ turn
         self.share = 1.0 / (1.0 + values + np.sqrt(1.0 + values))  # of (1 + U U')^(-1/2) = 1 - U share U'
-        self.logs = logs + np.log1p(values).sum(axis=1)
+        self.walk = plain.known.walk(plain.sizes, self._apart(plain.nodes))
+        self.logs = plain.logs + np.log1p(values).sum(axis=1) + self.walk.logs
 
     def _apart(self, white: Array) -> Array:
         along = np.swapaxes(self.aside, 1, 2) @ white
         return np.asarray(white - self.aside @ (self.share[..., None] * along))
 
     def __call__(self, values: Array) -> Array:
-        """Whitened, shape (E, n, m)."""
-        return self._apart(self.back @ values)
+        """Whitened: shape (E, n, m) to (E, n + 1, m), the last row by the steps of the sensor's walk."""
+        return self.walk.apart(self._apart(self.back @ values))
 
     def weighted(self, values: Array) -> Array:
         """Times the inverse covariance, shape (E, n)."""
-        white = self._apart(self._apart(self.back @ values[..., None]))
+        white = self._apart(self(values[..., None])[:, :-1])
         return np.asarray((np.swapaxes(self.back, 1, 2) @ white)[..., 0])
 
 
@@ -202,17 +236,52 @@ def _misfit(sizes: Array, residual: Array, k: Known) -> tuple[float, Array]:
         root = np.asarray(np.linalg.cholesky(covariance(sizes, k)[1]), float)
     except np.linalg.LinAlgError:
         return np.inf, np.zeros(0)
-    white = np.stack([dtrtrs(one, r, lower=1)[0] for one, r in zip(root, residual, strict=True)])
-    logs = np.log(np.diagonal(root, axis1=1, axis2=2)).sum()
-    return float((white**2).sum() + 2.0 * logs + (((sizes - CENTRES) / WIDTHS) ** 2).sum()), root
+    side = np.concatenate([residual[..., None], k.nodes], axis=2)
+    white = np.stack([dtrtrs(one, r, lower=1)[0] for one, r in zip(root, side, strict=True)])
+    walk = k.walk(sizes, white[..., 1:])
+    logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + walk.logs.sum()
+    squares = float((walk.apart(white[..., :1]) ** 2).sum())
+    return squares + float(logs + (((sizes - CENTRES) / WIDTHS) ** 2).sum()), root
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Residuals under a covariance.
+
+    Attributes:
+        inverted: blocks of the events in the inverse of the covariance (N^-2), shape (E, n, n).
+        weighted: the inverse covariance times the residuals (1/N), shape (E, n).
+        walk: of the sensor.
+        stands: its most likely nodes (m), shape (E, 2).
+        back: inverse root of the covariance with the nodes known (1/N), shape (E, n, n).
+    """
+
+    inverted: Array
+    weighted: Array
+    walk: SensorWalk
+    stands: Array
+    back: Array
+
+
+def weigh(sizes: Array, residual: Array, k: Known, root: Array | None = None) -> Weighed:
+    """Residuals (E, n) under the whole covariance, of which the root with the nodes known may be given."""
+    back = inverse(np.asarray(np.linalg.cholesky(covariance(sizes, k)[1]) if root is None else root, float))
+    turned = np.swapaxes(back, 1, 2)
+    white = back @ k.nodes
+    walk = k.walk(sizes, white)
+    residual = back @ residual[..., None]
+    stands = np.stack(walk.found(residual), axis=1)
+    upon = turned @ white
+    inverted = turned @ back
+    inverted -= upon @ walk.covariance() @ np.swapaxes(upon, 1, 2)
+    return Weighed(inverted, (turned @ (residual - white @ stands))[..., 0], walk, stands[..., 0], back)
 
 
 def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array, Array]:
     """Gradient of the cost and its average information, one for each size."""
     s = np.exp(sizes)
-    back = inverse(root)
-    inverted = np.swapaxes(back, 1, 2) @ back
-    a = (inverted @ residual[..., None])[..., 0]
+    found = weigh(sizes, residual, k, root)
+    a, inverted = found.weighted, found.inverted
     inverted *= k.there[:, :, None]
     gradient, moved = np.zeros(sizes.size), np.zeros((*residual.shape, sizes.size))
     for r in range(_OWN):
@@ -231,7 +300,12 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
         pulled = (part @ a[..., None])[..., 0]
         gradient[i] = 2.0 * s[i] ** 2 * (np.einsum("eij,eij->", inverted, part) - (a * pulled).sum())
         moved[..., i] = 2.0 * s[i] ** 2 * pulled
-    information = np.einsum("eia,eib->ab", moved, inverted @ moved, optimize=True)
+    steps = np.array([-1.0, 1.0])
+    left = ((steps @ found.walk.covariance() @ steps) + (found.stands @ steps) ** 2) / found.walk.spread**2
+    gradient[_WALK] += 2.0 * (1.0 - left).sum()
+    moved[..., _WALK] += 2.0 * (k.nodes @ found.stands[..., None])[..., 0]
+    white = found.walk.apart(found.back @ moved).reshape(-1, sizes.size)
+    information = white.T @ white
     gradient += 2.0 * (sizes - CENTRES) / WIDTHS**2
     return gradient, information + np.diag(2.0 / WIDTHS**2)
 

@@ -19,7 +19,6 @@ from .along import Way, along, undone
 from .fit import Fit
 from .linearised import Array, prior_rows, reach
 from .problem import EMPTY, PROGRAMS, PULL, Own, Problem, model_of, of_events
-from .scatter import covariance
 
 CHUNK = 64  # members evaluated at once
 
@@ -118,9 +117,6 @@ class Explained:
 
     def __init__(self, fit: Fit) -> None:
         self.fit = fit
-        _, whole = covariance(fit.scatter.sizes, fit.known)
-        self.root = np.linalg.cholesky(np.asarray(whole))
-        self.inverse = np.linalg.inv(self.root)
         rows = self._white(fit.slopes.shared)
         low, high = reach(fit.problem, fit.point)
         free = (low < 0.0) & (high > 0.0)
@@ -130,12 +126,17 @@ class Explained:
         self._shared = fit.slopes.shared[:, free]
         rest = np.concatenate([self._white(fit.marginal[:, None])[:, 0], target])
         self.rest = rest - self.basis @ (self.basis.T @ rest)
-        e, n = fit.blocks.index.shape
-        self.event = np.concatenate([np.repeat(np.arange(e), n), np.full(self.extra, -1)])
 
     def _white(self, columns: Array) -> Array:
-        side = self.fit.blocks(columns)
-        return (self.inverse @ side).reshape(-1, side.shape[-1])
+        return self._by_event(columns).reshape(-1, columns.shape[1])
+
+    def _by_event(self, columns: Array) -> Array:
+        return self.fit.white(self.fit.blocks(columns))
+
+    def events(self, rows: Array) -> Array:
+        """Rows of :meth:`apart` without those of the priors, by event, shape (E, n, ...)."""
+        events = self.fit.problem.events
+        return rows[: rows.shape[0] - self.extra].reshape(events, -1, *rows.shape[1:])
 
     def apart(self, columns: Array) -> Array:
         """Columns (p, m) whitened and freed of what the model can do itself."""
@@ -147,10 +148,8 @@ class Explained:
 
         Shapes (E, n, m), (E, k, m) and (E, n).
         """
-        e, n = self.fit.blocks.index.shape
-        white = self.inverse @ self.fit.blocks(columns)
-        own = self.basis[: e * n].reshape(e, n, -1)
-        return white, np.einsum("enk,enm->ekm", own, white, optimize=True), self.rest[: e * n].reshape(e, n)
+        white, own = self._by_event(columns), self.events(self.basis)
+        return white, np.einsum("enk,enm->ekm", own, white, optimize=True), self.events(self.rest)
 
     def left(self, columns: Array) -> Array:
         """Forces (p, m) less what the model's own parameters would take of them (N)."""
@@ -168,11 +167,9 @@ class Explained:
 
     def unseen(self, columns: Array, left_out: Sequence[NDArray[np.intp]]) -> Array:
         """Fall of each event's cost with the columns (p, m), their coefficients from the other folds, shape (E,)."""
-        e, n = self.fit.blocks.index.shape
-        rows = self.apart(columns)[: e * n].reshape(e, n, -1)
-        rest = self.rest[: e * n].reshape(e, n)
+        rows, rest = self.events(self.apart(columns)), self.events(self.rest)
         each, upon = np.einsum("enp,enq->epq", rows, rows), np.einsum("enp,en->ep", rows, rest)
-        out = np.zeros(e)
+        out = np.zeros(len(rows))
         for part in left_out:
             matrix, right = each.sum(axis=0) - each[part].sum(axis=0), upon.sum(axis=0) - upon[part].sum(axis=0)
             found, *_ = np.linalg.lstsq(matrix, -right, rcond=1e-10)
