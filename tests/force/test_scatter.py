@@ -32,7 +32,8 @@ RUN = 20  # events
 SPRING = 2e5  # N/m
 TRUE = {
     "strength": 3e-3, "stretch": 0.03, "shape": 0.03, "offset": 3e-9, "creep": 4e-3, "nucleation": 3e-3, "slip": 2e-3,
-    "ring-down": 1e-3, "position": 2e-9, "walk": 2e-9, "white": 1.0,
+    "ring-down": 1e-3, "position": 2e-9, "walk": 2e-9,
+    "fringe": 1e-9, "white": 1.0,
 }  # fmt: skip
 
 
@@ -54,8 +55,9 @@ def events(short: bool = False) -> Known:
         local[~there] = 0.0
     near = np.exp(-np.abs(np.subtract.outer(np.arange(POINTS), np.arange(POINTS))) / 0.5)
     noise = (1e-4 * STRENGTH) ** 2 * near * there[:, :, None] * there[:, None, :]
+    waves = 1e6 * rng.standard_normal((EVENTS, POINTS, 2)) * there[..., None]
     return Known(
-        noise, np.zeros(shape), local, np.tile(phase, (EVENTS, 1)),
+        noise, waves @ np.swapaxes(waves, 1, 2), np.zeros(shape), local, np.tile(phase, (EVENTS, 1)),
         np.full(shape, SPRING), np.tile(tangent, (EVENTS, 1)), place, elapsed,
         lasting, np.arange(EVENTS) % RUN == 0, there, STRENGTH,
     )  # fmt: skip

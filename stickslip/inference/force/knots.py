@@ -51,6 +51,7 @@ class Knots:
         phase: of the points, an index of PHASES.
         of: event of the points.
         rate, acceleration: of the reading at the points, under the test function (m/s, m/s2).
+        samples: the reading (m), shape (N,).
         reading: (n, N) from the samples of the reading to the displacement at the knots.
         moving: (p, N) from the samples to rate and acceleration at the points.
         place: coordinate along which misfits are alike, one unit apart little (1).
@@ -75,6 +76,7 @@ class Knots:
     of: Index
     rate: Array
     acceleration: Array
+    samples: Array
     reading: csr_array
     moving: tuple[csr_array, csr_array]
     place: Array
@@ -133,7 +135,7 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     if n - edge > 4 * h:
         last = len(events)
         pieces.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, compared=False)
-    return pieces.made(trace, t, (phi, first, second), events, noise, times, smoother)
+    return pieces.made(trace, t, x, (phi, first, second), events, noise, times, smoother)
 
 
 class _Pieces:
@@ -216,8 +218,8 @@ class _Pieces:
         )  # fmt: skip
 
     def made(
-        self, trace: Trace, t: Array, weights: tuple[Array, Array, Array], events: tuple[Event, ...], noise: float,
-        times: Scales, smoother: Smoother,
+        self, trace: Trace, t: Array, samples: Array, weights: tuple[Array, Array, Array], events: tuple[Event, ...],
+        noise: float, times: Scales, smoother: Smoother,
     ) -> Knots:  # fmt: skip
         knot_t = np.concatenate(self.t)
         d = np.concatenate(self.d)
@@ -291,7 +293,7 @@ class _Pieces:
         event = event[turns.source]
         knots_made = Knots(
             trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
-            made["at"], phase, of, made["rate"], made["acceleration"],
+            made["at"], phase, of, made["rate"], made["acceleration"], samples,
             turns.rows(reading), (moving[0], moving[1]),
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, begun), np.diff(begun),
             noise, trace.spring_stiffness, trace.virgin,

@@ -7,7 +7,8 @@ together and those of two events do not. The covariance of an event's residuals 
 
 with the noise N of the sensor's samples carried to a force by stiffness and inertia together, random effects D
 (strength, yield displacements, shape of the backbone, position at the arrest), and misfit whose size L depends on the
-phase of the cycle and, for errors of the position, on the stiffness, and the bridge of the sensor's walk.
+phase of the cycle and, for errors of the position, on the stiffness, the bridge of the sensor's walk, and errors that
+are periodic within a fringe.
 All sizes are estimated from the campaign itself by maximum likelihood.
 """
 
@@ -25,12 +26,12 @@ from .sensor_walk import SensorWalk, nodes
 
 Array = NDArray[np.float64]
 EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event to event
-NAMES = (*EVENTS, *PHASES, "position", "walk", "white")
+NAMES = (*EVENTS, *PHASES, "position", "walk", "fringe", "white")
 _OWN, _PHASE = len(EVENTS), slice(len(EVENTS), len(EVENTS) + len(PHASES))
-_POSITION, _WALK, _WHITE = range(len(NAMES) - 3, len(NAMES))
+_POSITION, _WALK, _FRINGE, _WHITE = range(len(NAMES) - 4, len(NAMES))
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
-CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1.0]))
-WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 0.1])
+CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0]))
+WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 1.0, 0.1])
 NUMERIC = 1e-4  # share of the strength below which nothing is claimed
 REACH = 1.0  # correlation length along the place
 FARTHEST = 1.5  # step of a size, in e-folds
@@ -47,7 +48,7 @@ class Scatter:
     @classmethod
     def wide(cls) -> Scatter:
         """What a fit begins with, so that no single kink of the model holds it."""
-        return cls(np.log(np.array([1e-2, 0.1, 0.05, 5e-9, 0.02, 0.02, 0.02, 0.02, 2e-9, 1e-9, 1.0])))
+        return cls(np.log(np.array([1e-2, 0.1, 0.05, 5e-9, 0.02, 0.02, 0.02, 0.02, 2e-9, 1e-9, 1e-9, 1.0])))
 
     def named(self) -> dict[str, float]:
         """Name -> size: shares of strength and of yield displacement, metres of position."""
@@ -87,13 +88,15 @@ class Blocks:
 class Known:
     """What the covariance is made of, at the points of every event, shape (E, n).
 
-    ``noise`` is the covariance (N^2) by the noise of samples, shape (E, n, n); ``dropped`` a variance (N^2) that takes
+    ``noise`` and ``periodic`` are covariances (N^2) by the noise of samples and by errors of 1 m that are periodic
+    within a fringe, shape (E, n, n); ``dropped`` a variance (N^2) that takes
     a point's weight; ``spring`` and ``tangent`` are stiffnesses of the spring and of what sticks (N/m); ``elapsed`` is
     the time since the arrest before, of ``lasting``, shape (E,), to the one after (s); ``first`` tells the first events
     of the runs, shape (E,).
     """
 
     noise: Array
+    periodic: Array
     dropped: Array
     local: Array
     phase: Array
@@ -155,7 +158,7 @@ def _plain(sizes: Array, k: Known) -> Array:
     s = np.exp(sizes)
     placed, walked = k.shifts
     out = _by_phase(s, k)
-    for size, part in ((s[_POSITION], placed), (s[_WALK], walked), (s[_WHITE], k.noise)):
+    for size, part in ((s[_POSITION], placed), (s[_WALK], walked), (s[_FRINGE], k.periodic), (s[_WHITE], k.noise)):
         out += size**2 * part
     at = np.arange(out.shape[1])
     out[:, at, at] += np.where(k.there, k.dropped + (NUMERIC * k.strength) ** 2, 1.0)
@@ -296,7 +299,7 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
     for p in range(len(PHASES)):
         gradient[_OWN + p] = 2.0 * (traces - a * pulled[..., 0])[own[..., p]].sum()
         moved[..., _OWN + p] = own[..., p] * pulled[..., 0] + pulled[..., 1 + p]
-    for i, part in zip((_POSITION, _WALK, _WHITE), (*k.shifts, k.noise), strict=True):
+    for i, part in zip((_POSITION, _WALK, _FRINGE, _WHITE), (*k.shifts, k.periodic, k.noise), strict=True):
         pulled = (part @ a[..., None])[..., 0]
         gradient[i] = 2.0 * s[i] ** 2 * (np.einsum("eij,eij->", inverted, part) - (a * pulled).sum())
         moved[..., i] = 2.0 * s[i] ** 2 * pulled
