@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.inference.force.kernels import kernels
-from stickslip.inference.force.knots import CREEP, knots
+from stickslip.inference.force.knots import CREEP, _between, knots
 from stickslip.inference.force.smoothing import hum, onward
 
 RATE = 1e4
@@ -67,6 +67,22 @@ def test_a_force_at_the_knots_is_averaged_as_the_motion_is(small):
         assert np.abs(got[fast] - want).max() < 2e-3
         slow = k.phase == CREEP
         np.testing.assert_allclose(got[slow], force(k.at[slow]), atol=1e-12)
+
+
+def test_forces_between_knots_are_of_fourth_order():
+    """Friction falls with slip as exp(-s): its chord lies above it everywhere, the cubic crosses it."""
+    rng = np.random.default_rng(3)
+    errors = []
+    for number in (20, 40, 80, 160):
+        t = np.cumsum(rng.uniform(0.6, 1.4, number + 1)) / number
+        moments = np.linspace(t[0], t[-1], 3000).reshape(3, -1)
+        nodes, weights = _between(t, moments)
+        np.testing.assert_allclose((weights * (t[nodes] ** 3 - t[nodes])).sum(axis=0), moments**3 - moments, atol=1e-12)
+        off = (weights * np.exp(-5.0 * t[nodes])).sum(axis=0) - np.exp(-5.0 * moments)
+        errors.append(np.sqrt(np.mean(off**2)))
+        chord = np.interp(moments, t, np.exp(-5.0 * t)) - np.exp(-5.0 * moments)
+        assert abs(off.mean()) < 0.05 * chord.mean()
+    assert np.log2(np.array(errors[:-1]) / errors[1:]).mean() == pytest.approx(4.0, abs=0.4)
 
 
 def test_points_have_the_motion_under_the_test_function(small):

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from stickslip.inference.force.fit import fit
-from stickslip.inference.force.knots import RING, knots
-from stickslip.inference.force.noise import noise, remembered
+from stickslip.inference.force.knots import NUCLEATION, RING, SLIP, knots
+from stickslip.inference.force.noise import by_reading, noise, periodic, remembered
 from stickslip.inference.force.problem import Problem
 from stickslip.inference.force.scatter import Blocks
+from stickslip.physics.sensor.chain import FRINGE
 
 TRIALS = 120
 SMALL = 1e-12  # m, so that nothing but the linear answer is seen
@@ -31,7 +33,7 @@ def test_noise_of_the_samples_reaches_the_force_as_stated(small):
         drawn.append(Problem(problem.composition, shaken).evaluate(point).residual - slopes.residual)
     levels = np.concatenate([np.full(k.at.size, k.noise) for k in problem.runs])
     seen = blocks(np.stack(drawn, axis=1) / SMALL * levels[:, None])
-    stated, local = noise(problem, point, slopes, blocks), blocks(slopes.local)
+    stated, local = noise(problem, by_reading(problem, point, slopes), blocks), blocks(slopes.local)
     variances, along, apart = [], [], []
     for e, phase in enumerate(blocks(problem.phase)):
         ringing = np.flatnonzero((phase == RING) & blocks.there[e])
@@ -58,8 +60,41 @@ def test_a_spring_of_the_run_counts_as_that_of_the_rig_does(small):
     stiffness = problem.composition.fixed["rig.spring_stiffness"]
     fixed = {**problem.composition.fixed, "rig.spring_stiffness": 0.1 * stiffness}
     own = Problem(replace(problem.composition, fixed=fixed), [replace(k, stiffness=stiffness) for k in problem.runs])
-    shared = noise(problem, point, problem.evaluate(point), blocks)
-    np.testing.assert_allclose(noise(own, point, own.evaluate(point), blocks), shared, rtol=1e-12, atol=0.0)
+    found = [noise(p, by_reading(p, point, p.evaluate(point)), blocks) for p in (problem, own)]
+    np.testing.assert_allclose(*found, rtol=1e-12, atol=0.0)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0])
+def test_an_error_periodic_within_a_fringe_reaches_the_force_as_stated(small, turn):
+    """A small one is added to the reading: what it does to the residuals lies in the span of what is stated.
+
+    Of a contact that slip does not weaken: that an error of the path weakens it is not carried.
+    """
+    problem = small.problem
+    z = small.point.z.copy()
+    place = next(i for i, f in enumerate(problem.composition.shared) if f.name == "weakening.drop")
+    z[place] = problem.composition.shared[place].inward(1e-9)
+    point = replace(small.point, z=z)
+    blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
+    shaken = []
+    for trace, found, k in zip(small.traces, small.found, problem.runs, strict=True):
+        phase = 2.0 * np.pi * k.samples / FRINGE
+        error = SMALL * (np.sin(phase + turn) + 0.25 * np.cos(2.0 * phase - turn))
+        shaken.append(knots(trace, found, small.times, error))
+    seen = blocks(Problem(problem.composition, shaken).evaluate(point).residual - slopes.residual)
+    stated = periodic(problem, by_reading(problem, point, slopes), blocks)
+    fast = blocks(np.isin(problem.phase, [NUCLEATION, SLIP]))  # where hardly an element sticks, whose kinks answer
+    explained, checked = [], 0
+    for e, own in enumerate(fast & blocks.there):
+        if own.sum() < 10:
+            continue
+        values, vectors = np.linalg.eigh(stated[e][np.ix_(own, own)])
+        assert values[-5] < 1e-9 * values[-1]  # sine and cosine of the fringe and of its half
+        span = vectors[:, -4:]
+        part = span.T @ seen[e][own]
+        explained.append((part**2).sum() / (seen[e][own] ** 2).sum())
+        checked += 1
+    assert checked > 4 and np.median(explained) > 0.99
 
 
 def test_an_element_remembers_where_it_last_slid():
