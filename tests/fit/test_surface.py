@@ -75,3 +75,11 @@ def test_the_derivatives_are_those_of_lines():
 def test_lines_pressed_flat_have_no_power_law():
     with pytest.raises(InputError, match="touch over their whole length"):
         sensitivity(rig(h_rms=1e-9))
+
+
+def test_the_smoothest_lines_have_derivatives_too():
+    """A step of the Hurst exponent beyond 1 would be no surface."""
+    found = [sensitivity(rig(H=hurst)) for hurst in (0.97, 0.93)]
+    at = found[0].names.index("H")
+    here, there = (f.jacobian[:2, at] for f in found)
+    np.testing.assert_allclose(here, there, rtol=0.25, atol=0.2)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from stickslip.inference.force.candidates import Start, _at, _columns, try_effect, with_start
-from stickslip.inference.force.descent import descend
+from stickslip.inference.force.descent import SETTLED, descend
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.linearised import Linearised
 from stickslip.inference.force.scatter import Whitening
@@ -46,10 +46,12 @@ def test_a_model_that_makes_room_stays_near_its_optimum(base, tag, size):
 
 
 @pytest.mark.parametrize("tag", ["tilt", "inertia", "sensor-gain"])
-def test_a_refit_ends_no_higher_than_the_first_look_promises(base, tag):
+def test_a_refit_ends_no_higher_than_it_began(base, tag):
+    """What is not there gains nothing and costs nothing: a tilt once ended 43 above the model without it."""
     cls = catalogue.get(tag)
     for found in try_effect(base, Explained(base), tag, list(catalogue.forms(cls))):
-        assert base.cost - found.fit.cost > 0.7 * found.promise - 2.0
+        assert found.promise < 9.0
+        assert -SETTLED < base.cost - found.fit.cost < 9.0 + found.promise
 
 
 def test_a_search_comes_back_from_the_side_of_the_valley(base):

@@ -14,6 +14,7 @@ from .static_table import StaticRig
 LINES = 60
 OUTPUTS = ("contact.u_max", "contact.p", "contact.spread", "contact.strength")
 STEP = 0.05  # of a logarithm, for derivatives
+SMOOTHEST = 0.98  # Hurst exponent
 LOADS = np.linspace(0.02, 0.98, 49)
 
 
@@ -44,7 +45,7 @@ def sensitivity(rig: Rig) -> Sensitivity:
     """Derivatives of u_max, p, spread and strength in the unmeasured ones of H, h_rms, L, load, friction and E.
 
     H, h_rms and L are never measured: they are parameters of the distribution of gaps. Derivatives are central
-    differences between the same random lines.
+    differences between the same random lines, towards smaller H alone where it is next to 1.
 
     Args:
         rig: with H and h_rms (m), be it those that a fit implies.
@@ -60,10 +61,13 @@ def sensitivity(rig: Rig) -> Sensitivity:
     contacts = int(rig.contacts or 1)
     columns = []
     for name, value in centre.items():
-        ends = [_lines(rig.model_copy(update=centre | {name: value * np.exp(s)})) for s in (-STEP, STEP)]
+        low, high = value * np.exp(-STEP), value * np.exp(STEP)
+        if name == "H":
+            high = min(high, SMOOTHEST)
+        ends = [_lines(rig.model_copy(update=centre | {name: v})) for v in (low, high)]
         change = [np.array([e.u.mean(), e.p.mean(), np.log(e.u.std(ddof=1))]) for e in ends]
         strength = 1.0 if name in ("normal_force", "friction_coefficient") else 0.0  # friction times all loads
-        columns.append(np.append((change[1] - change[0]) / (2 * STEP), strength))
+        columns.append(np.append((change[1] - change[0]) / np.log(high / low), strength))
     middle = _lines(rig.model_copy(update=centre))
     scatter = np.zeros((4, 4))
     scatter[:2, :2] = np.cov(middle.u, middle.p) / contacts + middle.mismatch**2 * np.eye(2)

@@ -112,8 +112,8 @@ class Fit:
 
     @property
     def cost(self) -> float:
-        """Twice the negative logarithm of likelihood and priors."""
-        return float(self.likelihood.sum()) + self.prior
+        """Twice the negative logarithm of likelihood and priors, those of the sizes of what is random included."""
+        return float(self.likelihood.sum()) + self.prior + self.scatter.prior
 
     @property
     def residual(self) -> Array:

@@ -50,6 +50,11 @@ class Scatter:
         """What a fit begins with, so that no single kink of the model holds it."""
         return cls(np.log(np.array([1e-2, 0.1, 0.05, 5e-9, 0.02, 0.02, 0.02, 0.02, 2e-9, 1e-9, 1e-9, 1.0])))
 
+    @property
+    def prior(self) -> float:
+        """How far the sizes are from what is expected of them (chi-square)."""
+        return float((((self.sizes - CENTRES) / WIDTHS) ** 2).sum())
+
     def named(self) -> dict[str, float]:
         """Name -> size: shares of strength and of yield displacement, metres of position."""
         return dict(zip(NAMES, np.exp(self.sizes).tolist(), strict=True))
@@ -244,7 +249,7 @@ def _misfit(sizes: Array, residual: Array, k: Known) -> tuple[float, Array]:
     walk = k.walk(sizes, white[..., 1:])
     logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + walk.logs.sum()
     squares = float((walk.apart(white[..., :1]) ** 2).sum())
-    return squares + float(logs + (((sizes - CENTRES) / WIDTHS) ** 2).sum()), root
+    return squares + float(logs) + Scatter(sizes).prior, root
 
 
 @dataclass(frozen=True)
