@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.inference.force.kernels import kernels
-from stickslip.inference.force.knots import CREEP, _between, knots
+from stickslip.inference.force.knots import CREEP, _between, bow, knots
 from stickslip.inference.force.smoothing import hum, onward
 
 RATE = 1e4
@@ -66,7 +66,7 @@ def test_a_force_at_the_knots_is_averaged_as_the_motion_is(small):
         want = force(trace.time[centre[:, None] + np.arange(-h, h + 1)]) @ phi
         assert np.abs(got[fast] - want).max() < 2e-3
         slow = k.phase == CREEP
-        np.testing.assert_allclose(got[slow], force(k.at[slow]), atol=1e-12)
+        np.testing.assert_allclose(k.mean[np.flatnonzero(slow)] @ (5.0 * k.t), 5.0 * k.at[slow], atol=1e-12)
 
 
 def test_forces_between_knots_are_of_fourth_order():
@@ -99,20 +99,42 @@ def test_points_have_the_motion_under_the_test_function(small):
     assert np.abs(k.acceleration[fast] - x @ second).max() < 1e-3 * np.abs(k.acceleration).max()
 
 
-def test_windows_are_means(small):
+def test_windows_are_made_of_the_samples(small):
     for k, trace in zip(small.knots, small.traces, strict=True):
         slow = k.phase == CREEP
-        rows = k.mean[np.flatnonzero(slow)]
-        assert np.all(np.diff(rows.indptr) == 1)
-        knot = rows.indices
-        count = np.diff(k.reading.indptr)[knot]
-        start = np.rint((k.t[knot] - trace.time[0]) * trace.sampling_rate - 0.5 * (count - 1)).astype(int)
-        far = count > 20
-        assert far.sum() > 20
-        for s, n, j in zip(start[far], count[far], knot[far], strict=True):
-            assert k.t[j] == pytest.approx(trace.time[s : s + n].mean(), abs=1e-9)
-            assert k.drive[j] == pytest.approx(trace.drive.position(trace.time[s : s + n]).mean(), abs=1e-13)
-            assert k.x[j] == pytest.approx(trace.displacement[s : s + n].mean(), abs=2e-8)
+        knot = np.searchsorted(k.t, k.at[slow])
+        np.testing.assert_array_equal(k.t[knot], k.at[slow])
+        np.testing.assert_allclose(k.reading[knot] @ k.samples, k.x[knot], rtol=0.0, atol=1e-15)
+        assert np.all(np.diff(k.reading.indptr)[knot] > 1)
+        np.testing.assert_allclose(k.drive[knot], trace.drive.position(k.at[slow]), atol=1e-13)
+
+
+def test_means_over_windows_are_made_of_values_in_their_middles():
+    """Friction falls with slip as exp(-s): its mean over a window lies above the value in the middle."""
+    rng = np.random.default_rng(5)
+    shape, bent, plain = rng.uniform(0.6, 1.4, 20), [], []
+    for number in (40, 80, 160, 320):
+        width = np.tile(shape, number // 20)
+        width = width / width.sum()
+        edges = np.append(0.0, np.cumsum(width))
+        t = 0.5 * (edges[1:] + edges[:-1])
+        value, mean = np.exp(-5.0 * t), -np.diff(np.exp(-5.0 * edges)) / (5.0 * width)
+        matrix, inner = bow(t, width, np.zeros(0)), (t > 0.15) & (t < 0.85)
+        bent.append(np.sqrt(np.mean((value + matrix @ value - mean)[inner] ** 2)))
+        plain.append(np.sqrt(np.mean((value - mean)[inner] ** 2)))
+        # the other way the neighbours are bent otherwise
+        assert np.sqrt(np.mean((mean - matrix @ mean - value)[inner] ** 2)) < 0.25 * plain[-1]
+        np.testing.assert_allclose(matrix @ (3.0 - 2.0 * t), 0.0, atol=1e-12)
+    assert np.log2(np.array(plain[:-1]) / plain[1:]).mean() == pytest.approx(2.0, abs=0.1)
+    assert np.log2(np.array(bent[:-1]) / bent[1:]).mean() > 2.9  # 4 where all windows are of one width
+    assert bent[-1] < 0.02 * plain[-1]
+
+
+def test_no_mean_reaches_over_a_break_of_the_drive_or_into_samples():
+    width = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+    t = np.array([0.0, 0.1, 0.6, 1.6, 2.6, 3.6, 4.6, 5.6, 6.2])
+    rows = np.diff(bow(t, width, np.array([3.1])).indptr) * (abs(bow(t, width, np.array([3.1]))).sum(axis=1) > 0.0)
+    np.testing.assert_array_equal(np.flatnonzero(rows), [3, 6])
 
 
 def test_knots_go_forward_in_time(small, begun):
@@ -135,7 +157,7 @@ def test_no_point_belongs_to_a_stick_with_an_unknown_past(small, begun):
 def flat(x, **options):
     x = np.asarray(x, float)
     given = {"weight": np.ones(x.size), "slow": np.ones(x.size, bool), "event": np.zeros(x.size, int), "noise": 1e-9}
-    return onward(x, **{**given, **options})
+    return onward(x, **{**given, **options}) @ x
 
 
 def test_a_way_that_goes_on_is_left_alone():

@@ -150,8 +150,8 @@ def _misfit(m: Measurement, fit: Fit, runs: list[int]) -> tuple[Any, ...]:
     left = np.where(damping < 1.0, np.exp(-np.pi * damping / np.sqrt(np.maximum(1.0 - damping**2, 1e-12))), 0.0)
     onset = np.full(np.shape(m.cycles.start), size["nucleation"])
     onset[np.asarray(m.cycles.virgin), 0] = np.hypot(size["nucleation"], size["creep"])
-    late = (onset * fit.strength / spring / _speed(m)) ** 2
-    longer = ((1.0 + left) * np.hypot(onset, size["slip"]) * fit.strength / spring) ** 2
+    late = (onset * fit.known.strength / spring / _speed(m)) ** 2
+    longer = ((1.0 + left) * np.hypot(onset, size["slip"]) * fit.known.strength / spring) ** 2
     return late, late, longer, 0.0
 
 

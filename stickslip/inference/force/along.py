@@ -53,6 +53,8 @@ class Held(NamedTuple):
         elements: share of its full strength that each element carries, shape (n, k).
         tangent: stiffness of the elements that stick (N/m), shape (n,).
         slides: whether an element is at its cap, shape (n, k).
+        sliding: force of those that slide (N), shape (n,).
+        psi: state of the weakening, shape (n,).
     """
 
     pull: Array
@@ -61,6 +63,8 @@ class Held(NamedTuple):
     elements: Array
     tangent: Array
     slides: Array
+    sliding: Array
+    psi: Array
 
 
 def lead(model: Model, t: Array, drive: Array) -> Array:
@@ -94,14 +98,17 @@ def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
         state, forces = model.advance(state, own, contact, motion)
         sticks = jnp.abs(state.force) < state.cap * (1.0 - 1e-6)
         tangent = jnp.sum(jnp.where(sticks, state.stiffness, 0.0))
-        here = Held(forces.spring, forces.body, forces.contact, state.force * share, tangent, ~sticks)
+        sliding = jnp.sum(jnp.where(sticks, 0.0, state.force))
+        here = Held(
+            forces.spring, forces.body, forces.contact, state.force * share, tangent, ~sticks, sliding, state.psi
+        )
         return state, forces.spring, Held(*(a.at[i].set(b) for a, b in zip(held, here, strict=True)))
 
     n, none = way.t.size, jnp.zeros(way.t.size)
     pull = model.pull(led[0] - way.x[0])
     first = Held(
         none.at[0].set(pull), none, none, jnp.zeros((n, share.size)), none.at[0].set(jnp.sum(bank.stiffness)),
-        jnp.zeros((n, share.size), bool),
+        jnp.zeros((n, share.size), bool), none, none.at[0].set(1.0),
     )  # fmt: skip
     return jax.lax.fori_loop(1, n if knots is None else knots, step, (start, pull, first))[2]
 

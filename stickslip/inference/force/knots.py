@@ -221,10 +221,15 @@ class _Pieces:
         self, trace: Trace, t: Array, samples: Array, weights: tuple[Array, Array, Array], events: tuple[Event, ...],
         noise: float, times: Scales, smoother: Smoother,
     ) -> Knots:  # fmt: skip
-        knot_t = np.concatenate(self.t)
+        assert trace.drive is not None
+        knot_t, seen = np.concatenate(self.t), np.concatenate(self.x)
         d = np.concatenate(self.d)
-        x = onward(np.concatenate(self.x), np.concatenate(self.weight), np.concatenate(self.slow),
-                    np.concatenate(self.event), max(noise, 0.3 * self.step))  # fmt: skip
+        one_way = onward(seen, np.concatenate(self.weight), np.concatenate(self.slow), np.concatenate(self.event),
+                         max(noise, 0.3 * self.step))  # fmt: skip
+        width = np.where(np.concatenate(self.slow), np.concatenate(self.weight), 0.0) * (t[1] - t[0])
+        bowed = bow(knot_t, width, np.asarray(trace.drive.breakpoints))
+        made_of = csr_array(one_way - one_way @ bowed)  # values in the middles from means
+        x = made_of @ seen
         v, slow = np.concatenate(self.v), np.concatenate(self.slow)
         slopes = np.gradient(x, knot_t)
         v = np.where(slow, slopes, v)
@@ -272,10 +277,11 @@ class _Pieces:
         # between windows the velocity is a mean, which tells no turning point
         turns = Turns.of(knot_t, x, np.where(slow, 0.0, v), slow)
         shape = (p, turns.size)
-        r = np.concatenate([*rows[0], *rows_window])
-        c = turns.place[np.concatenate([*rows[1], *columns_window])]
+        flat = bowed[_joined(columns_window)].tocoo()
+        r = np.concatenate([*rows[0], *rows_window, _joined(rows_window)[flat.coords[0]]])
+        c = turns.place[np.concatenate([*rows[1], *columns_window, flat.coords[1]])]
         ones = [np.ones(w.size) for w in rows_window]
-        mean = coo_array((np.concatenate([*values[0], *ones]), (r, c)), shape=shape).tocsr()
+        mean = coo_array((np.concatenate([*values[0], *ones, flat.data]), (r, c)), shape=shape).tocsr()
         smooth = tuple(_sparse(k, rows[0], [turns.place[i] for i in rows[1]], shape) for k in values[1:])
         moving = tuple(_sparse(k, shaken[0], shaken[1], (p, t.size)) for k in shaken[2:])
         made = {k: np.concatenate(w) for k, w in out.items()}
@@ -283,7 +289,7 @@ class _Pieces:
         of, phase = made["of"].astype(int), made["phase"].astype(int)
         # of a contact that was loaded before the record begins nothing is known until all of it slides
         keep = (of < len(events)) & ((of > 0) | trace.virgin)
-        reading = self._reading(smoother, (knot_t.size, t.size))
+        reading = csr_array(made_of @ self._reading(smoother, (knot_t.size, t.size)))
         begun = np.array([float(t[0]), *(e.t_arrest for e in events)])
         knot_t, x, v, d = (
             turns.joined(y, own) for y, own in zip((knot_t, x, v, d), turns.at(knot_t, x, d), strict=True)
@@ -312,6 +318,29 @@ class _Pieces:
             columns.append(part.coords[1])
             values.append(part.data)
         return _sparse(values, rows, columns, shape)
+
+
+def bow(t: Array, width: Array, breaks: Array) -> csr_array:
+    """By how much the mean over a window differs from the value in its middle, of values in the middles, shape (n, n).
+
+    A twelfth of half the second derivative of the parabola through it and the windows beside it, times its width
+    squared; none where the drive breaks between them, or no window lies at both sides.
+
+    Args:
+        t: middles (s), shape (n,).
+        width: of the windows (s), zero where there is none, shape (n,).
+        breaks: times at which the drive changes (s).
+    """
+    i = np.arange(1, t.size - 1)
+    before, after = np.diff(t)[:-1], np.diff(t)[1:]
+    beside = width[:-1] + width[1:]
+    close = (np.minimum(width[:-1], width[1:]) > 0.0) & (np.abs(2.0 * np.diff(t) - beside) < 1e-6 * beside)
+    steady = np.searchsorted(breaks, t[:-2]) == np.searchsorted(breaks, t[2:])
+    bent = np.where(close[:-1] & close[1:] & steady, width[1:-1] ** 2 / 12.0, 0.0)
+    left, right = bent / (before * (before + after)), bent / (after * (before + after))
+    rows = np.concatenate([i, i, i])
+    columns = np.concatenate([i - 1, i, i + 1])
+    return coo_array((np.concatenate([left, -left - right, right]), (rows, columns)), shape=(t.size,) * 2).tocsr()
 
 
 def _between(t: Array, moments: Array) -> tuple[Index, Array]:

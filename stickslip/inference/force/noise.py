@@ -13,6 +13,7 @@ from .problem import Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, weigh
 
 Array = NDArray[np.float64]
+FORGOTTEN = 5.0  # e-folds after which the weakening remembers nothing of the path
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
 
 
@@ -27,7 +28,7 @@ def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size
 
 def known_of(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks, dropped: NDArray[np.bool_]) -> Known:
     """What the covariance is made of, at a point."""
-    strength = float(point.weights.sum())
+    strength = problem.composition.nominal[0]  # not the model's: a weaker contact would have a smaller misfit allowed
     carried = by_reading(problem, point, slopes)
     return Known(
         noise(problem, carried, blocks), periodic(problem, carried, blocks),
@@ -42,18 +43,20 @@ def by_reading(problem: Problem, point: Point, slopes: Slopes) -> list[csr_array
 
     A sample that is off by e changes the force of springs and contact by k e, that of inertia by m e'': together, so
     that near the resonance of the contact, where the one nearly undoes the other, little noise is left. An element that
-    sticks counts from where it last slid, and holds the error of that reading until it slides again.
+    sticks counts from where it last slid (or the record began), and holds that reading's error.
     """
     values = problem.values(point)
     elements = point.weights / problem.composition.reach
     out = []
-    for run, stiffness, slides in zip(problem.runs, slopes.sticking, slopes.slides, strict=True):
+    weakening = 1.0 - values["weakening.drop"], values["weakening.slip_distance"], values["weakening.healing_time"]
+    for r, (run, stiffness) in enumerate(zip(problem.runs, slopes.sticking, strict=True)):
         rate, acceleration = run.moving
         spring = values.get("rig.spring_stiffness", 0.0) if run.stiffness is None else run.stiffness
         stiff = dia_array((stiffness + spring, 0), shape=(stiffness.size, stiffness.size))
-        since = remembered(elements, stiffness, slides)
+        since = remembered(elements, stiffness, slopes.slides[r])
+        slid = weakened(run.t, run.x, slopes.sliding[r], slopes.psi[r], *weakening)
         out.append(
-            run.mean @ ((stiff - since) @ run.reading)
+            run.mean @ ((stiff - since + slid) @ run.reading)
             + values["rig.damping"] * rate
             + values["rig.mass"] * acceleration
         )
@@ -102,8 +105,35 @@ def remembered(elements: Array, stiffness: Array, slides: NDArray[np.bool_]) -> 
         slides: whether an element slides at a knot, shape (n, k).
     """
     n = len(slides)
-    last = np.maximum.accumulate(np.where(slides, np.arange(n)[:, None], -1), axis=0)
-    at, element = np.nonzero(~slides & (last >= 0))
+    last = np.maximum.accumulate(np.where(slides, np.arange(n)[:, None], 0), axis=0)
+    at, element = np.nonzero(~slides)
     plain = ~slides @ elements
     own = np.divide(stiffness, plain, out=np.ones(n), where=plain > 0.0)
     return coo_array((elements[element] * own[at], (at, last[at, element])), shape=(n, n)).tocsr()
+
+
+def weakened(t: Array, x: Array, sliding: Array, psi: Array, ratio: float, reach: float, time: float) -> csr_array:
+    """What an error of the reading at a knot does, by the path, to the force of what slides (N/m), shape (n, n).
+
+    The path takes strength away, and healing forgets it: ``psi' = (1 - psi)/time - |x'| psi/reach``.
+
+    Args:
+        t, x: of the knots (s, m), shape (n,).
+        sliding: force of the elements that slide (N), shape (n,).
+        psi: state of the weakening, shape (n,).
+        ratio, reach, time: kinetic over static friction, slip distance (m) and healing time (s).
+    """
+    dt, dx = np.diff(t), np.diff(x)
+    lost = dt / time + np.abs(dx) / reach
+    kept = np.exp(-lost)
+    healed = dt / time * (1.0 - (1.0 + lost) * kept) / np.maximum(lost, 1e-9) ** 2
+    by_step = np.append(0.0, -np.sign(dx) / reach * (psi[:-1] * kept + healed))
+    ends = np.append(0.0, np.cumsum(lost))
+    first = np.searchsorted(ends, ends - FORGOTTEN)
+    at = np.repeat(np.arange(t.size), np.arange(t.size) - first + 1)
+    j = np.concatenate([np.arange(a, i + 1) for i, a in enumerate(first)])
+    weight = (1.0 - ratio) * sliding / (ratio + (1.0 - ratio) * psi)
+    value = (weight[at] * np.exp(ends[j] - ends[at])) * by_step[j]
+    later = j > first[at]  # the error of a step's begin
+    rows, columns = np.concatenate([at, at[later]]), np.concatenate([j, j[later] - 1])
+    return coo_array((np.concatenate([value, -value[later]]), (rows, columns)), shape=(t.size,) * 2).tocsr()

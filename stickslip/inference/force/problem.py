@@ -157,6 +157,8 @@ class Slopes:
         tangent: stiffness of what sticks (N/m), shape (p,).
         sticking: the same at the knots of every run, shape (n,) each.
         slides: whether an element slides there, shape (n, k) each.
+        sliding: force of those that slide (N), shape (n,) each.
+        psi: state of the weakening, shape (n,) each.
         held: force that the model holds (N), shape (p,).
         share: what a reading counts for as the rig is stated, over what it counts for in the model, shape (p,).
     """
@@ -168,6 +170,8 @@ class Slopes:
     tangent: Array
     sticking: tuple[Array, ...]
     slides: tuple[NDArray[np.bool_], ...]
+    sliding: tuple[Array, ...]
+    psi: tuple[Array, ...]
     held: Array
     share: Array
 
@@ -283,10 +287,10 @@ class Problem:
             ]
 
         found = side_by_side(of_run, enumerate(self.run_arguments(point)))
-        p, sticking, sliding = 0, [], []
+        p, kept = 0, []
         for r, (run, parts) in enumerate(zip(self.runs, found, strict=True)):
             n, s = run.t.size, slice(p, p + run.at.size)
-            q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent, slides = parts
+            q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent, *state = parts
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             if sensed:
@@ -312,12 +316,14 @@ class Problem:
             held[s] = held_by @ weights
             springs[s] = share[s] * (mean @ slope[:n])
             tangents[s] = share[s] * (mean @ tangent[:n])
-            sticking.append(tangent[:n] * np.interp(run.t, run.at, share[s]))
-            sliding.append(slides[:n])
+            shares = np.interp(run.t, run.at, share[s])
+            slides, sliding, psi = (a[:n] for a in state)
+            kept.append((tangent[:n] * shares, slides, sliding * shares, psi))
             p += run.at.size
         slopes[:, a + b * runs + k :] = self._carried(tangents)
         residual += slopes[:, a + b * runs + k :] @ point.common
-        return Slopes(residual, slopes, local, springs, tangents, tuple(sticking), tuple(sliding), held, share)
+        sticking, sliding, forces, states = zip(*kept, strict=True)
+        return Slopes(residual, slopes, local, springs, tangents, sticking, sliding, forces, states, held, share)
 
 
 def _room(size: int) -> int:
@@ -401,7 +407,7 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any) ->
         gain = 1.0 + jnp.sum(steps * jnp.diff(shift)) / jnp.sum(steps**2)
         return (
             (held.pull + held.body - held.contact, shift, model.mass(), steep, gain),
-            (held.elements, held.tangent, held.slides),
+            (held.elements, held.tangent, held.slides, held.sliding, held.psi),
         )
 
     def whole(

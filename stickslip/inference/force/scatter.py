@@ -97,7 +97,7 @@ class Known:
     within a fringe, shape (E, n, n); ``dropped`` a variance (N^2) that takes
     a point's weight; ``spring`` and ``tangent`` are stiffnesses of the spring and of what sticks (N/m); ``elapsed`` is
     the time since the arrest before, of ``lasting``, shape (E,), to the one after (s); ``first`` tells the first events
-    of the runs, shape (E,).
+    of the runs, shape (E,); ``strength`` is what is known of the contact's beforehand (N).
     """
 
     noise: Array

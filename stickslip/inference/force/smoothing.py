@@ -136,20 +136,24 @@ def _local(length: int, degree: int, period: float | None = None) -> tuple[Array
     return np.asarray((value / scale) @ solved), np.asarray((slope / scale) @ solved)
 
 
-def onward(x: Array, weight: Array, slow: NDArray[np.bool_], event: Index, noise: float) -> Array:
-    """The windows of every stick without steps back that are the noise's: the block creeps one way.
+def onward(x: Array, weight: Array, slow: NDArray[np.bool_], event: Index, noise: float) -> csr_array:
+    """What takes the noise's steps back from the windows of every stick, shape (n, n): the block creeps one way.
 
     A step back by a nanometre would unload every element, and the next one forward would not load them again at once:
-    noise would make the model weaker than the contact. Where the block does go back by more than noise, nothing is
-    changed.
+    noise would make the model weaker than the contact. Windows that go back share their mean. Where the block does go
+    back by more than noise, nothing is changed.
     """
-    out = x.copy()
+    block, share = np.arange(x.size), np.ones(x.size)
     edges = np.flatnonzero(np.diff(slow.astype(int)) | (np.diff(event) != 0)) + 1
     for piece in np.split(np.arange(x.size), edges):
         if piece.size < 3 or not slow[piece[0]]:
             continue
         rising = bool(x[piece[-1]] >= x[piece[0]])
-        found = isotonic_regression(x[piece], weights=weight[piece], increasing=rising).x
-        if np.abs(found - x[piece]).max() < BACK * noise:
-            out[piece] = found
-    return out
+        found = isotonic_regression(x[piece], weights=weight[piece], increasing=rising)
+        if np.abs(found.x - x[piece]).max() < BACK * noise:
+            sizes = np.diff(found.blocks)
+            block[piece] = piece[0] + np.repeat(found.blocks[:-1], sizes)
+            share[piece] = np.where(np.repeat(sizes, sizes) > 1, weight[piece] / np.repeat(found.weights, sizes), 1.0)
+    shape = (x.size, x.size)
+    means = coo_array((share, (block, np.arange(x.size))), shape=shape).tocsr()
+    return csr_array(means[block])
