@@ -27,6 +27,7 @@ SHORT = 6  # evaluations from each start, after which the better half of them go
 EVEN = 1.0  # of two forms' costs: less is no reason to try one from where the other ended
 LARGE = 4.0  # times the promised amplitude: the model without the effect has taken a part of it, and laws may be bent
 PROMISING = 3.0  # fall of the cost that chance alone promises; where no more is, one start serves
+BESIDE = 0.03  # of the amplitude from which a refit gained nothing, from where it is begun anew
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 
 
@@ -185,6 +186,10 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
         if values not in [s.values for s in starts]:
             starts.append(Start(values, point, None, float(errors[i])))
     found, start = _best_of(base, effect, starts)
+    if found.cost > base.cost:  # a dent beside the model without the effect, which is begun at itself
+        values = {**start.values, effect.amplitude: null + BESIDE * (start.values[effect.amplitude] - null)}
+        own = start._replace(values=values, base=base.point)
+        found, start = min((found, start), (adapted(_begun(base, effect, own)), own), key=lambda end: end[0].cost)
     return Candidate(
         effect.tag, form, float(falls.max()), found, "", len(members), 5.0 * start.error, start.values
     )  # fmt: skip

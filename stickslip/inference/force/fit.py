@@ -13,7 +13,7 @@ from ...errors import FitError
 from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
-from .linearised import FARTHEST, Array, Linearised, moved, reach
+from .linearised import FARTHEST, Array, Linearised, moved
 from .noise import beyond, known_of
 from .problem import Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
@@ -24,7 +24,7 @@ ROUNDS = 10  # times that the scatter is estimated anew
 LAST = 30  # evaluations with the covariance as it was found
 STEPS = 4  # evaluations between
 NEWTON = 4  # steps of the sizes between
-BESIDE, SEED = 2, 1  # fits begun anew about the end of one, and where
+LARGER = 1.0  # e-folds by which sizes are taken for larger where a search may stand in a dent
 
 
 @dataclass(frozen=True)
@@ -87,13 +87,6 @@ class Fit:
         far = float(np.abs(change[: self.point.z.size]).max(initial=0.0))
         share = min(1.0, FARTHEST / far) if far > 0.0 else 1.0
         return moved(self.point, share * change, self.point.events + share * events), share
-
-    def drawn(self, rng: np.random.Generator) -> Point:
-        """A point of the posterior as the derivatives have it, events at their best there."""
-        values, turn = np.linalg.eigh(self.covariance)
-        change = turn @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(values.size))
-        change = np.clip(change, *reach(self.problem, self.point))
-        return moved(self.point, change, self._system.events_after(change))
 
     @property
     def likelihood(self) -> Array:
@@ -193,23 +186,19 @@ def fit(
             break
     made, around = known_of(problem, point, slopes, blocks, out), point
     point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, blocks, LAST)
-    return _best(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
+    return _arrived(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
 
 
-def _best(found: Fit) -> Fit:
-    """The best of a fit and of those begun about its end, as far off as the data allow.
+def _arrived(found: Fit) -> Fit:
+    """The better of a fit and of one that goes on from it with all that is random taken for larger than it is.
 
     Where an element begins to slide the force has a kink, and the floor of the valley is rough: in one of its dents the
     search may stand still before it has arrived, and then every law that is added gains by leaving it.
     """
-    rng = np.random.default_rng(SEED)
-    best, evaluations = found, found.evaluations
-    for _ in range(BESIDE):
-        with suppress(FitError):
-            other = adapted(refit(found.problem, best.drawn(rng), found))
-            evaluations += other.evaluations
-            best = min(best, other, key=lambda f: f.cost)
-    return replace(best, evaluations=evaluations)
+    with suppress(FitError):
+        other = adapted(refit(found.problem, found.point, replace(found, scatter=found.scatter.larger(LARGER))))
+        return replace(min(found, other, key=lambda f: f.cost), evaluations=found.evaluations + other.evaluations)
+    return found
 
 
 def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:

@@ -13,7 +13,7 @@ from .problem import Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, weigh
 
 Array = NDArray[np.float64]
-FORGOTTEN = 5.0  # e-folds after which the weakening remembers nothing of the path
+FORGOTTEN = 4.0  # e-folds after which the weakening remembers nothing of the path
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
 
 
@@ -56,7 +56,7 @@ def by_reading(problem: Problem, point: Point, slopes: Slopes) -> list[csr_array
         since = remembered(elements, stiffness, slopes.slides[r])
         slid = weakened(run.t, run.x, slopes.sliding[r], slopes.psi[r], *weakening)
         out.append(
-            run.mean @ ((stiff - since + slid) @ run.reading)
+            (run.mean @ (stiff - since + slid)) @ run.reading
             + values["rig.damping"] * rate
             + values["rig.mass"] * acceleration
         )
@@ -129,11 +129,14 @@ def weakened(t: Array, x: Array, sliding: Array, psi: Array, ratio: float, reach
     healed = dt / time * (1.0 - (1.0 + lost) * kept) / np.maximum(lost, 1e-9) ** 2
     by_step = np.append(0.0, -np.sign(dx) / reach * (psi[:-1] * kept + healed))
     ends = np.append(0.0, np.cumsum(lost))
-    first = np.searchsorted(ends, ends - FORGOTTEN)
-    at = np.repeat(np.arange(t.size), np.arange(t.size) - first + 1)
-    j = np.concatenate([np.arange(a, i + 1) for i, a in enumerate(first)])
     weight = (1.0 - ratio) * sliding / (ratio + (1.0 - ratio) * psi)
+    slide = np.flatnonzero(weight)
+    first = np.searchsorted(ends, ends[slide] - FORGOTTEN)
+    counts = slide - first + 1
+    at = np.repeat(slide, counts)
+    place = np.arange(at.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    j = np.repeat(first, counts) + place
     value = (weight[at] * np.exp(ends[j] - ends[at])) * by_step[j]
-    later = j > first[at]  # the error of a step's begin
+    later = place > 0  # the error of a step's begin
     rows, columns = np.concatenate([at, at[later]]), np.concatenate([j, j[later] - 1])
     return coo_array((np.concatenate([value, -value[later]]), (rows, columns)), shape=(t.size,) * 2).tocsr()
