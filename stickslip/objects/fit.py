@@ -165,8 +165,8 @@ class Fit(Shown):
             unit = (VARIABLES | WAYS)[name]
             coords[name.replace(" ", "_")] = ("point", where[name], {"units": unit, "long_name": name})
         data = {
-            "measured": found.slopes.measured, "model": found.slopes.held, "residual": found.marginal,
-            "floor": self._floor, "stiffness": found.slopes.tangent,
+            "measured": found.forces.measured, "model": found.forces.held, "residual": found.marginal,
+            "floor": self._floor, "stiffness": found.forces.tangent,
         }  # fmt: skip
         units = {"stiffness": "N/m"}
         made = {k: ("point", v, {"units": units.get(k, "N")}) for k, v in data.items()}

@@ -528,4 +528,5 @@ def _complete(fit: Fit) -> Fit:
     """The fit with all that pages ask for, found while the bar still runs."""
     for name in ("force", "errors", "unseen_errors", "ladder", "backbone", "std"):
         getattr(fit, name)
+    fit.with_values({})  # what a slider needs is compiled before a hand moves it
     return fit

@@ -199,3 +199,11 @@ def test_the_held_force_is_the_sum_of_its_elements(placed):
         problem.phase == PHASES.index("creep"), 1.0, 1.0 + problem.values(point).get("inertia.share", 0.0)
     )
     np.testing.assert_allclose(heavier * (shares @ point.weights), slopes.held, rtol=1e-12, atol=1e-14)
+
+
+def test_forces_alone_are_those_that_come_with_all_derivatives(placed):
+    problem, point, slopes = placed
+    alone, whole = problem.forces(point), vars(slopes)
+    for name, value in vars(alone).items():
+        for one, other in zip(*([v] if isinstance(v, np.ndarray) else v for v in (value, whole[name])), strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-14 * max(float(np.abs(other).max()), 1.0))

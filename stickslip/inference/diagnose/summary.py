@@ -354,7 +354,7 @@ def variables(d: Diagnosis) -> Variables:
     for r, run in enumerate(d.prepared.runs):
         own = problem.run == r
         dim = f"force{r}_point"
-        held = d.fit.slopes.held[own]
+        held = d.fit.forces.held[own]
         for name, values, unit in (
             ("time", problem.at[own], "s"),
             ("model", held, "N"),

@@ -15,7 +15,7 @@ from .bank import placed
 from .descent import DAMPING, descend
 from .linearised import FARTHEST, Array, Linearised, moved
 from .noise import beyond, known_of
-from .problem import Point, Problem, Slopes
+from .problem import Forces, Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
 from .sensor_walk import grown
 
@@ -33,7 +33,7 @@ class Fit:
 
     Attributes:
         problem, point: what was fitted, and where.
-        slopes: residuals and derivatives there.
+        forces: residuals there.
         scatter: sizes of what is random.
         dropped: points left out, for they lie beyond what else is random (a jump of the sensor), shape (p,).
         known: what the covariance is made of.
@@ -47,7 +47,7 @@ class Fit:
 
     problem: Problem
     point: Point
-    slopes: Slopes
+    forces: Forces
     scatter: Scatter
     dropped: NDArray[np.bool_]
     known: Known
@@ -56,6 +56,11 @@ class Fit:
     strength: float
     evaluations: int
     valleys: tuple[Array, ...] = ()
+
+    @cached_property
+    def slopes(self) -> Slopes:
+        """Forces with all their derivatives: found when asked for where a hand moved the model."""
+        return self.forces if isinstance(self.forces, Slopes) else self.problem.evaluate(self.point)
 
     @cached_property
     def _system(self) -> Linearised:
@@ -111,12 +116,12 @@ class Fit:
     @property
     def residual(self) -> Array:
         """Residual force with every event at its own best strength, stretch and offset (N), shape (p,)."""
-        return self.slopes.residual
+        return self.forces.residual
 
     @property
     def marginal(self) -> Array:
         """Residual force with all events alike (N), shape (p,)."""
-        return self.slopes.residual - (self.slopes.local * self.point.events[self.problem.of]).sum(axis=1)
+        return self.forces.residual - (self.forces.local * self.point.events[self.problem.of]).sum(axis=1)
 
     @property
     def values(self) -> dict[str, float]:
@@ -247,7 +252,7 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
 
 def at(problem: Problem, point: Point, scatter: Scatter, base: Fit) -> Fit:
     """A model at a point, with what is known of the noise as in another fit of the same data."""
-    return _like(base, problem, point, problem.evaluate(point), scatter, 1)
+    return _like(base, problem, point, problem.forces(point), scatter, 1)
 
 
 def again(
@@ -259,17 +264,17 @@ def again(
     return _found(problem, point, problem.evaluate(point), scatter, dropped, known, around, evaluations)
 
 
-def _like(base: Fit, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, evaluations: int) -> Fit:
-    return _found(problem, point, slopes, scatter, base.dropped, base.known, base.around, evaluations)
+def _like(base: Fit, problem: Problem, point: Point, forces: Forces, scatter: Scatter, evaluations: int) -> Fit:
+    return _found(problem, point, forces, scatter, base.dropped, base.known, base.around, evaluations)
 
 
 def _found(
-    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, dropped: NDArray[np.bool_], known: Known,
+    problem: Problem, point: Point, forces: Forces, scatter: Scatter, dropped: NDArray[np.bool_], known: Known,
     around: Point, evaluations: int,
 ) -> Fit:  # fmt: skip
     blocks = Blocks.of(problem.of, problem.events)
     return Fit(
-        problem, point, slopes, scatter, dropped, known.with_local(blocks(slopes.local)), around, blocks,
+        problem, point, forces, scatter, dropped, known.with_local(blocks(forces.local)), around, blocks,
         float(point.weights.sum()), evaluations,
     )  # fmt: skip
 

@@ -73,7 +73,7 @@ def smooth_force(fit: Fit, name: str, values: Array) -> tuple[Array, Array]:
     scaled = np.arcsinh(values / (0.02 * np.abs(values).max())) if name in BENT else values
     nodes = np.unique(np.quantile(scaled, np.linspace(0.0, 1.0, NODES)))
     hats = np.stack([np.interp(scaled, nodes, row) for row in np.eye(nodes.size)], axis=1)
-    columns = -fit.slopes.share[:, None] * hats
+    columns = -fit.forces.share[:, None] * hats
     if name == PULLED and nodes.size > 1:  # it makes the spring another one, for which a reading counts differently
         steeper = np.stack([_slope(scaled, nodes, row) for row in np.eye(nodes.size)], axis=1)
         common = fit.point.common
