@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from stickslip.inference.force.fit import fit, refit
-from stickslip.inference.force.heldout import folds, unseen
+from stickslip.inference.force.heldout import folds, points, unseen
 from stickslip.inference.force.linearised import prior_rows, reach
 
 from .test_derivatives import EFFECTS, with_effects
@@ -56,6 +58,22 @@ def test_what_was_not_seen_is_predicted_less_well_than_what_was(fitted):
     assert np.all(np.isfinite(predicted.cost))
     nothing = unseen(fitted, [np.array([], int)])
     assert not nothing.residual.any()
+
+
+def test_a_model_is_run_with_what_a_fit_without_the_events_finds(fitted):
+    """The force at its parameters is what is predicted to first order, and the others are described no worse."""
+    parts, predicted = folds(fitted), unseen(fitted).residual
+    problem, sd = fitted.problem, np.sqrt(np.diag(fitted.covariance))[: fitted.point.z.size]
+    for part, point in zip(parts, points(fitted, parts), strict=True):
+        hidden = np.isin(problem.of, part)
+        found = problem.forces(point).residual
+        gap = np.linalg.norm(found[hidden] - predicted[hidden]) / np.linalg.norm(predicted[hidden])
+        assert gap < 0.15
+        assert np.abs((point.z - fitted.point.z) / sd).max() > 0.3
+        assert not point.events.any()
+        away = fitted.forces.residual + 0.05 * fitted.strength * hidden  # which a fit that does not see them ignores
+        (other,) = points(replace(fitted, forces=replace(fitted.slopes, residual=away)), [part])
+        assert np.abs((other.z - point.z) / sd).max() < 0.3
 
 
 def test_every_event_is_left_out_once(fitted):

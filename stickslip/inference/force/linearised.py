@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from .bank import spacing
-from .problem import PULL, Point, Problem, Slopes
+from .problem import PULL, Forces, Point, Problem, Slopes
 from .scatter import EVENTS, Blocks, Scatter, Whitening
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class Linearised:
         other.target = np.zeros_like(self.target)
         return other
 
-    def objective(self, point: Point, slopes: Slopes) -> float:
+    def objective(self, point: Point, slopes: Forces) -> float:
         """Of residual, random effects and priors, with this covariance."""
         white = self.plain(self.blocks(slopes.residual)[..., None])
         _, target = prior_rows(self.problem, point)
