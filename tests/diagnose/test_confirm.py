@@ -18,6 +18,8 @@ from stickslip.inference.diagnose.prepare import Prepared
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.heldout import halves, points
+from stickslip.inference.force.knots import NUCLEATION
+from stickslip.inference.force.linearised import moved
 from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
 from stickslip.show.report.free_figures import free_picture
@@ -69,21 +71,44 @@ def test_without_a_hidden_effect_the_free_model_does_what_was_measured(confirmed
     assert len(found["by_run"]) == 2
 
 
+def unsure(base) -> np.ndarray:
+    """How far the force in every nucleation differs between draws of the parameters (N), shape (E,)."""
+    rng, small, drawn = np.random.default_rng(5), 1e-3, []
+    values, turn = np.linalg.eigh(base.covariance)
+    for _ in range(150):
+        change = small * turn @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(values.size))
+        drawn.append(base.problem.forces(moved(base.point, change, base.point.events)).residual - base.residual)
+    variance = np.mean(np.square(drawn), axis=0) / small**2
+    problem = base.problem
+    own = [(problem.of == e) & (problem.phase == NUCLEATION) for e in range(problem.events)]
+    return np.sqrt([variance[points].mean() for points in own])
+
+
 def test_the_scatter_of_the_recurrence_is_that_of_the_force_at_the_onset(plain, confirmed):
+    """Of strengths that differ, of the misfit, and of parameters that are not known better."""
     _, base = plain
     size, m = base.scatter.named(), confirmed.measurement
-    force = np.hypot(size["strength"], size["nucleation"]) * base.strength
-    expected = force / base.values["rig.spring_stiffness"] / np.asarray(m.velocities)
-    later = confirmed.scatter.recurrence[:, 1:4]
-    np.testing.assert_allclose(later, np.broadcast_to(expected[:, None], later.shape), rtol=0.25)
+    random = np.hypot(size["strength"], size["nucleation"]) * base.strength
+    force = np.hypot(random, unsure(base).reshape(2, 4)[:, 1:])
+    expected = force / base.values["rig.spring_stiffness"] / np.asarray(m.velocities)[:, None]
+    np.testing.assert_allclose(confirmed.scatter.recurrence[:, 1:4], expected, rtol=0.25)
 
 
-def test_wrong_parameters_show(plain, confirmed):
+@pytest.fixture
+def stronger(plain, monkeypatch):
+    """Run with a contact so many times as strong as that of the fit."""
     data, base = plain
-    point = replace(base.point, weights=1.05 * base.point.weights)
-    c = confirm({BASE: replace(base, point=point)}, BASE, data)
-    right, wrong = of_all(confirmed, BASE), of_all(c, BASE)
-    # one step of a fold cannot mend it: its slopes are those of the right parameters
+
+    def run(times):
+        point = replace(base.point, weights=times * base.point.weights, events=np.zeros_like(base.point.events))
+        monkeypatch.setattr(confirming, "points", lambda fit, parts: [point] * len(parts))
+        return confirm({BASE: base}, BASE, data)
+
+    return run
+
+
+def test_wrong_parameters_show(stronger, confirmed):
+    right, wrong = of_all(confirmed, BASE), of_all(stronger(1.05), BASE)
     assert wrong["recurrence"]["relative"] > 5.0 * right["recurrence"]["relative"]
     assert wrong["slip"]["relative"] > 2.0 * right["slip"]["relative"]
 
@@ -117,10 +142,8 @@ def test_a_contradiction_needs_both_sides_and_more_than_two_standard_errors():
     assert contradiction((3.0, 1.0), (without, np.where(np.arange(30) == 7, np.nan, worse))) is not None
 
 
-def test_a_slip_that_does_not_come_is_counted_and_said(plain):
-    data, base = plain
-    point = replace(base.point, weights=3.0 * base.point.weights)
-    c = confirm({BASE: replace(base, point=point)}, BASE, data)
+def test_a_slip_that_does_not_come_is_counted_and_said(stronger):
+    c = stronger(3.0)
     found = of_all(c, BASE)
     assert found["missed"] > 0
     assert np.isfinite(found["recurrence"]["relative"])

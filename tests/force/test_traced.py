@@ -168,14 +168,14 @@ def test_traces_of_effects_from_elsewhere_are_not_kept():
     class Elsewhere(Effect):
         tag = "elsewhere"
 
-    def name(*effects, names=("weakening.drop",)):
-        return _program(names, (), jax.tree.structure(effects)).name
+    def name(*effects, names=("weakening.drop",), whole=True):
+        return _program(names, (), jax.tree.structure(effects), whole).name
 
     wear, other = catalogue.get("wear")(), catalogue.get("wear")(course="saturating")
     assert name(wear, Elsewhere()) is None
-    found = {name(), name(wear), name(other), name(wear, names=("weakening.drop", "wear.rate"))}
+    found = {name(), name(whole=False), name(wear), name(other), name(wear, names=("weakening.drop", "wear.rate"))}
     assert None not in found
-    assert len(found) == 4
+    assert len(found) == 5
 
 
 def test_a_force_is_the_same_from_a_kept_trace(folder, small):

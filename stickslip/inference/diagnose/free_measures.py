@@ -10,7 +10,8 @@ The measures are features of a cycle (:mod:`stickslip.inference.features`), of d
 * a misfit of the force in the nucleation, a share e of the strength F_s, lets the slip begin at another force: it comes
   e F_s/(c_s v) later and is (1 + q) e F_s/c_s longer, where q is the share of its swing that the damping leaves of the
   second half (1 without damping). A misfit in the slip is a kinetic friction that differs: (1 + q) e F_s/c_s as well.
-  A virgin contact creeps towards its slip as fast as others nucleate, and there the misfit of the creep counts too;
+  A virgin contact creeps towards its slip as fast as others nucleate, and there the misfit of the creep counts too.
+  What the parameters are not known for is such a misfit as well;
 * the sensor, as for a fit of events.
 """
 
@@ -28,6 +29,7 @@ from ..features.evaluate import of_tracks
 from ..features.measurement import Measurement
 from ..force.fit import Fit
 from ..force.free_run import run_freely
+from ..force.knots import NUCLEATION
 from ..force.problem import Point, Problem
 from ..force.scatter import EVENTS
 
@@ -148,11 +150,23 @@ def _misfit(m: Measurement, fit: Fit, runs: list[int]) -> tuple[Any, ...]:
     spring = own[:, None]
     damping = values["rig.damping"] / (2.0 * np.sqrt(spring * values["rig.mass"]))
     left = np.where(damping < 1.0, np.exp(-np.pi * damping / np.sqrt(np.maximum(1.0 - damping**2, 1e-12))), 0.0)
-    onset = np.full(np.shape(m.cycles.start), size["nucleation"])
-    onset[np.asarray(m.cycles.virgin), 0] = np.hypot(size["nucleation"], size["creep"])
-    late = (onset * fit.known.strength / spring / _speed(m)) ** 2
-    longer = ((1.0 + left) * np.hypot(onset, size["slip"]) * fit.known.strength / spring) ** 2
+    strength, shape = fit.known.strength, np.shape(m.cycles.start)
+    onset = np.full(shape, size["nucleation"] * strength)
+    onset[np.asarray(m.cycles.virgin), 0] = np.hypot(size["nucleation"], size["creep"]) * strength
+    own_events = fit.problem.first[np.asarray(runs)][:, None] + np.arange(shape[1])
+    onset = np.hypot(onset, _unsure(fit)[np.minimum(own_events, fit.problem.events - 1)])
+    late = (onset / spring / _speed(m)) ** 2
+    longer = ((1.0 + left) * np.hypot(onset, size["slip"] * strength) / spring) ** 2
     return late, late, longer, 0.0
+
+
+def _unsure(fit: Fit) -> Array:
+    """How far the force in every event's nucleation is off for what the parameters are not known (N), shape (E,)."""
+    at = np.flatnonzero(fit.problem.phase == NUCLEATION)
+    rows = fit.slopes.shared[at]
+    variance = np.einsum("pi,ij,pj->p", rows, fit.covariance, rows)
+    event, count = fit.problem.of[at], fit.problem.events
+    return np.sqrt(np.bincount(event, variance, count) / np.maximum(np.bincount(event, minlength=count), 1))
 
 
 def _speed(m: Measurement) -> Array:
