@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import matplotlib
 import numpy as np
 import pytest
@@ -9,8 +11,16 @@ import xarray
 from matplotlib.colors import to_rgb
 
 from stickslip.data.segment import thin
-from stickslip.show.plots import creep_figure, effect_figure, save, series_figure, static_against_inertial, trace_figure
-from stickslip.show.plots.style import scaled
+from stickslip.show.plots import (
+    creep_figure,
+    effect_figure,
+    save,
+    series_figure,
+    static_against_inertial,
+    style,
+    trace_figure,
+)
+from stickslip.show.plots.style import scaled, signed_log
 
 
 @pytest.fixture(scope="module")
@@ -107,3 +117,17 @@ def test_thinning_keeps_extremes():
     assert few_y.max() == 5.0 and few_y.min() == -3.0
     assert few_t[0] == 0 and few_t[-1] == t[-1]
     assert np.all(np.diff(few_t) >= 0)
+
+
+@pytest.mark.parametrize("low", [-1e-5, -2e-3, -3.0, 0.0])
+def test_numbers_of_a_signed_logarithmic_axis_do_not_touch(low):
+    values = np.concatenate([[low], np.geomspace(1e-4, 8.0, 50)])
+    made, axes = style.figure(1, 1, width=3.1, height=3.0)
+    axes[0, 0].plot(values, values)
+    signed_log(axes[0, 0], values)
+    made.canvas.draw()
+    inside = axes[0, 0].get_window_extent()
+    boxes = [t.get_window_extent() for t in axes[0, 0].get_xticklabels()]
+    boxes = sorted((b for b in boxes if b.x1 > inside.x0 and b.x0 < inside.x1), key=lambda b: b.x0)
+    assert len(boxes) >= 3
+    assert all(one.x1 < other.x0 for one, other in pairwise(boxes))

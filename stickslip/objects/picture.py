@@ -9,7 +9,7 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
 from ..errors import InputError, nearest
-from ..show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
+from ..show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, signed_log, styled
 from ..show.report.force_figures import COLOURS
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def residual(fit: Fit, against: str) -> Figure:
         middle = [np.median(x[p]) * k for p in pieces]
         ax.plot(middle, [np.median(z[p]) for p in pieces], color=colour, lw=1.5, label=plain(run, 24))
     if name in ("velocity", "time_in_contact"):
-        ax.set_xscale("symlog", linthresh=max(0.002 * float(np.abs(x).max()) * k, 1e-300))
+        signed_log(ax, x * k)
     ax.axhline(0.0, color=LIGHT, lw=0.8)
     label = {"age": "time in contact", "place": "displacement", "event": "number of the event"}.get(against, against)
     ax.set(xlabel=f"{label} / {unit}" if unit else label, ylabel="residual force / floor", ylim=(-WIDEST, WIDEST))

@@ -13,7 +13,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
 from ...system.runstore import write_aside
 from ...system.units import PREFIXES, power_for, takes_prefix
@@ -80,6 +80,22 @@ def logarithmic(axes: Axes, which: str) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def signed_log(axes: Axes, values: np.ndarray) -> None:
+    """A horizontal axis that is logarithmic to both sides of a linear piece, with numbers that do not touch.
+
+    Args:
+        axes: drawn in.
+        values: that are drawn, in the axis' unit.
+    """
+    low, high = float(np.min(values)), float(np.max(values))
+    top = max(-low, high, 1e-300)
+    linear = 0.002 * top
+    axes.set_xscale("symlog", linthresh=linear)
+    least = linear * (3.0 if low > -linear else 30.0)  # numbers of both sides meet at zero
+    decades = 10.0 ** np.arange(np.ceil(np.log10(least)), np.floor(np.log10(top)) + 1.0)
+    axes.xaxis.set_major_locator(FixedLocator([*-decades[decades <= -low], 0.0, *decades[decades <= high]]))
 
 
 def remark(axes: Axes, text: str) -> None:

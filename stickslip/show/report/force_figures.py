@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, signed_log, styled
 from .figures import series
 
 if TYPE_CHECKING:
@@ -80,8 +80,7 @@ def residual_picture(data: xarray.Dataset, names: list[str]) -> Figure:
             middle = np.array([np.median(x[p]) for p in pieces]) * k
             ax.plot(middle, [np.median(z[p]) for p in pieces], color=colour, lw=1.4, label=label)
         if name in ("velocity", "time_in_contact"):
-            least = 0.002 * max(float(np.max(np.abs(v))) for v in values) * k
-            ax.set_xscale("symlog", linthresh=max(least, 1e-300))
+            signed_log(ax, np.concatenate(values) * k)
         ax.axhline(0.0, color=LIGHT, lw=0.8)
         ax.set(xlabel=f"{text} / ({shown})" if "/" in shown else f"{text} / {shown}", ylim=(-4, 4))
     axes[0, 0].set_ylabel("residual force / floor")
