@@ -1,0 +1,70 @@
+"""How far free simulations of fitted models are off on campaigns of another simulator: a table of docs/diagnosis.
+
+``python -m tests.diagnose.free_runs`` makes the campaigns (two runs of four slips), fits, runs the models freely
+through events that their fits have not seen, and writes the table to ``docs/results/figures.json``.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from stickslip import __version__
+from stickslip.inference.diagnose.confirm import confirm
+from stickslip.inference.diagnose.engine import settled
+from stickslip.inference.diagnose.free_errors import errors
+from stickslip.inference.diagnose.prepare import Prepared
+from stickslip.inference.force.candidates import try_effect
+from stickslip.inference.force.fit import fit
+from stickslip.inference.force.signatures import Explained
+from stickslip.physics.effects import catalogue
+from stickslip.system import cache
+from tests.force.conftest import made, seen
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results" / "figures.json"
+PART, AGEING = "free runs", "contact-ageing"
+COLUMNS = ["campaign of another simulator, two runs of four slips", "model", "recurrence off by", "in scatters"]
+BASE, AGED = ("static", "inertia"), ("static", "inertia", AGEING)
+
+
+def rows(name: str, folder: Path, seed: int, hidden: tuple[Any, ...] = ()) -> list[list[str]]:
+    """One campaign's rows of the table."""
+    case = made(folder, seed, hidden, spring_known=True)
+    data = Prepared(case.problem, case.point, tuple(case.traces), tuple(case.found), case.times, ())
+    base = fit(case.problem, case.point)
+    models, last, named = {BASE: base}, BASE, {BASE: "base"}
+    if hidden:
+        form = next(iter(catalogue.forms(catalogue.get(AGEING))))
+        models[AGED] = settled(base, try_effect(base, Explained(base), AGEING, [form])[0])
+        last, named = AGED, {**named, AGED: "base and contact ageing"}
+    c = confirm(models, last, data)
+    out = []
+    for parts, words in named.items():
+        found = errors(c, c.models[parts])["recurrence"]
+        out.append([name, words, f"{100.0 * found['relative']:.2g} %", f"{found['scatters']:.2g}"])
+    return out
+
+
+def main() -> None:
+    """Make the table and keep it."""
+    cache.enable()
+    with tempfile.TemporaryDirectory() as folder:
+        at = Path(folder)
+        found = [
+            *rows("nothing hidden, first", at / "first", 11),
+            *rows("nothing hidden, second", at / "second", 12),
+            *rows("contact ageing at ten times what can be seen", at / "aged", 11, (seen(AGEING, "logarithm", 10.0),)),
+        ]
+    known = json.loads(RESULTS.read_text(encoding="utf-8"))
+    known[PART] = {
+        "version": __version__, "date": date.today().isoformat(), "command": "python -m tests.diagnose.free_runs",
+        "columns": COLUMNS, "rows": found,
+    }  # fmt: skip
+    RESULTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
