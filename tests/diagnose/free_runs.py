@@ -22,7 +22,7 @@ from stickslip.inference.force.fit import fit
 from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
 from stickslip.system import cache
-from tests.force.conftest import made, seen
+from tests.force.conftest import Case, made, seen
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results" / "figures.json"
 PART, AGEING = "free runs", "contact-ageing"
@@ -30,10 +30,15 @@ COLUMNS = ["campaign of another simulator, two runs of four slips", "model", "re
 BASE, AGED = ("static", "inertia"), ("static", "inertia", AGEING)
 
 
+def prepared(case: Case) -> Prepared:
+    """A campaign as a diagnosis takes it."""
+    return Prepared(case.problem, case.point, tuple(case.traces), tuple(case.found), case.times, ())
+
+
 def rows(name: str, folder: Path, seed: int, hidden: tuple[Any, ...] = ()) -> list[list[str]]:
     """One campaign's rows of the table."""
     case = made(folder, seed, hidden, spring_known=True)
-    data = Prepared(case.problem, case.point, tuple(case.traces), tuple(case.found), case.times, ())
+    data = prepared(case)
     base = fit(case.problem, case.point)
     models, last, named = {BASE: base}, BASE, {BASE: "base"}
     if hidden:

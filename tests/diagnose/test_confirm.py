@@ -14,7 +14,6 @@ from stickslip.inference.diagnose.confirm import confirm
 from stickslip.inference.diagnose.engine import settled
 from stickslip.inference.diagnose.free_errors import contradiction, errors, predicted, summed
 from stickslip.inference.diagnose.free_words import cautions, free_variables
-from stickslip.inference.diagnose.prepare import Prepared
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.heldout import halves, points
@@ -25,11 +24,7 @@ from stickslip.physics.effects import catalogue
 from stickslip.show.report.free_figures import free_picture
 from tests.force.conftest import made, seen
 
-BASE, AGED = ("static", "inertia"), ("static", "inertia", "contact-ageing")
-
-
-def prepared(case):
-    return Prepared(case.problem, case.point, tuple(case.traces), tuple(case.found), case.times, ())
+from .free_runs import AGED, BASE, prepared
 
 
 @pytest.fixture(scope="module")

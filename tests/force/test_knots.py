@@ -107,6 +107,13 @@ def test_windows_are_made_of_the_samples(small):
         np.testing.assert_allclose(k.reading[knot] @ k.samples, k.x[knot], rtol=0.0, atol=1e-15)
         assert np.all(np.diff(k.reading.indptr)[knot] > 1)
         np.testing.assert_allclose(k.drive[knot], trace.drive.position(k.at[slow]), atol=1e-13)
+        np.testing.assert_allclose(np.asarray(k.reading[knot].sum(axis=1)).ravel(), 1.0, atol=1e-12)
+        half = 0.25 * np.minimum(k.t[knot] - k.t[knot - 1], k.t[knot + 1] - k.t[knot])
+        edges = np.searchsorted(trace.time, [k.t[knot] - half, k.t[knot] + half])
+        far = np.diff(edges, axis=0)[0] > 20
+        assert far.sum() > 20
+        for j, a, b in zip(knot[far], *edges[:, far], strict=True):
+            assert k.x[j] == pytest.approx(trace.displacement[a:b].mean(), abs=2e-8)
 
 
 def test_means_over_windows_are_made_of_values_in_their_middles():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -250,7 +251,7 @@ def with_start(
     free = effect_parameters(effect, amplitude=values[effect.amplitude])
     free = [f if f.amplitude and not inside else _kept(f, values) for f in free]
     for name, value in values.items():
-        effect = eqx.tree_at(lambda e, n=name: getattr(e, n), effect, np.float64(value))  # type: ignore[misc]
+        effect = eqx.tree_at(attrgetter(name), effect, np.float64(value))
     return problem.with_composition(problem.composition.with_effect(effect, free)), free
 
 
