@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .checks.spring_force import gain_is_wrong, stick_gain
+from .prescribed import prescribed
 from .readers.repair import from_load_point
 from .segment import Segmentation, block_motion, segment
 from .trace import Trace
@@ -38,13 +39,16 @@ def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[
 def with_displacements(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Trace], list[str]]:
     """Traces of velocity or spring force with the displacement (m) they imply; others as they are.
 
+    Where the motion is prescribed it stays what it is, and so does the force beside it.
+
     Returns:
         The traces, and a sentence for each that was given a displacement.
     """
     out, notes = [], []
     for trace, events in zip(traces, found, strict=True):
         position, drive, gain, unit = block_motion(trace, gain=events.settings.gain)
-        if trace.displacement is not None or unit != "m":
+        aside = gain is not None and prescribed(trace, events)
+        if trace.displacement is not None or unit != "m" or aside:
             out.append(trace)
             continue
         notes.append(f"{trace.name}: the displacement is {'drive - F/c_s' if gain else 'the integral of the velocity'}")

@@ -1,3 +1,4 @@
+import json
 import os
 import sys
 import warnings
@@ -29,6 +30,28 @@ def test_matlab(tmp_path, version):
     same(columns, "t", "x")
     assert columns.reader == "mat"
     assert columns.ignored["fs"] == "a single number"
+
+
+def test_json_arrays_rows_and_records(tmp_path):
+    rows = np.column_stack([T, X]).tolist()
+    (tmp_path / "a.json").write_text(json.dumps({"t": T.tolist(), "run": {"x": X.tolist()}, "dt": 1e-3, "unit": "m"}))
+    columns = read_columns(tmp_path / "a.json")
+    same(columns, "t", "run.x")
+    assert columns.reader == "json"
+    (tmp_path / "b.json").write_text(json.dumps({"data": rows}))
+    same(read_columns(tmp_path / "b.json"), "data:1", "data:2")
+    (tmp_path / "c.json").write_text(json.dumps([{"t": t, "x": x} for t, x in rows]))
+    same(read_columns(tmp_path / "c.json"), "t", "x")
+
+
+def test_json_says_what_it_left_out(tmp_path):
+    (tmp_path / "a.json").write_text(json.dumps({"t": [0.0, None, 2.0], "x": ["a", "b"], "y": [[1.0], [2.0, 3.0]]}))
+    columns = read_columns(tmp_path / "a.json")
+    assert np.isnan(columns.data["t"][1])
+    assert set(columns.ignored) == {"x", "y"}
+    (tmp_path / "b.json").write_text('{"t": [1.0, 2.0')
+    with pytest.raises(InputError, match="not a readable JSON file"):
+        read_columns(tmp_path / "b.json")
 
 
 def test_matlab_structs_cells_and_matrices(tmp_path):

@@ -42,7 +42,9 @@ def march(bank, effects, dt, v, state=None, t0=0.0, x0=0.0):
     model = still_model(bank, *effects)
     dt, v = np.broadcast_arrays(np.atleast_1d(np.asarray(dt, float)), np.atleast_1d(np.asarray(v, float)))
     dx, zero = v * dt, 0.0 * dt
-    motions = Motion(*(jnp.asarray(f) for f in (t0 + np.cumsum(dt), dt, x0 + np.cumsum(dx), v, zero, dx, zero, zero)))
+    motions = Motion(
+        *(jnp.asarray(f) for f in (t0 + np.cumsum(dt), dt, x0 + np.cumsum(dx), v, zero, dx, zero, zero, 1.0 + zero))
+    )
     state, (force, body, _) = _march(model, motions, model.rest() if state is None else state)
     return np.asarray(force), np.asarray(body), state
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -202,6 +203,7 @@ def seeds() -> list[tuple[str, bytes]]:
         ("f.npy", _made("f.npy", lambda p: np.save(p, np.asfortranarray(np.column_stack([T, X])).astype(">f4")))),
         ("a.npz", _made("a.npz", lambda p: np.savez(p, **data))),
         ("z.npz", _made("z.npz", lambda p: np.savez_compressed(p, **data))),
+        ("a.json", json.dumps({k: np.asarray(v).tolist() for k, v in data.items()}).encode()),
         ("text.uff", _uff(False)),
         ("binary.uff", _uff(True)),
     ]

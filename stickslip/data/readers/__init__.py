@@ -12,6 +12,7 @@ from ...errors import InputError, nearest
 from ...system.registry import Registry
 from .base import HEAD_BYTES, Columns, Reader, split_unit
 from .hdf import HdfReader
+from .json_arrays import JsonReader
 from .mat import MatReader
 from .netcdf import NetcdfReader
 from .npy import NpyReader
@@ -35,6 +36,7 @@ _BUILT_IN: tuple[Reader, ...] = (
     NpyReader(),
     TdmsReader(),
     UffReader(),
+    JsonReader(),
 )
 for _reader in _BUILT_IN:
     READERS.register(_reader.name, _reader)

@@ -19,6 +19,7 @@ from ..force.candidates import Candidate, every_form
 from ..force.fit import Fit, deviations, fit
 from ..force.heldout import unseen
 from ..force.linearised import Array
+from ..force.prescribed import applies
 from ..force.problem import Point, Problem
 from ..force.residual import Structure, structures
 from ..force.rig import slips_finding, spring_freed
@@ -28,7 +29,7 @@ from .checkpoints import Store, kept, name_of
 from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named
 from .prepare import Prepared, prepare
-from .shape import Shape, shape_of
+from .shape import Shape, shape_of, unshaped
 from .trials import Tell, trials
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
@@ -177,6 +178,9 @@ def diagnose(
     if campaign.rig.contacts == 1 and SEVERAL in tags:
         tags.remove(SEVERAL)
         dropped.append(f"{SEVERAL}: not tried, for the rig has one contact")
+    if prepared.prescribed:
+        tags = [t for t in tags if applies(t)]
+    tags = [t for t in tags if prepared.shows(catalogue.get(t))]
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
     tell("fitting the base model", 0.5)
     base = kept(store, "base", prepared.problem, lambda: fit(prepared.problem, prepared.start))
@@ -204,7 +208,7 @@ def diagnose(
         ladder[-1] = replace(ladder[-1], fit=search.base)
     floor = deviations(search.base)
     tell("the laws of the backbone", 1.0)
-    shape = shape_of(search.base, campaign.rig, tags)
+    shape = unshaped(search.base, campaign.rig) if prepared.prescribed else shape_of(search.base, campaign.rig, tags)
     verdict = verdict if wrong else with_shape(verdict, shape)
     complete = in_time()
     confirmed = confirm(leading(ladder, search.named), ladder[-1].model, prepared, store, tell, in_time)

@@ -7,16 +7,22 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ...data.campaign import Campaign
+from ...data.prescribed import prescribed, with_motion
 from ...data.segment import Segmentation
 from ...data.trace import Trace
 from ...errors import InputError, nearest
+from ...physics.effects.base import Effect
 from ..features.measurement import Measurement, doubts, measure
 from ..fit.start import FALLBACK_PERIOD, ringing, shared_rig
 from ..force.knots import Knots, knots
+from ..force.prescribed import SAID, thinned
+from ..force.prescribed import begin as begin_prescribed
 from ..force.problem import Point, Problem
+from ..force.rig import SPRING
 from ..force.scales import Scales, scales, too_coarse
 from ..force.starting_values import begin
 
+BOTH = 0.1  # of the force one way, which it takes the other way at least
 FEWEST = 2  # slips of a run that takes part
 MOST_CYCLES = 40  # of a run, that are run freely
 UNHEARD = "no ringing is heard after the slips, so the contact's stiffness is known from the creep alone"
@@ -31,6 +37,7 @@ class Prepared:
         traces, segmentations: of the runs that take part, in order.
         scales: times of the campaign.
         dropped: what was left out, and why.
+        prescribed: whether the motion is and the force measured, with no driving spring between.
     """
 
     problem: Problem
@@ -39,11 +46,24 @@ class Prepared:
     segmentations: tuple[Segmentation, ...]
     scales: Scales
     dropped: tuple[str, ...]
+    prescribed: bool = False
 
     @property
     def runs(self) -> tuple[Knots, ...]:
         """The runs at their knots."""
         return self.problem.runs
+
+    def shows(self, effect: type[Effect]) -> bool:
+        """Whether the records hold what an effect needs to be told at all: both signs of the force, a measured load."""
+        return (not effect.both_ways or self.both_ways) and (not effect.measured or self.problem.loaded)
+
+    @cached_property
+    def both_ways(self) -> bool:
+        """Whether the force takes both signs, each beyond a tenth of the other."""
+        stated = self.problem.values(self.start)[SPRING]
+        pulls = [(k.stiffness or stated) * (k.drive - k.x) for k in self.runs]
+        low, high = min(float(p.min()) for p in pulls), max(float(p.max()) for p in pulls)
+        return min(high, -low) > BOTH * max(high, -low)
 
     @cached_property
     def measurement(self) -> Measurement:
@@ -52,6 +72,8 @@ class Prepared:
         Raises:
             InputError: no cycle can be compared.
         """
+        if self.prescribed:
+            raise InputError("the motion is prescribed, so no slip is the block's own and none can be predicted")
         ring = self.scales.ring or FALLBACK_PERIOD
         return measure(self.traces, self.segmentations, ring_period=ring, most_cycles=MOST_CYCLES)
 
@@ -66,20 +88,25 @@ def prepare(
         holdout: runs to keep aside.
 
     Raises:
-        InputError: no run of that name; no run has displacement, drive and slips, or the mass is not given.
+        InputError: no run of that name; no run has displacement, drive and slips, or the mass is not given; nor has any
+            a measured force and a motion of its own.
     """
     names = [t.name for t in traces]
     for name in holdout:
         if name not in names:
             raise InputError("no run of this name to hold out", key="--holdout", value=name, hint=nearest(name, names))
-    used, dropped = [], []
+    used, given, dropped = [], [], []
     for trace, found in zip(traces, segmentations, strict=True):
         aside = trace.name in holdout or (not holdout and trace.role == "held-out")
         why = "kept aside: no fit sees it" if aside else _why_not(trace, found)
+        if why and not aside and prescribed(trace, found):
+            given.append((trace, found))
         if why:
             dropped.append(f"{trace.name}: {why}")
         else:
             used.append((trace, found))
+    if not used and given:
+        return _prescribed(campaign, given)
     if not used:
         usable = [t for t in traces if t.displacement is not None and t.drive is not None]
         slips = max((len(s.events) for s in segmentations), default=0)
@@ -108,6 +135,15 @@ def prepare(
     except InputError as error:
         raise error.at(file=campaign.path) from None
     return Prepared(problem, start, kept, segments, times, tuple(dropped))
+
+
+def _prescribed(campaign: Campaign, given: Sequence[tuple[Trace, Segmentation]]) -> Prepared:
+    """Runs without a driving spring."""
+    traces, segments = tuple(with_motion(t) for t, _ in given), tuple(s for _, s in given)
+    runs = [thinned(t) for t in traces]
+    problem, start = begin_prescribed(shared_rig(campaign, [t.name for t in traces]), runs)
+    step = 1.0 / min(t.sampling_rate for t in traces)
+    return Prepared(problem, start, traces, segments, Scales(step, 0.0, step), (SAID,), True)
 
 
 def _why_not(trace: Trace, found: Segmentation) -> str:

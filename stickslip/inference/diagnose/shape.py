@@ -98,6 +98,13 @@ def shape_of(fit: Fit, rig: Any, tags: Sequence[str] | None = None) -> Shape:
     return judged(curve, power, found)
 
 
+def unshaped(fit: Fit, rig: Any) -> Shape:
+    """The backbone where elasticity of the instrument is in series with the contact, so that no law of a contact is."""
+    curve = backbone(fit)
+    power = power_law(curve, int(rig.contacts or 1))
+    return Shape(curve, power, lacking="The backbone is of contact and instrument in series, no law of a contact.")
+
+
 def judged(curve: Backbone, power: PowerLaw, found: Laws) -> Shape:
     """Which of the laws is to be named: seen beyond chance, on top of a roughness that is known."""
     tried = max(len(found.shaped), 1)

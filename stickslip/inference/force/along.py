@@ -31,6 +31,7 @@ class Way(NamedTuple):
         turn: from the knot before to the turning point within the increment (m); zero where there is none.
         strength, stretch: factors on caps and on yield displacements of all elements, which vary from event to event.
         shape: power of an element's yield displacement, over the mean of all, by which it is stretched besides.
+        load: normal load over its median, 1 where it was not measured.
     """
 
     t: Any
@@ -41,6 +42,7 @@ class Way(NamedTuple):
     strength: Any
     stretch: Any
     shape: Any
+    load: Any
 
 
 class Held(NamedTuple):
@@ -85,16 +87,16 @@ def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
     mass = model.mass()
     start = model.rest(way.t[0], way.x[0], way.v[0])
     dt, dx = jnp.diff(way.t, prepend=way.t[:1]), jnp.diff(way.x, prepend=way.x[:1])
-    items = (way.t, dt, way.x, dx, way.v, led, way.turn, way.strength, way.stretch, way.shape)
+    items = (way.t, dt, way.x, dx, way.v, led, way.turn, way.strength, way.stretch, way.shape, way.load)
     apart = departures(bank)
     share = 1.0 / jnp.where(bank.strength > 0.0, bank.strength, 1.0)
 
     def step(i: Array, carry: tuple[State, Array, Held]) -> tuple[State, Array, Held]:
         state, pull, held = carry
-        t, dt, x, dx, v, at, turn, strength, stretch, shape = (a[i] for a in items)
+        t, dt, x, dx, v, at, turn, strength, stretch, shape, load = (a[i] for a in items)
         own = Bank(bank.stiffness * jnp.exp(jnp.log(strength / stretch) - shape * apart), bank.strength * strength)
         contact = Contact(state.force, own.stiffness, own.strength, pull, state.cap, mass)
-        motion = Motion(t, dt, x, v, turn, dx, at)
+        motion = Motion(t, dt, x, v, turn, dx, at, load=load)
         state, forces = model.advance(state, own, contact, motion)
         sticks = jnp.abs(state.force) < state.cap * (1.0 - 1e-6)
         tangent = jnp.sum(jnp.where(sticks, state.stiffness, 0.0))

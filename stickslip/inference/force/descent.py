@@ -46,7 +46,7 @@ def descend(
         trial = moved(here[0], change, events)
         there = problem.evaluate(trial)
         count += 1
-        held = np.isfinite(there.residual).all() and trial.weights.sum() > 0.0
+        held = there.finite and trial.weights.sum() > 0.0
         then = system.objective(trial, there) if held else np.inf
         if then < cost:
             poor = poor + 1 if cost - then < SETTLED else 0

@@ -168,7 +168,7 @@ def fit(
     out = np.zeros(problem.of.size, bool) if dropped is None else dropped
     slopes = problem.evaluate(point)
     evaluations, damping = 1, DAMPING
-    if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
+    if not slopes.finite:
         raise FitError("the model gives no finite force along the motion")
     for turn in range(rounds):
         if scatter is None and turn == PLACED:
@@ -215,7 +215,7 @@ def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
         FitError: the model gives no finite force at the start.
     """
     blocks, slopes = base.blocks, problem.evaluate(point)
-    if not (np.isfinite(slopes.residual).all() and np.isfinite(slopes.shared).all()):
+    if not slopes.finite:
         raise FitError("the model gives no finite force along the motion")
     point, slopes, _, count, _ = descend(problem, point, slopes, base.scatter, base.known, blocks, last)
     return _like(base, problem, point, slopes, base.scatter, count + 1)

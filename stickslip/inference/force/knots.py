@@ -28,7 +28,7 @@ Index = NDArray[np.intp]
 
 CREEP, NUCLEATION, SLIP, RING = range(4)
 PHASES = ("creep", "nucleation", "slip", "ring-down")
-POINTS = ("at", "phase", "of", "rate", "acceleration", "place", "elapsed")
+POINTS = ("at", "phase", "of", "rate", "acceleration", "place", "elapsed", "force_noise")
 UNSTEADY = 4.0  # levels of slow noise by which two windows must differ
 
 
@@ -60,6 +60,8 @@ class Knots:
         noise: standard deviation of one sample (m).
         stiffness: of the driving spring, where this run has its own (N/m).
         virgin: whether the contact is force-free at the start.
+        load: measured normal load at the knots (N), NaN where there is none.
+        force_noise: variance of the force at the points where that is measured by itself, else zero (N^2).
     """
 
     name: str
@@ -85,6 +87,13 @@ class Knots:
     noise: float
     stiffness: float | None
     virgin: bool
+    load: Array
+    force_noise: Array
+
+    @property
+    def prescribed(self) -> bool:
+        """Whether the force is measured beside a prescribed motion."""
+        return bool(self.force_noise.any())
 
     @property
     def events(self) -> int:
@@ -300,7 +309,7 @@ class _Pieces:
             made["at"], phase, of, made["rate"], made["acceleration"], samples,
             turns.rows(reading), (moving[0], moving[1]),
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, begun), np.diff(begun),
-            noise, trace.spring_stiffness, trace.virgin,
+            noise, trace.spring_stiffness, trace.virgin, load_at(trace, knot_t), np.zeros(of.size),
         )  # fmt: skip
         return selected(knots_made, keep)
 
@@ -318,6 +327,11 @@ class _Pieces:
             columns.append(part.coords[1])
             values.append(part.data)
         return _sparse(values, rows, columns, shape)
+
+
+def load_at(trace: Trace, t: Array) -> Array:
+    """Measured normal load at some times (N), NaN where none was measured; shape as ``t``."""
+    return np.full(t.size, np.nan) if trace.normal_load is None else np.interp(t, trace.time, trace.normal_load)
 
 
 def bow(t: Array, width: Array, breaks: Array) -> csr_array:

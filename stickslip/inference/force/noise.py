@@ -77,6 +77,7 @@ def noise(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Arr
         together = event[own][i] == event[own][j]
         i, j = i[together], j[together]
         out[event[own][i], place[own][i], place[own][j]] = run.noise**2 * pairs.data[together]
+        out[event[own], place[own], place[own]] += run.force_noise
         first += run.at.size
     return out
 

@@ -35,6 +35,7 @@ PULL = "start.pull"  # of the spring at the start of a record, where the contact
 PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
 CREEPING = PHASES.index("creep")
 LEAST_ROOM = 1024  # knots
+LOADED = 1e-3  # of the load, which it must vary by to be told of
 EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
 NODES = (
     -8.0,
@@ -189,6 +190,11 @@ class Slopes(Forces):
 
     shared: Array
 
+    @property
+    def finite(self) -> bool:
+        """Whether a search can go on from here."""
+        return all(np.isfinite(a).all() for a in (self.residual, self.local, self.shared))
+
 
 class Problem:
     """All runs of a campaign under one composition."""
@@ -198,7 +204,10 @@ class Problem:
         first = np.cumsum([0, *(k.events for k in runs)])
         self.first, self.events = first[:-1], int(first[-1])
         room = _room(max(k.t.size for k in runs))
-        self.ways = tuple(_padded(k, room) for k in runs)
+        loads = np.concatenate([k.load for k in runs])
+        median = float(np.median(loads)) if np.isfinite(loads).all() else None
+        self.loaded = median is not None and float(np.std(loads)) > LOADED * abs(median)
+        self.ways = tuple(_padded(k, room, median) for k in runs)
         self.of = np.concatenate([k.of + f for k, f in zip(runs, first[:-1], strict=True)])
         self.run = np.concatenate([np.full(k.at.size, r) for r, k in enumerate(runs)])
         self.event_run = np.concatenate([np.full(k.events, r) for r, k in enumerate(runs)])
@@ -314,14 +323,15 @@ class Problem:
                 rate, acceleration = rate + first @ shift[:n], acceleration + second @ shift[:n]
             spring = starts["rig.spring_stiffness"] if run.stiffness is None else run.stiffness
             steep = mean @ slope[:n] / (mean @ np.ones(n))
-            counts = gain * np.where(slow[s], steep / spring, mass / c.mass)
+            read = not run.prescribed  # else a reading is told by itself, and the likelihood is that of the force
+            counts = gain * np.where(slow[s], steep / spring, mass / c.mass) if read else np.ones(run.at.size)
             share[s] = 1.0 / counts
             residual[s] = share[s] * (mean @ q[:n] - mass * acceleration - damping * rate)
             moved = mean @ dq[:, :n].T - acceleration[:, None] * dmass
             if sensed:
                 moved = moved - mass * (second @ dshift[:, :n].T) - damping * (first @ dshift[:, :n].T)
             grown = np.where(slow[s, None], (mean @ dslope[:, :n].T) / (mean @ slope[:n])[:, None], dmass / mass)
-            moved = share[s, None] * moved - residual[s, None] * (grown + dgain / gain)
+            moved = share[s, None] * moved - read * residual[s, None] * (grown + dgain / gain)
             local[s] = moved[:, -OWN:]
             if whole:
                 slopes[s, bent] = moved[:, : len(bent)]
@@ -348,14 +358,14 @@ def _room(size: int) -> int:
     return int(max(LEAST_ROOM, 2 ** int(np.ceil(np.log2(size)))))
 
 
-def _padded(k: Knots, n: int) -> Way:
+def _padded(k: Knots, n: int, load: float | None) -> Way:
     def grown(a: Array, step: float = 0.0) -> Array:
         return np.concatenate([a, a[-1] + step * np.arange(1, n - a.size + 1)])
 
     # turning points are knots
     return Way(
         grown(k.t, 1e-3), grown(k.x), np.concatenate([k.v, np.zeros(n - k.v.size)]), grown(k.drive), np.zeros(n),
-        np.ones(n), np.ones(n), np.zeros(n),
+        np.ones(n), np.ones(n), np.zeros(n), np.ones(n) if load is None else grown(k.load / load),
     )  # fmt: skip
 
 

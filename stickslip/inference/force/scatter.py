@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event to event
 NAMES = (*EVENTS, *PHASES, "position", "walk", "fringe", "white")
 _OWN, _PHASE = len(EVENTS), slice(len(EVENTS), len(EVENTS) + len(PHASES))
+_LENGTHS = EVENTS.index("offset")  # that many are logarithms
 _POSITION, _WALK, _FRINGE, _WHITE = range(len(NAMES) - 4, len(NAMES))
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
 CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0]))
@@ -330,6 +331,7 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     """
     low = np.append(CENTRES[:-1] - 5.0 * WIDTHS[:-1], -0.05)
     high = np.append(CENTRES[:-1] + 4.0 * WIDTHS[:-1], 1.0)
+    high[:_LENGTHS] = np.minimum(high[:_LENGTHS], 0.0)  # further apart than an e-fold are no two events of one contact
     sizes, damping = np.clip(start.sizes, low, high), 1e-2
     cost, root = _misfit(sizes, residual, known)
     for _ in range(steps):

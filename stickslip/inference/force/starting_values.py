@@ -117,7 +117,7 @@ def begin(
     point = Point(
         vector(composition.shared), begun, flat, np.zeros((problem.events, OWN)), np.zeros(problem.cycles.shape[1])
     )
-    return problem, _weighed(problem, point, strength)
+    return problem, with_weights(problem, point, strength)
 
 
 def _creep(runs: Sequence[Knots], found: Sequence[Segmentation]) -> float:
@@ -126,7 +126,7 @@ def _creep(runs: Sequence[Knots], found: Sequence[Segmentation]) -> float:
     return max(float(np.median(np.abs(crept))) if crept else 1e-6, 1e-9)
 
 
-def _weighed(problem: Problem, point: Point, strength: float) -> Point:
+def with_weights(problem: Problem, point: Point, strength: float) -> Point:
     """The point with weights by non-negative least squares."""
     slopes = problem.evaluate(point)
     k = point.weights.size

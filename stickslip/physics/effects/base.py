@@ -29,6 +29,7 @@ class Motion(NamedTuple):
         dx: displacement from the start to the end (m).
         load_point: displacement of the load point at the end (m).
         pull: force of the driving spring at the end (N); filled in by the model.
+        load: normal load over its median where it was measured, else 1.
     """
 
     t: Array
@@ -39,6 +40,7 @@ class Motion(NamedTuple):
     dx: Array
     load_point: Array
     pull: Array | float = 0.0
+    load: Array | float = 1.0
 
     @property
     def path(self) -> Array:
@@ -108,6 +110,8 @@ class Effect(eqx.Module):
             put energy in; all others are held to be passive by the conformance suite.
         periodic: of a wave: the parameter that is its period (or "frequency"), and over what it is periodic: "time",
             "load point" or "displacement". A parameter called ``phase`` gets a value for each run.
+        both_ways: whether it is told only where the force on the contact takes both signs; it is not tried elsewhere.
+        measured: channel of the record that it needs, such as "normal_load"; it is not tried without.
         drawn: whether its course is one draw at random. Such an effect is simulated; what a measurement says of it is
             a size and a length (:meth:`stickslip.Campaign.levels`), and no course that could be fitted.
     """
@@ -123,6 +127,8 @@ class Effect(eqx.Module):
     exponents: ClassVar[tuple[str, ...]] = ()
     periodic: ClassVar[tuple[str, Literal["time", "load point", "displacement"]] | None] = None
     family: ClassVar[str] = "contact"
+    both_ways: ClassVar[bool] = False
+    measured: ClassVar[str] = ""
     drawn: ClassVar[bool] = False
     symbols: ClassVar[dict[str, str]] = {}
 

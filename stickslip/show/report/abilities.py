@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...data.prescribed import prescribed
 from ...data.segment import LAWS, Segmentation, Shapes, event_shapes
 from ...data.trace import Trace
 from ...inference.fit.creep_process import V_LIM, creep_processes
@@ -37,7 +38,13 @@ def abilities(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) ->
     can: list[str] = []
     cannot: list[str] = []
     slipping = [(t, s) for t, s in pairs if s.events]
-    if not slipping:
+    given = [t.name for t, s in pairs if prescribed(t, s)]
+    if given:
+        can.append(
+            f"A force beside a prescribed motion in {_some(given)}: the law of friction is driven by that motion, and "
+            "elasticity of the instrument counts as the contact's."
+        )
+    elif not slipping:
         cannot.append("No trace holds a slip: nothing but creep or sliding can be looked at, no dynamic model fitted.")
     shapes = [event_shapes(t, s) for t, s in slipping]
     verdicts = [judge(pairs, slipping) for judge in (_velocities, _events, _holds, _virgin, _signals, _slow_noise)]
@@ -128,7 +135,7 @@ def _virgin(pairs: Pairs, slipping: Pairs) -> Verdict:
 
 
 def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
-    force = [t.name for t, _ in pairs if t.leading == "spring_force"]
+    force = [t.name for t, s in pairs if t.leading == "spring_force" and not prescribed(t, s)]
     if not force:
         return [], []
     bad = [

@@ -176,7 +176,17 @@ def prescribed() -> Motion:
     dx = 0.5 * dt * (before + v)
     reverses = before * v < 0
     turn = np.where(reverses, 0.5 * dt * before**2 / np.where(reverses, before - v, 1.0), 0.0)
-    fields = (np.cumsum(dt), dt, np.cumsum(dx), v, turn, dx, 0.0 * dt, 0.0 * dt)
+    fields = (
+        np.cumsum(dt),
+        dt,
+        np.cumsum(dx),
+        v,
+        turn,
+        dx,
+        0.0 * dt,
+        0.0 * dt,
+        1.0 + 0.05 * np.sin(np.arange(dt.size)),
+    )
     return Motion(*(jnp.asarray(f) for f in fields))
 
 

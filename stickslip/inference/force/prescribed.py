@@ -1,0 +1,213 @@
+"""Runs whose motion is prescribed and whose force is measured, with no driving spring between.
+
+The force on the contact is a channel of the record, so nothing is slow or fast and every point is a window. Elasticity
+between where the motion is read and the contact is in series with it, and part of the backbone. The measured force
+stands in the model as that of a spring far softer than the contact, whose elongation it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+from ...data.campaign import Rig
+from ...data.resolution import estimate_resolution, noise_level
+from ...data.trace import Drive, Trace
+from ...physics.effects import catalogue
+from ..fit.parameters import Free, vector
+from .knots import CREEP, Knots, bow, load_at
+from .problem import OWN, Composition, Point, Problem
+from .smoothing import onward
+from .starting_values import ELEMENTS, REACH, known, with_weights
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+AFTER, EVEN = 24, 24  # windows of a stretch: spaced as the logarithm of the time from its start, and evenly
+FASTER = 1.5  # times the speed: another stretch, where the motion has few speeds
+STILL = 0.05  # of the usual speed: the motion rests
+SETTLED = 0.75  # of a stretch's way, after which all elements are taken to slide and the next event begins
+SOFT = 1e-6  # stiffness of the spring that the measured force stands in, over that of the contact
+PLACED_APART = 3.0  # of two stretches of an event in the coordinate along which misfits are alike
+ROLES = {"Drive", "Spring", "Inertia"}  # of effects that need a driving spring
+SAID = (
+    "the motion is prescribed and the force measured, with no driving spring between: what acts on spring, drive or "
+    "mass is not tried, and nothing is simulated freely"
+)
+
+
+def applies(tag: str) -> bool:
+    """Whether an effect means something where no spring drives the block."""
+    effect = catalogue.get(tag)
+    return not ROLES & set(catalogue.roles(effect)) and effect.family != "drive"
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Samples between two changes of the motion: ``first`` to before ``last``; ``way`` is its displacement (m)."""
+
+    first: int
+    last: int
+    way: float
+    moving: bool
+
+
+def stretches(t: Array, x: Array, noise: float, count: float | None) -> list[Stretch]:
+    """Where a motion goes one way, rests, or goes on at another speed."""
+    pieces = Drive.sampled(t, x, count or 0.0, noise)
+    speeds = np.diff(pieces.positions) / np.diff(pieces.times)
+    usual = pieces.speed
+    few = pieces.speeds(FASTER)
+    kinds = np.sign(speeds) * (np.abs(speeds) > STILL * usual)
+    if len(few) > 1:
+        kinds = kinds * (1 + np.argmin(np.abs(np.log(np.maximum(np.abs(speeds), 1e-300)[:, None] / few)), axis=1))
+    changes = np.flatnonzero(np.diff(kinds)) + 1
+    edges = np.concatenate([[0], np.searchsorted(t, pieces.times[changes]), [t.size]])
+    own = kinds[np.concatenate([[0], changes])]
+    return [
+        Stretch(int(a), int(b), float(x[b - 1] - x[a]), bool(k))
+        for a, b, k in zip(edges[:-1], edges[1:], own, strict=True)
+        if b > a
+    ]
+
+
+def edges_within(stretch: Stretch) -> Index:
+    """Edges of the windows of a stretch, some as the logarithm of the time from its start and some evenly."""
+    a, b = stretch.first, stretch.last
+    size = b - a
+    if size < 4:
+        return np.array([a, b])
+    after = np.geomspace(1, size, AFTER)
+    return a + np.unique(np.round(np.concatenate([[0.0], after, np.linspace(0, size, EVEN)])).astype(int))
+
+
+def thinned(trace: Trace) -> Knots:
+    """Thin a run of prescribed motion (its displacement) and measured force."""
+    assert trace.spring_force is not None and trace.displacement is not None
+    t, x, force = trace.time, trace.displacement, trace.spring_force
+    count = estimate_resolution(x)
+    noise, forced = noise_level(x, count), noise_level(force, estimate_resolution(force))
+    parts = stretches(t, x, noise, count)
+    edges = [edges_within(s) for s in parts]
+    edges[0] = np.unique(np.maximum(edges[0], 1))  # the first sample is a knot by itself
+    starts = np.concatenate([[0], *(e[:-1] for e in edges)])
+    sizes = np.concatenate([[1], *(np.diff(e) for e in edges)])
+    piece = np.concatenate([[0], *(np.full(e.size - 1, i) for i, e in enumerate(edges))])
+    means = _means(starts, sizes, t.size)
+    at = means @ t
+    width = np.where(np.arange(at.size) == 0, 0.0, sizes / sizes.sum() * (t[-1] - t[0]))
+    breaks = t[[s.first for s in parts[1:]]]
+    back = onward(means @ x, sizes.astype(float), np.ones(at.size, bool), piece, max(noise, count or 0.0))
+    bowed = bow(at, width, breaks)
+    eye = csr_array(np.eye(1)) if at.size == 1 else _identity(at.size)
+    made_of = csr_array(back - back @ bowed)
+    knots_x = made_of @ (means @ x)
+    knots_force = (eye - bowed) @ (means @ force)
+    begins = _begins(parts, t, x)
+    event = np.searchsorted(begins[1:], at, side="right")
+    rate, bend = _rates(at, knots_x, piece)
+    stiffness = SOFT * steepest(knots_x, knots_force, piece)
+    compared = np.arange(1, at.size)
+    compared = compared[(event[compared] > 0) | trace.virgin]
+    if not trace.virgin:
+        event = event - 1  # of a contact that was loaded before the record begins nothing is known until it slides
+        begins = begins[1:]
+    of = event[compared]
+    empty = csr_array((compared.size, at.size))
+    unmoved = csr_array((compared.size, t.size))
+    since = at[compared] - t[[s.first for s in parts]][piece[compared]]
+    least = np.median(np.diff(t))
+    return Knots(
+        trace.name, at, knots_x, rate, knots_x + knots_force / stiffness, event, np.full(at.size, -1),
+        csr_array((eye + bowed)[compared]), (empty, empty), at[compared], np.full(compared.size, CREEP), of,
+        rate[compared], bend[compared], x, csr_array(made_of @ means), (unmoved, unmoved),
+        np.log1p(since / least) / np.log(4.0) + PLACED_APART * piece[compared], at[compared] - begins[of],
+        np.diff(np.append(begins, t[-1])), noise, stiffness, trace.virgin,
+        load_at(trace, at) if trace.normal_load is None else means @ trace.normal_load, forced**2 / sizes[compared],
+    )  # fmt: skip
+
+
+def _identity(n: int) -> csr_array:
+    i = np.arange(n)
+    return coo_array((np.ones(n), (i, i)), shape=(n, n)).tocsr()
+
+
+def _means(starts: Index, sizes: Index, samples: int) -> csr_array:
+    """From samples to means over windows."""
+    columns = np.concatenate([np.arange(a, a + n) for a, n in zip(starts, sizes, strict=True)])
+    rows = np.repeat(np.arange(sizes.size), sizes)
+    return coo_array((np.repeat(1.0 / sizes, sizes), (rows, columns)), shape=(sizes.size, samples)).tocsr()
+
+
+def _begins(parts: Sequence[Stretch], t: Array, x: Array) -> Array:
+    """Times (s) at which events begin: the start, and wherever most of a stretch lies behind that others follow."""
+    far = 0.1 * max((abs(s.way) for s in parts if s.moving), default=0.0)
+    out = [float(t[0])]
+    for s in parts[:-1]:
+        if s.moving and abs(s.way) > far:
+            done = np.abs(x[s.first : s.last] - x[s.first]) >= SETTLED * abs(s.way)
+            out.append(float(t[s.first + int(np.argmax(done))]))
+    return np.array(out)
+
+
+def _rates(t: Array, x: Array, piece: Index) -> tuple[Array, Array]:
+    """Velocity and acceleration at the knots, of every stretch by itself."""
+    rate, bend = np.zeros(t.size), np.zeros(t.size)
+    for own in np.split(np.arange(t.size), np.flatnonzero(np.diff(piece)) + 1):
+        if own.size > 2:
+            rate[own] = np.gradient(x[own], t[own])
+            bend[own] = np.gradient(rate[own], t[own])
+        elif own.size == 2:
+            rate[own] = np.diff(x[own]) / np.diff(t[own])
+    return rate, bend
+
+
+def steepest(x: Array, force: Array, piece: Index) -> float:
+    """Largest slope of force over displacement from the start of a stretch (N/m), beyond what is too near to tell."""
+    near = 1e-3 * float(np.ptp(x))
+    slopes = [0.0]
+    for own in np.split(np.arange(x.size), np.flatnonzero(np.diff(piece)) + 1):
+        way = np.abs(x[own] - x[own[0]])
+        slopes += (np.abs(force[own] - force[own[0]]) / (way + near)).tolist()
+    return max(max(slopes), 1e-300)
+
+
+def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Problem, Point]:
+    """The base model of runs of prescribed motion, and where its fit begins."""
+    levels = np.concatenate([np.abs(k.stiffness * (k.drive - k.x)) for k in runs if k.stiffness is not None])
+    strength = float(np.quantile(levels, 0.95))
+    softest = min(k.stiffness for k in runs if k.stiffness is not None)
+    reach = strength / (softest / SOFT)
+    moving = np.concatenate([np.abs(k.v) for k in runs])
+    speed = float(np.median(moving[moving > STILL * moving.max()]))
+    mass = known(rig.mass, 1e-9 * strength, 0.0)[0]
+    critical = strength / speed
+
+    def log(name: str, unit: str, start: float, width: float, lower: float, upper: float, doc: str) -> Free:
+        return Free(name, unit, "log", start, start, width, lower, upper, doc)
+
+    free = [
+        log("weakening.drop", "1", 0.03, 1.5, 1e-4, 0.95, "1 - kinetic over static friction"),
+        log("weakening.slip_distance", "m", reach, 1.5, 3e-3 * reach, 3e3 * reach,
+            "slip over which strength is lost"),
+        log("weakening.healing_time", "s", reach / speed, 1.5, 1e-3 * reach / speed, 1e3 * reach / speed,
+            "time over which strength returns"),
+        log("rig.damping", "N s/m", 1e-3 * critical, 1.5, 1e-7 * critical, 10.0 * critical, "viscous damping"),
+    ]  # fmt: skip
+    composition = Composition(
+        mass, reach * np.geomspace(*REACH, elements), tuple(free), {"rig.spring_stiffness": softest}, (),
+        (strength, 0.1),
+    )  # fmt: skip
+    problem = Problem(composition, runs)
+    flat = np.full(elements, strength / elements)
+    point = Point(
+        vector(composition.shared),
+        np.zeros((0, len(runs))),
+        flat,
+        np.zeros((problem.events, OWN)),
+        np.zeros(problem.cycles.shape[1]),
+    )
+    return problem, with_weights(problem, point, strength)

@@ -1,0 +1,121 @@
+"""Loops of prescribed motion and measured force: the backbone, the noise and an uneven fixture, from a plain bank."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stickslip.data.campaign import Rig
+from stickslip.data.prescribed import prescribed, with_motion
+from stickslip.data.segment import segment
+from stickslip.data.trace import Trace
+from stickslip.inference.force.backbone import backbone
+from stickslip.inference.force.candidates import try_effect
+from stickslip.inference.force.fit import fit
+from stickslip.inference.force.prescribed import begin, stretches, thinned
+from stickslip.inference.force.signatures import Explained
+from stickslip.physics.effects import catalogue
+
+RATE, STROKE, SPEED, REST = 200.0, 2.4e-4, 2.2e-4, 0.5  # Hz, m, m/s, s
+CAPS = np.full(30, 2.4 / 30)  # N
+YIELDS = np.linspace(2e-6, 9e-5, 30)  # m
+NOISE = 2e-4  # N
+BEND = 8e-7  # m/N^2
+
+
+def stage(cycles: int) -> tuple[np.ndarray, np.ndarray]:
+    """A triangle with a rest at either end (s, m)."""
+    one_way = STROKE / SPEED
+    knots = np.cumsum(np.tile([0.0, one_way, REST, one_way, REST], cycles)[1:])
+    knots = np.concatenate([[0.0], np.unique(knots)])
+    ends = np.concatenate([[0.0], np.tile([1.0, 1.0, 0.0, 0.0], cycles)]) * STROKE
+    t = np.arange(0.0, knots[-1], 1.0 / RATE)
+    return t, np.interp(t, knots, ends)
+
+
+def jenkins(x: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
+    """Force of a bank of Coulomb elements along a way, sample by sample; caps in proportion to a load about 1."""
+    load = np.ones(x.size) if load is None else load
+    force, out = np.zeros(CAPS.size), np.zeros(x.size)
+    for i, step in enumerate(np.diff(x), start=1):
+        force = np.clip(force + CAPS / YIELDS * step, -CAPS * load[i], CAPS * load[i])
+        out[i] = force.sum()
+    return out
+
+
+def record(seed: int, bend: float = 0.0) -> Trace:
+    t, x = stage(4)
+    force = jenkins(x)
+    noise = np.random.default_rng(seed).normal(0.0, NOISE, t.size)
+    return Trace.from_arrays(
+        f"run {seed}", time=t, drive_position=x + bend * force**2, spring_force=force + noise, noise=NOISE, virgin=True
+    )
+
+
+@pytest.fixture(scope="module")
+def plain():
+    runs = [thinned(with_motion(record(seed))) for seed in (1, 2, 3)]
+    return fit(*begin(Rig(), runs))
+
+
+def test_a_record_of_force_and_motion_is_told_from_one_of_a_force_alone():
+    t, _ = stage(1)
+    loop = record(1)
+    assert prescribed(loop, segment(loop))
+    teeth = Trace.from_arrays(time=t, spring_force=(t % 0.3) / 0.3 + 0.1, drive_velocity=SPEED, spring_stiffness=1e4)
+    assert segment(teeth).events
+    assert not prescribed(teeth, segment(teeth))
+
+
+def test_every_stroke_and_every_rest_is_a_stretch_of_its_own():
+    t, x = stage(3)
+    found = stretches(t, x, 1e-9, None)
+    ways = np.array([s.way for s in found if abs(s.way) > 0.5 * STROKE])
+    assert ways.size == 6
+    assert np.sign(ways).tolist() == [1.0, -1.0] * 3
+    assert sum(not s.moving for s in found) >= 5
+
+
+def test_the_backbone_of_the_bank_is_measured(plain):
+    curve = backbone(plain)
+    true = np.array([np.minimum(CAPS, CAPS / YIELDS * u).sum() for u in curve.displacement])
+    inside = (curve.displacement > YIELDS[0]) & (curve.displacement < YIELDS[-1])
+    np.testing.assert_allclose(curve.force[inside], true[inside], atol=3e-3 * CAPS.sum())
+
+
+def test_what_the_bank_leaves_is_small(plain):
+    assert np.sqrt(np.mean(plain.marginal**2)) < 2e-3 * CAPS.sum()
+
+
+def test_an_uneven_fixture_is_found_with_its_size():
+    runs = [thinned(with_motion(record(seed, BEND))) for seed in (1, 2, 3)]
+    base = fit(*begin(Rig(), runs))
+    (found,) = try_effect(base, Explained(base), "uneven-compliance", [{}])
+    assert base.cost - found.fit.cost > 100.0
+    error = found.fit.std()["uneven-compliance.bend"]
+    assert found.fit.values["uneven-compliance.bend"] == pytest.approx(BEND, abs=max(3.0 * error, 0.03 * BEND))
+
+
+def test_an_even_fixture_has_no_uneven_part(plain):
+    (found,) = try_effect(plain, Explained(plain), "uneven-compliance", [{}])
+    assert abs(found.fit.values["uneven-compliance.bend"]) < 0.03 * BEND
+
+
+def test_friction_follows_the_load_that_was_measured_beside_it():
+    runs = []
+    for seed in (1, 2, 3):
+        t, x = stage(4)
+        load = 5.0 * (1.0 + 0.05 * np.sin(1.3 * t + seed))
+        force = jenkins(x, load / 5.0) + np.random.default_rng(seed).normal(0.0, NOISE, t.size)
+        trace = Trace.from_arrays(f"{seed}", time=t, drive_position=x, spring_force=force, noise=NOISE, virgin=True)
+        runs.append(thinned(with_motion(trace.replace(normal_load=load))))
+    base = fit(*begin(Rig(), runs))
+    assert base.problem.loaded
+    (found,) = try_effect(base, Explained(base), "measured-load", [{}])
+    error = found.fit.std()["measured-load.share"]
+    assert base.cost - found.fit.cost > 100.0
+    assert found.fit.values["measured-load.share"] == pytest.approx(1.0, abs=max(3.0 * error, 0.03))
+
+
+def test_an_uneven_fixture_is_tried_only_where_force_goes_both_ways():
+    assert catalogue.get("uneven-compliance").both_ways
