@@ -2,20 +2,23 @@
 
 The numbers are the program's, run on measured records.
 
-    python docs/make_real_data.py [FOLDER]
+    python docs/make_real_data.py [FOLDER] [--only PART ...]
 
 FOLDER holds the records (default: the environment's STICKSLIP_REAL_DATA, else ../shared/data/real beside the
-repository). The records themselves are others' and are not part of this repository.
+repository). The records themselves are others' and are not part of this repository. Reports of diagnoses are left in
+out/real-data.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import io
 import json
 import os
-import sys
+import shutil
 import tempfile
+import tomllib
 from datetime import date
 from pathlib import Path
 from statistics import mean, median, stdev
@@ -24,11 +27,13 @@ from typing import Any
 import numpy as np
 import xarray
 
+import stickslip as ss
 from stickslip import __version__
 from stickslip.cli import run
 from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.segment import segment
 from stickslip.show.plots import save
+from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
 from stickslip.show.report.figures import ripple_picture, trace_picture
 from stickslip.show.report.fit_figures import ramp_grid
 from stickslip.show.report.ripple import stick_spectrum
@@ -70,6 +75,16 @@ minimum_slip = "{smallest} mm"
 stop = "{stop:.3f} s"
 virgin = true
 """
+
+# campaigns of scenarios/real, and where their records are
+PRESCRIBED = {
+    "reciprocating-loops": "reciprocating-loops-200Hz",
+    "drill-string": "torsional-rig-drillstring",
+    "robot-loops": "robot-breakaway-creep/test3",
+    "friction-damper": "friction-damper-brfd",
+    "rock-basalt": "rock-velocity-steps",
+    "rock-sepiolite": "rock-velocity-steps",
+}
 
 # peaks of the force that the collector of the records counted
 BY_EYE = {
@@ -289,17 +304,84 @@ def fault(data: Path, work: Path) -> dict[str, Any]:
     }
 
 
+def prescribed(data: Path, work: Path) -> dict[str, Any]:
+    """Campaigns of scenarios/real whose motion is prescribed and whose force is measured, diagnosed."""
+    return {name: diagnosed(name, data / folder, work / name) for name, folder in PRESCRIBED.items()}
+
+
+def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
+    """One of them: the ladder, what the program says, and a picture."""
+    work.mkdir(parents=True)
+    path = Path(shutil.copy(DOCS.parent / "scenarios" / "real" / f"{name}.toml", work))
+    for trace in tomllib.loads(path.read_text(encoding="utf-8"))["trace"]:
+        for channel in (trace, *(c for c in trace.values() if isinstance(c, dict) and "file" in c)):
+            shutil.copy(records / channel["file"], work)
+    made = ss.load_campaign(path).diagnose()
+    made.save(DOCS.parent / "out" / "real-data" / name, force=True)
+    assert made.found is not None
+    fits = [rung.fit for rung in made.found.ladder if rung.fit is not None]
+    save(hysteresis(fits[0], fits[-1], name), DOCS / "figures" / f"real-{name}.png")
+    verdict = made.result["verdict"]
+    return {
+        "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
+        "says": f"{verdict['kind']}: {verdict['text']}",
+        "ladder": [
+            {
+                "model": rung["added"] or "static", "fitted": rung["train_error"], "unseen": rung["heldout_error"],
+                "force": rung["force_error"],
+            }
+            for rung in made.result["ladder"]
+        ],
+    }  # fmt: skip
+
+
+@styled
+def hysteresis(base: Any, last: Any, title: str) -> Any:
+    """Force against displacement of a run, measured and by the first and the last model, and what either leaves."""
+    problem = base.problem
+    chosen = len(problem.runs) // 2
+    own = np.flatnonzero(problem.run == chosen)
+    run = problem.runs[chosen]
+    x, length = scaled_to(run.mean @ run.x, "m")
+    force, newton = scaled_to(base.forces.measured[own], "N")
+    made, axes = figure(1, 2, width=10.0, height=4.0)
+    left, right = axes[0]
+    left.plot(x, force, ".", ms=3, color=DARK, label="measured")
+    for fit, color, line in ((base, LIGHT, "-"), (last, MIDDLE, "--"))[: 1 + (last is not base)]:
+        share = force / base.forces.measured[own]
+        names = ["base", *(e.tag for e in fit.problem.composition.effects)]
+        left.plot(x, force - fit.marginal[own] * share, line, color=color, lw=1.0, label=plain(" + ".join(names)))
+        right.plot(run.at - run.at[0], 100.0 * fit.marginal[own] / base.strength, line, color=color, lw=1.0)
+    left.set(xlabel=f"displacement / {length}", ylabel=f"force / {newton}", title=plain(title))
+    right.set(xlabel="time / s", ylabel="measured - model / % of the strength", title=plain(run.name))
+    left.legend(loc="best", fontsize="small")
+    return made
+
+
+def scaled_to(values: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
+    """Values in a unit with a prefix that suits them."""
+    k, name = scaled(values, unit)
+    return values * k, name
+
+
 def main() -> None:
-    data = Path(sys.argv[1] if len(sys.argv) > 1 else os.environ.get("STICKSLIP_REAL_DATA", DEFAULT)).resolve()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", nargs="?", default=os.environ.get("STICKSLIP_REAL_DATA", str(DEFAULT)))
+    parser.add_argument("--only", nargs="*", help="parts to make anew; the others stay as they are")
+    asked = parser.parse_args()
+    data = Path(asked.folder).resolve()
     if not data.is_dir():
         raise SystemExit(f"there is no folder {data}; name it, or set STICKSLIP_REAL_DATA")
     (DOCS / "figures").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
-        parts = {f.__name__: f(data, work) for f in (paper, together, robot, fault)}
+        made = (paper, together, robot, fault, prescribed)
+        parts = {f.__name__: f(data, work) for f in made if asked.only is None or f.__name__ in asked.only}
     head = {"version": __version__, "date": date.today().isoformat(), "command": "python docs/make_real_data.py"}
-    text = json.dumps({**head, **parts}, indent=1, ensure_ascii=False)
-    (DOCS / "results" / "real_data.json").write_text(text + "\n", encoding="utf-8")
+    path = DOCS / "results" / "real_data.json"
+    known = json.loads(path.read_text(encoding="utf-8")) if asked.only is not None else {}
+    text = json.dumps({**known, **head, **parts}, indent=1, ensure_ascii=False)
+    path.write_text(text + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

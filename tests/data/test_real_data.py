@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.prescribed import prescribed
 from stickslip.data.readers import read_columns
 from stickslip.data.segment import segment
 from stickslip.errors import InputError
@@ -109,8 +110,10 @@ def test_reciprocating_loops(load, shipped):
     trace = load(file, body + 'spring_force = { column = "Friction" }')
     assert {repair.kind: repair.count for repair in trace.repairs}["dropped-samples"] == 179
     assert "sign opposite" in trace.warnings[0]
-    (trace,) = shipped("reciprocating-loops", "reciprocating-loops-200Hz")
-    assert trace.warnings == ()
+    for part in shipped("reciprocating-loops", "reciprocating-loops-200Hz"):
+        assert part.warnings == ()
+        assert prescribed(part, segment(part))
+    trace = load(file, body + 'spring_force = { column = "Friction", unit = "-1 uN" }')
     found = segment(trace)
     assert found.events == ()
     long = [phase for phase in found.during("hold") if phase.stop - phase.start > 0.8]
@@ -141,11 +144,25 @@ def test_rock_steps_slide(shipped, name):
     assert found.events == ()
 
 
-def test_a_drill_string_sticks_and_slips(shipped):
-    (trace,) = shipped("drill-string", "torsional-rig-drillstring")
-    found = segment(trace)
+def test_a_drill_string_sticks_and_slips(load, shipped):
+    for part in shipped("drill-string", "torsional-rig-drillstring"):
+        assert prescribed(part, segment(part))
+    body = (
+        'time = { column = "time_s", unit = "s" }\nvelocity = { column = "bit_speed_rpm", unit = "0.10471976 m/s" }\n'
+    )
+    body += 'spring_force = { column = "bit_torque_Nm", unit = "N" }'
+    found = segment(load("torsional-rig-drillstring/175_completo_1.csv", body))
     assert 130 <= len(found.events) <= 145  # 140 peaks of the speed
     assert np.median([e.recurrence for e in found.events[1:]]) == pytest.approx(0.36, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "folder"),
+    [("robot-loops", "robot-breakaway-creep/test3"), ("friction-damper", "friction-damper-brfd")],
+)
+def test_motions_that_were_imposed_are_told(shipped, name, folder):
+    for trace in shipped(name, folder):
+        assert prescribed(trace, segment(trace))
 
 
 def test_matlab_and_text_exports_agree(real_data):
