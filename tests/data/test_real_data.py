@@ -147,9 +147,8 @@ def test_rock_steps_slide(shipped, name):
 def test_a_drill_string_sticks_and_slips(load, shipped):
     for part in shipped("drill-string", "torsional-rig-drillstring"):
         assert prescribed(part, segment(part))
-    body = (
-        'time = { column = "time_s", unit = "s" }\nvelocity = { column = "bit_speed_rpm", unit = "0.10471976 m/s" }\n'
-    )
+    body = 'time = { column = "time_s", unit = "s" }\n'
+    body += 'velocity = { column = "bit_speed_rpm", unit = "0.10471976 m/s" }\n'
     body += 'spring_force = { column = "bit_torque_Nm", unit = "N" }'
     found = segment(load("torsional-rig-drillstring/175_completo_1.csv", body))
     assert 130 <= len(found.events) <= 145  # 140 peaks of the speed

@@ -106,10 +106,10 @@ def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> Way:
     x, v = np.concatenate([x, np.full(more, x[-1])]), np.concatenate([v, np.zeros(more)])
     ones = np.ones(KNOTS)
     return Way(
-        *(
-            jnp.asarray(a)
-            for a in (t, x, v, np.interp(t, TIMES, POSITIONS), turning(t, v), ones, ones, 0.0 * ones, ones)
-        )
+        *map(jnp.asarray, (t, x, v, np.interp(t, TIMES, POSITIONS), turning(t, v), ones, ones)),
+        shape=0.0 * ones,
+        load=ones,
+        force=0.0 * ones,
     )
 
 

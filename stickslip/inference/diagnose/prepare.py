@@ -61,7 +61,7 @@ class Prepared:
     def both_ways(self) -> bool:
         """Whether the force takes both signs, each beyond a tenth of the other."""
         stated = self.problem.values(self.start)[SPRING]
-        pulls = [(k.stiffness or stated) * (k.drive - k.x) for k in self.runs]
+        pulls = [(k.stiffness or stated) * (k.drive - k.x) + k.force for k in self.runs]
         low, high = min(float(p.min()) for p in pulls), max(float(p.max()) for p in pulls)
         return min(high, -low) > BOTH * max(high, -low)
 

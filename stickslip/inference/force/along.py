@@ -32,6 +32,7 @@ class Way(NamedTuple):
         strength, stretch: factors on caps and on yield displacements of all elements, which vary from event to event.
         shape: power of an element's yield displacement, over the mean of all, by which it is stretched besides.
         load: normal load over its median, 1 where it was not measured.
+        force: that was measured to pull the block where no spring does (N).
     """
 
     t: Any
@@ -43,6 +44,7 @@ class Way(NamedTuple):
     stretch: Any
     shape: Any
     load: Any
+    force: Any
 
 
 class Held(NamedTuple):

@@ -60,6 +60,7 @@ class Knots:
         noise: standard deviation of one sample (m).
         stiffness: of the driving spring, where this run has its own (N/m).
         virgin: whether the contact is force-free at the start.
+        force: measured force at the knots where the motion is prescribed, else zero (N).
         load: measured normal load at the knots (N), NaN where there is none.
         force_noise: variance of the force at the points where that is measured by itself, else zero (N^2).
     """
@@ -87,6 +88,7 @@ class Knots:
     noise: float
     stiffness: float | None
     virgin: bool
+    force: Array
     load: Array
     force_noise: Array
 
@@ -309,7 +311,8 @@ class _Pieces:
             made["at"], phase, of, made["rate"], made["acceleration"], samples,
             turns.rows(reading), (moving[0], moving[1]),
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, begun), np.diff(begun),
-            noise, trace.spring_stiffness, trace.virgin, load_at(trace, knot_t), np.zeros(of.size),
+            noise, trace.spring_stiffness, trace.virgin, np.zeros(knot_t.size), load_at(trace, knot_t),
+            np.zeros(of.size),
         )  # fmt: skip
         return selected(knots_made, keep)
 

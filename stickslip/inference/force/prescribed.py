@@ -1,8 +1,8 @@
 """Runs whose motion is prescribed and whose force is measured, with no driving spring between.
 
 The force on the contact is a channel of the record, so nothing is slow or fast and every point is a window. Elasticity
-between where the motion is read and the contact is in series with it, and part of the backbone. The measured force
-stands in the model as that of a spring far softer than the contact, whose elongation it is.
+between where the motion is read and the contact is in series with it, and part of the backbone. The driving spring of
+the model has no elongation, so that no law of the spring's force can take the measured force for its own.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ AFTER, EVEN = 24, 24  # windows of a stretch: spaced as the logarithm of the tim
 FASTER = 1.5  # times the speed: another stretch, where the motion has few speeds
 STILL = 0.05  # of the usual speed: the motion rests
 SETTLED = 0.75  # of a stretch's way, after which all elements are taken to slide and the next event begins
-SOFT = 1e-6  # stiffness of the spring that the measured force stands in, over that of the contact
+SOFT = 1e-6  # stiffness of a spring that does nothing, over that of the contact
 PLACED_APART = 3.0  # of two stretches of an event in the coordinate along which misfits are alike
 ROLES = {"Drive", "Spring", "Inertia"}  # of effects that need a driving spring
 SAID = (
@@ -121,11 +121,11 @@ def thinned(trace: Trace) -> Knots:
     since = at[compared] - t[[s.first for s in parts]][piece[compared]]
     least = np.median(np.diff(t))
     return Knots(
-        trace.name, at, knots_x, rate, knots_x + knots_force / stiffness, event, np.full(at.size, -1),
+        trace.name, at, knots_x, rate, knots_x, event, np.full(at.size, -1),
         csr_array((eye + bowed)[compared]), (empty, empty), at[compared], np.full(compared.size, CREEP), of,
         rate[compared], bend[compared], x, csr_array(made_of @ means), (unmoved, unmoved),
         np.log1p(since / least) / np.log(4.0) + PLACED_APART * piece[compared], at[compared] - begins[of],
-        np.diff(np.append(begins, t[-1])), noise, stiffness, trace.virgin,
+        np.diff(np.append(begins, t[-1])), noise, stiffness, trace.virgin, knots_force,
         load_at(trace, at) if trace.normal_load is None else means @ trace.normal_load, forced**2 / sizes[compared],
     )  # fmt: skip
 
@@ -177,7 +177,7 @@ def steepest(x: Array, force: Array, piece: Index) -> float:
 
 def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Problem, Point]:
     """The base model of runs of prescribed motion, and where its fit begins."""
-    levels = np.concatenate([np.abs(k.stiffness * (k.drive - k.x)) for k in runs if k.stiffness is not None])
+    levels = np.abs(np.concatenate([k.force for k in runs]))
     strength = float(np.quantile(levels, 0.95))
     softest = min(k.stiffness for k in runs if k.stiffness is not None)
     reach = strength / (softest / SOFT)

@@ -366,6 +366,7 @@ def _padded(k: Knots, n: int, load: float | None) -> Way:
     return Way(
         grown(k.t, 1e-3), grown(k.x), np.concatenate([k.v, np.zeros(n - k.v.size)]), grown(k.drive), np.zeros(n),
         np.ones(n), np.ones(n), np.zeros(n), np.ones(n) if load is None else grown(k.load / load),
+        grown(k.force),
     )  # fmt: skip
 
 
@@ -426,7 +427,7 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
         seen = way
         if any(isinstance(e, Sensor) for e in effects):
             # the measured force, near enough for a sensor that sees it
-            force = model.block.spring_stiffness * (way.drive - way.x)
+            force = model.block.spring_stiffness * (way.drive - way.x) + way.force
             seen = undone(model, way, force, knots)
         shift = seen.x - way.x
         held = along(model, of_events(seen, event), knots)
@@ -435,7 +436,7 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
         steps = jnp.diff(way.x)
         gain = 1.0 + jnp.sum(steps * jnp.diff(shift)) / jnp.sum(steps**2)
         return (
-            (held.pull + held.body - held.contact, shift, model.mass(), steep, gain),
+            (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, gain),
             (held.elements, held.tangent, held.slides, held.sliding, held.psi),
         )
 

@@ -55,7 +55,8 @@ def coordinates(fit: Fit) -> dict[str, Array]:
     stiffness = np.concatenate([np.full(k.at.size, shared if k.stiffness is None else k.stiffness) for k in runs])
     number = problem.of - problem.first[problem.run]
     path = np.concatenate([k.mean @ np.concatenate([[0.0], np.cumsum(np.abs(np.diff(k.x)))]) for k in runs])
-    values = (problem.at, x, rate, stiffness * (drive - x), problem.elapsed, number.astype(float), path, drive)
+    pulled = stiffness * (drive - x) + np.concatenate([k.mean @ k.force for k in runs])
+    values = (problem.at, x, rate, pulled, problem.elapsed, number.astype(float), path, drive)
     return dict(zip((*VARIABLES, *WAYS), values, strict=True))
 
 
@@ -86,7 +87,10 @@ def structures(fit: Fit, explained: Explained, dispersion: float = 1.0) -> list[
     """All variables, the most telling first."""
     out = []
     found = coordinates(fit)
+    prescribed = any(k.prescribed for k in fit.problem.runs)
     for name, unit in VARIABLES.items():
+        if prescribed and name == PULLED:  # which is what was measured itself
+            continue
         at, columns = smooth_force(fit, name, found[name])
         if at.size < 3:
             continue

@@ -100,7 +100,7 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
                 moving = moving._replace(drive=moving.drive + everything[PULL] / model.block.spring_stiffness)
             seen = moving
             if any(isinstance(e, Sensor) for e in model.effects):
-                force = model.block.spring_stiffness * (moving.drive - moving.x)
+                force = model.block.spring_stiffness * (moving.drive - moving.x) + moving.force
                 seen = undone(model, moving, force, knots)
             held = along(model, of_events(seen, own.value), knots)
             return held.pull + held.body - held.contact, seen.x - way.x, model.mass()
