@@ -32,6 +32,7 @@ TABS = """
 
 def ready() -> None:
     """Panel as the workbench needs it: one design; not by its extension, which loads from the network in a notebook."""
+    importlib.import_module("panel.models.file_dropper")  # its script is then in every window, also in one that chooses
     pn.config.param.update(design=Native, notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
 
 

@@ -104,5 +104,20 @@ def test_the_model_is_saved_listed_and_its_report_shown(browser, home):
     assert not (home.parent / "elsewhere").exists()
 
 
+def test_a_campaign_that_was_chosen_is_shown(tmp_path):
+    shutil.copytree(SCENARIO, tmp_path / "rig")
+    served = Served(tmp_path)
+    made = Browser(str(CHROMIUM), str(DRIVER))
+    try:
+        made.open(served.url)
+        made.press("button", "Open rig")
+        made.wait(lambda: made.js("const d = named('data displacement'); return d && d.data.t.length"), 60)
+        made.wait(lambda: "Simulate" in made.text(".bk-tab"))
+        assert made.complaints() == []
+    finally:
+        made.close()
+        served.end()
+
+
 def test_nothing_is_asked_of_the_network_and_nothing_complained(browser):
     assert browser.elsewhere() == [] and browser.complaints() == []
