@@ -45,8 +45,9 @@ class Free:
         return float(np.log(value)) if self.scale == "log" else float(value) / float(self.scale)
 
     def outward(self, z: float) -> float:
-        """Search scale -> SI."""
-        return float(np.exp(z)) if self.scale == "log" else float(z) * float(self.scale)
+        """Search scale -> SI; rounding leads none across a bound."""
+        value = float(np.exp(z)) if self.scale == "log" else float(z) * float(self.scale)
+        return min(max(value, self.lower), self.upper)
 
     @property
     def bounds(self) -> tuple[float, float]:
