@@ -10,6 +10,7 @@ import numpy as np
 import panel as pn
 from bokeh.models import FixedTicker
 
+from ..data.trace import Trace
 from ..errors import InputError
 from ..inference.force.candidates import every_form
 from ..objects import Fit
@@ -20,7 +21,7 @@ from . import experiments
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Message, Words
 from .evidence import best_forms
-from .experiments import MEASURES, Setting, Telling
+from .experiments import MEASURES, Setting, Swept, Telling
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .overview import record, reduced
 from .parts import Table, head, progress, row_of
@@ -198,7 +199,7 @@ class _Beside:
             r = found.recording
             moved = r["displacement"].values
             self._model.data = _thinned(r["time"].values, moved * k, (r["drive_position"].values - moved) * g)
-        columns, rows = event_rows(experiments.measured(campaign.events[campaign.names.index(run)]), found)
+        columns, rows = event_rows(experiments.measured(campaign.events[campaign.names.index(run)]), found, trace)
         self._table.param.update(columns=columns, rows=rows)
 
 
@@ -224,13 +225,13 @@ def _thinned(t: np.ndarray, x: np.ndarray, gap: np.ndarray) -> dict[str, np.ndar
 
 
 def event_rows(
-    measured: dict[str, tuple[float, float, int]], found: Simulated | None
+    measured: dict[str, tuple[float, float, int]], found: Simulated | None, trace: Trace
 ) -> tuple[list[str], list[list[str]]]:  # fmt: skip
-    """Means over the slips after the first, measured and simulated."""
+    """Means over the slips after the first, measured (in a trace) and simulated."""
     columns = ["means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)]
     if found is None:
         return columns, [["measured", *_cells(measured)]]
-    model = [f"model: {' + '.join(found.fit.parts)}", *_cells(experiments.simulated(found.recording))]
+    model = [f"model: {' + '.join(found.fit.parts)}", *_cells(experiments.simulated(found.recording, trace))]
     verdict = str(found.recording.attrs.get("verdict", ""))
     return [*columns, "what happens"], [["measured", *_cells(measured), ""], [*model, verdict]]
 
@@ -318,16 +319,16 @@ class _Sweep:
     def update(self) -> None:
         """Draw what there is."""
         self._button.disabled = bool(self._work.doing)
-        found = self._work.found
+        found: Swept | None = self._work.found
         every = [v for v, _ in self._steady.values()]
-        velocities = np.array([*every, *([] if found is None else found["value"].values)])
+        velocities = np.array([*every, *([] if found is None else found.velocities)])
         k, unit = unit_of(velocities, "m/s")
-        model: dict[str, Any] = {"v": [] if found is None else found["value"].values * k}
+        model: dict[str, Any] = {"v": velocities[len(every) :] * k}
         measured: dict[str, Any] = {"v": np.array(every) * k, "run": list(self._steady)}
         for key, si in (("recurrence", "s"), ("slip", "m")):
             own = np.array([values[key][0] for _, values in self._steady.values()])
             std = np.array([values[key][1] for _, values in self._steady.values()])
-            theirs = np.array([]) if found is None else found[key].values
+            theirs = np.array([]) if found is None else found.mean(key)
             f, written = unit_of(np.concatenate([own, theirs]), si)
             model[key], measured[key] = theirs * f, own * f
             self._bars[key].data = {
@@ -443,8 +444,9 @@ class _Experiment:
     def _draw(self, telling: Telling) -> None:
         """The models side by side in one experiment."""
         found: list[Telling] = self._work.found
+        campaign = self._session.campaign
         self._table.chosen = next((i for i, t in enumerate(found) if t is telling), -1)
-        if telling is self._drawn or not telling.recordings:
+        if telling is self._drawn or not telling.recordings or campaign is None:
             return
         self._drawn = telling
         theme = look()
@@ -463,7 +465,8 @@ class _Experiment:
             own.xaxis.axis_label, own.yaxis.axis_label = label("time from the start", "s"), label(name, unit)
             legend(own)
         made[1].x_range = made[0].x_range
-        rows = [[tag, *_cells(experiments.simulated(r))] for tag, r in telling.recordings.items()]
+        trace = campaign[telling.setting.run]
+        rows = [[tag, *_cells(experiments.simulated(r, trace))] for tag, r in telling.recordings.items()]
         columns = [
             f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
         ]  # fmt: skip

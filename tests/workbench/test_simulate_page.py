@@ -121,11 +121,11 @@ def test_a_simulation_can_be_cancelled(base):
 def test_a_sweep_comes_to_the_measured_recurrence(session, campaign, base):
     shown = []
     found = experiments.sweep(base, Setting("v100", events=3), "100 um/s", "400 um/s", 3, _silent, shown.append)
-    assert [d.sizes["run"] for d in shown] == [1, 2, 3]
+    assert [len(d.velocities) for d in shown] == [1, 2, 3]
     speed, values = experiments.steady_runs(campaign)["v200"]
     assert speed == pytest.approx(2e-4) and "holds" not in experiments.steady_runs(campaign)
-    assert found["value"].values[1] == pytest.approx(2e-4)
-    assert found["recurrence"].values[1] == pytest.approx(values["recurrence"][0], rel=0.1)
+    assert found.velocities[1] == pytest.approx(2e-4)
+    assert found.mean("recurrence")[1] == pytest.approx(values["recurrence"][0], rel=0.1)
     for low, high, points in (("2 um/s", "1 um/s", 3), ("1 um/s", "2 um/s", 400), ("x", "2 um/s", 3)):
         with pytest.raises(InputError):
             experiments.sweep(base, Setting("v100"), low, high, points, _silent, shown.append)
@@ -145,6 +145,10 @@ def test_a_synthetic_record_can_be_opened(campaign, base, folder):
     assert made == folder / "synthetic run" and not list(folder.glob(".synthetic*"))
     read = ss.load_campaign(made / "campaign.toml")
     assert len(read.events[0].events) >= 3 and read.traces[0].drive_velocity == pytest.approx(4e-4)
+    again = experiments.run(experiments.scenario(base, Setting("v400", "400 um/s", events=4)))
+    seen = experiments.simulated(again, campaign["v400"])
+    for key, (mean, _, count) in experiments.measured(read.events[0]).items():
+        assert seen[key][0] == pytest.approx(mean, rel=3e-3) and seen[key][2] == count, key  # a sample
     for name in ("synthetic run", "../elsewhere", "a/b", ".hidden", ""):
         with pytest.raises(InputError):
             experiments.write(base, Setting("v400"), campaign, name, _silent)
