@@ -104,6 +104,7 @@ class Session(param.Parameterized):
         self._journal: Journal | None = None
         self._search: Search | None = None
         self._listing: Search | None = None
+        self._looked: tuple[Fit | None, int] = (None, 0)
         self._moves: dict[str, float | str] = {}
         self._guard = threading.Lock()
         self._held = ExitStack()
@@ -387,10 +388,11 @@ class Session(param.Parameterized):
     # what is missing
 
     def list_promises(self) -> None:
-        """Look at every effect on top of the model as it stands, in a process beside."""
+        """Look at every effect on top of the model as it stands, in a process beside, unless that goes on already."""
         fit = self.fitted
-        if fit is None:
+        if fit is None or (self.listed < 1.0 and self._looked == (fit, self.loaded)):
             return
+        self._looked = (fit, self.loaded)
         if self._listing is not None:
             self._listing.cancel()
             self._listing = None
