@@ -65,13 +65,14 @@ class _Residual:
         self._medians: dict[str, Any] = {}
         self._law, self._smooth = source(x=[], y=[]), source(x=[], y=[])
         self.figure.add_layout(Span(location=0.0, dimension="width", line_color=theme.soft, line_width=1))
-        self.figure.line(
-            "x", "y", source=self._law, color=theme.model, line_width=4, alpha=0.8, line_dash="dashed",
-            legend_label="the chosen effect",
-        )  # fmt: skip
-        self.figure.line(
+        asked = self.figure.line(
             "x", "y", source=self._smooth, color=theme.text, line_width=3.5, legend_label="what all runs ask for",
         )  # fmt: skip
+        law = self.figure.line(
+            "x", "y", source=self._law, color=theme.model, line_width=4, line_dash="dashed",
+            legend_label="the chosen effect",
+        )  # fmt: skip
+        self._over = (asked, law)
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
         legend(self.figure, "below", ncols=4)
         self._draw_runs()
@@ -81,7 +82,7 @@ class _Residual:
         self.update()
 
     def _draw_runs(self) -> None:
-        """A colour for every run that has none yet."""
+        """A colour for every run that has none yet, under the two curves of all runs."""
         runs = look().runs
         for name in self._session.campaign.names if self._session.campaign is not None else ():
             if name not in self._points:
@@ -89,6 +90,7 @@ class _Residual:
                 self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])
                 self.figure.scatter("x", "y", source=self._points[name], size=3, alpha=0.35, **more)
                 self.figure.line("x", "y", source=self._medians[name], line_width=2.5, **more)
+        self.figure.renderers = [*(r for r in self.figure.renderers if r not in self._over), *self._over]
 
     def update(self) -> None:
         """Draw it anew; only numbers change."""

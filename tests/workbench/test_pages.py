@@ -113,6 +113,14 @@ def test_the_residual_is_folded_over_a_period(session, base):
     assert part.period.disabled
 
 
+def test_the_effect_that_is_laid_over_is_drawn_over_all_else(session, base, promises):
+    made = missing_page._Residual(session)
+    session.promises, made.chosen = promises, promises[0].tag
+    made.update()
+    last = made.figure.renderers[-1].data_source
+    assert last is made._law and len(last.data["x"]) > 3
+
+
 def test_the_slip_path_is_the_way_there_and_back(base):
     force = base.force
     for run in np.unique(force.run.values):
