@@ -121,6 +121,11 @@ def test_the_effect_that_is_laid_over_is_drawn_over_all_else(session, base, prom
     assert last is made._law and len(last.data["x"]) > 3
 
 
+def test_an_error_of_five_floors_is_seen_beside_one_of_sixty():
+    blue = [int(model_page.heat(value, 60.0)[5:], 16) for value in (1.0, 5.0, 60.0)]
+    assert blue[0] - blue[1] > 0.3 * (blue[0] - blue[2]) > 0
+
+
 def test_the_slip_path_is_the_way_there_and_back(base):
     force = base.force
     for run in np.unique(force.run.values):
