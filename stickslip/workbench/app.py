@@ -19,6 +19,7 @@ from .session import Session, watch
 from .watching import Place, placed
 
 PAGES = ("data_page", "model_page", "missing_page", "simulate_page", "keep_page")
+KEYED = ("data_page", "model_page")  # where the arrows go through cycles and runs
 DRAWN = "This page is being drawn."  # in place of a page until it is there
 STYLE = """
 body { margin: 0; padding: 12px 18px; font-family: system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
@@ -50,7 +51,13 @@ def view(session: Session) -> Any:
         if session.campaign is None:
             body[:] = [offers(session)]
         elif not body.objects or not isinstance(body[0], pn.Tabs):
-            body[:] = [tabs(session)]
+            made = tabs(session)
+            made.param.watch(lambda event: keyed(made), "active")
+            keyed(made)
+            body[:] = [made]
+
+    def keyed(made: pn.Tabs) -> None:
+        head.keyed = PAGES[made.active] in KEYED
 
     show()
     if session.campaign is None:

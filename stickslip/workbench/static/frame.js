@@ -59,9 +59,8 @@ export function render({ model }) {
     theme.click()
   }
   const typed = (event) => {
-    const at = event.composedPath()[0]
-    if (event.altKey || event.ctrlKey || event.metaKey) return
-    if (at && (at.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(at.tagName || ""))) return
+    const own = (e) => e.isContentEditable || /^(INPUT|TEXTAREA|SELECT|TABLE)$/.test(e.tagName || "")
+    if (!model.keyed || event.altKey || event.ctrlKey || event.metaKey || event.composedPath().some(own)) return
     if (["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"].includes(event.key)) {
       event.preventDefault()
       model.send_msg({ kind: "key", key: event.key })
