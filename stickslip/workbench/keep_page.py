@@ -61,7 +61,8 @@ def _history(session: Session) -> list[Any]:
 
     watch(session, ["steps", "at"], update)
     update()
-    return [head("History: a click shows the model after a step; the steps behind it can be had again"), made]
+    floors = Words(text="Errors are in floors of each step's own model: 1 is as good as the data allow.", **WIDE)
+    return [head("History: a click shows the model after a step; the steps behind it can be had again"), made, floors]
 
 
 def commands(session: Session) -> str:

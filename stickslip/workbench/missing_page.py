@@ -25,6 +25,11 @@ MANY = 4  # models of a ladder, above which their names are written aslant
 BENT = ("age", "velocity")  # variables whose small values matter as much as their large ones
 WAYS = ("time", "place", "slip path", "load point")  # along which something may come back
 KNOTS, FEWEST = 40, 5  # medians of the smooth curve, and how many different ones it needs
+FLOORS = (
+    "Errors are in floors: 1 is as good as noise and scatter of the data allow. All rungs are held against the floors of "
+    "the last model, so earlier ones differ from the errors that the head and the history gave them. Gain: by how much "
+    "the cost (chi-square, no unit) fell."
+)
 CARD = "background: var(--wb-surface); border: 1px solid var(--wb-line); border-radius: 4px; padding: 8px 12px;"
 
 
@@ -244,7 +249,7 @@ class _Listed:
         self._words.text = (
             f"looking at the effects ({100 * session.listed:.0f} %)"
             if session.listed < 1.0
-            else "by the fall of the cost that each promises; a click lays one over the residual"
+            else "by the fall of the cost (chi-square) that each promises; a click lays one over the residual"
         )
         self.verdict.object = _verdict(session.diagnosis)
 
@@ -323,7 +328,8 @@ def _table(every: Any) -> str:
         texts.append(f"{row['gain']:.0f}" if np.isfinite(row["gain"]) else "")
         numbers = "".join(f'<td style="{cell}">{t}</td>' for t in texts)
         lines.append(f'<tr><td style="padding-right: 14px">{escape(str(row["step"]))}</td>{numbers}</tr>')
-    return f'<div style="{CARD} color: var(--wb-text); font-size: 13px"><table>{"".join(lines)}</table></div>'
+    note = f'<div style="color: var(--wb-soft); font-size: 12px; margin-top: 6px">{FLOORS}</div>'
+    return f'<div style="{CARD} color: var(--wb-text); font-size: 13px"><table>{"".join(lines)}</table>{note}</div>'
 
 
 def _pair(value: float, std: float) -> str:

@@ -1,4 +1,6 @@
 // The catalogue: one line for each effect. Everything from elsewhere is set as text, never as HTML.
+const EVIDENCE = "by how much the cost (chi-square, no unit) falls: promised by a small amplitude, nothing fitted, or gained " +
+  "when the effect was fitted; on runs that had no part in its amplitude it must fall too"
 const SVG = "http://www.w3.org/2000/svg"
 
 function part(kind, classes, parent, text) {
@@ -28,6 +30,7 @@ export function render({ model }) {
       part("b", "", name, row.tag)
       if (row.alike) part("span", "words", name, row.alike)
       const evidence = part("div", "evidence", line)
+      evidence.title = EVIDENCE
       const bar = part("div", "strength", evidence)
       bar.style.width = `${Math.round(100 * row.share)}%`
       part("span", "gain", evidence, row.gain)

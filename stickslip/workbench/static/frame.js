@@ -15,6 +15,7 @@ export function render({ model }) {
   const title = part("span", "title", top)
   const shown = part("span", "model", top)
   const errors = part("span", "errors", top)
+  errors.title = "in floors of this model: 1 is as good as noise and scatter of the data allow"
   const theme = part("button", "quiet", top)
   const bars = []
   for (const [what, share, stop] of [["busy", "share", "cancel"], ["searching", "searched", "stop"]]) {
