@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -102,7 +103,8 @@ def knobs(fit: Fit) -> dict[str, Knob]:
             half = max(DEVIATIONS * deviation, 0.1 * (most - least))
             low, high = z - half, z + half
         low, high = max(low, least), min(high, most)
-        out[f.name] = Knob(f.name, f.unit, low, high, f.scale, deviation, f.doc, f.known)
+        known = f.known_as(partial(shown, unit=f.unit, digits=3))
+        out[f.name] = Knob(f.name, f.unit, low, high, f.scale, deviation, f.doc, known)
     return out
 
 
