@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 import panel as pn
+from panel.theme.base import Inherit
 from panel.theme.native import Native
 
 from .controls import BUTTON, Frame, Message, Words
@@ -24,6 +25,15 @@ DRAWN = "This page is being drawn."  # in place of a page until it is there
 STYLE = """
 body { margin: 0; padding: 12px 18px; font-family: system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
 """
+FIELDS = """
+.bk-input::placeholder { color: var(--wb-soft); opacity: 1; }
+.bk-spin-btn { --color: var(--wb-soft); }
+select.bk-input:not([multiple]) {
+  background-image: linear-gradient(45deg, transparent 50%, var(--wb-soft) 50%),
+    linear-gradient(-45deg, transparent 50%, var(--wb-soft) 50%);
+  background-position: right 12px center, right 7px center; background-size: 5px 5px;
+}
+"""
 TABS = """
 :host { --tab: var(--wb-text); }
 .bk-tab { color: var(--wb-text); font-size: 15px; padding: 6px 14px; }
@@ -31,10 +41,16 @@ TABS = """
 """
 
 
+class Plain(Native):
+    """Panel's own look, with fields that can be read in both themes."""
+
+    modifiers = {**Native.modifiers, pn.widgets.Widget: {"stylesheets": [Inherit, FIELDS]}}
+
+
 def ready() -> None:
     """Panel as the workbench needs it: one design; not by its extension, which loads from the network in a notebook."""
     importlib.import_module("panel.models.file_dropper")  # its script is then in every window, also in one that chooses
-    pn.config.param.update(design=Native, notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
+    pn.config.param.update(design=Plain, notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
 
 
 def modules() -> list[ModuleType]:
