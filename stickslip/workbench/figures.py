@@ -139,7 +139,21 @@ def legend(made: Any, place: str = "above", **more: Any) -> None:
         found.label_text_font_size = "12px"
         found.update(padding=2, margin=2, spacing=12)
         found.update(**more)
+        for each in found.items:
+            _while_drawn(each)
         made.add_layout(found, place)
+
+
+def _while_drawn(item: Any) -> None:
+    """An entry is there while its curves have data: without, its sign would be missing."""
+    sources = [each.data_source for each in item.renderers]
+
+    def update(attr: str, old: Any, new: Any) -> None:
+        item.visible = any(len(column) for s in sources for column in s.data.values())
+
+    for each in sources:
+        each.on_change("data", update)
+    update("data", None, None)
 
 
 def source(**columns: Any) -> ColumnDataSource:

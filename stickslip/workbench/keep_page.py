@@ -191,7 +191,8 @@ _OPEN = """
 const page = document.createElement("textarea")
 page.innerHTML = pane.text
 const frame = page.value.replace("height:900px", "height:97vh")
-const whole = new Blob(["<!doctype html><meta charset='utf-8'><title>report</title><body style='margin:0'>" + frame], {type: "text/html"})
+const head = "<!doctype html><meta charset='utf-8'><title>report</title><body style='margin:0'>"
+const whole = new Blob([head + frame], {type: "text/html"})
 window.open(URL.createObjectURL(whole), "_blank", "noopener")
 """
 

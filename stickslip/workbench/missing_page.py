@@ -26,9 +26,9 @@ BENT = ("age", "velocity")  # variables whose small values matter as much as the
 WAYS = ("time", "place", "slip path", "load point")  # along which something may come back
 KNOTS, FEWEST = 40, 5  # medians of the smooth curve, and how many different ones it needs
 FLOORS = (
-    "Errors are in floors: 1 is as good as noise and scatter of the data allow. All rungs are held against the floors of "
-    "the last model, so earlier ones differ from the errors that the head and the history gave them. Gain: by how much "
-    "the cost (chi-square, no unit) fell."
+    "Errors are in floors: 1 is as good as noise and scatter of the data allow. All rungs are held against the floors "
+    "of the last model, so earlier ones differ from the errors that the head and the history gave them. Gain: by how "
+    "much the cost (chi-square, no unit) fell."
 )
 CARD = "background: var(--wb-surface); border: 1px solid var(--wb-line); border-radius: 4px; padding: 8px 12px;"
 
@@ -79,8 +79,8 @@ class _Residual:
         )  # fmt: skip
         self._over = (asked, law)
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
-        legend(self.figure, "below", ncols=4)
         self._draw_runs()
+        legend(self.figure, "below", ncols=4)
         self.against.param.watch(lambda event: self.update(), "value")
         self.period.param.watch(lambda event: self.update(), "value")
         watch(session, ["steps", "at", "promises", "campaign"], self.update)
