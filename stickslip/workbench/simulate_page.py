@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import panel as pn
+from bokeh.core.properties import value
 from bokeh.models import FixedTicker
 
 from ..data.trace import Trace
@@ -20,7 +21,7 @@ from ..system.units import shown, to_si
 from . import experiments
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Message, Words
-from .evidence import best_forms
+from .evidence import LEAST, best_forms
 from .experiments import MEASURES, Setting, Swept, Telling
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .overview import record, reduced
@@ -128,6 +129,12 @@ def needed(session: Session) -> Fit:
     return session.fit
 
 
+def named(fit: Fit, now: Fit | None) -> str:
+    """What a curve is of: the model as it stands, or one that stood before."""
+    parts = " + ".join(fit.parts)
+    return f"model: {parts}" if fit is now else f"a model before: {parts}"
+
+
 class _Beside:
     """One run of the model beside the measured one."""
 
@@ -144,7 +151,7 @@ class _Beside:
             made = figure(height=230, window_axis="x", output_backend="canvas", **linked)
             for name, data, colour, dash in (
                 ("measured", self._measured, theme.measured, "solid"),
-                ("model, run freely", self._model, theme.model, "dashed"),
+                ("model", self._model, theme.model, "dashed"),
             ):
                 made.line(
                     "t", key, source=data, color=colour, line_width=2, line_dash=dash, legend_label=name,
@@ -152,6 +159,7 @@ class _Beside:
             made.min_border_left = LEFT
             self.figures[key] = made
         legend(self.figures["x"])
+        self._name = self.figures["x"].legend[0].items[1]
         self.figures["gap"].legend.visible = False
         crosshair(*self.figures.values())
         self._table = Table(choosing=False, **WIDE)
@@ -162,7 +170,7 @@ class _Beside:
         )
         asked.run.param.watch(lambda event: self.update(), "value")
         watch(self._work, ["found", "doing"], self.update)
-        watch(session, ["campaign"], self.update)
+        watch(session, ["campaign", "steps", "at"], self.update)
         self.update()
 
     def start(self) -> None:
@@ -196,10 +204,12 @@ class _Beside:
         if found is None:
             self._model.data = {"t": [], "x": [], "gap": []}
         else:
+            self._name.label = value(named(found.fit, self._session.fit))
             r = found.recording
             moved = r["displacement"].values
             self._model.data = _thinned(r["time"].values, moved * k, (r["drive_position"].values - moved) * g)
-        columns, rows = event_rows(experiments.measured(campaign.events[campaign.names.index(run)]), found, trace)
+        own = experiments.measured(campaign.events[campaign.names.index(run)])
+        columns, rows = event_rows(own, found, trace, self._session.fit)
         self._table.param.update(columns=columns, rows=rows)
 
 
@@ -225,13 +235,13 @@ def _thinned(t: np.ndarray, x: np.ndarray, gap: np.ndarray) -> dict[str, np.ndar
 
 
 def event_rows(
-    measured: dict[str, tuple[float, float, int]], found: Simulated | None, trace: Trace
+    measured: dict[str, tuple[float, float, int]], found: Simulated | None, trace: Trace, now: Fit | None
 ) -> tuple[list[str], list[list[str]]]:  # fmt: skip
-    """Means over the slips after the first, measured (in a trace) and simulated."""
+    """Means over the slips after the first, measured (in a trace) and simulated; ``now`` is the model as it stands."""
     columns = ["means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)]
     if found is None:
         return columns, [["measured", *_cells(measured)]]
-    model = [f"model: {' + '.join(found.fit.parts)}", *_cells(experiments.simulated(found.recording, trace))]
+    model = [named(found.fit, now), *_cells(experiments.simulated(found.recording, trace))]
     verdict = str(found.recording.attrs.get("verdict", ""))
     return [*columns, "what happens"], [["measured", *_cells(measured), ""], [*model, verdict]]
 
@@ -282,6 +292,7 @@ class _Sweep:
             made.scatter("v", key, source=self._measured, color=theme.measured, size=9, legend_label="measured")
             legend(made)
             self.figures[key] = made
+        self._names = [made.legend[0].items[0] for made in self.figures.values()]
         self.view = pn.Column(
             head("A sweep of the velocity: means over the slips after the first, with their scatter"),
             pn.FlexBox(self.low, self.high, self.points, self._button, gap="6px 0"),
@@ -291,6 +302,7 @@ class _Sweep:
         )
         watch(self._work, ["found", "doing"], self.update)
         watch(session, ["campaign"], self._anew)
+        watch(session, ["steps", "at"], self.update)
         self._prepare()
 
     def _anew(self) -> None:
@@ -341,6 +353,9 @@ class _Sweep:
             if key == "recurrence":
                 self.figures[key].yaxis.ticker = FixedTicker(ticks=ticks(np.concatenate([own, theirs]) * f))
         self._model.data, self._measured.data = model, measured
+        if found is not None:
+            for item in self._names:
+                item.label = value(named(found.fit, self._session.fit))
 
 
 class _Experiment:
@@ -351,6 +366,7 @@ class _Experiment:
         self._work = beside(session, "rivals")
         self._sets: list[tuple[tuple[str, ...], str]] = []
         self._drawn: Telling | None = None
+        self._offered: list[str] = []
         self.which = pn.widgets.Select(
             name="effects that these data cannot tell apart", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
         )
@@ -392,9 +408,9 @@ class _Experiment:
             self.effects.value = [tag for tag in tags if tag in self.effects.options][:RIVALS]
             self._said.text = f"The diagnosis proposes: {text}. {DONE}"
             return
-        if not self.effects.value:
-            best = [p.tag for p in best_forms(self._session.promises)][:2]
-            self.effects.value = [tag for tag in best if tag in self.effects.options]
+        if self.effects.value == self._offered:  # nobody chose others
+            best = [p.tag for p in best_forms(self._session.promises) if p.fall > LEAST]
+            self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
         self._said.text = f"The effects that promise most are offered; others can be chosen. {DONE}"
 
     def start(self) -> None:
