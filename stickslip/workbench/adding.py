@@ -20,6 +20,7 @@ from ..system.units import factor_to_si, to_si
 from .places import new_place
 
 NONE = "-"  # no column
+VELOCITY = "velocity of the load point"
 CHANNELS = {
     "time": "s", "displacement": "m", "velocity": "m/s", "spring_force": "N", "drive_position": "m", "normal_load": "N",
 }  # fmt: skip
@@ -149,7 +150,7 @@ def entry_text(file: str, choice: Choice, said: Mapping[str, str] | None = None)
         said: column -> unit that the file itself says.
 
     Raises:
-        InputError: a unit, a velocity or a rate cannot be read, or one is missing.
+        InputError: a unit, a velocity or a rate cannot be read, or something is missing or given twice.
     """
     said = said or {}
     lines = ["[[trace]]", f"file = {_text(file)}"]
@@ -175,15 +176,27 @@ def entry_text(file: str, choice: Choice, said: Mapping[str, str] | None = None)
             to_si(choice.resolution, "m", key="resolution")
             parts.append(f"resolution = {_text(choice.resolution.strip())}")
         lines.append(f"{channel} = {{ {', '.join(parts)} }}")
+    _check(choice)
     if choice.drive_velocity.strip():
         lines.append(_drive(choice.drive_velocity))
     lines.append(f"virgin = {'true' if choice.virgin else 'false'}")
     return "\n".join(lines) + "\n"
 
 
+def _check(choice: Choice) -> None:
+    """What the campaign's file asks of a run, in the words of the form."""
+    if not {"displacement", "velocity", "spring_force"} & set(choice.columns):
+        raise InputError("no column is the displacement, the velocity or the force", key="columns")
+    given, measured = bool(choice.drive_velocity.strip()), "drive_position" in choice.columns
+    if given and measured:
+        raise InputError("given beside a column of its position", key=VELOCITY, hint="keep one of them")
+    if not (given or measured or "spring_force" in choice.columns):
+        raise InputError("neither it nor a column of its position is given", key=VELOCITY, allowed="such as 50 um/s")
+
+
 def _drive(text: str) -> str:
     """One velocity, or velocities with the times until which they last."""
-    key = "velocity of the load point"
+    key = VELOCITY
     if "until" not in text:
         to_si(text.strip(), "m/s", key=key)
         return f"drive_velocity = {_text(text.strip())}"

@@ -10,7 +10,7 @@ import panel as pn
 from ..data.readers import Columns
 from ..errors import InputError
 from ..objects import Campaign
-from .adding import CHANNELS, NONE, Choice, add, entry_text, guess, look
+from .adding import CHANNELS, NONE, VELOCITY, Choice, add, entry_text, guess, look
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Words
 from .parts import Table, head, progress
@@ -55,7 +55,7 @@ class Form:
         }
         text: Any = partial(pn.widgets.TextInput, width=210, **fixed)
         self.rate = text(name="sampling rate, without a column of times", placeholder="10 kHz")
-        self.velocity = text(name="velocity of the load point", placeholder="50 um/s, or 50 um/s until 5 s, ...")
+        self.velocity = text(name=VELOCITY, placeholder="50 um/s, or 50 um/s until 5 s, ...")
         self.resolution = text(name="one count of the displacement, if known", placeholder="8 nm")
         self.stored = text(name="stored beside the campaign as")
         self.run = text(name="name of the run, if another")

@@ -173,7 +173,10 @@ def test_a_dropped_file_is_stored_and_the_campaign_grows(own, folder):
 )  # fmt: skip
 def test_names_that_lead_elsewhere_or_are_taken_are_refused(own, name):
     before = {p.name: p.read_bytes() for p in own.description.folder.iterdir()}
-    text = entry_text("x.csv", Choice({"time": "time", "displacement": "x"}, {"time": "s", "displacement": "um"}))
+    text = entry_text(
+        "x.csv",
+        Choice({"time": "time", "displacement": "x"}, {"time": "s", "displacement": "um"}, drive_velocity="1 um/s"),
+    )
     with pytest.raises(InputError):
         add(own, name, _table(), text)
     assert {p.name: p.read_bytes() for p in own.description.folder.iterdir()} == before
@@ -188,9 +191,10 @@ def test_a_link_in_the_folder_leads_nowhere(own, tmp_path_factory):
 
 def test_a_run_that_cannot_be_loaded_leaves_the_campaign_as_it_was(own):
     before = {p.name: p.read_bytes() for p in own.description.folder.iterdir()}
-    choice = Choice({"time": "time", "displacement": "x"}, {"time": "s", "displacement": "um"})
+    back = "50 um/s until 5 s, 0 um/s until 3 s"
+    choice = Choice({"time": "time", "displacement": "x"}, {"time": "s", "displacement": "um"}, drive_velocity=back)
     with pytest.raises(InputError) as told:
-        add(own, "run.csv", _table(), entry_text("run.csv", choice))  # no drive
+        add(own, "run.csv", _table(), entry_text("run.csv", choice))
     assert "campaign.toml" in str(told.value) and "drive" in str(told.value) and "adding" not in str(told.value)
     assert {p.name: p.read_bytes() for p in own.description.folder.iterdir()} == before
 
@@ -200,9 +204,14 @@ def test_what_is_wrong_is_said_in_the_form(own):
     form.take("bad.csv", b"\x00\x01\x02 nothing")
     assert form.dropped is None and "bad.csv" in form.said.text
     form.take("run.csv", _table())
+    for channel in ("drive_position", "spring_force"):
+        form.columns[channel].value = NONE
     form.velocity.value = "fast"
     form.send()
     assert "velocity of the load point" in form.said.text
+    form.velocity.value, form.said.text = "", ""
+    form.send()
+    assert "velocity of the load point" in form.said.text and "campaign.toml" not in form.said.text
     form.columns["time"].value = NONE
     form.velocity.value = "50 um/s"
     form.send()
