@@ -197,6 +197,24 @@ def test_the_catalogue_shows_what_a_diagnosis_found(campaign, base, promises):
     assert rows(base, (), found, "age")[0]["tag"] == "contact-ageing"
 
 
+def test_the_catalogue_is_in_the_order_of_what_it_shows(campaign, base, promises):
+    ranked = [
+        {"effect": tag, "gain": gain, "heldout_cost": gain, "heldout_cost_std": 1.0, "note": "", "heldout_error": 1.0,
+         "amplitude": {"value": 0.003, "std": 1e-4, "unit": "1"}}
+        for tag, gain in (("drive-ripple", 2000.0), ("contact-ageing", 955.0), ("viscous-drag", 1500.0))
+    ]  # fmt: skip
+    made = rows(base, promises, Diagnosis(campaign, None, {"ranking": ranked, "visible": {}}, {}), "age")
+    assert [r["tag"] for r in made][:3] == ["drive-ripple", "viscous-drag", "contact-ageing"]
+
+
+def test_an_effect_in_the_model_shows_what_it_takes_off(aged):
+    (made,) = rows(aged, (), None, "age")
+    before, after = (float(text) for text in made["unseen"].removeprefix("error on unseen runs ").split(" to "))
+    assert after == pytest.approx(aged.unseen_error, abs=0.006) and before > 2.0 * after
+    residual, law, _ = (np.array(curve) for curve in made["picture"])
+    assert np.corrcoef(residual[:, 1], law[:, 1])[0, 1] > 0.9
+
+
 def test_a_signature_of_another_model_is_not_drawn(base):
     assert signature(base, np.zeros(3), []) == []
     assert signature(base, np.zeros(3), [np.arange(3)]) == []
