@@ -19,6 +19,7 @@ import param
 from ..errors import RunFolderError, StickslipError
 from ..inference.force.first_order import Promise
 from ..objects import Campaign, Diagnosis, Fit, load_campaign
+from ..objects.fitted_run import FittedRun
 from ..physics.effects import catalogue
 from ..simulation.conformance import load_effects
 from ..system.progress import Cancelled
@@ -33,6 +34,7 @@ __all__ = ["BASE", "HAND", "Session", "Step", "watch"]
 BASE = "the base model"
 HAND = "by hand"
 MOST = 60  # steps that are kept
+SAME = 0.01  # standard deviations by which a parameter that was fitted anew may be off
 STILL = 0.25  # s without a move, after which a model that was moved is kept
 
 
@@ -67,6 +69,7 @@ class Session(param.Parameterized):
         run, event: what is selected: name of a run, number of a cycle in it.
         busy, share: what long work is going on ("" for none), and how much of it is done.
         searching, searched: the same of the diagnosis, which goes on beside all else.
+        saved: the model of a run folder that is to stand, until it does; None for the base.
         said: what the user must read: an error in words or a note ("" for nothing).
         locked: names of parameters that a fit leaves as they are.
         promises: what every effect promises on top of the model as it stands; ``listed`` is how many were looked at.
@@ -82,6 +85,7 @@ class Session(param.Parameterized):
     steps = param.Parameter(())
     at = param.Integer(-1)
     diagnosis = param.Parameter(None)
+    saved = param.ClassSelector(class_=FittedRun)
     run = param.String("")
     event = param.Integer(0)
     busy = param.String("")
@@ -174,11 +178,31 @@ class Session(param.Parameterized):
 
     def _begin(self, campaign: Campaign) -> None:
         with self._long("looking at the data"):
-            if self._journal is not None and self._again():
-                return
-            self.busy = "fitting the base model"
-            self.first(_complete(campaign.fit()))
+            if self._journal is None or not self._again():
+                self.busy = "fitting the base model"
+                self.first(_complete(campaign.fit()))
+            if self.saved is not None:
+                self._restore(self.saved)
+                self.saved = None
             self.keep()
+
+    def _restore(self, saved: FittedRun) -> None:
+        """Fit a saved model anew, and set what was set by hand in it, as steps; none where it stands already."""
+        fit, forms, name = self.fit, list(saved.effect_forms), saved.folder.name
+        assert fit is not None and self.campaign is not None
+        if sorted(fit.effect_forms) != sorted(forms):
+            self.busy = f"fitting the model of {name}"
+            fit = _complete(self.campaign.fit(forms))
+            command = "stickslip fit campaign.toml " + " ".join(f"--add {form}" for form in forms)
+            self.take(Step(f"the model of {name}", fit, f"fit = campaign.fit({forms!r})", command.strip()))
+        values, own = saved.parameters, fit.values
+        moved = {
+            n: values[n]["value"] for n, std in fit.std.items()
+            if n in values and abs(values[n]["value"] - own[n]) > SAME * std
+        }  # fmt: skip
+        if moved:
+            code = f"fit = fit.with_values({moved!r})"
+            self.take(Step(f"{HAND}: as in {name}", fit.with_values(moved), code, "", moved))
 
     def _again(self) -> bool:
         """Where it was left; whether there was anything."""

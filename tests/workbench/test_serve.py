@@ -15,6 +15,7 @@ import pytest
 
 from stickslip.cli import run
 from stickslip.errors import InputError
+from stickslip.inference.fit.serialised import KEY, record
 from stickslip.system.runstore import json_text
 from stickslip.workbench import opening, own
 from stickslip.workbench.journal import FOLDER
@@ -165,6 +166,23 @@ def test_a_run_folder_opens_the_campaign_it_was_made_from(folder, tmp_path):
     assert opened(tmp_path).campaign.description.path.name == "campaign.toml"
     with pytest.raises(InputError, match="not found"):
         campaign_of(tmp_path, {"inputs": [{"file": "gone.toml"}]})
+
+
+def test_a_saved_model_stands_again(folder, base, aged, tmp_path, monkeypatch):
+    from stickslip.objects import Campaign
+
+    name = "contact-ageing.rate"
+    moved = aged.with_values({name: 1.1 * aged.values[name]})
+    inputs = [{"file": str(folder / "campaign.toml"), "sha256": ""}]
+    (tmp_path / "result.json").write_text(json_text({"kind": "fit", "inputs": inputs, KEY: record(moved.fitted)}))
+    monkeypatch.setattr(Campaign, "fit", lambda self, effects=(): aged if list(effects) == ["contact-ageing"] else base)
+    with closing(opened(tmp_path)) as session:
+        session.begin(keep=False)
+        assert [step.fit.effects for step in session.steps] == [(), ("contact-ageing",), ("contact-ageing",)]
+        assert session.fit.values[name] == pytest.approx(moved.values[name])
+        assert list(session.steps[-1].changed) == [name]
+        session.undo()
+        assert session.fit is aged and session.saved is None
 
 
 def test_what_lies_in_a_folder_is_offered(folder, tmp_path):
