@@ -18,7 +18,7 @@ from bokeh.models import (
 from bokeh.models.annotations import Legend, Span
 from bokeh.plotting import figure as bokeh_figure
 
-from ..show.plots.style import scaled
+from ..show.plots.style import RUNS, scaled
 
 FEW = "canvas"  # what draws some hundred points quickest
 
@@ -52,7 +52,7 @@ class Look:
 
 LIGHT = Look(
     "#14213d", "#5b6577", "#dfe3e8", "#ffffff", "#f4f5f7", "#14213d", "#c8553d", "#8d99ae",
-    ("#0072b2", "#d55e00", "#009e73", "#b8578c", "#9a7400", "#3a93c9", "#5b6577"), "#1d5fa8",
+    RUNS, "#1d5fa8",
     "#5e3c99", "#f7f7f7", "#b35806",
 )  # fmt: skip
 DARK = Look(
