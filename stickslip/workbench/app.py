@@ -16,7 +16,7 @@ from panel.theme.native import Native
 from .controls import BUTTON, Frame, Message, Words
 from .figures import dark, look
 from .selection import follow
-from .session import Session, watch
+from .session import Note, Session, watch
 from .watching import Place, placed
 
 PAGES = ("data_page", "model_page", "missing_page", "simulate_page", "keep_page")
@@ -37,6 +37,7 @@ select.bk-input:not([multiple]) {
 TABS = """
 :host { --tab: var(--wb-text); }
 .bk-tab { color: var(--wb-text); font-size: 15px; padding: 6px 14px; }
+:host > [style*="hidden"] { height: 0; min-height: 0 !important; overflow: hidden; }
 .bk-tab.bk-active { color: var(--wb-accent); background: var(--wb-surface); border-color: var(--wb-line); }
 """
 
@@ -167,6 +168,7 @@ def frame(session: Session) -> Frame:
             searching=f"Diagnose: {session.searching}" if session.searching else "",
             searched=session.searched,
             said=session.said,
+            well=isinstance(session.said, Note),
         )
 
     def errors() -> None:

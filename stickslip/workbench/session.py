@@ -38,6 +38,10 @@ SAME = 0.01  # standard deviations by which a parameter that was fitted anew may
 STILL = 0.25  # s without a move, after which a model that was moved is kept
 
 
+class Note(str):
+    """What is said where nothing is wrong."""
+
+
 @dataclass(frozen=True)
 class Step:
     """One step of the history.
@@ -70,7 +74,7 @@ class Session(param.Parameterized):
         busy, share: what long work is going on ("" for none), and how much of it is done.
         searching, searched: the same of the diagnosis, which goes on beside all else.
         saved: the model of a run folder that is to stand, until it does; None for the base.
-        said: what the user must read: an error in words or a note ("" for nothing).
+        said: what the user must read: an error in words or a :class:`Note` ("" for nothing).
         locked: names of parameters that a fit leaves as they are.
         promises: what every effect promises on top of the model as it stands; ``listed`` is how many were looked at.
         effects: Python files with effects of one's own; ``loaded`` counts how often they were.
@@ -488,7 +492,7 @@ class Session(param.Parameterized):
             with self._told():
                 classes = load_effects([path])
                 tags = [cls.tag for cls in classes]
-                self.said = f"{path.name} was loaded anew: {', '.join(tags)}"
+                self.said = Note(f"{path.name} was loaded anew: {', '.join(tags)}")
                 fit = self.fit
                 forms = {} if fit is None else dict(zip(fit.effects, fit.effect_forms, strict=True))
                 for tag in tags:
@@ -528,7 +532,7 @@ class _Long:
         if self._text:
             self._session.busy = ""
         if isinstance(error, Cancelled):
-            self._session.said = "cancelled; the model is as it was"
+            self._session.said = Note("cancelled; the model is as it was")
             return True
         if isinstance(error, StickslipError):
             self._session.said = str(error)

@@ -76,7 +76,14 @@ class _Asked:
         self.step = text(name="a step to the velocity", placeholder="none, such as 1 mm/s")
         self.spring, self.mass = text(name="spring"), text(name="mass")
         self.events = pn.widgets.IntInput(
-            name="slips, if at a velocity", value=7, start=1, end=100, width=150, margin=(0, 10, 0, 0), **FIXED
+            name="number of slips",
+            description="At a velocity written here, and in the sweep",
+            value=7,
+            start=1,
+            end=100,
+            width=150,
+            margin=(0, 10, 0, 0),
+            **FIXED,
         )
         asked = (self.run, self.velocity, self.hold, self.step, self.spring, self.mass, self.events)
         self.row = pn.FlexBox(*asked, gap="6px 0")

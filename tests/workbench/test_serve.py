@@ -21,7 +21,7 @@ from stickslip.workbench import opening, own
 from stickslip.workbench.journal import FOLDER
 from stickslip.workbench.opening import campaign_of, offered, opened
 from stickslip.workbench.serve import _free
-from stickslip.workbench.session import Session
+from stickslip.workbench.session import Note, Session
 
 from .browser import Served
 
@@ -76,7 +76,7 @@ def _status(url: str, **headers: str) -> int:
 def test_only_the_address_with_its_token_opens(served):
     root, token = served.url.rstrip("/").rsplit("/", 1)
     assert len(token) > 20
-    assert _status(served.url) == 200
+    assert _status(served.url) == _status(f"{served.url}favicon.ico") == 200
     for path in (
         "",
         "/",
@@ -220,6 +220,7 @@ def test_an_effect_that_is_saved_is_loaded_anew(tmp_path, campaign):
         time.sleep(0.5)
         path.write_text(EFFECT.replace("A constant pull", "Another pull"))
         _until(lambda: session.loaded == 1)
+        assert isinstance(session.said, Note)
         assert "own-pull" in session.said
         path.write_text(EFFECT + "\n1 / 0\n")
         _until(lambda: "ZeroDivisionError" in session.said)

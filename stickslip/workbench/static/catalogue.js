@@ -35,7 +35,7 @@ export function render({ model }) {
       bar.style.width = `${Math.round(100 * row.share)}%`
       part("span", "gain", evidence, row.gain)
       part("span", "gain", evidence, row.unseen)
-      part("span", "gain", evidence, row.amplitude)
+      part("span", "gain", evidence, row.amplitude.replace(/e-(?=\d)/g, "e\u2011")) // no line ends within a number
       const picture = document.createElementNS(SVG, "svg")
       picture.setAttribute("viewBox", "0 0 114 40")
       picture.setAttribute("class", "signature")

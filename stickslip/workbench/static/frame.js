@@ -47,6 +47,7 @@ export function render({ model }) {
     for (const bar of bars) bar()
     said.style.display = model.said ? "flex" : "none"
     words.textContent = model.said
+    said.classList.toggle("well", model.well)
     const style = document.documentElement.style
     for (const [name, value] of Object.entries(model.colours)) style.setProperty(`--wb-${name}`, value)
     document.body.style.background = model.colours.page || ""
@@ -68,7 +69,7 @@ export function render({ model }) {
     }
   }
   document.addEventListener("keydown", typed)
-  for (const name of ["title", "model", "errors", "busy", "share", "searching", "searched", "said", "dark", "colours"]) {
+  for (const name of ["title", "model", "errors", "busy", "share", "searching", "searched", "said", "well", "dark", "colours"]) {
     model.on(name, update)
   }
   model.on("remove", () => document.removeEventListener("keydown", typed))
