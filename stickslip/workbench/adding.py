@@ -34,6 +34,8 @@ _NAMES = {
 }
 _FIRST = ("time", "drive_position", "normal_load")  # whose names tell most
 _TOML = ".toml"
+CAMPAIGN = "campaign.toml"
+FOLDER = "name of the new folder"
 
 
 @dataclass
@@ -222,6 +224,49 @@ def appended(old: bytes, text: str) -> bytes:
     return old + (gap + end + text.replace("\n", end)).encode()
 
 
+def create(home: Path, folder: str, name: str, content: bytes, text: str, rig: Mapping[str, str]) -> Campaign:
+    """A campaign of one run in a new folder; all of it or nothing.
+
+    Args:
+        home: in which the folder is made.
+        folder: its name, and the campaign's title.
+        name, content: of the run's file.
+        text: the run's table, of :func:`entry_text`.
+        rig: key -> value with its unit, for what is known: ``mass``, ``spring_stiffness``.
+
+    Raises:
+        InputError: a name cannot be used or is there already, or the campaign cannot be loaded.
+    """
+    place = new_place(home, folder, FOLDER)
+    known = [f"{key} = {_text(value.strip())}" for key, value in rig.items() if value.strip()]
+    whole = "\n".join(["schema = 1", f"title = {_text(place.name)}", "", "[rig]", *known, "", text])
+    with tempfile.TemporaryDirectory(prefix=".stickslip-", dir=home) as aside:
+        made = Path(aside) / "made"
+        made.mkdir()
+        write_aside(new_place(made, run_name(name), "file"), content)
+        write_aside(made / CAMPAIGN, whole)
+        try:
+            described = files.load_campaign(made / CAMPAIGN)
+            files.load_trace(described, described.entries[-1])
+        except InputError as error:
+            raise type(error)(
+                error.what, file=CAMPAIGN, key=error.key, value=error.value, allowed=error.allowed, hint=error.hint
+            ) from None
+        made.rename(place)
+    return load_campaign(place / CAMPAIGN)
+
+
+def run_name(name: str) -> str:
+    """A name for a run's file.
+
+    Raises:
+        InputError: it would be taken for a campaign.
+    """
+    if Path(name).suffix.lower() == _TOML:
+        raise InputError("a run is a file of measurements", key="file", value=name, hint="give it another ending")
+    return name
+
+
 def add(campaign: Campaign, name: str, content: bytes, text: str) -> Campaign:
     """Store a run's file beside the campaign and put its table into it; both or neither.
 
@@ -240,8 +285,7 @@ def add(campaign: Campaign, name: str, content: bytes, text: str) -> Campaign:
     described = campaign.description
     if not described.filed:
         raise InputError("this campaign has no file", hint="only a campaign of a file can be given a run more")
-    if Path(name).suffix.lower() == _TOML:
-        raise InputError("a run is a file of measurements", key="file", value=name, hint="give it another ending")
+    run_name(name)
     toml, folder = described.path, described.folder
     trial = folder / f".{toml.stem}.adding{_TOML}"
     with alone(toml):

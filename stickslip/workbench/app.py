@@ -13,6 +13,7 @@ import panel as pn
 from panel.theme.base import Inherit
 from panel.theme.native import Native
 
+from .adding_form import FirstRun
 from .controls import BUTTON, Frame, Message, Words
 from .figures import dark, look
 from .selection import follow
@@ -50,7 +51,7 @@ class Plain(Native):
 
 def ready() -> None:
     """Panel as the workbench needs it: one design; not by its extension, which loads from the network in a notebook."""
-    importlib.import_module("panel.models.file_dropper")  # its script is then in every window, also in one that chooses
+    importlib.import_module("panel.models.file_dropper")  # its script is then in every window, also where none drops
     pn.config.param.update(design=Plain, notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
 
 
@@ -83,18 +84,20 @@ def view(session: Session) -> Any:
 
 
 def offers(session: Session) -> Any:
-    """What can be opened, to choose from."""
+    """What can be opened, to choose from, and a place to drop the first run of a campaign."""
+    made: list[Any] = []
     if not session.offers:
-        return pn.pane.HTML(
+        made.append(pn.pane.HTML(
             "No campaign file is in this folder. Write one with <code>stickslip new campaign</code>, or name one: "
             "<code>stickslip open campaign.toml</code>"
-        )
-    made = []
+        ))  # fmt: skip
     for i, path in enumerate(session.offers):
         button = pn.widgets.Button(name=f"Open {path}", width=560, sizing_mode="fixed", stylesheets=[BUTTON])
         button.on_click(partial(_opened, session, i))
         made.append(button)
-    return pn.Column(*made, margin=(16, 0))
+    if session.home is not None:
+        made.append(FirstRun(session).view)
+    return pn.Column(*made, margin=(16, 0), sizing_mode="stretch_width")
 
 
 def _opened(session: Session, number: int, event: Any) -> None:

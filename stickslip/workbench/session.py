@@ -68,6 +68,7 @@ class Session(param.Parameterized):
 
     Attributes:
         campaign: what is open; None until one of ``offers`` (paths of campaign files) was chosen.
+        home: folder in which a campaign may be made where none is open; None for nowhere.
         steps, at: the history, and the number of the step that is shown (undo goes back, redo forth).
         diagnosis: of the present campaign, or None.
         run, event: what is selected: name of a run, number of a cycle in it.
@@ -86,6 +87,7 @@ class Session(param.Parameterized):
 
     campaign = param.ClassSelector(class_=Campaign)
     offers = param.Parameter(())
+    home = param.ClassSelector(class_=Path)
     steps = param.Parameter(())
     at = param.Integer(-1)
     diagnosis = param.Parameter(None)
@@ -142,12 +144,16 @@ class Session(param.Parameterized):
 
         def job() -> None:
             with self._long(f"reading {self.offers[number]}"):
-                self.campaign = load_campaign(self.offers[number], self.effects)
-                self.said = ""
-                self.begin()
+                self.show_first(load_campaign(self.offers[number], self.effects))
 
         if self.campaign is None and 0 <= number < len(self.offers):
             self.worker("", job)
+
+    def show_first(self, campaign: Campaign) -> None:
+        """The campaign that was chosen or made, where none is open yet."""
+        if self.campaign is None:
+            self.campaign, self.said = campaign, ""
+            self.begin()
 
     def begin(self, keep: bool = True) -> None:
         """Fit the base model, or go on where the same campaign was left.

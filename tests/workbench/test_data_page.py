@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import shutil
+from contextlib import closing
 
 import numpy as np
 import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
+from stickslip.objects import Campaign
 from stickslip.workbench import data_page
 from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, guess, look
-from stickslip.workbench.adding_form import Form
+from stickslip.workbench.adding_form import FirstRun, Form
 from stickslip.workbench.event_parts import PARTS, part
 from stickslip.workbench.event_view import EventView
 from stickslip.workbench.overview import AROUND, DISPLACEMENT, GAP, Levels, Window, record, reduced
@@ -216,6 +218,26 @@ def test_what_is_wrong_is_said_in_the_form(own):
     form.velocity.value = "50 um/s"
     form.send()
     assert "sampling rate" in form.said.text
+
+
+def test_a_file_that_is_dropped_where_nothing_is_open_begins_a_campaign(folder, base, tmp_path, monkeypatch):
+    monkeypatch.setattr(Campaign, "fit", lambda self, effects=(): base)
+    with closing(Session(home=tmp_path)) as session:
+        form = FirstRun(session)
+        form.take("v400.csv", (folder / "v400.csv").read_bytes())
+        form.rate.value, form.velocity.value, form.units["displacement"].value = "10 kHz", "400 um/s", "7.91 nm"
+        for name, mass, told in (("../rig", "", "cannot be used"), ("", "", "cannot be used"), ("rig", "3 N", "mass")):
+            form.folder.value, form.mass.value = name, mass
+            form.send()
+            assert told in form.said.text and session.campaign is None and not list(tmp_path.iterdir())
+        form.mass.value, form.spring.value = "89.4 g", "980 N/m"
+        form.send()
+        made = session.campaign
+        assert [p.name for p in tmp_path.iterdir()] == ["rig"]
+        assert made.description.path == tmp_path / "rig" / "campaign.toml"
+        assert (made.rig.mass, made.rig.spring_stiffness) == pytest.approx((0.0894, 980.0))
+        assert made["v400"].drive_velocity == pytest.approx(4e-4) and len(made.events[0].events) == 7
+        assert session.fit is base
 
 
 def test_a_drive_with_holds_can_be_given(own, folder):
