@@ -8,15 +8,17 @@ import urllib.request
 import numpy as np
 import pytest
 
+from stickslip.inference.fit.parameters import effect_parameters
 from stickslip.inference.force.candidates import every_form, try_effect
 from stickslip.inference.force.first_order import promise
 from stickslip.inference.force.signatures import Explained
 from stickslip.objects import Diagnosis
+from stickslip.physics.effects import catalogue
 from stickslip.workbench import app, missing_page, model_page
 from stickslip.workbench.evidence import best_forms, rows, signature
 from stickslip.workbench.figures import DARK, LIGHT
 from stickslip.workbench.free_panel import Free
-from stickslip.workbench.knobs import knobs
+from stickslip.workbench.knobs import Knob, knobs
 from stickslip.workbench.knobs import rows as knob_rows
 from stickslip.workbench.session import Session
 from stickslip.workbench.watching import Place
@@ -50,6 +52,12 @@ def test_a_slider_shows_and_gives_back_its_value(base):
         assert row["band"][0] <= row["place"] <= row["band"][1]
         assert row["locked"] == (row["name"] == "weakening.drop")
         assert row["text"] and row["std"].startswith("±")
+
+
+def test_a_slider_reaches_the_bounds_of_a_parameter():
+    free = next(f for f in effect_parameters(catalogue.make("rate-and-state")) if f.name.endswith("cutoff_velocity"))
+    knob = Knob(free, *free.bounds, "")
+    assert free.lower <= knob.value(0.0) < knob.value(1.0) <= free.upper
 
 
 def test_the_pages_are_made_and_follow(session, base):
