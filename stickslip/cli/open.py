@@ -34,7 +34,7 @@ def open(
     campaign:
         TOML file that describes the rig and its measured runs; or the run folder that a command made of one; or a
         scenario, which is simulated first, into NAME-simulated in this folder. Default: a page to choose from what lies
-        in this folder.
+        in this folder, or to begin a campaign with a file that is dropped there.
     port:
         Of the server; 0 for any that is free.
     browser:
@@ -62,7 +62,7 @@ def open(
             raise InputError(
                 "an effect of your own is tried on a campaign", key="--effect", hint="name the campaign too"
             )
-        session = Session(offers=tuple(offered(Path())))
+        session = Session(offers=tuple(offered(Path())), home=Path().resolve())
     else:
         session = opened(_simulated(campaign) if _is_scenario(campaign) else campaign, effect)
     if address not in OWN:

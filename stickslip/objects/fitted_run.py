@@ -11,6 +11,7 @@ from ..errors import InputError, RunFolderError, nearest
 from ..inference.fit.equations import solved
 from ..inference.fit.serialised import KEY, Driven, Fitted, constant_drive, from_record, pieces_drive, shared
 from ..physics.effects.equations import Equations
+from ..physics.effects.named import with_form
 from ..physics.model import Model
 from ..physics.params import specs, variants
 from ..simulation.conformance import load_effects
@@ -49,6 +50,11 @@ class FittedRun:
     def parts(self) -> tuple[str, ...]:
         """Tags of what is in the model, such as ``("static", "inertia", "contact-ageing")``."""
         return self.fitted.parts
+
+    @property
+    def effect_forms(self) -> tuple[str, ...]:
+        """Its effects as :meth:`stickslip.Fit.add` takes them, with the form of a law where it is not the usual one."""
+        return tuple(with_form(e) for e in self.fitted.composition.effects)
 
     @property
     def parameters(self) -> dict[str, dict[str, Any]]:

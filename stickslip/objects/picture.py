@@ -9,8 +9,7 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
 from ..errors import InputError, nearest
-from ..show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, signed_log, styled
-from ..show.report.force_figures import COLOURS
+from ..show.plots.style import DARK, LIGHT, MIDDLE, figure, of_run, plain, scaled, signed_log, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -168,12 +167,12 @@ def residual(fit: Fit, against: str) -> Figure:
     k, unit = (1.0, "") if name == "event" else scaled(x, str(kept[name].attrs["units"]))
     for i, run in enumerate(dict.fromkeys(kept.run.values)):
         own = kept.run.values == run
-        colour = COLOURS[i % len(COLOURS)]
+        curve = of_run(i)
         order = np.flatnonzero(own)[np.argsort(x[own])]
-        ax.plot(x[order] * k, np.clip(z[order], -6, 6), ".", ms=2.0, color=colour, alpha=0.3)
+        ax.plot(x[order] * k, np.clip(z[order], -6, 6), ".", ms=2.0, color=curve["color"], alpha=0.3)
         pieces = [p for p in np.array_split(order, PARTS) if p.size]
         middle = [np.median(x[p]) * k for p in pieces]
-        ax.plot(middle, [np.median(z[p]) for p in pieces], color=colour, lw=1.5, label=plain(run, 24))
+        ax.plot(middle, [np.median(z[p]) for p in pieces], **curve, lw=1.5, label=plain(run, 24))
     if name in ("velocity", "time_in_contact"):
         signed_log(ax, x * k)
     ax.axhline(0.0, color=LIGHT, lw=0.8)

@@ -20,6 +20,7 @@ from ..system.units import factor_to_si, to_si
 from .places import new_place
 
 NONE = "-"  # no column
+VELOCITY = "velocity of the load point"
 CHANNELS = {
     "time": "s", "displacement": "m", "velocity": "m/s", "spring_force": "N", "drive_position": "m", "normal_load": "N",
 }  # fmt: skip
@@ -33,6 +34,8 @@ _NAMES = {
 }
 _FIRST = ("time", "drive_position", "normal_load")  # whose names tell most
 _TOML = ".toml"
+CAMPAIGN = "campaign.toml"
+FOLDER = "name of the new folder"
 
 
 @dataclass
@@ -149,7 +152,7 @@ def entry_text(file: str, choice: Choice, said: Mapping[str, str] | None = None)
         said: column -> unit that the file itself says.
 
     Raises:
-        InputError: a unit, a velocity or a rate cannot be read, or one is missing.
+        InputError: a unit, a velocity or a rate cannot be read, or something is missing or given twice.
     """
     said = said or {}
     lines = ["[[trace]]", f"file = {_text(file)}"]
@@ -175,15 +178,27 @@ def entry_text(file: str, choice: Choice, said: Mapping[str, str] | None = None)
             to_si(choice.resolution, "m", key="resolution")
             parts.append(f"resolution = {_text(choice.resolution.strip())}")
         lines.append(f"{channel} = {{ {', '.join(parts)} }}")
+    _check(choice)
     if choice.drive_velocity.strip():
         lines.append(_drive(choice.drive_velocity))
     lines.append(f"virgin = {'true' if choice.virgin else 'false'}")
     return "\n".join(lines) + "\n"
 
 
+def _check(choice: Choice) -> None:
+    """What the campaign's file asks of a run, in the words of the form."""
+    if not {"displacement", "velocity", "spring_force"} & set(choice.columns):
+        raise InputError("no column is the displacement, the velocity or the force", key="columns")
+    given, measured = bool(choice.drive_velocity.strip()), "drive_position" in choice.columns
+    if given and measured:
+        raise InputError("given beside a column of its position", key=VELOCITY, hint="keep one of them")
+    if not (given or measured or "spring_force" in choice.columns):
+        raise InputError("neither it nor a column of its position is given", key=VELOCITY, allowed="such as 50 um/s")
+
+
 def _drive(text: str) -> str:
     """One velocity, or velocities with the times until which they last."""
-    key = "velocity of the load point"
+    key = VELOCITY
     if "until" not in text:
         to_si(text.strip(), "m/s", key=key)
         return f"drive_velocity = {_text(text.strip())}"
@@ -209,6 +224,49 @@ def appended(old: bytes, text: str) -> bytes:
     return old + (gap + end + text.replace("\n", end)).encode()
 
 
+def create(home: Path, folder: str, name: str, content: bytes, text: str, rig: Mapping[str, str]) -> Campaign:
+    """A campaign of one run in a new folder; all of it or nothing.
+
+    Args:
+        home: in which the folder is made.
+        folder: its name, and the campaign's title.
+        name, content: of the run's file.
+        text: the run's table, of :func:`entry_text`.
+        rig: key -> value with its unit, for what is known: ``mass``, ``spring_stiffness``.
+
+    Raises:
+        InputError: a name cannot be used or is there already, or the campaign cannot be loaded.
+    """
+    place = new_place(home, folder, FOLDER)
+    known = [f"{key} = {_text(value.strip())}" for key, value in rig.items() if value.strip()]
+    whole = "\n".join(["schema = 1", f"title = {_text(place.name)}", "", "[rig]", *known, "", text])
+    with tempfile.TemporaryDirectory(prefix=".stickslip-", dir=home) as aside:
+        made = Path(aside) / "made"
+        made.mkdir()
+        write_aside(new_place(made, run_name(name), "file"), content)
+        write_aside(made / CAMPAIGN, whole)
+        try:
+            described = files.load_campaign(made / CAMPAIGN)
+            files.load_trace(described, described.entries[-1])
+        except InputError as error:
+            raise type(error)(
+                error.what, file=CAMPAIGN, key=error.key, value=error.value, allowed=error.allowed, hint=error.hint
+            ) from None
+        made.rename(place)
+    return load_campaign(place / CAMPAIGN)
+
+
+def run_name(name: str) -> str:
+    """A name for a run's file.
+
+    Raises:
+        InputError: it would be taken for a campaign.
+    """
+    if Path(name).suffix.lower() == _TOML:
+        raise InputError("a run is a file of measurements", key="file", value=name, hint="give it another ending")
+    return name
+
+
 def add(campaign: Campaign, name: str, content: bytes, text: str) -> Campaign:
     """Store a run's file beside the campaign and put its table into it; both or neither.
 
@@ -227,8 +285,7 @@ def add(campaign: Campaign, name: str, content: bytes, text: str) -> Campaign:
     described = campaign.description
     if not described.filed:
         raise InputError("this campaign has no file", hint="only a campaign of a file can be given a run more")
-    if Path(name).suffix.lower() == _TOML:
-        raise InputError("a run is a file of measurements", key="file", value=name, hint="give it another ending")
+    run_name(name)
     toml, folder = described.path, described.folder
     trial = folder / f".{toml.stem}.adding{_TOML}"
     with alone(toml):

@@ -10,7 +10,8 @@ import panel as pn
 from ..data.readers import Columns
 from ..errors import InputError
 from ..objects import Campaign
-from .adding import CHANNELS, NONE, Choice, add, entry_text, guess, look
+from ..system.units import to_si
+from .adding import CHANNELS, FOLDER, NONE, VELOCITY, Choice, add, create, entry_text, guess, look
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Words
 from .parts import Table, head, progress
@@ -30,13 +31,19 @@ WORDS = {
 }  # fmt: skip
 
 
+_field: Any = partial(pn.widgets.TextInput, width=210, sizing_mode="fixed")
+
+
 class Form:
-    """What is asked for of a file that was dropped.
+    """What is asked for of a file that was dropped, which becomes a run of the campaign.
 
     Attributes:
         view: to be shown.
         dropped: name and content of the file, None before there is one.
     """
+
+    asking = "Add a run: drop its file here, or choose one"
+    doing = "adding the run"
 
     def __init__(self, session: Session) -> None:
         self._session, self._work = session, beside(session, "adding")
@@ -53,26 +60,25 @@ class Form:
         self.units: dict[str, Any] = {
             name: pn.widgets.TextInput(name="unit", placeholder=si, width=80, **fixed) for name, si in CHANNELS.items()
         }
-        text: Any = partial(pn.widgets.TextInput, width=210, **fixed)
-        self.rate = text(name="sampling rate, without a column of times", placeholder="10 kHz")
-        self.velocity = text(name="velocity of the load point", placeholder="50 um/s, or 50 um/s until 5 s, ...")
-        self.resolution = text(name="one count of the displacement, if known", placeholder="8 nm")
-        self.stored = text(name="stored beside the campaign as")
-        self.run = text(name="name of the run, if another")
+        self.rate = _field(name="sampling rate, without a column of times", placeholder="10 kHz")
+        self.velocity = _field(name=VELOCITY, placeholder="50 um/s, or 50 um/s until 5 s, ...")
+        self.resolution = _field(name="one count of the displacement, if known", placeholder="8 nm")
+        self.stored = _field(name="stored beside the campaign as")
+        self.run = _field(name="name of the run, if another")
         self.virgin = pn.widgets.Checkbox(name="the contact was freshly set down", width=210, **fixed)
         self.add = pn.widgets.Button(name="Add the run", width=140, stylesheets=[BUTTON], margin=(12, 0), **fixed)
         self.said = Words(sizing_mode="stretch_width")
         self._first = Table(choosing=False, sizing_mode="stretch_width")
         rows = [pn.Row(self.columns[n], self.units[n], **fixed) for n in CHANNELS]
         more = (self.rate, self.velocity, self.resolution, self.virgin)
-        last = (self.stored, self.run, self.add)
+        last = (*self._asked_besides(), self.stored, self.run, self.add)
         self._asked = pn.Column(
             self._first,
             pn.FlexBox(*(pn.Column(*part, **fixed) for part in (rows[:3], rows[3:], more, last)), gap="0 12px"),
             sizing_mode="stretch_width", visible=False,
         )  # fmt: skip
         self.view = pn.Column(
-            head("Add a run: drop its file here, or choose one"),
+            head(self.asking),
             self.drop,
             self.said,
             self._asked,
@@ -131,13 +137,12 @@ class Form:
         )  # fmt: skip
 
     def send(self) -> None:
-        """Store the file and put its table into the campaign."""
-        campaign = self._session.campaign
-        if self.dropped is None or self._columns is None or campaign is None:
+        """Store what was dropped and show the campaign with it."""
+        if self.dropped is None or self._columns is None:
             return
         name, content = self.stored.value.strip(), self.dropped[1]
         try:
-            new_place(campaign.description.folder, name, "stored as")
+            self._check(name)
             text = entry_text(name, self.choice(), self._columns.units)
         except InputError as error:
             self.said.text = str(error)
@@ -147,18 +152,60 @@ class Form:
             return
 
         def make(tell: Tell, show: Show) -> Campaign:
-            tell("adding the run", 0.0)
-            made = add(campaign, name, content, text)
-            self._session.reopen(made)
-            self._work.said = f"{name} is stored beside the campaign, which has {len(made)} runs now"
-            return made
+            tell(self.doing, 0.0)
+            return self._store(name, content, text)
 
-        self._work.do("adding the run", make)
+        self._work.do(self.doing, make)
+
+    def _asked_besides(self) -> tuple[Any, ...]:
+        return ()
+
+    def _check(self, name: str) -> None:
+        campaign = self._session.campaign
+        assert campaign is not None
+        new_place(campaign.description.folder, name, "stored as")
+
+    def _store(self, name: str, content: bytes, text: str) -> Campaign:
+        """Store the file and put its table into the campaign."""
+        campaign = self._session.campaign
+        assert campaign is not None
+        made = add(campaign, name, content, text)
+        self._session.reopen(made)
+        self._work.said = f"{name} is stored beside the campaign, which has {len(made)} runs now"
+        return made
 
     def _update(self) -> None:
         self.add.disabled = bool(self._work.doing)
         if self._work.found is not None and self._work.found is self._session.campaign and self.dropped is not None:
             self.dropped, self._asked.visible, self.said.text = None, False, ""
+
+
+class FirstRun(Form):
+    """The same where nothing is open: the file becomes the first run of a campaign in a new folder."""
+
+    asking = "Or begin a campaign: drop the file of a run here, or choose one"
+    doing = "making the campaign"
+
+    def _asked_besides(self) -> tuple[Any, ...]:
+        self.folder = _field(name=FOLDER, placeholder="my-rig")
+        self.mass = _field(name="mass of the block", placeholder="89.4 g")
+        self.spring = _field(name="stiffness of the spring", placeholder="980 N/m")
+        self.add.name, self.stored.name = "Make the campaign", "name of the file in it"
+        return self.folder, self.mass, self.spring
+
+    def _check(self, name: str) -> None:
+        assert self._session.home is not None
+        new_place(self._session.home, self.folder.value, FOLDER)
+        for field, unit in ((self.mass, "kg"), (self.spring, "N/m")):
+            if field.value.strip():
+                to_si(field.value, unit, key=field.name)
+
+    def _store(self, name: str, content: bytes, text: str) -> Campaign:
+        assert self._session.home is not None
+        rig = {"mass": self.mass.value, "spring_stiffness": self.spring.value}
+        made = create(self._session.home, self.folder.value.strip(), name, content, text, rig)
+        self._session.show_first(made)
+        return made
 
 
 def adding(session: Session) -> Any:
@@ -170,4 +217,4 @@ def adding(session: Session) -> Any:
     return made.view
 
 
-__all__ = ["Form", "adding"]
+__all__ = ["FirstRun", "Form", "adding"]

@@ -10,29 +10,49 @@ from types import ModuleType
 from typing import Any
 
 import panel as pn
+from panel.theme.base import Inherit
 from panel.theme.native import Native
 
+from .adding_form import FirstRun
 from .controls import BUTTON, Frame, Message, Words
 from .figures import dark, look
 from .selection import follow
-from .session import Session, watch
+from .session import Note, Session, watch
 from .watching import Place, placed
 
 PAGES = ("data_page", "model_page", "missing_page", "simulate_page", "keep_page")
+KEYED = ("data_page", "model_page")  # where the arrows go through cycles and runs
 DRAWN = "This page is being drawn."  # in place of a page until it is there
 STYLE = """
 body { margin: 0; padding: 12px 18px; font-family: system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
 """
+FIELDS = """
+.bk-input::placeholder { color: var(--wb-soft); opacity: 1; }
+.bk-spin-btn { --color: var(--wb-soft); }
+select.bk-input:not([multiple]) {
+  background-image: linear-gradient(45deg, transparent 50%, var(--wb-soft) 50%),
+    linear-gradient(-45deg, transparent 50%, var(--wb-soft) 50%);
+  background-position: right 12px center, right 7px center; background-size: 5px 5px;
+}
+"""
 TABS = """
 :host { --tab: var(--wb-text); }
 .bk-tab { color: var(--wb-text); font-size: 15px; padding: 6px 14px; }
+:host > [style*="hidden"] { height: 0; min-height: 0 !important; overflow: hidden; }
 .bk-tab.bk-active { color: var(--wb-accent); background: var(--wb-surface); border-color: var(--wb-line); }
 """
 
 
+class Plain(Native):
+    """Panel's own look, with fields that can be read in both themes."""
+
+    modifiers = {**Native.modifiers, pn.widgets.Widget: {"stylesheets": [Inherit, FIELDS]}}
+
+
 def ready() -> None:
     """Panel as the workbench needs it: one design; not by its extension, which loads from the network in a notebook."""
-    pn.config.param.update(design=Native, notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
+    importlib.import_module("panel.models.file_dropper")  # its script is then in every window, also where none drops
+    pn.config.param.update(design=Plain, notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
 
 
 def modules() -> list[ModuleType]:
@@ -49,7 +69,13 @@ def view(session: Session) -> Any:
         if session.campaign is None:
             body[:] = [offers(session)]
         elif not body.objects or not isinstance(body[0], pn.Tabs):
-            body[:] = [tabs(session)]
+            made = tabs(session)
+            made.param.watch(lambda event: keyed(made), "active")
+            keyed(made)
+            body[:] = [made]
+
+    def keyed(made: pn.Tabs) -> None:
+        head.keyed = PAGES[made.active] in KEYED
 
     show()
     if session.campaign is None:
@@ -58,18 +84,20 @@ def view(session: Session) -> Any:
 
 
 def offers(session: Session) -> Any:
-    """What can be opened, to choose from."""
+    """What can be opened, to choose from, and a place to drop the first run of a campaign."""
+    made: list[Any] = []
     if not session.offers:
-        return pn.pane.HTML(
+        made.append(pn.pane.HTML(
             "No campaign file is in this folder. Write one with <code>stickslip new campaign</code>, or name one: "
             "<code>stickslip open campaign.toml</code>"
-        )
-    made = []
+        ))  # fmt: skip
     for i, path in enumerate(session.offers):
         button = pn.widgets.Button(name=f"Open {path}", width=560, sizing_mode="fixed", stylesheets=[BUTTON])
         button.on_click(partial(_opened, session, i))
         made.append(button)
-    return pn.Column(*made, margin=(16, 0))
+    if session.home is not None:
+        made.append(FirstRun(session).view)
+    return pn.Column(*made, margin=(16, 0), sizing_mode="stretch_width")
 
 
 def _opened(session: Session, number: int, event: Any) -> None:
@@ -143,6 +171,7 @@ def frame(session: Session) -> Frame:
             searching=f"Diagnose: {session.searching}" if session.searching else "",
             searched=session.searched,
             said=session.said,
+            well=isinstance(session.said, Note),
         )
 
     def errors() -> None:

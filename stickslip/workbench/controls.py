@@ -61,7 +61,12 @@ class Words(JSComponent):
 
 
 class Frame(Spoken):
-    """The head of the window: title, model, errors, what is going on, what must be read; and the keyboard."""
+    """The head of the window: title, model, errors, what is going on, what must be read; and the keyboard.
+
+    Attributes:
+        well: whether what is said is a note, and nothing wrong.
+        keyed: whether the arrows are told as ``{"kind": "key", "key": name}``.
+    """
 
     title = param.String("")
     model = param.String("")
@@ -71,6 +76,8 @@ class Frame(Spoken):
     searching = param.String("")
     searched = param.Number(0.0)
     said = param.String("")
+    well = param.Boolean(False)
+    keyed = param.Boolean(False)
     dark = param.Boolean(False)
     colours = param.Dict({})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from ..inference.force.first_order import Promise
 from ..objects import Diagnosis, Fit
 from ..objects.picture import AGAINST
 from ..physics.effects import catalogue
+from ..physics.params import specs
 from ..system.units import shown
 
 BINS = 12  # of a signature, each with as many points
@@ -35,7 +37,7 @@ def name_of(found: Promise) -> str:
 def rows(
     fit: Fit, promises: Sequence[Promise], diagnosis: Diagnosis | None, against: str, chosen: str = ""
 ) -> list[dict[str, Any]]:
-    """What the catalogue shows, a row for each effect: those in the model first.
+    """What the catalogue shows, a row for each effect: those in the model first, the others by what is shown of them.
 
     Args:
         fit: the model as it stands.
@@ -49,14 +51,13 @@ def rows(
     best = [p for p in best_forms(promises) if p.tag not in fit.effects]
     top = max([p.fall for p in best if np.isfinite(p.fall)] + [float(k["gain"]) for k in known.values()] + [1.0])
     order = bins(fit, against)
-    out = [_in_model(fit, tag, chosen) for tag in fit.effects]
     said = {p.tag for p in best}
-    for each in best:
-        out.append(_row(fit, each, known.get(each.tag), top, order, chosen))
+    out = [_row(fit, each, known.get(each.tag), top, order, chosen) for each in best]
     for tag, found in known.items():  # before the effects were looked at
         if tag not in said and tag not in fit.effects:
             out.append({**_empty(tag, chosen), **_gains(found), "share": _share(float(found["gain"]), top)})
-    return out
+    inside = [_in_model(fit, tag, order, chosen) for tag in fit.effects]
+    return [*inside, *sorted(out, key=lambda row: -row["share"])]
 
 
 def bins(fit: Fit, against: str) -> list[np.ndarray]:
@@ -102,19 +103,35 @@ def _row(
     return made if known is None else {**made, **_gains(known), "share": _share(float(known["gain"]), top)}
 
 
-def _in_model(fit: Fit, tag: str, chosen: str) -> dict[str, Any]:
+@lru_cache(maxsize=8)
+def _without(fit: Fit, name: str, null: float) -> Fit:
+    """The model without what an amplitude does, nothing fitted; kept, as the list is made anew with every promise."""
+    return fit.with_values({name: null})
+
+
+def _in_model(fit: Fit, tag: str, parts: Sequence[np.ndarray], chosen: str) -> dict[str, Any]:
     if tag not in catalogue.tags():
         return {**_empty(tag, chosen), "on": True, "share": 1.0, "gain": "in the model, and in no file any more"}
-    name = f"{tag}.{catalogue.get(tag).amplitude}"
+    cls = catalogue.get(tag)
+    name = f"{tag}.{cls.amplitude}"
     free = {f.name: f for f in fit.free}
-    unit = free[name].unit if name in free else "1"
-    size = f"{shown(fit.values[name], unit, 3)} ± {shown(fit.std.get(name, 0.0), unit, 2)}" if name in free else ""
+    size, picture = "", []
+    if name in free:
+        std = fit.std.get(name, 0.0)
+        size = shown(fit.values[name], free[name].unit, 3)
+        size += f" ± {shown(std, free[name].unit, 2)}" if std > 0.0 else ""
+        bare = _without(fit, name, specs(cls)[cls.amplitude].null or 0.0)
+        picture = signature(bare, bare.force.residual.values - fit.force.residual.values, parts)
     gain = fit.climbed.gains.get(tag)
+    rung = max((i for i, r in enumerate(fit.climbed.ladder) if r.added == tag), default=0)
+    before, after = fit.ladder["unseen error"].iloc[[rung - 1, rung]] if rung else (np.nan, np.nan)
     return {
         **_empty(tag, chosen),
         "on": True,
         "share": 1.0,
         "gain": "in the model" if gain is None else f"in the model, gained {gain:.0f}",
+        "unseen": f"error on unseen runs {before:.2f} to {after:.2f}" if np.isfinite(before + after) else "",
+        "picture": picture,
         "amplitude": f"{name.partition('.')[2].replace('_', ' ')} {size}" if size else "",
     }
 

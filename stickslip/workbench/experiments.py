@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from ..data.segment import Segmentation
+from ..data.segment import Segmentation, segment
+from ..data.trace import Drive, Trace
 from ..errors import InputError, StickslipError
 from ..objects import Campaign, Diagnosis, Fit
 from ..simulation.scenario import Scenario
 from ..simulation.scenario.recording import Recording
 from ..simulation.scenario.schema import SweepTable
-from ..simulation.scenario.series import scenarios_of, summary
+from ..simulation.scenario.series import scenarios_of
 from ..simulation.scenario.simulation import Progress, record
 from ..simulation.scenario.writers import write_campaign
 from ..system.progress import breathe
@@ -143,9 +144,23 @@ def measured(found: Segmentation) -> dict[str, tuple[float, float, int]]:
     return {key: spread([getattr(e, key) for e in found.events]) for key in ("recurrence", "slip", "peak_velocity")}
 
 
-def simulated(recording: Recording) -> dict[str, tuple[float, float, int]]:
-    """The same of a simulated run."""
-    return {key: spread(recording[key].values) for key in MEASURES}
+def segmented(recording: Recording, trace: Trace) -> Segmentation:
+    """Events of a simulated run, found as those of a measured one are: with its sensor and its smallest slip.
+
+    The recorder's own slips begin earlier, where the block outruns the load point; the creep between is no error.
+    """
+    own = trace.leading == "displacement"
+    t, drive = recording["time"].values, recording["drive_position"].values
+    return segment(Trace(
+        trace.name, t, displacement=recording["displacement"].values, drive=Drive.sampled(t, drive),
+        resolution=trace.resolution if own else None, noise=trace.noise if own else None, virgin=trace.virgin,
+        minimum_slip=trace.minimum_slip,
+    ))  # fmt: skip
+
+
+def simulated(recording: Recording, trace: Trace) -> dict[str, tuple[float, float, int]]:
+    """The same of a simulated run beside a measured one, and the creep before its slips."""
+    return {**measured(segmented(recording, trace)), "creep_before_slip": spread(recording["creep_before_slip"].values)}
 
 
 def steady_runs(campaign: Campaign) -> dict[str, tuple[float, dict[str, tuple[float, float, int]]]]:
@@ -160,14 +175,33 @@ def steady_runs(campaign: Campaign) -> dict[str, tuple[float, dict[str, tuple[fl
     return out
 
 
+@dataclass(frozen=True)
+class Swept:
+    """Events of a model over the velocity of the drive.
+
+    Attributes:
+        fit: the model.
+        velocities: m/s, as far as they are simulated.
+        events: of each of them, as of :func:`simulated`.
+    """
+
+    fit: Fit
+    velocities: tuple[float, ...] = ()
+    events: tuple[dict[str, tuple[float, float, int]], ...] = ()
+
+    def mean(self, key: str) -> np.ndarray:
+        """Means of one of :data:`MEASURES`, shape (n,); nan where there is no event."""
+        return np.array([values[key][0] for values in self.events])
+
+
 def sweep(
-    fit: Fit, setting: Setting, low: str, high: str, points: int, tell: Tell, show: Callable[[Any], None]
-) -> Any:  # fmt: skip
+    fit: Fit, setting: Setting, low: str, high: str, points: int, tell: Tell, show: Callable[[Swept], None]
+) -> Swept:  # fmt: skip
     """Events of the model over the velocity of the drive; shown as far as they are there.
 
     Args:
         fit: the model.
-        setting: its spring, mass and number of events.
+        setting: its spring, mass and number of events, and the run whose sensor sees them.
         low, high: ends of the velocities, with units.
         points: how many.
         tell, show: told the progress, and what there is so far.
@@ -182,17 +216,17 @@ def sweep(
         raise InputError("out of range", key="number of velocities", value=points, allowed=f"{FEWEST} to {MOST}")
     base = scenario(fit, replace(setting, velocity=low, hold="", step=""))
     series = SweepTable(key="drive.velocity", start=ends[0], stop=ends[1], points=points)
-    members = scenarios_of(base, series)
-    done: list[Any] = []
-    for i, (value, member) in enumerate(members):
+    done = Swept(fit)
+    for i, (value, member) in enumerate(scenarios_of(base, series)):
         words = f"{i + 1} of {points}: {1e6 * value:.4g} µm/s"
 
         def within(text: str, share: float, i: int = i) -> None:
             tell(text, (i + share) / points)
 
-        done.append(run(member, within, words).dataset())
-        show(summary(base, "drive.velocity", [v for v, _ in members], done))
-    return summary(base, "drive.velocity", [v for v, _ in members], done)
+        events = simulated(run(member, within, words), fit.campaign[setting.run])
+        done = Swept(fit, (*done.velocities, value), (*done.events, events))
+        show(done)
+    return done
 
 
 def write(fit: Fit, setting: Setting, campaign: Campaign, name: str, tell: Tell) -> Path:

@@ -18,7 +18,7 @@ from bokeh.models import (
 from bokeh.models.annotations import Legend, Span
 from bokeh.plotting import figure as bokeh_figure
 
-from ..show.plots.style import scaled
+from ..show.plots.style import RUNS, scaled
 
 FEW = "canvas"  # what draws some hundred points quickest
 
@@ -52,7 +52,7 @@ class Look:
 
 LIGHT = Look(
     "#14213d", "#5b6577", "#dfe3e8", "#ffffff", "#f4f5f7", "#14213d", "#c8553d", "#8d99ae",
-    ("#0072b2", "#d55e00", "#009e73", "#b8578c", "#9a7400", "#3a93c9", "#5b6577"), "#1d5fa8",
+    RUNS, "#1d5fa8",
     "#5e3c99", "#f7f7f7", "#b35806",
 )  # fmt: skip
 DARK = Look(
@@ -139,7 +139,21 @@ def legend(made: Any, place: str = "above", **more: Any) -> None:
         found.label_text_font_size = "12px"
         found.update(padding=2, margin=2, spacing=12)
         found.update(**more)
+        for each in found.items:
+            _while_drawn(each)
         made.add_layout(found, place)
+
+
+def _while_drawn(item: Any) -> None:
+    """An entry is there while its curves have data: without, its sign would be missing."""
+    sources = [each.data_source for each in item.renderers]
+
+    def update(attr: str, old: Any, new: Any) -> None:
+        item.visible = any(len(column) for s in sources for column in s.data.values())
+
+    for each in sources:
+        each.on_change("data", update)
+    update("data", None, None)
 
 
 def source(**columns: Any) -> ColumnDataSource:

@@ -32,7 +32,8 @@ class Free:
         self.figure = figure("slip, run freely from the arrest before", height=300, output_backend=FEW)
         self.figure.line("t", "x", source=self._measured, color=theme.measured, line_width=2.5, legend_label="measured")
         self.figure.line(
-            "t", "x", source=self._model, color=theme.model, line_width=2, line_dash="dashed", legend_label="model",
+            "t", "x", source=self._model, color=theme.model, line_width=2, line_dash="dashed",
+            legend_label="model, to its arrest",
         )  # fmt: skip
         legend(self.figure)
         self.words = Words(sizing_mode="stretch_width", margin=(0, 0, 8, 70))

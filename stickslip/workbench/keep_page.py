@@ -61,7 +61,8 @@ def _history(session: Session) -> list[Any]:
 
     watch(session, ["steps", "at"], update)
     update()
-    return [head("History: a click shows the model after a step; the steps behind it can be had again"), made]
+    floors = Words(text="Errors are in floors of each step's own model: 1 is as good as the data allow.", **WIDE)
+    return [head("History: a click shows the model after a step; the steps behind it can be had again"), made, floors]
 
 
 def commands(session: Session) -> str:
@@ -190,7 +191,8 @@ _OPEN = """
 const page = document.createElement("textarea")
 page.innerHTML = pane.text
 const frame = page.value.replace("height:900px", "height:97vh")
-const whole = new Blob(["<!doctype html><title>report</title><body style='margin:0'>" + frame], {type: "text/html"})
+const head = "<!doctype html><meta charset='utf-8'><title>report</title><body style='margin:0'>"
+const whole = new Blob([head + frame], {type: "text/html"})
 window.open(URL.createObjectURL(whole), "_blank", "noopener")
 """
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from ..inference.fit.parameters import Free
 from ..objects import Fit
 from ..objects.fit import MEANINGS, STRENGTH
 from ..system.units import shown
@@ -22,56 +24,43 @@ class Knob:
     """One slider.
 
     Attributes:
-        name, unit: of the parameter.
+        free: the parameter.
         low, high: ends on the search scale.
-        scale: "log", or the linear unit of the search scale (SI).
-        std: standard deviation on the search scale.
-        doc, prior: in words.
+        prior: in words.
     """
 
-    name: str
-    unit: str
+    free: Free
     low: float
     high: float
-    scale: str | float
-    std: float
-    doc: str
     prior: str
-
-    def inward(self, value: float) -> float:
-        """SI -> search scale."""
-        return float(np.log(value)) if self.scale == "log" else value / float(self.scale)
-
-    def outward(self, z: float) -> float:
-        """Search scale -> SI."""
-        return float(np.exp(z)) if self.scale == "log" else z * float(self.scale)
 
     def place(self, value: float) -> float:
         """Where a value (SI) is on the slider, 0 to 1."""
-        return float(np.clip((self.inward(value) - self.low) / (self.high - self.low), 0.0, 1.0))
+        return float(np.clip((self.free.inward(value) - self.low) / (self.high - self.low), 0.0, 1.0))
 
     def value(self, place: float) -> float:
         """The value (SI) at a place of the slider."""
-        return self.outward(self.low + float(np.clip(place, 0.0, 1.0)) * (self.high - self.low))
+        return self.free.outward(self.low + float(np.clip(place, 0.0, 1.0)) * (self.high - self.low))
 
     def row(self, value: float, std: float, locked: bool) -> dict[str, Any]:
         """What the slider shows; ``std`` in SI."""
-        tag, _, own = self.name.rpartition(".")
-        z, width = self.inward(value), self.high - self.low
-        deviation = std / (value if self.scale == "log" else float(self.scale))
+        free = self.free
+        tag, _, own = free.name.rpartition(".")
+        z, width = free.inward(value), self.high - self.low
+        deviation = std / free.slope(z)
         ends = [float(np.clip((z + s * deviation - self.low) / width, 0.0, 1.0)) for s in (-1.0, 1.0)]
         return {
-            "name": self.name,
+            "name": free.name,
             "label": own.replace("_", " "),
             "group": "" if tag in BASE else tag,
-            "text": shown(value, self.unit),
-            "std": f"± {shown(std, self.unit, 2)}" if std > 0.0 else "",
+            "text": shown(value, free.unit),
+            "std": f"± {shown(std, free.unit, 2)}" if std > 0.0 else "",
             "prior": self.prior,
-            "doc": self.doc,
+            "doc": free.doc,
             "place": self.place(value),
             "band": ends if std > 0.0 and np.isfinite(ends).all() else [0.0, 0.0],
-            "low": shown(self.outward(self.low), self.unit, 2),
-            "high": shown(self.outward(self.high), self.unit, 2),
+            "low": shown(free.outward(self.low), free.unit, 2),
+            "high": shown(free.outward(self.high), free.unit, 2),
             "locked": locked,
         }
 
@@ -79,14 +68,11 @@ class Knob:
 def knobs(fit: Fit) -> dict[str, Knob]:
     """Name -> slider of every parameter of a model that was fitted; the contact's strength first."""
     std, values = fit.std, fit.values
-    relative = std[STRENGTH] / values[STRENGTH]
-    half = float(np.clip(DEVIATIONS * relative, 0.1, 1.0))
-    centre = float(np.log(values[STRENGTH]))
-    out = {
-        STRENGTH: Knob(
-            STRENGTH, "N", centre - half, centre + half, "log", relative, MEANINGS[STRENGTH], "measured"
-        )
-    }  # fmt: skip
+    strength = values[STRENGTH]
+    half = float(np.clip(DEVIATIONS * std[STRENGTH] / strength, 0.1, 1.0))
+    centre = float(np.log(strength))
+    whole = Free(STRENGTH, "N", "log", strength, strength, np.inf, 0.0, np.inf, MEANINGS[STRENGTH])
+    out = {STRENGTH: Knob(whole, centre - half, centre + half, "measured")}
     for f in fit.free:
         z = f.inward(values[f.name])
         deviation = std.get(f.name, 0.0) / max(abs(f.slope(z)), 1e-300)
@@ -102,7 +88,8 @@ def knobs(fit: Fit) -> dict[str, Knob]:
             half = max(DEVIATIONS * deviation, 0.1 * (most - least))
             low, high = z - half, z + half
         low, high = max(low, least), min(high, most)
-        out[f.name] = Knob(f.name, f.unit, low, high, f.scale, deviation, f.doc, f.known)
+        known = f.known_as(partial(shown, unit=f.unit, digits=3))
+        out[f.name] = Knob(f, low, high, known)
     return out
 
 

@@ -25,6 +25,11 @@ MANY = 4  # models of a ladder, above which their names are written aslant
 BENT = ("age", "velocity")  # variables whose small values matter as much as their large ones
 WAYS = ("time", "place", "slip path", "load point")  # along which something may come back
 KNOTS, FEWEST = 40, 5  # medians of the smooth curve, and how many different ones it needs
+FLOORS = (
+    "Errors are in floors: 1 is as good as noise and scatter of the data allow. All rungs are held against the floors "
+    "of the last model, so earlier ones differ from the errors that the head and the history gave them. Gain: by how "
+    "much the cost (chi-square, no unit) fell."
+)
 CARD = "background: var(--wb-surface); border: 1px solid var(--wb-line); border-radius: 4px; padding: 8px 12px;"
 
 
@@ -65,23 +70,24 @@ class _Residual:
         self._medians: dict[str, Any] = {}
         self._law, self._smooth = source(x=[], y=[]), source(x=[], y=[])
         self.figure.add_layout(Span(location=0.0, dimension="width", line_color=theme.soft, line_width=1))
-        self.figure.line(
-            "x", "y", source=self._law, color=theme.model, line_width=4, alpha=0.8, line_dash="dashed",
-            legend_label="the chosen effect",
-        )  # fmt: skip
-        self.figure.line(
+        asked = self.figure.line(
             "x", "y", source=self._smooth, color=theme.text, line_width=3.5, legend_label="what all runs ask for",
         )  # fmt: skip
+        law = self.figure.line(
+            "x", "y", source=self._law, color=theme.model, line_width=4, line_dash="dashed",
+            legend_label="the chosen effect",
+        )  # fmt: skip
+        self._over = (asked, law)
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
-        legend(self.figure, "below", ncols=4)
         self._draw_runs()
+        legend(self.figure, "below", ncols=4)
         self.against.param.watch(lambda event: self.update(), "value")
         self.period.param.watch(lambda event: self.update(), "value")
         watch(session, ["steps", "at", "promises", "campaign"], self.update)
         self.update()
 
     def _draw_runs(self) -> None:
-        """A colour for every run that has none yet."""
+        """A colour for every run that has none yet, under the two curves of all runs."""
         runs = look().runs
         for name in self._session.campaign.names if self._session.campaign is not None else ():
             if name not in self._points:
@@ -89,6 +95,7 @@ class _Residual:
                 self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])
                 self.figure.scatter("x", "y", source=self._points[name], size=3, alpha=0.35, **more)
                 self.figure.line("x", "y", source=self._medians[name], line_width=2.5, **more)
+        self.figure.renderers = [*(r for r in self.figure.renderers if r not in self._over), *self._over]
 
     def update(self) -> None:
         """Draw it anew; only numbers change."""
@@ -242,7 +249,7 @@ class _Listed:
         self._words.text = (
             f"looking at the effects ({100 * session.listed:.0f} %)"
             if session.listed < 1.0
-            else "by the fall of the cost that each promises; a click lays one over the residual"
+            else "by the fall of the cost (chi-square) that each promises; a click lays one over the residual"
         )
         self.verdict.object = _verdict(session.diagnosis)
 
@@ -321,7 +328,8 @@ def _table(every: Any) -> str:
         texts.append(f"{row['gain']:.0f}" if np.isfinite(row["gain"]) else "")
         numbers = "".join(f'<td style="{cell}">{t}</td>' for t in texts)
         lines.append(f'<tr><td style="padding-right: 14px">{escape(str(row["step"]))}</td>{numbers}</tr>')
-    return f'<div style="{CARD} color: var(--wb-text); font-size: 13px"><table>{"".join(lines)}</table></div>'
+    note = f'<div style="color: var(--wb-soft); font-size: 12px; margin-top: 6px">{FLOORS}</div>'
+    return f'<div style="{CARD} color: var(--wb-text); font-size: 13px"><table>{"".join(lines)}</table>{note}</div>'
 
 
 def _pair(value: float, std: float) -> str:

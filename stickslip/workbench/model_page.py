@@ -305,14 +305,14 @@ class _Heat:
 
 
 def heat(value: float, top: float) -> str:
-    """Colour of an error: 1 is as good as the data allow, ``top`` the worst."""
+    """Colour of an error: 1 is as good as the data allow, ``top`` the worst; by factors, so that 5 among 60 is seen."""
     theme = look()
     if not np.isfinite(value):
         return theme.surface
     ends, share = (
         ((theme.middle, theme.low), 1.0 - value)
         if value < 1.0
-        else ((theme.middle, theme.high), (value - 1) / (top - 1))
+        else ((theme.middle, theme.high), np.log(value) / np.log(top))
     )
     one, other = (np.array([int(c[i : i + 2], 16) for i in (1, 3, 5)]) for c in ends)
     mixed = one + (other - one) * float(np.clip(share, 0.0, 1.0))

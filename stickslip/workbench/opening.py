@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..inference.fit.serialised import KEY
 from ..objects import Diagnosis, load_campaign
+from ..objects.fitted_run import load_run
 from ..system.runstore import RESULT, read_result
 from .session import Session
 
@@ -21,10 +23,10 @@ EXAMPLE = Path("hidden-effect") / CAMPAIGN
 
 
 def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
-    """A session on a campaign file or a run folder.
+    """A session on a campaign file or a run folder, with the model that was saved there.
 
     Raises:
-        InputError: as of :func:`stickslip.load_campaign`; a run folder whose campaign is not found.
+        InputError: as of :func:`stickslip.load_campaign`; a run folder whose campaign or effect is not found.
     """
     own = tuple(p.resolve() for p in effects)
     if not path.is_dir():
@@ -36,6 +38,8 @@ def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
     session = Session(campaign=campaign, effects=own)
     if result.get("kind") == "diagnose":
         session.diagnosis = Diagnosis(campaign, None, result, {}, path)
+    elif KEY in result:
+        session.saved = load_run(path)
     return session
 
 

@@ -9,14 +9,14 @@ from ..errors import InputError
 LONGEST = 120
 FORBIDDEN = '/\\:*?"<>|'
 RESERVED = {"con", "prn", "aux", "nul", *(f"{n}{i}" for n in ("com", "lpt") for i in range(1, 10))}  # of Windows
-ALLOWED = "a name in the campaign's folder, such as run6.csv: no folders, no leading point"
+ALLOWED = "one plain name, such as run6.csv: no folders, no leading point"
 
 
 def new_place(folder: Path, name: str, key: str = "name") -> Path:
     """Where something new of that name goes in a folder.
 
     Args:
-        folder: of the campaign.
+        folder: in which it goes.
         name: as it was asked for.
         key: what an error calls it.
 

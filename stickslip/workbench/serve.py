@@ -16,7 +16,7 @@ from typing import Any
 from tornado.httputil import HTTPServerRequest
 from tornado.ioloop import IOLoop
 from tornado.routing import Router
-from tornado.web import Application, RequestHandler
+from tornado.web import Application, RequestHandler, StaticFileHandler
 
 from ..errors import InputError
 from . import own
@@ -74,6 +74,7 @@ def serve(
     Raises:
         InputError: the port is taken, or the address is none of this machine.
     """
+    from panel.io.resources import DIST_DIR
     from panel.io.server import get_server
 
     for name in ("bokeh", "panel", "tornado"):
@@ -86,6 +87,7 @@ def serve(
     server: Any = get_server(
         {"/": lambda: view(session)}, port=port, address=address, prefix=f"/{token}", websocket_origin=origins,
         title="stickslip", start=False, show=False, loop=IOLoop.current(),
+        extra_patterns=[(r"/(favicon\.ico)", StaticFileHandler, {"path": DIST_DIR / "images"})],
     )  # fmt: skip
     server._http.request_callback = Door(server._tornado, token)
     server.start()

@@ -19,6 +19,7 @@ import param
 from ..errors import RunFolderError, StickslipError
 from ..inference.force.first_order import Promise
 from ..objects import Campaign, Diagnosis, Fit, load_campaign
+from ..objects.fitted_run import FittedRun
 from ..physics.effects import catalogue
 from ..simulation.conformance import load_effects
 from ..system.progress import Cancelled
@@ -33,7 +34,12 @@ __all__ = ["BASE", "HAND", "Session", "Step", "watch"]
 BASE = "the base model"
 HAND = "by hand"
 MOST = 60  # steps that are kept
+SAME = 0.01  # standard deviations by which a parameter that was fitted anew may be off
 STILL = 0.25  # s without a move, after which a model that was moved is kept
+
+
+class Note(str):
+    """What is said where nothing is wrong."""
 
 
 @dataclass(frozen=True)
@@ -62,12 +68,14 @@ class Session(param.Parameterized):
 
     Attributes:
         campaign: what is open; None until one of ``offers`` (paths of campaign files) was chosen.
+        home: folder in which a campaign may be made where none is open; None for nowhere.
         steps, at: the history, and the number of the step that is shown (undo goes back, redo forth).
         diagnosis: of the present campaign, or None.
         run, event: what is selected: name of a run, number of a cycle in it.
         busy, share: what long work is going on ("" for none), and how much of it is done.
         searching, searched: the same of the diagnosis, which goes on beside all else.
-        said: what the user must read: an error in words or a note ("" for nothing).
+        saved: the model of a run folder that is to stand, until it does; None for the base.
+        said: what the user must read: an error in words or a :class:`Note` ("" for nothing).
         locked: names of parameters that a fit leaves as they are.
         promises: what every effect promises on top of the model as it stands; ``listed`` is how many were looked at.
         effects: Python files with effects of one's own; ``loaded`` counts how often they were.
@@ -79,9 +87,11 @@ class Session(param.Parameterized):
 
     campaign = param.ClassSelector(class_=Campaign)
     offers = param.Parameter(())
+    home = param.ClassSelector(class_=Path)
     steps = param.Parameter(())
     at = param.Integer(-1)
     diagnosis = param.Parameter(None)
+    saved = param.ClassSelector(class_=FittedRun)
     run = param.String("")
     event = param.Integer(0)
     busy = param.String("")
@@ -104,6 +114,7 @@ class Session(param.Parameterized):
         self._journal: Journal | None = None
         self._search: Search | None = None
         self._listing: Search | None = None
+        self._looked: tuple[Fit | None, int] = (None, 0)
         self._moves: dict[str, float | str] = {}
         self._guard = threading.Lock()
         self._held = ExitStack()
@@ -133,12 +144,16 @@ class Session(param.Parameterized):
 
         def job() -> None:
             with self._long(f"reading {self.offers[number]}"):
-                self.campaign = load_campaign(self.offers[number], self.effects)
-                self.said = ""
-                self.begin()
+                self.show_first(load_campaign(self.offers[number], self.effects))
 
         if self.campaign is None and 0 <= number < len(self.offers):
             self.worker("", job)
+
+    def show_first(self, campaign: Campaign) -> None:
+        """The campaign that was chosen or made, where none is open yet."""
+        if self.campaign is None:
+            self.campaign, self.said = campaign, ""
+            self.begin()
 
     def begin(self, keep: bool = True) -> None:
         """Fit the base model, or go on where the same campaign was left.
@@ -173,11 +188,31 @@ class Session(param.Parameterized):
 
     def _begin(self, campaign: Campaign) -> None:
         with self._long("looking at the data"):
-            if self._journal is not None and self._again():
-                return
-            self.busy = "fitting the base model"
-            self.first(_complete(campaign.fit()))
+            if self._journal is None or not self._again():
+                self.busy = "fitting the base model"
+                self.first(_complete(campaign.fit()))
+            if self.saved is not None:
+                self._restore(self.saved)
+                self.saved = None
             self.keep()
+
+    def _restore(self, saved: FittedRun) -> None:
+        """Fit a saved model anew, and set what was set by hand in it, as steps; none where it stands already."""
+        fit, forms, name = self.fit, list(saved.effect_forms), saved.folder.name
+        assert fit is not None and self.campaign is not None
+        if sorted(fit.effect_forms) != sorted(forms):
+            self.busy = f"fitting the model of {name}"
+            fit = _complete(self.campaign.fit(forms))
+            command = "stickslip fit campaign.toml " + " ".join(f"--add {form}" for form in forms)
+            self.take(Step(f"the model of {name}", fit, f"fit = campaign.fit({forms!r})", command.strip()))
+        values, own = saved.parameters, fit.values
+        moved = {
+            n: values[n]["value"] for n, std in fit.std.items()
+            if n in values and abs(values[n]["value"] - own[n]) > SAME * std
+        }  # fmt: skip
+        if moved:
+            code = f"fit = fit.with_values({moved!r})"
+            self.take(Step(f"{HAND}: as in {name}", fit.with_values(moved), code, "", moved))
 
     def _again(self) -> bool:
         """Where it was left; whether there was anything."""
@@ -387,10 +422,11 @@ class Session(param.Parameterized):
     # what is missing
 
     def list_promises(self) -> None:
-        """Look at every effect on top of the model as it stands, in a process beside."""
+        """Look at every effect on top of the model as it stands, in a process beside, unless that goes on already."""
         fit = self.fitted
-        if fit is None:
+        if fit is None or (self.listed < 1.0 and self._looked == (fit, self.loaded)):
             return
+        self._looked = (fit, self.loaded)
         if self._listing is not None:
             self._listing.cancel()
             self._listing = None
@@ -462,7 +498,7 @@ class Session(param.Parameterized):
             with self._told():
                 classes = load_effects([path])
                 tags = [cls.tag for cls in classes]
-                self.said = f"{path.name} was loaded anew: {', '.join(tags)}"
+                self.said = Note(f"{path.name} was loaded anew: {', '.join(tags)}")
                 fit = self.fit
                 forms = {} if fit is None else dict(zip(fit.effects, fit.effect_forms, strict=True))
                 for tag in tags:
@@ -502,7 +538,7 @@ class _Long:
         if self._text:
             self._session.busy = ""
         if isinstance(error, Cancelled):
-            self._session.said = "cancelled; the model is as it was"
+            self._session.said = Note("cancelled; the model is as it was")
             return True
         if isinstance(error, StickslipError):
             self._session.said = str(error)

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import panel as pn
+from bokeh.core.properties import value
 from bokeh.models import FixedTicker
 
+from ..data.trace import Trace
 from ..errors import InputError
 from ..inference.force.candidates import every_form
 from ..objects import Fit
@@ -19,8 +21,8 @@ from ..system.units import shown, to_si
 from . import experiments
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Message, Words
-from .evidence import best_forms
-from .experiments import MEASURES, Setting, Telling
+from .evidence import LEAST, best_forms
+from .experiments import MEASURES, Setting, Swept, Telling
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .overview import record, reduced
 from .parts import Table, head, progress, row_of
@@ -74,7 +76,14 @@ class _Asked:
         self.step = text(name="a step to the velocity", placeholder="none, such as 1 mm/s")
         self.spring, self.mass = text(name="spring"), text(name="mass")
         self.events = pn.widgets.IntInput(
-            name="slips, if at a velocity", value=7, start=1, end=100, width=150, margin=(0, 10, 0, 0), **FIXED
+            name="number of slips",
+            description="At a velocity written here, and in the sweep",
+            value=7,
+            start=1,
+            end=100,
+            width=150,
+            margin=(0, 10, 0, 0),
+            **FIXED,
         )
         asked = (self.run, self.velocity, self.hold, self.step, self.spring, self.mass, self.events)
         self.row = pn.FlexBox(*asked, gap="6px 0")
@@ -127,6 +136,12 @@ def needed(session: Session) -> Fit:
     return session.fit
 
 
+def named(fit: Fit, now: Fit | None) -> str:
+    """What a curve is of: the model as it stands, or one that stood before."""
+    parts = " + ".join(fit.parts)
+    return f"model: {parts}" if fit is now else f"a model before: {parts}"
+
+
 class _Beside:
     """One run of the model beside the measured one."""
 
@@ -143,7 +158,7 @@ class _Beside:
             made = figure(height=230, window_axis="x", output_backend="canvas", **linked)
             for name, data, colour, dash in (
                 ("measured", self._measured, theme.measured, "solid"),
-                ("model, run freely", self._model, theme.model, "dashed"),
+                ("model", self._model, theme.model, "dashed"),
             ):
                 made.line(
                     "t", key, source=data, color=colour, line_width=2, line_dash=dash, legend_label=name,
@@ -151,6 +166,7 @@ class _Beside:
             made.min_border_left = LEFT
             self.figures[key] = made
         legend(self.figures["x"])
+        self._name = self.figures["x"].legend[0].items[1]
         self.figures["gap"].legend.visible = False
         crosshair(*self.figures.values())
         self._table = Table(choosing=False, **WIDE)
@@ -161,7 +177,7 @@ class _Beside:
         )
         asked.run.param.watch(lambda event: self.update(), "value")
         watch(self._work, ["found", "doing"], self.update)
-        watch(session, ["campaign"], self.update)
+        watch(session, ["campaign", "steps", "at"], self.update)
         self.update()
 
     def start(self) -> None:
@@ -195,10 +211,12 @@ class _Beside:
         if found is None:
             self._model.data = {"t": [], "x": [], "gap": []}
         else:
+            self._name.label = value(named(found.fit, self._session.fit))
             r = found.recording
             moved = r["displacement"].values
             self._model.data = _thinned(r["time"].values, moved * k, (r["drive_position"].values - moved) * g)
-        columns, rows = event_rows(experiments.measured(campaign.events[campaign.names.index(run)]), found)
+        own = experiments.measured(campaign.events[campaign.names.index(run)])
+        columns, rows = event_rows(own, found, trace, self._session.fit)
         self._table.param.update(columns=columns, rows=rows)
 
 
@@ -224,13 +242,13 @@ def _thinned(t: np.ndarray, x: np.ndarray, gap: np.ndarray) -> dict[str, np.ndar
 
 
 def event_rows(
-    measured: dict[str, tuple[float, float, int]], found: Simulated | None
+    measured: dict[str, tuple[float, float, int]], found: Simulated | None, trace: Trace, now: Fit | None
 ) -> tuple[list[str], list[list[str]]]:  # fmt: skip
-    """Means over the slips after the first, measured and simulated."""
+    """Means over the slips after the first, measured (in a trace) and simulated; ``now`` is the model as it stands."""
     columns = ["means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)]
     if found is None:
         return columns, [["measured", *_cells(measured)]]
-    model = [f"model: {' + '.join(found.fit.parts)}", *_cells(experiments.simulated(found.recording))]
+    model = [named(found.fit, now), *_cells(experiments.simulated(found.recording, trace))]
     verdict = str(found.recording.attrs.get("verdict", ""))
     return [*columns, "what happens"], [["measured", *_cells(measured), ""], [*model, verdict]]
 
@@ -281,6 +299,7 @@ class _Sweep:
             made.scatter("v", key, source=self._measured, color=theme.measured, size=9, legend_label="measured")
             legend(made)
             self.figures[key] = made
+        self._names = [made.legend[0].items[0] for made in self.figures.values()]
         self.view = pn.Column(
             head("A sweep of the velocity: means over the slips after the first, with their scatter"),
             pn.FlexBox(self.low, self.high, self.points, self._button, gap="6px 0"),
@@ -290,6 +309,7 @@ class _Sweep:
         )
         watch(self._work, ["found", "doing"], self.update)
         watch(session, ["campaign"], self._anew)
+        watch(session, ["steps", "at"], self.update)
         self._prepare()
 
     def _anew(self) -> None:
@@ -318,16 +338,16 @@ class _Sweep:
     def update(self) -> None:
         """Draw what there is."""
         self._button.disabled = bool(self._work.doing)
-        found = self._work.found
+        found: Swept | None = self._work.found
         every = [v for v, _ in self._steady.values()]
-        velocities = np.array([*every, *([] if found is None else found["value"].values)])
+        velocities = np.array([*every, *([] if found is None else found.velocities)])
         k, unit = unit_of(velocities, "m/s")
-        model: dict[str, Any] = {"v": [] if found is None else found["value"].values * k}
+        model: dict[str, Any] = {"v": velocities[len(every) :] * k}
         measured: dict[str, Any] = {"v": np.array(every) * k, "run": list(self._steady)}
         for key, si in (("recurrence", "s"), ("slip", "m")):
             own = np.array([values[key][0] for _, values in self._steady.values()])
             std = np.array([values[key][1] for _, values in self._steady.values()])
-            theirs = np.array([]) if found is None else found[key].values
+            theirs = np.array([]) if found is None else found.mean(key)
             f, written = unit_of(np.concatenate([own, theirs]), si)
             model[key], measured[key] = theirs * f, own * f
             self._bars[key].data = {
@@ -340,6 +360,9 @@ class _Sweep:
             if key == "recurrence":
                 self.figures[key].yaxis.ticker = FixedTicker(ticks=ticks(np.concatenate([own, theirs]) * f))
         self._model.data, self._measured.data = model, measured
+        if found is not None:
+            for item in self._names:
+                item.label = value(named(found.fit, self._session.fit))
 
 
 class _Experiment:
@@ -350,6 +373,7 @@ class _Experiment:
         self._work = beside(session, "rivals")
         self._sets: list[tuple[tuple[str, ...], str]] = []
         self._drawn: Telling | None = None
+        self._offered: list[str] = []
         self.which = pn.widgets.Select(
             name="effects that these data cannot tell apart", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
         )
@@ -391,9 +415,9 @@ class _Experiment:
             self.effects.value = [tag for tag in tags if tag in self.effects.options][:RIVALS]
             self._said.text = f"The diagnosis proposes: {text}. {DONE}"
             return
-        if not self.effects.value:
-            best = [p.tag for p in best_forms(self._session.promises)][:2]
-            self.effects.value = [tag for tag in best if tag in self.effects.options]
+        if self.effects.value == self._offered:  # nobody chose others
+            best = [p.tag for p in best_forms(self._session.promises) if p.fall > LEAST]
+            self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
         self._said.text = f"The effects that promise most are offered; others can be chosen. {DONE}"
 
     def start(self) -> None:
@@ -443,8 +467,9 @@ class _Experiment:
     def _draw(self, telling: Telling) -> None:
         """The models side by side in one experiment."""
         found: list[Telling] = self._work.found
+        campaign = self._session.campaign
         self._table.chosen = next((i for i, t in enumerate(found) if t is telling), -1)
-        if telling is self._drawn or not telling.recordings:
+        if telling is self._drawn or not telling.recordings or campaign is None:
             return
         self._drawn = telling
         theme = look()
@@ -463,7 +488,8 @@ class _Experiment:
             own.xaxis.axis_label, own.yaxis.axis_label = label("time from the start", "s"), label(name, unit)
             legend(own)
         made[1].x_range = made[0].x_range
-        rows = [[tag, *_cells(experiments.simulated(r))] for tag, r in telling.recordings.items()]
+        trace = campaign[telling.setting.run]
+        rows = [[tag, *_cells(experiments.simulated(r, trace))] for tag, r in telling.recordings.items()]
         columns = [
             f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
         ]  # fmt: skip

@@ -58,6 +58,7 @@ def watch(session: param.Parameterized, names: Sequence[str], call: Callable[[],
     loses what it is asked to call.
     """
     import panel as pn
+    from panel.io import hold
 
     doc, place = pn.state.curdoc, _place.get()
     if doc is None or doc.session_context is None:
@@ -70,10 +71,11 @@ def watch(session: param.Parameterized, names: Sequence[str], call: Callable[[],
         nonlocal waiting
         with guard:
             waiting = False
-        if place is None:
-            call()
-        else:
-            place.call(call)
+        with hold(doc):  # in one message, which cannot overtake the one that brings the page
+            if place is None:
+                call()
+            else:
+                place.call(call)
 
     def changed(*events: Any) -> None:
         nonlocal waiting

@@ -96,6 +96,17 @@ def test_the_scenario_is_the_same_model(folder):
     assert heavier.contact.strength == pytest.approx(2 * 0.26)
 
 
+@pytest.mark.parametrize("end", ["lower", "upper"])
+def test_a_value_at_its_bound_is_one_that_the_effect_takes(end):
+    """exp(log(1e-10)) is less than 1e-10."""
+    for tag in catalogue.tags():
+        effect = catalogue.make(tag)
+        for free in effect_parameters(effect):
+            value = free.outward(free.inward(getattr(free, end)))
+            assert free.lower <= value <= free.upper and value == pytest.approx(getattr(free, end), rel=1e-12)
+            catalogue.make(tag, **{free.name.split(".")[1]: value})
+
+
 def test_a_parameter_is_set_by_the_name_that_the_fit_gives_it(folder):
     back = ss.load_run(folder)
     model = build(back.scenario(["rig.mass=0.1", "contact-ageing.rate=0.02", "contact.u_max=1um"])).model

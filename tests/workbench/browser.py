@@ -28,13 +28,14 @@ const named = (name) => Bokeh.documents.map((d) => d.get_model_by_name(name)).fi
 
 
 class Served:
-    """A server of its own process."""
+    """A server of its own process: of a campaign, or of what there is to choose from in a folder."""
 
-    def __init__(self, campaign: Path, *more: str) -> None:
+    def __init__(self, place: Path, *more: str) -> None:
+        what, folder = ((), place) if place.is_dir() else ((str(place),), place.parent)
         self.began = time.monotonic()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "stickslip", "open", str(campaign), "--no-browser", *more],
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=campaign.parent,
+            [sys.executable, "-m", "stickslip", "open", *what, "--no-browser", *more],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=folder,
             env={**os.environ, "PYTHONPATH": str(ROOT)},
         )  # fmt: skip
         assert self.process.stdout is not None

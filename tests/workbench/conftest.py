@@ -30,3 +30,9 @@ def campaign(folder):
 @pytest.fixture(scope="session")
 def base(campaign):
     return campaign.fit()
+
+
+@pytest.fixture(scope="session")
+def aged(base):
+    """The base model with the hidden effect, fitted once."""
+    return base.add("contact-ageing")

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import shutil
+from contextlib import closing
 
 import numpy as np
 import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
+from stickslip.objects import Campaign
 from stickslip.workbench import data_page
 from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, guess, look
-from stickslip.workbench.adding_form import Form
+from stickslip.workbench.adding_form import FirstRun, Form
 from stickslip.workbench.event_parts import PARTS, part
 from stickslip.workbench.event_view import EventView
 from stickslip.workbench.overview import AROUND, DISPLACEMENT, GAP, Levels, Window, record, reduced
@@ -173,7 +175,10 @@ def test_a_dropped_file_is_stored_and_the_campaign_grows(own, folder):
 )  # fmt: skip
 def test_names_that_lead_elsewhere_or_are_taken_are_refused(own, name):
     before = {p.name: p.read_bytes() for p in own.description.folder.iterdir()}
-    text = entry_text("x.csv", Choice({"time": "time", "displacement": "x"}, {"time": "s", "displacement": "um"}))
+    text = entry_text(
+        "x.csv",
+        Choice({"time": "time", "displacement": "x"}, {"time": "s", "displacement": "um"}, drive_velocity="1 um/s"),
+    )
     with pytest.raises(InputError):
         add(own, name, _table(), text)
     assert {p.name: p.read_bytes() for p in own.description.folder.iterdir()} == before
@@ -188,9 +193,10 @@ def test_a_link_in_the_folder_leads_nowhere(own, tmp_path_factory):
 
 def test_a_run_that_cannot_be_loaded_leaves_the_campaign_as_it_was(own):
     before = {p.name: p.read_bytes() for p in own.description.folder.iterdir()}
-    choice = Choice({"time": "time", "displacement": "x"}, {"time": "s", "displacement": "um"})
+    back = "50 um/s until 5 s, 0 um/s until 3 s"
+    choice = Choice({"time": "time", "displacement": "x"}, {"time": "s", "displacement": "um"}, drive_velocity=back)
     with pytest.raises(InputError) as told:
-        add(own, "run.csv", _table(), entry_text("run.csv", choice))  # no drive
+        add(own, "run.csv", _table(), entry_text("run.csv", choice))
     assert "campaign.toml" in str(told.value) and "drive" in str(told.value) and "adding" not in str(told.value)
     assert {p.name: p.read_bytes() for p in own.description.folder.iterdir()} == before
 
@@ -200,13 +206,38 @@ def test_what_is_wrong_is_said_in_the_form(own):
     form.take("bad.csv", b"\x00\x01\x02 nothing")
     assert form.dropped is None and "bad.csv" in form.said.text
     form.take("run.csv", _table())
+    for channel in ("drive_position", "spring_force"):
+        form.columns[channel].value = NONE
     form.velocity.value = "fast"
     form.send()
     assert "velocity of the load point" in form.said.text
+    form.velocity.value, form.said.text = "", ""
+    form.send()
+    assert "velocity of the load point" in form.said.text and "campaign.toml" not in form.said.text
     form.columns["time"].value = NONE
     form.velocity.value = "50 um/s"
     form.send()
     assert "sampling rate" in form.said.text
+
+
+def test_a_file_that_is_dropped_where_nothing_is_open_begins_a_campaign(folder, base, tmp_path, monkeypatch):
+    monkeypatch.setattr(Campaign, "fit", lambda self, effects=(): base)
+    with closing(Session(home=tmp_path)) as session:
+        form = FirstRun(session)
+        form.take("v400.csv", (folder / "v400.csv").read_bytes())
+        form.rate.value, form.velocity.value, form.units["displacement"].value = "10 kHz", "400 um/s", "7.91 nm"
+        for name, mass, told in (("../rig", "", "cannot be used"), ("", "", "cannot be used"), ("rig", "3 N", "mass")):
+            form.folder.value, form.mass.value = name, mass
+            form.send()
+            assert told in form.said.text and session.campaign is None and not list(tmp_path.iterdir())
+        form.mass.value, form.spring.value = "89.4 g", "980 N/m"
+        form.send()
+        made = session.campaign
+        assert [p.name for p in tmp_path.iterdir()] == ["rig"]
+        assert made.description.path == tmp_path / "rig" / "campaign.toml"
+        assert (made.rig.mass, made.rig.spring_stiffness) == pytest.approx((0.0894, 980.0))
+        assert made["v400"].drive_velocity == pytest.approx(4e-4) and len(made.events[0].events) == 7
+        assert session.fit is base
 
 
 def test_a_drive_with_holds_can_be_given(own, folder):

@@ -8,15 +8,17 @@ import urllib.request
 import numpy as np
 import pytest
 
+from stickslip.inference.fit.parameters import effect_parameters
 from stickslip.inference.force.candidates import every_form, try_effect
 from stickslip.inference.force.first_order import promise
 from stickslip.inference.force.signatures import Explained
 from stickslip.objects import Diagnosis
+from stickslip.physics.effects import catalogue
 from stickslip.workbench import app, missing_page, model_page
 from stickslip.workbench.evidence import best_forms, rows, signature
 from stickslip.workbench.figures import DARK, LIGHT
 from stickslip.workbench.free_panel import Free
-from stickslip.workbench.knobs import knobs
+from stickslip.workbench.knobs import Knob, knobs
 from stickslip.workbench.knobs import rows as knob_rows
 from stickslip.workbench.session import Session
 from stickslip.workbench.watching import Place
@@ -50,6 +52,12 @@ def test_a_slider_shows_and_gives_back_its_value(base):
         assert row["band"][0] <= row["place"] <= row["band"][1]
         assert row["locked"] == (row["name"] == "weakening.drop")
         assert row["text"] and row["std"].startswith("±")
+
+
+def test_a_slider_reaches_the_bounds_of_a_parameter():
+    free = next(f for f in effect_parameters(catalogue.make("rate-and-state")) if f.name.endswith("cutoff_velocity"))
+    knob = Knob(free, *free.bounds, "")
+    assert free.lower <= knob.value(0.0) < knob.value(1.0) <= free.upper
 
 
 def test_the_pages_are_made_and_follow(session, base):
@@ -111,6 +119,19 @@ def test_the_residual_is_folded_over_a_period(session, base):
         assert session.said and "phase" not in part.figure.xaxis.axis_label
     part.against.value = "velocity"
     assert part.period.disabled
+
+
+def test_the_effect_that_is_laid_over_is_drawn_over_all_else(session, base, promises):
+    made = missing_page._Residual(session)
+    session.promises, made.chosen = promises, promises[0].tag
+    made.update()
+    last = made.figure.renderers[-1].data_source
+    assert last is made._law and len(last.data["x"]) > 3
+
+
+def test_an_error_of_five_floors_is_seen_beside_one_of_sixty():
+    blue = [int(model_page.heat(value, 60.0)[5:], 16) for value in (1.0, 5.0, 60.0)]
+    assert blue[0] - blue[1] > 0.3 * (blue[0] - blue[2]) > 0
 
 
 def test_the_slip_path_is_the_way_there_and_back(base):
@@ -182,6 +203,24 @@ def test_the_catalogue_shows_what_a_diagnosis_found(campaign, base, promises):
     made = rows(base, promises, found, "age")
     assert made[0]["gain"] == "gains 955 when fitted" and made[0]["unseen"] == "on unseen runs 900 ± 30"
     assert rows(base, (), found, "age")[0]["tag"] == "contact-ageing"
+
+
+def test_the_catalogue_is_in_the_order_of_what_it_shows(campaign, base, promises):
+    ranked = [
+        {"effect": tag, "gain": gain, "heldout_cost": gain, "heldout_cost_std": 1.0, "note": "", "heldout_error": 1.0,
+         "amplitude": {"value": 0.003, "std": 1e-4, "unit": "1"}}
+        for tag, gain in (("drive-ripple", 2000.0), ("contact-ageing", 955.0), ("viscous-drag", 1500.0))
+    ]  # fmt: skip
+    made = rows(base, promises, Diagnosis(campaign, None, {"ranking": ranked, "visible": {}}, {}), "age")
+    assert [r["tag"] for r in made][:3] == ["drive-ripple", "viscous-drag", "contact-ageing"]
+
+
+def test_an_effect_in_the_model_shows_what_it_takes_off(aged):
+    (made,) = rows(aged, (), None, "age")
+    before, after = (float(text) for text in made["unseen"].removeprefix("error on unseen runs ").split(" to "))
+    assert after == pytest.approx(aged.unseen_error, abs=0.006) and before > 2.0 * after
+    residual, law, _ = (np.array(curve) for curve in made["picture"])
+    assert np.corrcoef(residual[:, 1], law[:, 1])[0, 1] > 0.9
 
 
 def test_a_signature_of_another_model_is_not_drawn(base):

@@ -87,6 +87,18 @@ def test_a_dropped_file_becomes_a_run_and_its_name_is_no_markup(browser, home, t
     browser.idle(200)
 
 
+def test_the_arrows_scroll_where_they_select_nothing(browser):
+    press = """
+    const key = new KeyboardEvent('keydown', { key: 'ArrowDown', bubbles: true, composed: true, cancelable: true })
+    return !(arguments[0] ? seen(arguments[0])[0] : document.body).dispatchEvent(key)
+    """
+    browser.tab("Data")
+    browser.wait(lambda: browser.js(press, ""))
+    assert not browser.js(press, "tbody tr") and not browser.js(press, "input")
+    browser.tab("Keep")
+    browser.wait(lambda: not browser.js(press, ""))
+
+
 def test_the_model_is_saved_listed_and_its_report_shown(browser, home):
     browser.tab("Keep")
     browser.wait(lambda: browser.js("return seen('button').some((e) => e.textContent.trim() === 'Save')"))
@@ -102,6 +114,21 @@ def test_the_model_is_saved_listed_and_its_report_shown(browser, home):
     frame = browser.wait(lambda: browser.js("return seen('iframe')[0]"))
     assert frame.get_attribute("sandbox") == "" and "Force along the measured motion" in frame.get_attribute("srcdoc")
     assert not (home.parent / "elsewhere").exists()
+
+
+def test_a_campaign_that_was_chosen_is_shown(tmp_path):
+    shutil.copytree(SCENARIO, tmp_path / "rig")
+    served = Served(tmp_path)
+    made = Browser(str(CHROMIUM), str(DRIVER))
+    try:
+        made.open(served.url)
+        made.press("button", "Open rig")
+        made.wait(lambda: made.js("const d = named('data displacement'); return d && d.data.t.length"), 60)
+        made.wait(lambda: "Simulate" in made.text(".bk-tab"))
+        assert made.complaints() == []
+    finally:
+        made.close()
+        served.end()
 
 
 def test_nothing_is_asked_of_the_network_and_nothing_complained(browser):

@@ -15,12 +15,13 @@ import pytest
 
 from stickslip.cli import run
 from stickslip.errors import InputError
+from stickslip.inference.fit.serialised import KEY, record
 from stickslip.system.runstore import json_text
 from stickslip.workbench import opening, own
 from stickslip.workbench.journal import FOLDER
 from stickslip.workbench.opening import campaign_of, offered, opened
 from stickslip.workbench.serve import _free
-from stickslip.workbench.session import Session
+from stickslip.workbench.session import Note, Session
 
 from .browser import Served
 
@@ -75,7 +76,7 @@ def _status(url: str, **headers: str) -> int:
 def test_only_the_address_with_its_token_opens(served):
     root, token = served.url.rstrip("/").rsplit("/", 1)
     assert len(token) > 20
-    assert _status(served.url) == 200
+    assert _status(served.url) == _status(f"{served.url}favicon.ico") == 200
     for path in (
         "",
         "/",
@@ -167,6 +168,23 @@ def test_a_run_folder_opens_the_campaign_it_was_made_from(folder, tmp_path):
         campaign_of(tmp_path, {"inputs": [{"file": "gone.toml"}]})
 
 
+def test_a_saved_model_stands_again(folder, base, aged, tmp_path, monkeypatch):
+    from stickslip.objects import Campaign
+
+    name = "contact-ageing.rate"
+    moved = aged.with_values({name: 1.1 * aged.values[name]})
+    inputs = [{"file": str(folder / "campaign.toml"), "sha256": ""}]
+    (tmp_path / "result.json").write_text(json_text({"kind": "fit", "inputs": inputs, KEY: record(moved.fitted)}))
+    monkeypatch.setattr(Campaign, "fit", lambda self, effects=(): aged if list(effects) == ["contact-ageing"] else base)
+    with closing(opened(tmp_path)) as session:
+        session.begin(keep=False)
+        assert [step.fit.effects for step in session.steps] == [(), ("contact-ageing",), ("contact-ageing",)]
+        assert session.fit.values[name] == pytest.approx(moved.values[name])
+        assert list(session.steps[-1].changed) == [name]
+        session.undo()
+        assert session.fit is aged and session.saved is None
+
+
 def test_what_lies_in_a_folder_is_offered(folder, tmp_path):
     (tmp_path / "scenario.toml").write_text("[block]\n")
     assert [p.name for p in offered(tmp_path)] in ([], ["campaign.toml"])
@@ -202,6 +220,7 @@ def test_an_effect_that_is_saved_is_loaded_anew(tmp_path, campaign):
         time.sleep(0.5)
         path.write_text(EFFECT.replace("A constant pull", "Another pull"))
         _until(lambda: session.loaded == 1)
+        assert isinstance(session.said, Note)
         assert "own-pull" in session.said
         path.write_text(EFFECT + "\n1 / 0\n")
         _until(lambda: "ZeroDivisionError" in session.said)

@@ -10,6 +10,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.system.progress import Cancelled
+from stickslip.workbench import searches
 from stickslip.workbench.journal import FOLDER, Journal
 from stickslip.workbench.selection import choose, cycles, follow, selected, worst
 from stickslip.workbench.session import Session
@@ -219,3 +220,25 @@ def test_a_campaign_can_be_begun_again(campaign, base, monkeypatch):
         session.begin()
         session.begin()
         assert session._journal is not None and "another workbench" not in session.said
+
+
+def test_a_second_window_leaves_the_listing_that_goes_on(session, base, monkeypatch):
+    begun, cancelled = [], []
+
+    class Fake:
+        def cancel(self):
+            cancelled.append(self)
+
+    monkeypatch.setattr(searches, "promises", lambda fit, *rest: begun.append((fit, rest[1])) or Fake())
+    session.list_promises()
+    begun[0][1](["one"], 0.5)
+    session.list_promises()
+    assert len(begun) == 1 and session.promises == ("one",) and not cancelled
+    begun[0][1]([], 1.0)
+    session.list_promises()
+    assert len(begun) == 1 and session.promises == ("one",)
+    session._promised, session.loaded = [], 1
+    session.list_promises()
+    session.loaded = 2
+    session.list_promises()
+    assert len(begun) == 3 and session.promises == () and len(cancelled) == 2

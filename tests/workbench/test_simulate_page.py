@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -88,6 +90,9 @@ def test_a_simulation_is_shown_beside_the_measurement(session):
     assert "/ µm" in made.figures["x"].yaxis.axis_label and made.figures["gap"].xaxis.axis_label.endswith("/ s")
     columns, rows = made._table.columns, made._table.rows
     assert len(rows) == 2 and all(len(r) == len(columns) for r in rows) and "±" in rows[1][1]
+    assert rows[1][0] == made._name.label.value == "model: static + inertia"
+    session.by_hand({"weakening.drop": session.fit.values["weakening.drop"] * 1.05})
+    assert made._table.rows[1][0] == made._name.label.value == "a model before: static + inertia"
 
 
 def test_a_wrong_quantity_is_said_and_nothing_else_happens(session):
@@ -121,11 +126,11 @@ def test_a_simulation_can_be_cancelled(base):
 def test_a_sweep_comes_to_the_measured_recurrence(session, campaign, base):
     shown = []
     found = experiments.sweep(base, Setting("v100", events=3), "100 um/s", "400 um/s", 3, _silent, shown.append)
-    assert [d.sizes["run"] for d in shown] == [1, 2, 3]
+    assert [len(d.velocities) for d in shown] == [1, 2, 3]
     speed, values = experiments.steady_runs(campaign)["v200"]
     assert speed == pytest.approx(2e-4) and "holds" not in experiments.steady_runs(campaign)
-    assert found["value"].values[1] == pytest.approx(2e-4)
-    assert found["recurrence"].values[1] == pytest.approx(values["recurrence"][0], rel=0.1)
+    assert found.velocities[1] == pytest.approx(2e-4)
+    assert found.mean("recurrence")[1] == pytest.approx(values["recurrence"][0], rel=0.1)
     for low, high, points in (("2 um/s", "1 um/s", 3), ("1 um/s", "2 um/s", 400), ("x", "2 um/s", 3)):
         with pytest.raises(InputError):
             experiments.sweep(base, Setting("v100"), low, high, points, _silent, shown.append)
@@ -138,6 +143,11 @@ def test_the_sweep_is_drawn_with_measured_points(session):
     made.low.value, made.high.value, made.points.value, asked.events.value = "200 um/s", "400 um/s", 2, 3
     made.start()
     assert len(made._model.data["v"]) == 2 and np.isfinite(made._model.data["recurrence"]).all()
+    assert {item.label.value for item in made._names} == {"model: static + inertia"}
+    session.by_hand({"weakening.drop": session.fit.values["weakening.drop"] * 1.05})
+    assert {item.label.value for item in made._names} == {"a model before: static + inertia"}
+    session.undo()
+    assert {item.label.value for item in made._names} == {"model: static + inertia"}
 
 
 def test_a_synthetic_record_can_be_opened(campaign, base, folder):
@@ -145,6 +155,10 @@ def test_a_synthetic_record_can_be_opened(campaign, base, folder):
     assert made == folder / "synthetic run" and not list(folder.glob(".synthetic*"))
     read = ss.load_campaign(made / "campaign.toml")
     assert len(read.events[0].events) >= 3 and read.traces[0].drive_velocity == pytest.approx(4e-4)
+    again = experiments.run(experiments.scenario(base, Setting("v400", "400 um/s", events=4)))
+    seen = experiments.simulated(again, campaign["v400"])
+    for key, (mean, _, count) in experiments.measured(read.events[0]).items():
+        assert seen[key][0] == pytest.approx(mean, rel=3e-3) and seen[key][2] == count, key  # a sample
     for name in ("synthetic run", "../elsewhere", "a/b", ".hidden", ""):
         with pytest.raises(InputError):
             experiments.write(base, Setting("v400"), campaign, name, _silent)
@@ -191,6 +205,21 @@ def test_where_nothing_was_proposed_effects_can_be_chosen(session):
     made.effects.value = ["wear"]
     made.start()
     assert "two effects" in beside(session, "rivals").said
+
+
+def test_what_is_offered_follows_the_promises_until_others_are_chosen(session):
+    made = simulate_page._Experiment(session, simulate_page._Asked(session))
+    falls = {"wear": 0.1, **dict(zip(RIVALS, (9.0, 5.0), strict=True))}
+    promised = [SimpleNamespace(tag=tag, fall=fall) for tag, fall in falls.items()]
+    session.promises = promised[:1]
+    assert made.effects.value == []
+    session.promises = promised[:2]
+    assert made.effects.value == ["contact-ageing"]
+    session.promises = promised
+    assert made.effects.value == list(RIVALS)
+    made.effects.value = ["wear", "viscous-drag"]
+    session.promises = promised[:2]
+    assert made.effects.value == ["wear", "viscous-drag"]
 
 
 def test_models_that_differ_in_nothing_are_said_to(base):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,8 +45,9 @@ class Free:
         return float(np.log(value)) if self.scale == "log" else float(value) / float(self.scale)
 
     def outward(self, z: float) -> float:
-        """Search scale -> SI."""
-        return float(np.exp(z)) if self.scale == "log" else float(z) * float(self.scale)
+        """Search scale -> SI; rounding leads none across a bound."""
+        value = float(np.exp(z)) if self.scale == "log" else float(z) * float(self.scale)
+        return min(max(value, self.lower), self.upper)
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -59,15 +60,19 @@ class Free:
 
     @property
     def known(self) -> str:
-        """The prior in words."""
+        """The prior in words, in SI."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return self.known_as(lambda value: f"{value:.3g}{unit}")
+
+    def known_as(self, text: Callable[[float], str]) -> str:
+        """The prior in words; ``text`` writes a value (SI) with its unit."""
         if not np.isfinite(self.width):
             return "none but its bounds"
-        unit = "" if self.unit == "1" else f" {self.unit}"
         if self.scale == "log":
-            return f"log-normal around {self.prior:.3g}{unit}, factor {float(f'{np.exp(self.width):.3g}'):g}"
+            return f"log-normal around {text(self.prior)}, factor {float(f'{np.exp(self.width):.3g}'):g}"
         deviation = self.width * float(self.scale)
         share = " (half its range)" if np.isclose(deviation, 0.5 * (self.upper - self.lower)) else ""
-        return f"normal around {self.prior:.3g}{unit}, standard deviation {deviation:.3g}{unit}{share}"
+        return f"normal around {text(self.prior)}, standard deviation {text(deviation)}{share}"
 
     def unusual(self, value: float, std: float) -> str:
         """Where values usually lie, if this one is beyond by more than its standard deviation; else nothing."""

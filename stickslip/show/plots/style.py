@@ -20,6 +20,9 @@ from ...system.units import PREFIXES, power_for, takes_prefix
 
 # dark, middle and light, so that a grey print keeps them apart; the line styles differ as well
 DARK, MIDDLE, LIGHT = "#14213d", "#c8553d", "#8d99ae"
+# of runs, in reports and in the workbench: after Okabe and Ito, to be told apart by the colour-blind
+RUNS = ("#0072b2", "#d55e00", "#009e73", "#b8578c", "#9a7400", "#3a93c9", "#5b6577")
+_DASHES = ("-", "--", "-.", ":")
 _LOOK: Any = {
     "font.size": 10,
     "axes.spines.top": False,
@@ -36,6 +39,11 @@ _LOOK: Any = {
     "lines.linewidth": 1.3,
     "axes.formatter.useoffset": False,
 }
+
+
+def of_run(number: int) -> dict[str, str]:
+    """Colour and dash of a run's curve, by the run's number; a grey print tells runs apart by the dash."""
+    return {"color": RUNS[number % len(RUNS)], "ls": _DASHES[number % len(_DASHES)]}
 
 
 def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, signed_log, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, of_run, plain, scaled, signed_log, styled
 from .figures import series
 
 if TYPE_CHECKING:
     import xarray
 
-COLOURS = (DARK, MIDDLE, "#4f772d", "#7b5ea7", "#c9a227", LIGHT)
 _AGAINST = (
     ("displacement", "m", "displacement"),
     ("velocity", "m/s", "velocity of the block"),
@@ -72,13 +71,13 @@ def residual_picture(data: xarray.Dataset, names: list[str]) -> Figure:
         k, shown = scaled(np.concatenate(values), unit)
         for i, (r, x) in enumerate(zip(runs, values, strict=True)):
             z = data[f"force{r}_base_residual"].values / data[f"force{r}_floor"].values
-            colour = COLOURS[i % len(COLOURS)]
+            curve = of_run(i)
             label = plain(names[r] if r < len(names) else str(r), 20)
             order = np.argsort(x)
             pieces = [p for p in np.array_split(order, 15) if p.size]
-            ax.plot(x * k, np.clip(z, -6, 6), ".", ms=1.5, color=colour, alpha=0.25)
+            ax.plot(x * k, np.clip(z, -6, 6), ".", ms=1.5, color=curve["color"], alpha=0.25)
             middle = np.array([np.median(x[p]) for p in pieces]) * k
-            ax.plot(middle, [np.median(z[p]) for p in pieces], color=colour, lw=1.4, label=label)
+            ax.plot(middle, [np.median(z[p]) for p in pieces], **curve, lw=1.4, label=label)
         if name in ("velocity", "time_in_contact"):
             signed_log(ax, np.concatenate(values) * k)
         ax.axhline(0.0, color=LIGHT, lw=0.8)

@@ -1,4 +1,6 @@
 // The catalogue: one line for each effect. Everything from elsewhere is set as text, never as HTML.
+const EVIDENCE = "by how much the cost (chi-square, no unit) falls: promised by a small amplitude, nothing fitted, or gained " +
+  "when the effect was fitted; on runs that had no part in its amplitude it must fall too"
 const SVG = "http://www.w3.org/2000/svg"
 
 function part(kind, classes, parent, text) {
@@ -28,11 +30,12 @@ export function render({ model }) {
       part("b", "", name, row.tag)
       if (row.alike) part("span", "words", name, row.alike)
       const evidence = part("div", "evidence", line)
+      evidence.title = EVIDENCE
       const bar = part("div", "strength", evidence)
       bar.style.width = `${Math.round(100 * row.share)}%`
       part("span", "gain", evidence, row.gain)
       part("span", "gain", evidence, row.unseen)
-      part("span", "gain", evidence, row.amplitude)
+      part("span", "gain", evidence, row.amplitude.replace(/e-(?=\d)/g, "e\u2011")) // no line ends within a number
       const picture = document.createElementNS(SVG, "svg")
       picture.setAttribute("viewBox", "0 0 114 40")
       picture.setAttribute("class", "signature")

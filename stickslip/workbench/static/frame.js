@@ -15,6 +15,7 @@ export function render({ model }) {
   const title = part("span", "title", top)
   const shown = part("span", "model", top)
   const errors = part("span", "errors", top)
+  errors.title = "in floors of this model: 1 is as good as noise and scatter of the data allow"
   const theme = part("button", "quiet", top)
   const bars = []
   for (const [what, share, stop] of [["busy", "share", "cancel"], ["searching", "searched", "stop"]]) {
@@ -46,6 +47,7 @@ export function render({ model }) {
     for (const bar of bars) bar()
     said.style.display = model.said ? "flex" : "none"
     words.textContent = model.said
+    said.classList.toggle("well", model.well)
     const style = document.documentElement.style
     for (const [name, value] of Object.entries(model.colours)) style.setProperty(`--wb-${name}`, value)
     document.body.style.background = model.colours.page || ""
@@ -59,16 +61,15 @@ export function render({ model }) {
     theme.click()
   }
   const typed = (event) => {
-    const at = event.composedPath()[0]
-    if (event.altKey || event.ctrlKey || event.metaKey) return
-    if (at && (at.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(at.tagName || ""))) return
+    const own = (e) => e.isContentEditable || /^(INPUT|TEXTAREA|SELECT|TABLE)$/.test(e.tagName || "")
+    if (!model.keyed || event.altKey || event.ctrlKey || event.metaKey || event.composedPath().some(own)) return
     if (["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"].includes(event.key)) {
       event.preventDefault()
       model.send_msg({ kind: "key", key: event.key })
     }
   }
   document.addEventListener("keydown", typed)
-  for (const name of ["title", "model", "errors", "busy", "share", "searching", "searched", "said", "dark", "colours"]) {
+  for (const name of ["title", "model", "errors", "busy", "share", "searching", "searched", "said", "well", "dark", "colours"]) {
     model.on(name, update)
   }
   model.on("remove", () => document.removeEventListener("keydown", typed))

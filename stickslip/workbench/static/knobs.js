@@ -23,7 +23,8 @@ export function render({ model }) {
     const value = part("span", "value", head)
     const std = part("span", "std", head)
     const way = part("div", "way", box)
-    const band = part("div", "band", way)
+    const band = part("div", "band", part("div", "rail", way))
+    band.title = "one standard deviation to either side of the value"
     const slider = part("input", "slider", way)
     slider.type = "range"
     slider.min = 0
@@ -78,8 +79,9 @@ export function render({ model }) {
       tick.checked = now.locked
       box.classList.toggle("effect", now.group !== "")
       if (held !== row.name) slider.value = now.place
-      band.style.left = `${100 * now.band[0]}%`
-      band.style.width = `${100 * Math.max(now.band[1] - now.band[0], 0)}%`
+      band.style.display = now.band[1] > now.band[0] ? "" : "none"
+      band.style.left = `${50 * (now.band[0] + now.band[1])}%`
+      band.style.width = `${100 * (now.band[1] - now.band[0])}%`
     }
   }
 

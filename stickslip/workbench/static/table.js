@@ -1,4 +1,6 @@
 // A table whose rows can be chosen. Everything from elsewhere is set as text, never as HTML.
+const LONG = 40 // signs after which a cell is broken into lines
+
 export function render({ model }) {
   const root = document.createElement("div")
   root.className = "holder"
@@ -15,7 +17,11 @@ export function render({ model }) {
       const line = body.insertRow()
       line.dataset.row = i
       if (i === model.chosen) line.className = "chosen"
-      row.forEach((text) => { line.insertCell().textContent = text })
+      row.forEach((text) => {
+        const cell = line.insertCell()
+        cell.textContent = text
+        cell.classList.toggle("long", text.length > LONG)
+      })
       if (model.choosing) {
         line.tabIndex = 0
         line.addEventListener("click", () => model.send_msg({ kind: "row", row: i }))
