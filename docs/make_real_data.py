@@ -319,7 +319,9 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     made = ss.load_campaign(path).diagnose()
     made.save(DOCS.parent / "out" / "real-data" / name, force=True)
     assert made.found is not None
-    fits = [rung.fit for rung in made.found.ladder if rung.fit is not None]
+    rungs = [rung for rung in made.found.ladder if rung.fit is not None]
+    fits = [rung.fit for rung in rungs]
+    level = float(np.quantile(np.abs(fits[0].forces.measured), 0.95))
     save(hysteresis(fits[0], fits[-1], name), DOCS / "figures" / f"real-{name}.png")
     verdict = made.result["verdict"]
     return {
@@ -327,12 +329,17 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
         "says": f"{verdict['kind']}: {verdict['text']}",
         "ladder": [
             {
-                "model": rung["added"] or "static", "fitted": rung["train_error"], "unseen": rung["heldout_error"],
-                "force": rung["force_error"],
+                "model": rung.added, "fitted": rms(rung.residual) / level, "unseen": rms(rung.unseen) / level,
+                "gain": None if rung.fit is fits[0] else last.fit.cost - rung.fit.cost,
             }
-            for rung in made.result["ladder"]
+            for last, rung in zip([rungs[0], *rungs], rungs, strict=False)
         ],
     }  # fmt: skip
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
 
 
 @styled
