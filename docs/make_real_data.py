@@ -32,6 +32,7 @@ from stickslip import __version__
 from stickslip.cli import run
 from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.segment import segment
+from stickslip.errors import InputError
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
 from stickslip.show.report.figures import ripple_picture, trace_picture
@@ -316,7 +317,11 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     for trace in tomllib.loads(path.read_text(encoding="utf-8"))["trace"]:
         for channel in (trace, *(c for c in trace.values() if isinstance(c, dict) and "file" in c)):
             shutil.copy(records / channel["file"], work)
-    made = ss.load_campaign(path).diagnose()
+    campaign = ss.load_campaign(path)
+    try:
+        made = campaign.diagnose()
+    except InputError as error:
+        return {"title": campaign.title, "declined": error.what}
     made.save(DOCS.parent / "out" / "real-data" / name, force=True)
     assert made.found is not None
     rungs = [rung for rung in made.found.ladder if rung.fit is not None]

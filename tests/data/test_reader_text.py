@@ -171,9 +171,9 @@ def test_files_that_are_no_tables(tmp_path, refuses):
     binary = tmp_path / "binary.csv"
     binary.write_bytes(bytes(range(256)) * 10)
     refuses(lambda: read_columns(binary), "binary.csv", "holds binary data", "MATLAB", "TDMS")
-    json = tmp_path / "data.json"
-    json.write_text('{"data": [[0, 1], [1, 2]]}')
-    refuses(lambda: read_columns(json), "format of the file is not known", "NetCDF", "CSV", "universal file")
+    page = tmp_path / "data.xml"
+    page.write_text("<data><row>0 1</row><row>1 2</row></data>")
+    refuses(lambda: read_columns(page), "format of the file is not known", "NetCDF", "CSV", "universal file")
     refuses(lambda: read_columns(tmp_path / "emty.csv"), "not there", "did you mean 'empty.csv'")
     refuses(lambda: read_columns(tmp_path), "not a file")
     refuses(lambda: find_reader(binary, "cvs"), "no reader 'cvs'")

@@ -46,7 +46,7 @@ TOLD: dict[tuple[str, ...], tuple[str, ...]] = {
         "K_i = Σ_(u_j ≥ u_i) k_j",
         "¬y",
     ),
-    ("measured-load",): ("F_i [1 + s (N/N_m - 1)]",),
+    ("measured-load",): ("μ [1 + s (N/N_m - 1)]",),
     ("nonlinear-spring", "quadratic"): ("F_spring [1 + β (x_0 - x)]",),
     ("nonlinear-spring", "cubic"): ("F_spring [1 + β (x_0 - x)^2/(0.1 mm)]",),
     ("plasticity",): ("[1 + (h u_i/max_j u_j)^n]^(-1/n)", "Σ_i c_i = F_s"),

@@ -9,6 +9,7 @@ from stickslip.data.campaign import Rig
 from stickslip.data.prescribed import prescribed, with_motion
 from stickslip.data.segment import segment
 from stickslip.data.trace import Trace
+from stickslip.inference.diagnose.engine import Round, _end
 from stickslip.inference.force.backbone import backbone
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit
@@ -115,6 +116,24 @@ def test_friction_follows_the_load_that_was_measured_beside_it():
     error = found.fit.std()["measured-load.share"]
     assert base.cost - found.fit.cost > 100.0
     assert found.fit.values["measured-load.share"] == pytest.approx(1.0, abs=max(3.0 * error, 0.03))
+
+
+def test_a_law_that_is_far_off_is_not_called_complete(plain):
+    """A damper with play: after every turn the force is gone for a while, which no effect of the catalogue knows."""
+    runs = []
+    for seed in (1, 2, 3):
+        t, x = stage(4)
+        follower = np.zeros(x.size)
+        for i in range(1, x.size):
+            follower[i] = np.clip(follower[i - 1], x[i] - 8e-5, x[i])
+        force = np.where(np.isclose(follower, x) | np.isclose(follower, x - 8e-5), jenkins(follower), 0.0)
+        force = force + np.random.default_rng(seed).normal(0.0, NOISE, t.size)
+        trace = Trace.from_arrays(f"{seed}", time=t, drive_position=x, spring_force=force, noise=NOISE, virgin=True)
+        runs.append(thinned(with_motion(trace)))
+    base = fit(*begin(Rig(), runs))
+    assert base.scatter.unexpected()
+    assert _end({}, Round(base, (), (), ())).kind == "unknown"
+    assert not plain.scatter.unexpected()
 
 
 def test_an_uneven_fixture_is_tried_only_where_force_goes_both_ways():

@@ -10,7 +10,7 @@
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
    effect predicts unseen runs better than it, nothing is named.
 5. *Unknown*: nothing more is seen, but the residual force is a function of a variable, and that would explain more
-   than half of what the named effects do.
+   than half of what the named effects do; or the misfit within events is larger than is expected of any law.
 """
 
 from __future__ import annotations

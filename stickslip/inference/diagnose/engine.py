@@ -87,12 +87,21 @@ class Rung:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The answer: see :mod:`.summary` for the words."""
+    """The answer: see :mod:`.summary` for the words.
+
+    Attributes:
+        kind: "complete", "missing", "ambiguous" or "unknown", and "fitted" where nothing was asked.
+        effects, set: what was named, and what the data cannot tell from it.
+        structure: of the residual force, where nothing explains it.
+        misfit: phase in which the model is off by more than any law of friction should be, and by which share of the
+            strength.
+    """
 
     kind: str
     effects: tuple[str, ...] = ()
     set: tuple[str, ...] = ()
     structure: Structure | None = None
+    misfit: tuple[str, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -355,6 +364,9 @@ def _end(named: Mapping[str, Round], last: Round) -> Verdict:
         structure = found[0]
     if structure is not None:
         return Verdict("unknown", taken, tuple(dict.fromkeys(j.tag for c in sets for j in c)), structure)
+    misfit = max(last.base.scatter.unexpected().items(), key=lambda phase: phase[1], default=None)
+    if misfit is not None and not last.close:
+        return Verdict("unknown", taken, tuple(dict.fromkeys(j.tag for c in sets for j in c)), misfit=misfit)
     if sets:
         every = tuple(dict.fromkeys([*taken, *(j.tag for c in sets for j in c)]))
         return Verdict("ambiguous", taken, every)

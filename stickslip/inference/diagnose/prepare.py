@@ -141,6 +141,14 @@ def _prescribed(campaign: Campaign, given: Sequence[tuple[Trace, Segmentation]])
     """Runs without a driving spring."""
     traces, segments = tuple(with_motion(t) for t, _ in given), tuple(s for _, s in given)
     runs = [thinned(t) for t in traces]
+    if sum(k.events for k in runs) < FEWEST:
+        raise InputError(
+            "the motion turns, stops or changes its speed less than twice, so no effect could be checked on what a fit "
+            "has not seen",
+            file=campaign.path,
+            key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in traces[:4]),
+            hint="record it again: two loops, or a step up and down",
+        )
     problem, start = begin_prescribed(shared_rig(campaign, [t.name for t in traces]), runs)
     step = 1.0 / min(t.sampling_rate for t in traces)
     return Prepared(problem, start, traces, segments, Scales(step, 0.0, step), (SAID,), True)

@@ -273,6 +273,12 @@ def verdict_text(d: Diagnosis) -> str:
             f"Something is missing that no effect of the catalogue explains: the residual force depends on the "
             f"{v.structure.variable} (probability by chance {v.structure.chance:.1g})."
         )
+    if v.misfit is not None:
+        phase, share = v.misfit
+        parts.append(
+            f"Something is missing that no effect of the catalogue explains: in {phase} the model is off by "
+            f"{100.0 * share:.2g} % of the strength, and alike at neighbouring points."
+        )
     if v.kind in ("complete", "missing"):
         seen = sorted(visible(d).items(), key=lambda item: item[0])
         some = "; ".join(f"{tag} {shown(a['amplitude'], a['unit'], 2)}" for tag, a in seen[:LISTED])

@@ -60,6 +60,11 @@ class Scatter:
         """How far the sizes are from what is expected of them (chi-square)."""
         return float((((self.sizes - CENTRES) / WIDTHS) ** 2).sum())
 
+    def unexpected(self) -> dict[str, float]:
+        """Phase -> misfit (share of the strength) that lies beyond two standard deviations of what is expected."""
+        beyond = self.sizes[_PHASE] > CENTRES[_PHASE] + 2.0 * WIDTHS[_PHASE]
+        return {name: float(np.exp(s)) for name, s, far in zip(PHASES, self.sizes[_PHASE], beyond, strict=True) if far}
+
     def named(self) -> dict[str, float]:
         """Name -> size: shares of strength and of yield displacement, metres of position."""
         return dict(zip(NAMES, np.exp(self.sizes).tolist(), strict=True))

@@ -20,7 +20,7 @@ class MeasuredLoad(Threshold):
 
     tag = "measured-load"
     summary = "friction follows the measured normal load"
-    equation = r"F_i \to F_i\,\left[1 + s\,(N/N_m - 1)\right]"
+    equation = r"\mu \to \mu\,\left[1 + s\,(N/N_m - 1)\right]"
     symbols = {"N": "measured normal load (N)", "N_m": "its median over all runs (N)"}
     signature = "friction rises and falls with the load of the record; a share of 1 is Amontons' law"
     confused_with = {

@@ -21,7 +21,7 @@ class UnevenCompliance(Sensor):
 
     tag = "uneven-compliance"
     summary = "the fixture gives way more one way than the other"
-    equation = r"y \to y + \beta\,\big(\sum_i f_i\big)^2"
+    equation = r"y \to y + \beta\,\left(\sum_i f_i\right)^2"
     signature = "loops of force against displacement that are no longer the same when turned by half a turn"
     confused_with = {
         "tilt": "turn the sample round: what belongs to the track turns with it",
