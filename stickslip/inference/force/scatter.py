@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dtrtri, dtrtrs
 
+from ...errors import FitError
 from .knots import PHASES
 from .sensor_walk import SensorWalk, nodes
 
@@ -333,12 +334,17 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
 
     Newton's method with the average information (Gilmour, Thompson & Cullis 1995) in place of the second derivative,
     damped, within bounds around what is expected.
+
+    Raises:
+        FitError: the covariance is not positive definite in double precision.
     """
     low = np.append(CENTRES[:-1] - 5.0 * WIDTHS[:-1], -0.05)
     high = np.append(CENTRES[:-1] + 4.0 * WIDTHS[:-1], 1.0)
     high[:_LENGTHS] = np.minimum(high[:_LENGTHS], 0.0)  # further apart than an e-fold are no two events of one contact
     sizes, damping = np.clip(start.sizes, low, high), 1e-2
     cost, root = _misfit(sizes, residual, known)
+    if not np.isfinite(cost):
+        raise FitError("the model's forces differ so much from event to event that no likelihood can be given")
     for _ in range(steps):
         gradient, information = _slopes(sizes, residual, known, root)
         free = ~(((sizes <= low) & (gradient > 0.0)) | ((sizes >= high) & (gradient < 0.0)))
