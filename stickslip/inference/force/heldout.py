@@ -1,8 +1,7 @@
 """How well events are predicted that a fit has not seen: leave one run out, without fitting again.
 
 At the optimum the model is linear enough in its parameters that what a fit without some events would give is one
-Gauss-Newton step away (the infinitesimal jackknife made exact for a linear model). What that fit would not know of its
-parameters is part of the density by which an event is predicted. A run that has parameters of its
+Gauss-Newton step away (the infinitesimal jackknife made exact for a linear model). A run that has parameters of its
 own, a phase or the pull at its start, is left out by halves: they are told by its other half.
 """
 
@@ -85,29 +84,11 @@ def unseen(fit: Fit, left_out: list[NDArray[np.intp]] | None = None) -> Unseen:
         matrix, right = parts.without(part)
         step = -parts.scale * np.linalg.solve(matrix, right)
         predicted = parts.rest[part] + parts.rows[part] @ step
-        told = np.linalg.inv(np.linalg.cholesky(matrix))
-        cost[part] = _predictive(predicted, (parts.rows[part] * parts.scale) @ told.T) + parts.logs[part]
+        cost[part] = (predicted**2).sum(axis=1) + parts.logs[part]
         force = blocks(fit.marginal)[part] + blocks(fit.slopes.shared)[part][..., parts.free] @ step
         there = blocks.there[part]
         out[blocks.index[part][there]] = force[there]
     return Unseen(cost, out)
-
-
-def _predictive(predicted: Array, unsure: Array) -> Array:
-    """Twice the negative logarithm of the density of each event's whitened residuals, without what whitens them.
-
-    What the others do not tell, such as the level of the strength where only the run left out begins with a virgin
-    contact, is no error of a model that does not know it: ``S = 1 + U U'`` with what is not known of the parameters.
-
-    Args:
-        predicted: residuals with the parameters that the others tell, shape (e, n).
-        unsure: what a standard deviation of each independent combination of the parameters does, shape (e, n, p).
-    """
-    inner = np.swapaxes(unsure, 1, 2) @ unsure + np.eye(unsure.shape[2])
-    root = np.linalg.cholesky(inner)
-    along = np.linalg.solve(root, np.einsum("enp,en->ep", unsure, predicted)[..., None])[..., 0]
-    logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-    return np.asarray((predicted**2).sum(axis=1) - (along**2).sum(axis=1) + logs)
 
 
 def points(fit: Fit, left_out: list[NDArray[np.intp]]) -> list[Point]:
