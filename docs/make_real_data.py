@@ -87,6 +87,8 @@ PRESCRIBED = {
     "rock-sepiolite": "rock-velocity-steps",
 }
 
+PICTURES = {"reciprocating-loops": "real-reciprocating-loops", "drill-string": "real-drill-string"}
+
 # peaks of the force that the collector of the records counted
 BY_EYE = {
     (168, 1100): "119", (168, 4300): "67", (1002, 1100): "224", (1002, 4300): "132",
@@ -327,7 +329,8 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     rungs = [rung for rung in made.found.ladder if rung.fit is not None]
     fits = [rung.fit for rung in rungs]
     level = float(np.quantile(np.abs(fits[0].forces.measured), 0.95))
-    save(hysteresis(fits[0], fits[-1], name), DOCS / "figures" / f"real-{name}.png")
+    if name in PICTURES:
+        save(hysteresis(fits[0], fits[-1], name), DOCS / "figures" / f"{PICTURES[name]}.png")
     verdict = made.result["verdict"]
     return {
         "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
@@ -362,11 +365,11 @@ def hysteresis(base: Any, last: Any, title: str) -> Any:
     for fit, color, line in ((base, LIGHT, "-"), (last, MIDDLE, "--"))[: 1 + (last is not base)]:
         share = force / base.forces.measured[own]
         names = ["base", *(e.tag for e in fit.problem.composition.effects)]
-        left.plot(x, force - fit.marginal[own] * share, line, color=color, lw=1.0, label=plain(" + ".join(names)))
+        left.plot(x, force - fit.marginal[own] * share, line, color=color, lw=1.0, label=plain("\n+ ".join(names)))
         right.plot(run.at - run.at[0], 100.0 * fit.marginal[own] / base.strength, line, color=color, lw=1.0)
     left.set(xlabel=f"displacement / {length}", ylabel=f"force / {newton}", title=plain(title))
     right.set(xlabel="time / s", ylabel="measured - model / % of the strength", title=plain(run.name))
-    left.legend(loc="best", fontsize="small")
+    left.legend(loc="lower right", fontsize="x-small")
     return made
 
 
