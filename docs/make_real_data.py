@@ -260,7 +260,6 @@ def robot(data: Path, work: Path) -> dict[str, Any]:
         for i, f in enumerate(r["fits"])
     ]
     worst = max(r["fits"], key=lambda f: f["nrmse"])
-    said = program("diagnose", path, "--out", str(work / "robot-diagnosis"))[1].splitlines()[0]
     joints = []
     for joint in (1, 2):
         own = [f for f in r["fits"] if f["trace"].startswith(f"joint {joint}")]
@@ -279,7 +278,6 @@ def robot(data: Path, work: Path) -> dict[str, Any]:
         "worst": worst["trace"],
         "worst_nrmse": worst["nrmse"],
         "at_edge": sum(bool(f["note"]) for f in r["fits"]),
-        "declined": said.removeprefix("stickslip: "),
     }
 
 
@@ -309,7 +307,7 @@ def fault(data: Path, work: Path) -> dict[str, Any]:
 
 def prescribed(data: Path, work: Path) -> dict[str, Any]:
     """Campaigns of scenarios/real whose motion is prescribed and whose force is measured, diagnosed."""
-    return {name: diagnosed(name, data / folder, work / name) for name, folder in PRESCRIBED.items()}
+    return {"records": {name: diagnosed(name, data / folder, work / name) for name, folder in PRESCRIBED.items()}}
 
 
 def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
@@ -393,9 +391,11 @@ def main() -> None:
         made = (paper, together, robot, fault, prescribed)
         parts = {f.__name__: f(data, work) for f in made if asked.only is None or f.__name__ in asked.only}
     head = {"version": __version__, "date": date.today().isoformat(), "command": "python docs/make_real_data.py"}
+    if "prescribed" in parts:
+        parts["prescribed"] |= head
     path = DOCS / "results" / "real_data.json"
     known = json.loads(path.read_text(encoding="utf-8")) if asked.only is not None else {}
-    text = json.dumps({**known, **head, **parts}, indent=1, ensure_ascii=False)
+    text = json.dumps({**head, **known, **parts}, indent=1, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")
 
 

@@ -10,10 +10,12 @@ from stickslip.data.prescribed import prescribed, with_motion
 from stickslip.data.segment import segment
 from stickslip.data.trace import Trace
 from stickslip.inference.diagnose.engine import Round, _end
+from stickslip.inference.diagnose.prepare import Prepared
 from stickslip.inference.force.backbone import backbone
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.prescribed import begin, stretches, thinned
+from stickslip.inference.force.scales import Scales
 from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
 
@@ -136,5 +138,15 @@ def test_a_law_that_is_far_off_is_not_called_complete(plain):
     assert not plain.scatter.unexpected()
 
 
-def test_an_uneven_fixture_is_tried_only_where_force_goes_both_ways():
-    assert catalogue.get("uneven-compliance").both_ways
+def test_an_effect_is_tried_where_the_record_shows_what_it_needs(plain):
+    uneven, loaded = catalogue.get("uneven-compliance"), catalogue.get("measured-load")
+    loops = Prepared(plain.problem, plain.point, (), (), Scales(1.0, 0.0, 1.0), (), True)
+    assert loops.shows(uneven)
+    assert not loops.shows(loaded)  # no load was measured
+    t = np.arange(0.0, 2.0, 1.0 / RATE)
+    x = SPEED * np.minimum(t, 1.0)
+    ramp = Trace.from_arrays("ramp", time=t, drive_position=x, spring_force=jenkins(x), noise=NOISE, virgin=True)
+    runs = [thinned(with_motion(ramp.replace(normal_load=5.0 + 0.5 * np.sin(t))))]
+    one_way = Prepared(*begin(Rig(), runs), (), (), Scales(1.0, 0.0, 1.0), (), True)
+    assert not one_way.shows(uneven)
+    assert one_way.shows(loaded)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array, csr_array, eye_array
 
 from ...data.campaign import Rig
 from ...data.resolution import estimate_resolution, noise_level
@@ -102,7 +102,7 @@ def thinned(trace: Trace) -> Knots:
     breaks = t[[s.first for s in parts[1:]]]
     back = onward(means @ x, sizes.astype(float), np.ones(at.size, bool), piece, max(noise, count or 0.0))
     bowed = bow(at, width, breaks)
-    eye = csr_array(np.eye(1)) if at.size == 1 else _identity(at.size)
+    eye = eye_array(at.size, format="csr")
     made_of = csr_array(back - back @ bowed)
     knots_x = made_of @ (means @ x)
     knots_force = (eye - bowed) @ (means @ force)
@@ -128,11 +128,6 @@ def thinned(trace: Trace) -> Knots:
         np.diff(np.append(begins, t[-1])), noise, stiffness, trace.virgin, knots_force,
         load_at(trace, at) if trace.normal_load is None else means @ trace.normal_load, forced**2 / sizes[compared],
     )  # fmt: skip
-
-
-def _identity(n: int) -> csr_array:
-    i = np.arange(n)
-    return coo_array((np.ones(n), (i, i)), shape=(n, n)).tocsr()
 
 
 def _means(starts: Index, sizes: Index, samples: int) -> csr_array:
