@@ -47,7 +47,7 @@ def made(folder: Any, seed: int, effects: Any = (), runs: tuple[Run, ...] = SMAL
     campaign = load_campaign(folder / "campaign.toml")
     traces = load_traces(campaign)
     found = [segment(t) for t in traces]
-    times = scales(found, ringing(traces, found), traces[0].sampling_rate)
+    times = scales(list(zip(traces, found, strict=True)), ringing(traces, found), traces[0].sampling_rate)
     thinned = [knots(t, s, times) for t, s in zip(traces, found, strict=True)]
     problem, point = begin(campaign.rig, traces, found, thinned, times)
     return Case(truth, traces, found, thinned, times, problem, point)

@@ -10,6 +10,7 @@ import pytest
 
 from stickslip.inference.fit.parameters import Free, effect_parameters
 from stickslip.inference.force.knots import PHASES
+from stickslip.inference.force.noise import by_reading, carrier
 from stickslip.inference.force.problem import LOCAL, Point, Problem, is_own
 from stickslip.physics.effects import catalogue
 
@@ -183,7 +184,7 @@ def test_an_event_moves_its_own_points_alone(placed, which):
 def test_a_common_error_leaves_the_other_derivatives_as_they_are(placed):
     """In a search: what carries it to a force stays as it is."""
     problem, point, slopes = placed
-    problem = problem.carried_by(slopes.tangent)
+    problem = problem.carried_by(carrier(problem, slopes, by_reading(problem, point, slopes)))
     common = 1e-9 * np.random.default_rng(4).standard_normal(point.common.size)
     point = replace(point, common=common)
     slopes = problem.evaluate(point)

@@ -38,9 +38,9 @@ def test_a_model_that_makes_room_stays_near_its_optimum(base, tag, size):
     point, share = base.yielding(size * column)
     assert share == 1.0
     problem, free = with_start(base.problem, effect, {effect.amplitude: null + size})
-    carried = problem.carried_by(base.slopes.tangent)
+    carried = problem.carried_by(base.problem.carrier)
     room, none = (objective(base, carried, _at(problem, free, Start({}, p))) for p in (point, base.point))
-    start = objective(base, base.problem.carried_by(base.slopes.tangent), base.point)
+    start = objective(base, base.problem, base.point)
     assert room - start < 0.1 * (none - start)
     assert none - start > 10.0 * float((left**2).sum())
 

@@ -124,7 +124,7 @@ def prepare(
     if period is None:
         dropped.append(UNHEARD)
     rate = min(t.sampling_rate for t in kept)
-    times = scales(list(segments), period, rate)
+    times = scales(used, period, rate)
     coarse = too_coarse(times, rate)
     if coarse is not None:
         dropped.append(coarse)

@@ -14,7 +14,7 @@ from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
 from .linearised import FARTHEST, Array, Linearised, moved
-from .noise import beyond, known_of
+from .noise import beyond, by_reading, carrier, known_of
 from .problem import Forces, Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
 from .sensor_walk import grown
@@ -174,22 +174,23 @@ def fit(
         if scatter is None and turn == PLACED:
             problem, point = placed(problem, point)
             slopes = problem.evaluate(point)
-        problem = problem.carried_by(slopes.tangent)
+        rows = by_reading(problem, point, slopes)
+        problem = problem.carried_by(carrier(problem, slopes, rows))
         slopes = problem.recarried(slopes, point)
-        made = known_of(problem, point, slopes, blocks, out)
+        made = known_of(problem, slopes, rows, blocks, out)
         if turn or first:
             marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
             sizes = estimate(sizes, marginal, made, NEWTON)
             more = beyond(made, sizes, marginal, blocks, out.size) & ~out
             if dropped is None and more.any():
                 out = out | more
-                made = known_of(problem, point, slopes, blocks, out)
+                made = known_of(problem, slopes, rows, blocks, out)
                 sizes = estimate(sizes, marginal, made, NEWTON)
         point, slopes, total, count, damping = descend(problem, point, slopes, sizes, made, blocks, steps, damping)
         evaluations += count
         if turn > PLACED + 2 and total < 1.0:
             break
-    made, around = known_of(problem, point, slopes, blocks, out), point
+    made, around = known_of(problem, slopes, by_reading(problem, point, slopes), blocks, out), point
     point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, blocks, LAST)
     return _arrived(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
 
@@ -260,7 +261,8 @@ def again(
 ) -> Fit:
     """A fit that was made before, from where it ended; arguments as the attributes of :class:`Fit`."""
     blocks = Blocks.of(problem.of, problem.events)
-    known = known_of(problem, around, problem.evaluate(around), blocks, dropped)
+    slopes = problem.evaluate(around)
+    known = known_of(problem, slopes, by_reading(problem, around, slopes), blocks, dropped)
     return _found(problem, point, problem.evaluate(point), scatter, dropped, known, around, evaluations)
 
 

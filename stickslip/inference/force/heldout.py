@@ -1,7 +1,8 @@
 """How well events are predicted that a fit has not seen: leave one run out, without fitting again.
 
 At the optimum the model is linear enough in its parameters that what a fit without some events would give is one
-Gauss-Newton step away (the infinitesimal jackknife made exact for a linear model). A run that has parameters of its
+Gauss-Newton step away (the infinitesimal jackknife made exact for a linear model). What that fit would not know of its
+parameters is part of the density by which an event is predicted. A run that has parameters of its
 own, a phase or the pull at its start, is left out by halves: they are told by its other half.
 """
 
@@ -11,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from .fit import STEPS, Fit, refit
 from .linearised import Array, Linearised, moved, prior_rows, reach
@@ -55,8 +57,8 @@ class _Parts:
     def __init__(self, fit: Fit) -> None:
         self.fit = fit
         white = fit.white
-        self.low, self.high = reach(fit.problem, fit.point)
-        self.free = np.flatnonzero((self.low < 0.0) & (self.high > 0.0))
+        low, high = reach(fit.problem, fit.point)
+        self.free = np.flatnonzero((low < 0.0) & (high > 0.0))
         blocks = fit.blocks
         side = np.concatenate([blocks(fit.slopes.shared)[..., self.free], blocks(fit.marginal)[..., None]], axis=2)
         together = white(side)
@@ -69,11 +71,28 @@ class _Parts:
         self.right = self.slope.sum(axis=0) + prior.T @ target
         self.logs = white.logs
         self.scale = 1.0 / np.sqrt(np.maximum(np.diag(self.normal), 1e-300))
+        self.low, self.high = low[self.free] / self.scale, high[self.free] / self.scale
 
     def without(self, part: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Matrix and right side, scaled, of all events but these."""
+        """What all events but these say of the parameters.
+
+        Returns:
+            The step to their optimum, within the bounds, shape (q,), and the standard deviations of independent
+            combinations of what does not stand at a bound there, shape (q, r).
+        """
         matrix = (self.normal - self.each[part].sum(axis=0)) * self.scale[:, None] * self.scale
-        return matrix + 1e-10 * np.eye(len(self.scale)), self.scale * (self.right - self.slope[part].sum(axis=0))
+        right = self.scale * (self.right - self.slope[part].sum(axis=0))
+        root = np.linalg.cholesky(matrix + 1e-10 * np.eye(len(matrix)))
+        target = -np.linalg.solve(root, right)
+        step = np.linalg.solve(root.T, target)
+        inside = np.ones(step.size, bool)
+        if (step < self.low).any() or (step > self.high).any():
+            found = lsq_linear(root.T, target, (self.low, self.high), method="bvls")
+            step, inside = found.x, found.active_mask == 0
+            root = np.linalg.cholesky((matrix + 1e-10 * np.eye(len(matrix)))[np.ix_(inside, inside)])
+        unsure = np.zeros((step.size, len(root)))
+        unsure[inside] = np.linalg.inv(root).T
+        return self.scale * step, self.scale[:, None] * unsure
 
 
 def unseen(fit: Fit, left_out: list[NDArray[np.intp]] | None = None) -> Unseen:
@@ -81,14 +100,30 @@ def unseen(fit: Fit, left_out: list[NDArray[np.intp]] | None = None) -> Unseen:
     parts, blocks = _Parts(fit), fit.blocks
     cost, out = np.zeros(len(parts.rest)), np.zeros(fit.problem.of.size)
     for part in left_out or folds(fit):
-        matrix, right = parts.without(part)
-        step = -parts.scale * np.linalg.solve(matrix, right)
+        step, unsure = parts.without(part)
         predicted = parts.rest[part] + parts.rows[part] @ step
-        cost[part] = (predicted**2).sum(axis=1) + parts.logs[part]
+        cost[part] = _predictive(predicted, parts.rows[part] @ unsure) + parts.logs[part]
         force = blocks(fit.marginal)[part] + blocks(fit.slopes.shared)[part][..., parts.free] @ step
         there = blocks.there[part]
         out[blocks.index[part][there]] = force[there]
     return Unseen(cost, out)
+
+
+def _predictive(predicted: Array, unsure: Array) -> Array:
+    """Twice the negative logarithm of the density of each event's whitened residuals, without what whitens them.
+
+    What the others do not tell, such as the level of the strength where only the run left out begins with a virgin
+    contact, is no error of a model that does not know it: ``S = 1 + U U'`` with what is not known of the parameters.
+
+    Args:
+        predicted: residuals with the parameters that the others tell, shape (e, n).
+        unsure: what a standard deviation of each independent combination of the parameters does, shape (e, n, p).
+    """
+    inner = np.swapaxes(unsure, 1, 2) @ unsure + np.eye(unsure.shape[2])
+    root = np.linalg.cholesky(inner)
+    along = np.linalg.solve(root, np.einsum("enp,en->ep", unsure, predicted)[..., None])[..., 0]
+    logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    return np.asarray((predicted**2).sum(axis=1) - (along**2).sum(axis=1) + logs)
 
 
 def points(fit: Fit, left_out: list[NDArray[np.intp]]) -> list[Point]:

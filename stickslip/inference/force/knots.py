@@ -18,8 +18,10 @@ from scipy.sparse import coo_array, csr_array
 from ...data.segment import Event, Segmentation
 from ...data.trace import Trace
 from .kernels import kernels
+from .mains import hum
+from .sampling import even
 from .scales import Scales
-from .smoothing import Smoother, even, hum, onward, smoothed, unsteady
+from .smoothing import Smoother, onward, smoothed, unsteady
 from .turns import Turns
 from .windows import apart, edges_of, fast, hasty, thin
 
@@ -63,6 +65,7 @@ class Knots:
         force: measured force at the knots where the motion is prescribed, else zero (N).
         load: measured normal load at the knots (N), NaN where there is none.
         force_noise: variance of the force at the points where that is measured by itself, else zero (N^2).
+        hum: sine and cosine of the sensor's hum in the samples, each as large as is expected (m), shape (N, 2).
     """
 
     name: str
@@ -91,6 +94,7 @@ class Knots:
     force: Array
     load: Array
     force_noise: Array
+    hum: Array
 
     @property
     def prescribed(self) -> bool:
@@ -117,9 +121,9 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     rate = 1.0 / (t[1] - t[0])
     noise = max(float(trace.noise or 0.0), 1e-13)
     d = np.asarray(trace.drive.position(t))
-    x = x - hum(t, x, found.events, rate, times)
-    followed, speed, smoother = smoothed(x, noise, rate, times)
     breaks = np.searchsorted(t, trace.drive.breakpoints)
+    x = x - hum(t, x, trace, found, times.slip, times.hum)
+    followed, speed, smoother = smoothed(x, noise, rate, times)
     steady, raw = speed, x
     step = max(trace.resolution or 0.0, 2.0 * noise, UNSTEADY * unsteady(x, t, found.events, rate))
     if extra is not None:
@@ -306,13 +310,14 @@ class _Pieces:
             turns.joined(y, own) for y, own in zip((knot_t, x, v, d), turns.at(knot_t, x, d), strict=True)
         )
         event = event[turns.source]
+        reading = turns.rows(reading)
         knots_made = Knots(
             trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
             made["at"], phase, of, made["rate"], made["acceleration"], samples,
-            turns.rows(reading), (moving[0], moving[1]),
+            reading, (moving[0], moving[1]),
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, begun), np.diff(begun),
             noise, trace.spring_stiffness, trace.virgin, np.zeros(knot_t.size), load_at(trace, knot_t),
-            np.zeros(of.size),
+            np.zeros(of.size), times.hum.at(t),
         )  # fmt: skip
         return selected(knots_made, keep)
 

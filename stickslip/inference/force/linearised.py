@@ -127,10 +127,10 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
     bend = np.zeros((k - 2, size))
     bend[:, a + b : a + b + k] = k / (BEND * whole) * second - bent[:, None] / whole
     alike = np.zeros((c, size))
-    alike[:, a + b + k :] = np.eye(c) / problem.systematic
+    alike[:, a + b + k :] = np.diag(1.0 / problem.usual)
     return (
         np.vstack([*rows, bend, alike]),
-        np.concatenate([target, bent, point.common / problem.systematic]),
+        np.concatenate([target, bent, point.common / problem.usual]),
     )
 
 

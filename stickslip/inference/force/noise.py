@@ -26,12 +26,13 @@ def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size
     return out
 
 
-def known_of(problem: Problem, point: Point, slopes: Slopes, blocks: Blocks, dropped: NDArray[np.bool_]) -> Known:
-    """What the covariance is made of, at a point."""
+def known_of(
+    problem: Problem, slopes: Slopes, rows: Sequence[csr_array], blocks: Blocks, dropped: NDArray[np.bool_]
+) -> Known:
+    """What the covariance is made of, at a point; ``rows`` of :func:`by_reading`."""
     strength = problem.composition.nominal[0]  # not the model's: a weaker contact would have a smaller misfit allowed
-    carried = by_reading(problem, point, slopes)
     return Known(
-        noise(problem, carried, blocks), periodic(problem, carried, blocks),
+        noise(problem, rows, blocks), periodic(problem, rows, blocks),
         blocks(np.where(dropped, strength**2, 0.0)), blocks(slopes.local), blocks(problem.phase),
         blocks(slopes.spring), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed),
         problem.lasting, problem.begins, blocks.there, strength,
@@ -61,6 +62,12 @@ def by_reading(problem: Problem, point: Point, slopes: Slopes) -> list[csr_array
             + values["rig.mass"] * acceleration
         )
     return out
+
+
+def carrier(problem: Problem, slopes: Slopes, rows: Sequence[csr_array]) -> Array:
+    """What carries errors of the position that are found with the model (see :meth:`.problem.Problem.carried_by`)."""
+    hum = np.concatenate([row @ run.hum for run, row in zip(problem.runs, rows, strict=True)])
+    return np.column_stack([slopes.tangent, hum])
 
 
 def noise(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Array:

@@ -127,6 +127,7 @@ def thinned(trace: Trace) -> Knots:
         np.log1p(since / least) / np.log(4.0) + PLACED_APART * piece[compared], at[compared] - begins[of],
         np.diff(np.append(begins, t[-1])), noise, stiffness, trace.virgin, knots_force,
         load_at(trace, at) if trace.normal_load is None else means @ trace.normal_load, forced**2 / sizes[compared],
+        np.zeros((x.size, 2)),
     )  # fmt: skip
 
 
@@ -203,6 +204,6 @@ def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Pr
         np.zeros((0, len(runs))),
         flat,
         np.zeros((problem.events, OWN)),
-        np.zeros(problem.cycles.shape[1]),
+        np.zeros(problem.readings.shape[1]),
     )
     return problem, with_weights(problem, point, strength)

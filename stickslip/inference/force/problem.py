@@ -130,7 +130,8 @@ class Point:
         phases: shape (b, R).
         weights: strength of every element (N), not negative, shape (k,).
         events: :data:`LOCAL` of each event, shape (E, 4).
-        common: error of the position that all cycles share, as a function of the place in the cycle (m), shape (c,).
+        common: error of the position that all cycles share, as a function of the place in the cycle (m), and what is
+            left of the hum in each run, over what is expected of it, shape (c,).
     """
 
     z: Array
@@ -185,7 +186,7 @@ class Slopes(Forces):
     """Residual force and all its derivatives.
 
     Attributes:
-        shared: derivatives in z, phases of all runs, weights and what cycles share, shape (p, a + b R + k + c).
+        shared: derivatives in z, phases of all runs, weights and errors of the position, shape (p, a + b R + k + c).
     """
 
     shared: Array
@@ -197,7 +198,10 @@ class Slopes(Forces):
 
 
 class Problem:
-    """All runs of a campaign under one composition."""
+    """All runs of a campaign under one composition.
+
+    Errors of the position that are found with the model are ``readings`` (m), shape (p, c), each about ``usual`` times.
+    """
 
     def __init__(self, composition: Composition, runs: Sequence[Knots]) -> None:
         self.composition, self.runs = composition, tuple(runs)
@@ -220,10 +224,20 @@ class Problem:
         self._events = tuple(_events(k, room, int(f)) for k, f in zip(runs, first[:-1], strict=True))
         virgin = np.isin(self.of, [f for f, k in zip(first[:-1], runs, strict=True) if k.virgin])
         hats = _hats(self.place)
-        # quantisation, filters and hum leave about as much alike in all cycles as the noise of one sample is
-        self.systematic = max(float(np.median([k.noise for k in runs])), 1e-12)
-        self.cycles = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
+        # quantisation and filters leave about as much alike in all cycles as the noise of one sample is
+        systematic = max(float(np.median([k.noise for k in runs])), 1e-12)
+        alike = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
+        self.hums = np.array([r for r, k in enumerate(runs) if k.hum.any()], int)
+        at_points = np.concatenate([k.mean @ (k.reading @ k.hum) for k in runs])
+        self.readings = np.hstack([alike, self._by_run(at_points)])
+        self.usual = np.concatenate([np.full(alike.shape[1], systematic), np.ones(2 * self.hums.size)])
         self.carrier: Array | None = None
+
+    def _by_run(self, both: Array) -> Array:
+        """Sine and cosine, shape (p, 2), apart for every run with hum, shape (p, 2 h)."""
+        return np.hstack(
+            [np.zeros((self.run.size, 0)), *(np.where(self.run[:, None] == r, both, 0.0) for r in self.hums)]
+        )
 
     def with_composition(self, composition: Composition) -> Problem:
         """The same runs under another composition."""
@@ -232,13 +246,16 @@ class Problem:
         other.composition = composition
         return other
 
-    def carried_by(self, tangent: Array) -> Problem:
-        """The same with a given stiffness (N/m), shape (p,), that carries what cycles share of the position to a force.
+    def carried_by(self, carrier: Array) -> Problem:
+        """The same with what carries errors of the position to a force held as it is.
 
         With that of the model as it moves, a spring that begins to slide would make the force jump.
+
+        Args:
+            carrier: stiffness for what cycles share (N/m), and what sine and cosine of the hum do (N), shape (p, 3).
         """
         other = self.with_composition(self.composition)
-        other.carrier = tangent
+        other.carrier = carrier
         return other
 
     def recarried(self, slopes: Slopes, point: Point) -> Slopes:
@@ -251,8 +268,10 @@ class Problem:
         )
 
     def _carried(self, tangent: Array) -> Array:
-        carrier = tangent if self.carrier is None else self.carrier
-        return np.asarray(carrier[:, None] * self.cycles)
+        if self.carrier is None:
+            return np.asarray(tangent[:, None] * self.readings)
+        alike = self.readings.shape[1] - 2 * self.hums.size
+        return np.hstack([self.carrier[:, :1] * self.readings[:, :alike], self._by_run(self.carrier[:, 1:])])
 
     def values(self, point: Point) -> dict[str, float]:
         """Name -> SI value of what is shared."""
@@ -301,8 +320,8 @@ class Problem:
         starts = {**c.fixed, **{f.name: f.start for f in c.shared}}
         slow = self.phase == CREEPING
         share = np.ones(size)
-        cycles = self.cycles.shape[1]
-        slopes, local = np.zeros((size, a + b * runs + k + cycles)), np.zeros((size, OWN))
+        errors = self.readings.shape[1]
+        slopes, local = np.zeros((size, a + b * runs + k + errors)), np.zeros((size, OWN))
         sensed = any(isinstance(e, Sensor) for e in c.effects)
         common = scales, phase_scale, fixed, leaves, weights, c.reach
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...data.segment import Segmentation
+from ...data.trace import Trace
+from .mains import Hum, heard
 
 HALF = 3.0  # samples, the least half-width of the test function
 COARSE = 0.15  # of a slip, the largest half-width that still resolves its inertia
@@ -20,18 +23,20 @@ class Scales:
         half: half-width of the test function (s).
         ring: period of the ringing after an arrest (s); 0 where none is heard.
         slip: usual duration of a slip (s).
+        hum: of the sensor.
     """
 
     half: float
     ring: float
     slip: float
+    hum: Hum = field(default_factory=Hum)
 
 
-def scales(segmentations: list[Segmentation], ring: float | None, rate: float) -> Scales:
+def scales(runs: Sequence[tuple[Trace, Segmentation]], ring: float | None, rate: float) -> Scales:
     """The times of a campaign: medians over its slips, and the period of the ringing (s) where one is heard."""
-    slip = float(np.median([e.duration for s in segmentations for e in s.events]))
+    slip = float(np.median([e.duration for _, s in runs for e in s.events]))
     half = min(ring, slip / 8.0) if ring else slip / 12.0
-    return Scales(max(half, HALF / rate), ring or 0.0, slip)
+    return Scales(max(half, HALF / rate), ring or 0.0, slip, heard(runs, slip))
 
 
 def too_coarse(times: Scales, rate: float) -> str | None:

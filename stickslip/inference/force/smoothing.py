@@ -1,4 +1,4 @@
-"""What of a reading is motion: even steps, mains hum, slow noise, smoothed displacement and velocity."""
+"""What of a reading is motion: slow noise, smoothed displacement and velocity."""
 
 from __future__ import annotations
 
@@ -17,43 +17,6 @@ from .scales import Scales
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 BACK = 5.0  # noise levels of one sample within which a step back is noise
-HUM = 50.0  # Hz, the mains
-
-
-def even(t: Array, x: Array) -> tuple[Array, Array]:
-    """Equal steps of time; lost samples are filled in linearly."""
-    step = np.median(np.diff(t))
-    if np.ptp(np.diff(t)) < 1e-3 * step:
-        return np.asarray(t), np.asarray(x)
-    even = np.arange(t[0], t[-1], step)
-    return even, np.interp(even, t, x)
-
-
-def hum(t: Array, x: Array, events: tuple[Event, ...], rate: float, times: Scales) -> Array:
-    """The sine at the mains frequency in the sticks, which is the sensor's (m)."""
-    width = round(rate / HUM)
-    if width < 8:
-        return np.zeros_like(x)
-    still = np.ones(x.size, bool)
-    for event in events:
-        a = np.searchsorted(t, event.t_onset - 2.0 * times.slip)
-        b = np.searchsorted(t, event.t_arrest + 3.0 * times.slip)
-        still[max(a, 0) : b] = False
-    still[: 2 * width] = still[-2 * width :] = False
-    if still.sum() < 20 * width:
-        return np.zeros_like(x)
-    total = np.cumsum(np.insert(x, 0, 0.0))
-    mean = np.zeros_like(x)
-    half = width // 2
-    i = np.arange(half, x.size - width + half)
-    mean[i] = (total[i - half + width] - total[i - half]) / width
-    basis = np.stack([np.sin(2 * np.pi * HUM * t), np.cos(2 * np.pi * HUM * t)], axis=1)
-    rest = (x - mean)[still]
-    rest = rest - np.median(rest)
-    keep = np.abs(rest) < 6.0 * max(np.median(np.abs(rest)) * 1.48, 1e-15)
-    found, *_ = np.linalg.lstsq(basis[still][keep], rest[keep], rcond=None)
-    spread = float(np.std(rest[keep])) * np.sqrt(2.0 / keep.sum()) * np.sqrt(width)
-    return basis @ found if np.hypot(*found) > 4.0 * spread else np.zeros_like(x)
 
 
 def unsteady(x: Array, t: Array, events: tuple[Event, ...], rate: float) -> float:

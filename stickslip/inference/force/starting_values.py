@@ -115,7 +115,7 @@ def begin(
     problem = Problem(composition, runs)
     flat = np.full(elements, strength / elements)
     point = Point(
-        vector(composition.shared), begun, flat, np.zeros((problem.events, OWN)), np.zeros(problem.cycles.shape[1])
+        vector(composition.shared), begun, flat, np.zeros((problem.events, OWN)), np.zeros(problem.readings.shape[1])
     )
     return problem, with_weights(problem, point, strength)
 
