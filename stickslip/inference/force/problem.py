@@ -235,9 +235,8 @@ class Problem:
 
     def _by_run(self, both: Array) -> Array:
         """Sine and cosine, shape (p, 2), apart for every run with hum, shape (p, 2 h)."""
-        return np.hstack(
-            [np.zeros((self.run.size, 0)), *(np.where(self.run[:, None] == r, both, 0.0) for r in self.hums)]
-        )
+        own = self.run[:, None] == self.hums
+        return np.asarray((own[:, :, None] * both[:, None, :]).reshape(self.run.size, -1))
 
     def with_composition(self, composition: Composition) -> Problem:
         """The same runs under another composition."""
