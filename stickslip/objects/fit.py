@@ -21,7 +21,7 @@ from ..inference.force.backbone import backbone, power_law
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at, deviations
 from ..inference.force.fit import fit as fit_force
-from ..inference.force.heldout import unseen
+from ..inference.force.heldout import apart
 from ..inference.force.knots import PHASES
 from ..inference.force.residual import VARIABLES, WAYS, coordinates
 from ..inference.force.valleys import pinned
@@ -546,7 +546,7 @@ class Fit(Shown):
     @cached_property
     def _unseen(self) -> np.ndarray:
         """Residual force on runs that are left out (N), shape (p,)."""
-        return unseen(self._fit).residual
+        return apart(self._fit)
 
     @cached_property
     def _floor(self) -> np.ndarray:

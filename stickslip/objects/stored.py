@@ -12,7 +12,7 @@ from ..inference.diagnose.engine import Rung, static_residual
 from ..inference.force.candidates import with_start
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at
-from ..inference.force.heldout import unseen
+from ..inference.force.heldout import apart
 from ..inference.force.problem import Problem
 from ..inference.force.stored import fit_arrays, fit_of
 from ..physics.effects import catalogue
@@ -66,7 +66,7 @@ def unpacked(campaign: Campaign, kept: Mapping[str, Any], load: Callable[[str], 
         found = fit_of(problem, load(row["arrays"]))
         if not ladder:
             ladder.append(Rung(("static",), None, static_residual(found), None, None))
-        residual = unseen(found).residual
+        residual = apart(found)
         ladder.append(Rung(tuple(row["model"]), row["added"], found.marginal, residual, found, row["removed"]))
     moved = None
     if kept["moved"]:

@@ -14,7 +14,6 @@ from ...physics.effects.base import Effect
 from ...physics.params import specs, variants
 from ..force.candidates import shapes_backbone, try_effect
 from ..force.fit import Fit, deviations, fit
-from ..force.heldout import unseen
 from ..force.signatures import Explained
 from ..force.valleys import LEVEL, held, widened
 from ..uncertainty import Profile, profile
@@ -120,7 +119,7 @@ def climb(prepared: Prepared, effects: Sequence[Form], tell: Tell) -> Climbed:
     tell("the base model", 0.0)
     base = widened(fit(prepared.problem, prepared.start), [LEVEL], DISPERSION)
     first = Rung(("static",), None, static_residual(base), None, None)
-    done = Climbed(prepared, (first, _rung(("static", "inertia"), "inertia", base)), {})
+    done = Climbed(prepared, (first, Rung.of(("static", "inertia"), "inertia", base)), {})
     for i, (tag, form) in enumerate(effects):
         tell(f"adding {tag}", (i + 1) / (len(effects) + 2))
         done = extended(done, tag, form)
@@ -138,7 +137,7 @@ def extended(done: Climbed, tag: str, form: Mapping[str, str]) -> Climbed:
     (found,) = try_effect(base, Explained(base), tag, [dict(form)])
     if found.fit is None:
         raise FitError(f"{tag} could not be fitted: {found.note or 'no finite model with it'}")
-    rung = _rung((*done.ladder[-1].model, tag), tag, settled(base, found))
+    rung = Rung.of((*done.ladder[-1].model, tag), tag, settled(base, found))
     gain = max(base.cost - found.fit.cost, 0.0)
     return replace(done, ladder=(*done.ladder, rung), gains={**done.gains, tag: gain})
 
@@ -146,14 +145,14 @@ def extended(done: Climbed, tag: str, form: Mapping[str, str]) -> Climbed:
 def shortened(done: Climbed, tag: str) -> Climbed:
     """The ladder with an effect taken out of its last model, which is fitted anew."""
     model = tuple(t for t in done.ladder[-1].model if t != tag)
-    rung = _rung(model, None, without(done.fit, tag), tag)
+    rung = Rung.of(model, None, without(done.fit, tag), tag)
     return replace(done, ladder=(*done.ladder, rung), gains={t: g for t, g in done.gains.items() if t != tag})
 
 
 def replaced(done: Climbed, found: Fit) -> Climbed:
     """The ladder with another fit of its last model."""
     last = done.ladder[-1]
-    return replace(done, ladder=(*done.ladder[:-1], _rung(last.model, last.added, found, last.removed)))
+    return replace(done, ladder=(*done.ladder[:-1], Rung.of(last.model, last.added, found, last.removed)))
 
 
 def _acts(tag: str, form: Mapping[str, str]) -> None:
@@ -170,10 +169,6 @@ def _acts(tag: str, form: Mapping[str, str]) -> None:
             value=":".join([tag, *(f"{name}={value}" for name, value in form.items())]),
             hint="leave it out: its part is in the backbone already",
         )
-
-
-def _rung(model: tuple[str, ...], added: str | None, found: Fit, removed: str | None = None) -> Rung:
-    return Rung(model, added, found.marginal, unseen(found).residual, found, removed)
 
 
 def profiled(found: Fit, name: str, tell: Tell) -> Profile:

@@ -17,7 +17,7 @@ from ...data.trace import Trace
 from ...physics.effects import catalogue
 from ..force.candidates import Candidate, every_form
 from ..force.fit import Fit, deviations, fit
-from ..force.heldout import unseen
+from ..force.heldout import apart
 from ..force.linearised import Array
 from ..force.prescribed import applies
 from ..force.problem import Point, Problem
@@ -72,7 +72,8 @@ class Rung:
     Attributes:
         model: tags of its parts. added: the last of them, None where the ladder begins.
         residual: of the force with all events alike, on the runs it was fitted to (N), shape (p,).
-        unseen: the same of runs left out; None for the static model, which has no fit of its own.
+        unseen: the same of runs left out (:func:`..force.heldout.apart`); None for the static model, which has no fit
+            of its own.
         fit: None for the static model.
         removed: an effect that is not needed any more with those that came after it.
     """
@@ -83,6 +84,11 @@ class Rung:
     unseen: Array | None
     fit: Fit | None
     removed: str | None = None
+
+    @classmethod
+    def of(cls, model: tuple[str, ...], added: str | None, found: Fit, removed: str | None = None) -> Rung:
+        """Of a fit."""
+        return cls(model, added, found.marginal, apart(found), found, removed)
 
 
 @dataclass(frozen=True)
@@ -193,7 +199,10 @@ def diagnose(
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
     tell("fitting the base model", 0.5)
     base = kept(store, "base", prepared.problem, lambda: fit(prepared.problem, prepared.start))
-    ladder = [Rung(("static",), None, static_residual(base), None, None), _rung(("static", "inertia"), "inertia", base)]
+    ladder = [
+        Rung(("static",), None, static_residual(base), None, None),
+        Rung.of(("static", "inertia"), "inertia", base),
+    ]
     search = Search(base, ladder, jobs, tell, in_time, store)
     verdict: Verdict | None = None
     if wrong:  # an effect would be fitted to the wrong entry
@@ -291,7 +300,7 @@ class Search:
         self.base = base
         self.gone |= {removed} if removed else set()
         model = [t for t in self.ladder[-1].model if t != removed]
-        self.ladder.append(_rung((*model, *([added] if added else [])), added, base, removed))
+        self.ladder.append(Rung.of((*model, *([added] if added else [])), added, base, removed))
 
 
 def without(base: Fit, tag: str) -> Fit:
@@ -383,10 +392,6 @@ def with_shape(verdict: Verdict, shape: Shape) -> Verdict:
         kind = "ambiguous"
     effects = (*verdict.effects, tags[0])
     return replace(verdict, kind=kind, effects=effects, set=tuple(dict.fromkeys([*verdict.set, *tags])))
-
-
-def _rung(model: tuple[str, ...], added: str | None, found: Fit, removed: str | None = None) -> Rung:
-    return Rung(model, added, found.marginal, unseen(found).residual, found, removed)
 
 
 def static_residual(base: Fit) -> Array:

@@ -13,7 +13,7 @@ from ..fit.composition import run_of
 from ..fit.equations import solved
 from ..fit.serialised import KEY, Fitted, record
 from ..force.fit import Fit
-from ..force.heldout import unseen
+from ..force.heldout import apart
 from ..force.knots import PHASES
 from ..force.linearised import Array
 from ..force.problem import PULL
@@ -167,7 +167,7 @@ def _ranked(j: Judged, done: Round, rung: Rung, d: Diagnosis) -> dict[str, Any]:
         "gain": j.gain,
         "chance": j.chance,
         "train_error": error(fit.marginal, d),
-        "heldout_error": error(unseen(fit).residual, d),
+        "heldout_error": error(apart(fit), d),
         "heldout_gain": total / max(abs(j.gain), 1e-300) if j.gain > 1.0 else 0.0,
         "heldout_gain_std": j.error / max(abs(j.gain), 1e-300) if j.gain > 1.0 else 0.0,
         "heldout_cost": total,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from .fit import STEPS, Fit, refit
+from .fit import STEPS, Fit, deviations, refit
 from .linearised import Array, Linearised, moved, prior_rows, reach
 from .problem import Point
 from .scatter import Whitening
@@ -29,10 +29,12 @@ class Unseen:
     Attributes:
         cost: twice the negative logarithm of the predictive likelihood of each event, shape (E,).
         residual: residual force of the prediction, events alike (N), shape (p,).
+        spread: standard deviation of the prediction by what the others do not tell (N), shape (p,).
     """
 
     cost: Array
     residual: Array
+    spread: Array
 
 
 def folds(fit: Fit) -> list[NDArray[np.intp]]:
@@ -98,15 +100,26 @@ class _Parts:
 def unseen(fit: Fit, left_out: list[NDArray[np.intp]] | None = None) -> Unseen:
     """Predict every fold from the others."""
     parts, blocks = _Parts(fit), fit.blocks
-    cost, out = np.zeros(len(parts.rest)), np.zeros(fit.problem.of.size)
+    cost, (residual, spread) = np.zeros(len(parts.rest)), np.zeros((2, fit.problem.of.size))
     for part in left_out or folds(fit):
         step, unsure = parts.without(part)
         predicted = parts.rest[part] + parts.rows[part] @ step
         cost[part] = _predictive(predicted, parts.rows[part] @ unsure) + parts.logs[part]
-        force = blocks(fit.marginal)[part] + blocks(fit.slopes.shared)[part][..., parts.free] @ step
-        there = blocks.there[part]
-        out[blocks.index[part][there]] = force[there]
-    return Unseen(cost, out)
+        own = blocks.index[part][blocks.there[part]]
+        slopes = fit.slopes.shared[own][:, parts.free]
+        residual[own] = fit.marginal[own] + slopes @ step
+        spread[own] = np.sqrt(((slopes @ unsure) ** 2).sum(axis=1))
+    return Unseen(cost, residual, spread)
+
+
+def apart(fit: Fit) -> Array:
+    """Residual force of runs left out, events alike (N), shape (p,), to be seen over the floor.
+
+    It is as much smaller as the deviation of the prediction is larger than the floor: where only one run tells a
+    parameter, that run's being off is no error of the model.
+    """
+    held, floor = unseen(fit), deviations(fit)
+    return held.residual * floor / np.hypot(floor, held.spread)
 
 
 def _predictive(predicted: Array, unsure: Array) -> Array:
