@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from ...data.campaign import Campaign
 from ...data.prescribed import prescribed, with_motion
 from ...data.segment import Segmentation
@@ -17,7 +19,7 @@ from ..fit.start import FALLBACK_PERIOD, ringing, shared_rig
 from ..force.knots import Knots, knots
 from ..force.prescribed import SAID, thinned
 from ..force.prescribed import begin as begin_prescribed
-from ..force.problem import Point, Problem
+from ..force.problem import PULL, Point, Problem
 from ..force.rig import SPRING
 from ..force.scales import Scales, scales, too_coarse
 from ..force.starting_values import begin
@@ -60,8 +62,15 @@ class Prepared:
     @cached_property
     def both_ways(self) -> bool:
         """Whether the force takes both signs, each beyond a tenth of the other."""
-        stated = self.problem.values(self.start)[SPRING]
-        pulls = [(k.stiffness or stated) * (k.drive - k.x) + k.force for k in self.runs]
+        stated, composition = self.problem.values(self.start)[SPRING], self.problem.composition
+        names = [f.name for f in composition.phases]
+        begun = np.zeros(len(self.problem.runs))  # of a spring that was stretched when the record began
+        if PULL in names:
+            begun = self.start.phases[names.index(PULL)] * float(composition.phases[names.index(PULL)].scale)
+        pulls = [
+            (k.stiffness or stated) * (k.drive - k.x) + k.force + more
+            for k, more in zip(self.problem.runs, begun, strict=True)
+        ]
         low, high = min(float(p.min()) for p in pulls), max(float(p.max()) for p in pulls)
         return min(high, -low) > BOTH * max(high, -low)
 
