@@ -19,6 +19,8 @@ from stickslip.inference.force.scales import Scales
 from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
 
+from .conftest import made
+
 RATE, STROKE, SPEED, REST = 200.0, 2.4e-4, 2.2e-4, 0.5  # Hz, m, m/s, s
 CAPS = np.full(30, 2.4 / 30)  # N
 YIELDS = np.linspace(2e-6, 9e-5, 30)  # m
@@ -150,3 +152,13 @@ def test_an_effect_is_tried_where_the_record_shows_what_it_needs(plain):
     one_way = Prepared(*begin(Rig(), runs), (), (), Scales(1.0, 0.0, 1.0), (), True)
     assert not one_way.shows(uneven)
     assert one_way.shows(loaded)
+
+
+def test_a_spring_that_was_stretched_when_the_record_began_pulls_one_way(tmp_path):
+    """Its force is not known at first: where the block stands then is no force of zero, after which it would push."""
+    case = made(tmp_path / "case", 11, virgin=False, spring_known=True)
+    begun = Prepared(case.problem, case.point, (), (), case.times, ())
+    low = min(float(np.min(k.drive - k.x)) for k in begun.runs)
+    high = max(float(np.max(k.drive - k.x)) for k in begun.runs)
+    assert low < -0.1 * high
+    assert not begun.both_ways
