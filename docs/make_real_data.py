@@ -188,41 +188,7 @@ def without_phase(path: str) -> dict[str, float]:
 
 def together(data: Path, work: Path) -> dict[str, Any]:
     """The paper slider's records that slip, of both springs and three velocities, diagnosed together."""
-    parts = [PAPER.format(k=168, v=42, data=data) + 'start = "260 s"\nstop = "300 s"\n']
-    for k, v in ((168, 1100), (168, 4300), (1002, 1100), (1002, 4300)):
-        parts.append(PAPER.format(k=k, v=v, data=data) + f'spring_stiffness = "{k} N/m"\n')
-    path = campaign(work, "paper-together", "Paper on paper", PAPER_RIG.format(k=168), *parts)
-    out = work / "paper-diagnosis"
-    code, said = program("diagnose", path, "--out", str(out), "--force")
-    if not (out / "result.json").is_file():
-        raise SystemExit(f"diagnose failed with {code}: {said}")
-    found = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    tried = sorted((c for c in found["ranking"] or [] if c.get("cost") is not None), key=lambda c: c["cost"])[:5]
-    experiment = found["next_experiment"]
-    return {
-        "tried": len(found["ranking"] or []),
-        "says": [
-            *found["notes"],
-            f"{found['verdict']['kind']}: {found['verdict']['text']}",
-            *([experiment["text"]] if experiment else []),
-            *found["caution"],
-        ],
-        "ladder": [
-            {
-                "model": "static" if rung["added"] is None else rung["added"],
-                "fitted": rung["train_error"], "unseen": rung["heldout_error"],
-            }
-            for rung in found["ladder"]
-        ],
-        "base_cost": (found["ranking_base"] or {}).get("cost"),
-        "nearest": [
-            {
-                "effect": c["effect"], "cost": c["cost"], "fitted": c["train_error"], "unseen": c["heldout_error"],
-                "why_not": "; ".join(c["failures"] or []),
-            }
-            for c in tried
-        ],
-    }  # fmt: skip
+    return diagnosed("paper-slider-springs", data / "paper-slider-ens", work / "springs")
 
 
 def robot(data: Path, work: Path) -> dict[str, Any]:
@@ -333,12 +299,14 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     return {
         "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
         "says": f"{verdict['kind']}: {verdict['text']}",
+        "scatter": fits[-1].scatter.named(),
         "ladder": [
             {
                 "model": rung.added, "fitted": rms(rung.residual) / level, "unseen": rms(rung.unseen) / level,
                 "gain": None if rung.fit is fits[0] else last.fit.cost - rung.fit.cost,
+                "floors": [told["train_error"], told["heldout_error"]],
             }
-            for last, rung in zip([rungs[0], *rungs], rungs, strict=False)
+            for last, rung, told in zip([rungs[0], *rungs], rungs, made.result["ladder"][1:], strict=False)
         ],
     }  # fmt: skip
 
