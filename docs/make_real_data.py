@@ -187,8 +187,8 @@ def without_phase(path: str) -> dict[str, float]:
 
 
 def together(data: Path, work: Path) -> dict[str, Any]:
-    """The paper slider's records that slip, of both springs and three velocities, diagnosed together."""
-    return diagnosed("paper-slider-springs", data / "paper-slider-ens", work / "springs")
+    """The paper slider's records that slip through the softer spring, at three velocities, diagnosed together."""
+    return diagnosed("paper-slider-speeds", data / "paper-slider-ens", work / "speeds")
 
 
 def robot(data: Path, work: Path) -> dict[str, Any]:

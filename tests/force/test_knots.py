@@ -9,7 +9,7 @@ import pytest
 
 from stickslip.inference.force.kernels import kernels
 from stickslip.inference.force.knots import CREEP, _between, bow, knots
-from stickslip.inference.force.smoothing import hum, onward
+from stickslip.inference.force.smoothing import onward
 
 RATE = 1e4
 
@@ -198,29 +198,3 @@ def test_samples_and_other_events_are_not_made_to_go_on():
     assert found[5] == pytest.approx(0.0, abs=1e-20)
     assert np.all(np.diff(found[:5]) >= 0.0)
     assert np.all(np.diff(found[5:]) >= 0.0)
-
-
-def staircase(case):
-    """Smooth creep and slips at the events of a record, without noise."""
-    trace, found = case.traces[0], case.found[0]
-    x = 1e-8 * trace.time
-    for e in found.events:
-        x = x + e.slip * 0.5 * (1.0 + np.tanh((trace.time - 0.5 * (e.t_onset + e.t_arrest)) / (0.1 * e.duration)))
-    return trace.time, x, found.events, trace.sampling_rate
-
-
-def test_the_hum_of_the_mains_is_found_between_slips(small):
-    t, x, events, rate = staircase(small)
-    sine = 4e-9 * np.sin(2.0 * np.pi * 50.0 * t + 0.8)
-    noise = 3e-9 * np.random.default_rng(2).standard_normal(t.size)
-    found = hum(t, x + sine + noise, events, rate, small.times)
-    assert np.sqrt(np.mean((found - sine) ** 2)) < 0.1 * np.sqrt(np.mean(sine**2))
-
-
-@pytest.mark.parametrize("frequency", [31.0, 43.0, 60.0])
-def test_nothing_but_the_mains_is_taken_off(small, frequency):
-    t, x, events, rate = staircase(small)
-    wave = 4e-9 * np.sin(2.0 * np.pi * frequency * t + 0.8)
-    noise = 3e-9 * np.random.default_rng(2).standard_normal(t.size)
-    assert np.abs(hum(t, x + noise, events, rate, small.times)).max() == 0.0
-    assert np.abs(hum(t, x + wave + noise, events, rate, small.times)).max() < 0.05 * 4e-9

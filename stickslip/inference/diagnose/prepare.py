@@ -21,7 +21,7 @@ from ..force.prescribed import SAID, thinned
 from ..force.prescribed import begin as begin_prescribed
 from ..force.problem import PULL, Point, Problem
 from ..force.rig import SPRING
-from ..force.scales import Scales, scales, too_coarse
+from ..force.scales import Scales, of_run, scales, too_coarse
 from ..force.starting_values import begin
 
 BOTH = 0.1  # of the force one way, which it takes the other way at least
@@ -137,7 +137,7 @@ def prepare(
     coarse = too_coarse(times, rate)
     if coarse is not None:
         dropped.append(coarse)
-    runs = [knots(t, s, times) for t, s in used]
+    runs = [knots(t, s, of_run(times, t, s)) for t, s in used]
     rig = shared_rig(campaign, [t.name for t in kept])
     try:
         problem, start = begin(rig, kept, segments, runs, times)

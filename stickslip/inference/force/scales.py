@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...data.segment import Segmentation
 from ...data.trace import Trace
+from .kernels import kernels
 from .mains import Hum, heard
 
 HALF = 3.0  # samples, the least half-width of the test function
 COARSE = 0.15  # of a slip, the largest half-width that still resolves its inertia
+LOUD = 0.1  # of the acceleration of a slip, the most that noise should add
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,24 @@ def scales(runs: Sequence[tuple[Trace, Segmentation]], ring: float | None, rate:
     slip = float(np.median([e.duration for _, s in runs for e in s.events]))
     half = min(ring, slip / 8.0) if ring else slip / 12.0
     return Scales(max(half, HALF / rate), ring or 0.0, slip, heard(runs, slip))
+
+
+def of_run(times: Scales, trace: Trace, found: Segmentation) -> Scales:
+    """Those of one run: its own slips decide where no ringing does, and the noise of its readings.
+
+    The acceleration is a mean over the test function. It need not be told more finely than noise lets it be seen: where
+    its noise is more than a share :data:`LOUD` of what a slip of half a period has, the mean is taken over longer.
+    """
+    if times.ring:
+        return times
+    slip = float(np.median([e.duration for e in found.events]))
+    peak = 0.5 * float(np.median([e.slip for e in found.events])) * (np.pi / slip) ** 2
+    rate = trace.sampling_rate
+    for half in np.geomspace(max(slip / 12.0, HALF / rate), max(COARSE * slip, HALF / rate), 8):
+        _, _, second = kernels(float(half), rate)
+        if (trace.noise or 0.0) * float(np.sqrt((second**2).sum())) < LOUD * peak:
+            break
+    return replace(times, half=float(half), slip=slip)
 
 
 def too_coarse(times: Scales, rate: float) -> str | None:
