@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from stickslip.errors import FitError
 from stickslip.inference.force.candidates import Start, _at, _columns, try_effect, with_start
 from stickslip.inference.force.descent import SETTLED, descend
 from stickslip.inference.force.fit import fit
@@ -73,3 +75,10 @@ def test_a_search_comes_back_from_the_side_of_the_valley(base):
     assert start > 1e4
     assert fallen > start - 3.0
     assert count < 30
+
+
+def test_derivatives_that_no_covariance_holds_end_a_search_in_words(base):
+    """Of a candidate, which is then left out: one of a record with counts of a micrometre once ended the diagnosis."""
+    bad = replace(base.slopes, local=1e200 * base.slopes.local)
+    with pytest.raises(FitError, match="too large"), np.errstate(all="ignore"):
+        descend(base.problem, base.point, bad, base.scatter, base.known, base.blocks, 4)

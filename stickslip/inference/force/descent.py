@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...errors import FitError
 from ...system.progress import breathe
 from .linearised import Linearised, moved
 from .problem import Point, Problem, Slopes
@@ -27,6 +28,9 @@ def descend(
     one down to its bottom again: one step after which the cost is higher is gone on from (the watchdog of Chamberlain,
     Powell, Lemarechal & Pedersen 1982) before the damping is raised.
 
+    Raises:
+        FitError: derivatives are beyond what a covariance can hold.
+
     Returns:
         The point and the slopes there, by how much the cost fell, how often the model was evaluated, and the damping.
     """
@@ -36,7 +40,10 @@ def descend(
     white = Whitening(scatter.sizes, known)
     while count < most:
         breathe()
-        system = Linearised(problem, *here, scatter, blocks, white)
+        try:
+            system = Linearised(problem, *here, scatter, blocks, white)
+        except np.linalg.LinAlgError:
+            raise FitError("the derivatives in what is an event's own are too large for a likelihood") from None
         now = system.objective(*here)
         if count == 0:
             first = cost = now
