@@ -335,7 +335,7 @@ def hysteresis(base: Any, last: Any, title: str) -> Any:
         right.plot(run.at - run.at[0], 100.0 * fit.marginal[own] / base.strength, line, color=color, lw=1.0)
     left.set(xlabel=f"displacement / {length}", ylabel=f"force / {newton}", title=plain(title))
     right.set(xlabel="time / s", ylabel="measured - model / % of the strength", title=plain(run.name))
-    left.legend(loc="lower right", fontsize="x-small")
+    made.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize="x-small")
     return made
 
 

@@ -52,11 +52,11 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(engine, "fit", lambda problem, *_, **__: problem)
     monkeypatch.setattr(engine, "settled", lambda base, c, *_: Model((*base.tags, c.tag)))
     monkeypatch.setattr(
-        engine,
-        "_rung",
+        engine.Rung,
+        "of",
         lambda model, added, fit, removed=None: engine.Rung(model, added, np.zeros(0), None, fit, removed),
     )
-    ladder = [engine._rung(("static", "inertia"), "inertia", Model(()))]
+    ladder = [engine.Rung.of(("static", "inertia"), "inertia", Model(()))]
     made = engine.Search(Model(()), ladder, 1, lambda *_: None, lambda: True, None)
     made.table = table
     return made

@@ -69,10 +69,11 @@ def widened(found: Fit, names: Sequence[str], dispersion: float) -> Fit:
             continue
         variance = _variance(offset, rise)
         if variance > own:
-            # the valley is bent: its direction at the optimum is that of a parabola along it
-            scale = float(np.abs(offset).max())
+            # the valley is bent: its direction at the optimum is that of a parabola along its likely part
+            scale, likely = float(np.abs(offset).max()), np.exp(-0.25 * np.maximum(rise, 0.0))[:, None]
             bent = np.stack([offset / scale, (offset / scale) ** 2], axis=1)
-            along = np.linalg.lstsq(bent, np.array([p for p, _ in points]), rcond=None)[0][0] / scale
+            apart = np.array([p for p, _ in points])
+            along = np.linalg.lstsq(likely * bent, likely * apart, rcond=None)[0][0] / scale
             found = replace(found, valleys=(*found.valleys, along * np.sqrt(variance - own)))
     return found
 
