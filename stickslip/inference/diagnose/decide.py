@@ -3,7 +3,8 @@
 1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many
    members of its family, among as many effects; and the likelihood of unseen runs is better by more than 2.5 standard
    errors over their events. Parameters beyond where such values lie (``usual`` in the catalogue) have their price in
-   it: the range is four standard deviations wide.
+   it: the range is four standard deviations wide. The amplitude lies inside its bounds: at one of them the law would
+   have to be stronger than such laws are, and stands for another.
 2. *Named*: the seen effect that predicts unseen runs best.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
@@ -95,6 +96,11 @@ class Judged(Compared):
     def price(self) -> float:
         """Of parameters beyond where such values lie."""
         return _price(self.odd)
+
+    @property
+    def seen(self) -> bool:
+        """Rule 1; what stands at a bound has no deviation."""
+        return super().seen and self.std > 0.0
 
 
 def odd(fit: Fit, tag: str) -> dict[str, float]:

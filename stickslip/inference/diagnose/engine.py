@@ -15,7 +15,7 @@ from ...data.checks import Finding
 from ...data.segment import Segmentation, segment
 from ...data.trace import Trace
 from ...physics.effects import catalogue
-from ..force.candidates import Candidate, every_form
+from ..force.candidates import Candidate, every_form, from_end
 from ..force.fit import Fit, deviations, fit
 from ..force.heldout import apart
 from ..force.linearised import Array
@@ -23,6 +23,7 @@ from ..force.prescribed import applies
 from ..force.problem import Point, Problem
 from ..force.residual import Structure, structures
 from ..force.rig import slips_finding, spring_freed
+from ..force.scatter import Scatter
 from ..force.signatures import Explained
 from ..force.valleys import LEVEL, widened
 from .checkpoints import Store, kept, name_of
@@ -281,7 +282,7 @@ class Search:
         apart = kept(self._store, f"{key}-without", problem, lambda: without(self.base, tag))
         seen = sorted((j for j in best_forms(self.named[tag].judged) if j.seen), key=lambda j: -j.better)
         tags = [j.tag for j in seen if j.tag == tag or j.tag not in {*self.named, *self.gone}][:BEST]
-        done = self._tried(apart, tags, name)
+        done = self._tried(apart, tags, name, self.base)
         if not done.close:
             del self.named[tag]
             self._take(apart, None, tag)
@@ -292,9 +293,9 @@ class Search:
             self._take(settled(apart, done.close[0].candidate, self._store, key), other, tag)
             self.named = {other if t == tag else t: done if t == tag else r for t, r in self.named.items()}
 
-    def _tried(self, base: Fit, tags: Sequence[str], name: str) -> Round:
-        key = name.replace(" ", "")
-        return one_round(base, tags, self._jobs, partial(_told, self._tell, name), self._in_time, self._store, key)
+    def _tried(self, base: Fit, tags: Sequence[str], name: str, before: Fit | None = None) -> Round:
+        key, tell = name.replace(" ", ""), partial(_told, self._tell, name)
+        return one_round(base, tags, self._jobs, tell, self._in_time, self._store, key, before)
 
     def _take(self, base: Fit, added: str | None, removed: str | None) -> None:
         self.base = base
@@ -306,7 +307,7 @@ class Search:
 def without(base: Fit, tag: str) -> Fit:
     """The model without one of its effects, fitted anew with what is random."""
     problem, point = _taken_out(base, tag)
-    return fit(problem, point, base.scatter, dropped=base.dropped, first=True)
+    return fit(problem, point, Scatter(base.scatter.sizes), dropped=base.dropped, first=True)
 
 
 def _taken_out(base: Fit, tag: str) -> tuple[Problem, Point]:
@@ -339,9 +340,13 @@ def one_round(
     in_time: Callable[[], bool],
     store: Store | None = None,
     name: str = "round",
+    before: Fit | None = None,
 ) -> Round:
-    """Every effect on top of one model, and which of them is to be named."""
+    """Every effect on top of one model, and which of them is to be named; one was taken out of the model ``before``."""
     tried = trials(base, tags, jobs, tell, in_time, store, name)
+    if before is not None:
+        out = {e.tag for e in before.problem.composition.effects} - {e.tag for e in base.problem.composition.effects}
+        tried = [from_end(base, c, before) if c.tag in out else c for c in tried]
     judge = Judge(base, max(len(every_form(tags)), 1))
     judged = tuple(j for j in map(judge, tried) if j is not None)
     freed = spring_freed(base)
@@ -357,7 +362,8 @@ def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: s
     amplitudes = [f.name for f in found.free if f.amplitude]
 
     def made() -> Fit:
-        again = fit(found.problem, found.point, found.scatter, dropped=base.dropped, first=True)
+        sizes = found.scatter.within(base.scatter)
+        again = fit(found.problem, found.point, sizes, dropped=base.dropped, first=True)
         return widened(again, amplitudes, DISPERSION)
 
     return kept(store, key, found.problem, made)

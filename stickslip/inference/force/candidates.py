@@ -121,10 +121,7 @@ def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[s
     if best.fit is None:
         return made
     if catalogue.get(tag).periodic is None:
-        made = [
-            c if c.fit is None or c.fit.cost < best.fit.cost + EVEN else _better(c, _from(base, c, best.fit))
-            for c in made
-        ]
+        made = [c if c.fit is None or c.fit.cost < best.fit.cost + EVEN else from_end(base, c, best.fit) for c in made]
     return made
 
 
@@ -146,17 +143,25 @@ def _better(one: Candidate, other: Candidate) -> Candidate:
     return other if _cost(other) < _cost(one) else one
 
 
-def _from(base: Fit, c: Candidate, other: Fit) -> Candidate:
-    """The candidate refitted from where another form of it ended."""
+def from_end(base: Fit, c: Candidate, other: Fit) -> Candidate:
+    """The candidate, or what is better than it: begun where another model with its effect ended."""
     effect, values = catalogue.get(c.tag)(**c.form), other.values
     start = {name: values.get(f"{c.tag}.{name}", value) for name, value in c.start.items()}
-    point = replace(
-        other.point, z=other.point.z[: base.point.z.size], phases=other.point.phases[: len(base.point.phases)]
-    )
+    z = np.array([f.inward(values[f.name]) for f in base.free])
+    turns = {f.name: own * float(f.scale) for f, own in zip(_turned(other), other.point.phases, strict=True)}
+    phases = np.array([turns[f.name] / float(f.scale) for f in _turned(base)]).reshape(-1, len(base.problem.runs))
+    own = next((turn for name, turn in turns.items() if name.startswith(f"{c.tag}.")), None)
+    point = replace(other.point, z=z, phases=phases)
     try:
-        return replace(c, fit=adapted(_begun(base, effect, Start(start, point))), start=start)
+        found = adapted(_begun(base, effect, Start(start, point, own)))
     except StickslipError:
-        return replace(c, fit=None)
+        return c
+    return _better(c, replace(c, fit=found, start=start))
+
+
+def _turned(fit: Fit) -> tuple[Free, ...]:
+    """What every run has of its own in a model."""
+    return fit.problem.composition.phases
 
 
 def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]) -> Candidate:
@@ -225,10 +230,11 @@ def _begun(base: Fit, effect: Effect, start: Start) -> Fit:
     """The model refitted with an effect in a few evaluations.
 
     It is given sizes of its own of what is random: those of the base are as large as the lack of the effect makes them,
-    and under them ends of a search that differ much look alike.
+    and under them ends of a search that differ much look alike. Events may not differ more than in the base.
     """
     problem, free = with_start(base.problem, effect, start.values)
-    return adapted(refit(problem, _at(base.problem, free, start), base, SHORT), rounds=0)
+    bound = replace(base, scatter=base.scatter.within(base.scatter))
+    return adapted(refit(problem, _at(base.problem, free, start), bound, SHORT), rounds=0)
 
 
 def _best_of(base: Fit, effect: Effect, starts: Sequence[Start]) -> tuple[Fit, Start]:

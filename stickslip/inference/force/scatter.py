@@ -14,7 +14,7 @@ All sizes are estimated from the campaign itself by maximum likelihood.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -43,9 +43,15 @@ SETTLED = 0.05  # fall of the cost at which the search ends
 
 @dataclass(frozen=True)
 class Scatter:
-    """Logarithms of the sizes, in the order of NAMES."""
+    """Logarithms of the sizes, in the order of NAMES.
+
+    Attributes:
+        sizes: of what is random, shape (12,).
+        most: of what differs from event to event, which is not estimated larger, shape (4,).
+    """
 
     sizes: Array
+    most: Array = field(default_factory=lambda: np.full(_OWN, np.inf))
 
     @classmethod
     def wide(cls) -> Scatter:
@@ -54,7 +60,15 @@ class Scatter:
 
     def larger(self, folds: float) -> Scatter:
         """The same, all but the noise of samples, larger by ``folds`` e-folds."""
-        return Scatter(self.sizes + folds * (np.arange(len(NAMES)) != _WHITE))
+        return replace(self, sizes=self.sizes + folds * (np.arange(len(NAMES)) != _WHITE))
+
+    def within(self, other: Scatter) -> Scatter:
+        """The same where events may not differ more than in another.
+
+        A law that is added to a model explains a part of how events differ under it, or nothing of that. Where a model
+        describes the forces within events badly, a wrong law may describe them better and leave events less alike.
+        """
+        return replace(self, most=other.sizes[:_OWN])
 
     @property
     def prior(self) -> float:
@@ -341,6 +355,7 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     low = np.append(CENTRES[:-1] - 5.0 * WIDTHS[:-1], -0.05)
     high = np.append(CENTRES[:-1] + 4.0 * WIDTHS[:-1], 1.0)
     high[:_LENGTHS] = np.minimum(high[:_LENGTHS], 0.0)  # further apart than an e-fold are no two events of one contact
+    high[:_OWN] = np.maximum(np.minimum(high[:_OWN], start.most), low[:_OWN])
     sizes, damping = np.clip(start.sizes, low, high), 1e-2
     cost, root = _misfit(sizes, residual, known)
     if not np.isfinite(cost):
@@ -361,4 +376,4 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
             damping *= 10.0
         if fallen < SETTLED:
             break
-    return Scatter(sizes)
+    return replace(start, sizes=sizes)
