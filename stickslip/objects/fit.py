@@ -44,7 +44,11 @@ if TYPE_CHECKING:
     from .campaign import Campaign
 
 STRENGTH = "contact.strength"
-MEANINGS = {STRENGTH: "friction force of all contacts at full strength", "rig.mass": "mass of the block"}
+MEANINGS = {
+    STRENGTH: "friction force of all contacts at full strength",
+    "rig.mass": "mass of the block",
+    "rig.spring_stiffness": "stiffness of the driving spring",
+}
 COORDINATES = ("displacement", "velocity", "spring force", "time in contact", *WAYS)
 
 

@@ -91,10 +91,12 @@ class Knobs(Spoken):
     Attributes:
         rows: tables with ``name``, ``label``, ``group``, ``text``, ``std``, ``prior``, ``place`` (0 to 1), ``band``,
             ``low``, ``high`` and ``locked``.
+        given: tables with ``label``, ``text`` and ``doc`` of what no hand moves.
         closed: whether none can be moved at present.
     """
 
     rows = param.List([])
+    given = param.List([])
     closed = param.Boolean(False)
 
     _esm = (_HERE / "knobs.js").read_text(encoding="utf-8")

@@ -68,6 +68,18 @@ def bins(fit: Fit, against: str) -> list[np.ndarray]:
     return [part for part in np.array_split(use[np.argsort(x, kind="stable")], BINS) if part.size]
 
 
+def law(fit: Fit, promises: Sequence[Promise], tag: str) -> np.ndarray | None:
+    """What an effect takes off the residual force (N), or would take off, shape (p,); None where that is not known."""
+    if tag not in fit.effects:
+        return next((p.force for p in best_forms(promises) if p.tag == tag), None)
+    cls = catalogue.get(tag) if tag in catalogue.tags() else None
+    name = f"{tag}.{cls.amplitude}" if cls is not None else ""
+    if cls is None or name not in fit.values:
+        return None
+    bare = _without(fit, name, specs(cls)[cls.amplitude].null or 0.0)
+    return np.asarray(bare.force.residual.values - fit.force.residual.values)
+
+
 def signature(fit: Fit, law: np.ndarray | None, parts: Sequence[np.ndarray]) -> list[list[list[float]]]:
     """Medians of the residual and of an effect's force over the floor, scaled into a picture of side 1."""
     if law is None or not parts:
@@ -121,7 +133,7 @@ def _in_model(fit: Fit, tag: str, parts: Sequence[np.ndarray], chosen: str) -> d
         size = shown(fit.values[name], free[name].unit, 3)
         size += f" ± {shown(std, free[name].unit, 2)}" if std > 0.0 else ""
         bare = _without(fit, name, specs(cls)[cls.amplitude].null or 0.0)
-        picture = signature(bare, bare.force.residual.values - fit.force.residual.values, parts)
+        picture = signature(bare, law(fit, (), tag), parts)
     gain = fit.climbed.gains.get(tag)
     rung = max((i for i, r in enumerate(fit.climbed.ladder) if r.added == tag), default=0)
     before, after = fit.ladder["unseen error"].iloc[[rung - 1, rung]] if rung else (np.nan, np.nan)

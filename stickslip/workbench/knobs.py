@@ -93,6 +93,17 @@ def knobs(fit: Fit) -> dict[str, Knob]:
     return out
 
 
+def given(fit: Fit) -> list[dict[str, str]]:
+    """What the campaign's file states, so that no fit and no hand moves it: ``label``, ``text`` and ``doc``."""
+    table = fit.parameters
+    stated = table[table.prior == "given"]
+    names = [str(name).rpartition(".")[2].replace("_", " ") for name in stated.index]
+    return [
+        {"label": name, "text": shown(value, unit), "doc": meaning}
+        for name, value, unit, meaning in zip(names, stated.value, stated.unit, stated.meaning, strict=True)
+    ]
+
+
 def rows(fit: Fit, fitted: Fit, made: dict[str, Knob], locked: Collection[str] = ()) -> list[dict[str, Any]]:
     """What the sliders show of a model; deviations are those of the fit before it was moved by hand."""
     values, std = fit.values, fitted.std

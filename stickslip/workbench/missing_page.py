@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..objects.picture import AGAINST, PARTS, WIDEST
 from ..system.units import shown, to_si
 from .controls import BUTTON, Catalogue, Message, Words
-from .evidence import best_forms, bins, rows
+from .evidence import bins, law, rows
 from .figures import figure, label, legend, look, source, unit_of
 from .session import Session, watch
 
@@ -73,11 +73,11 @@ class _Residual:
         asked = self.figure.line(
             "x", "y", source=self._smooth, color=theme.text, line_width=3.5, legend_label="what all runs ask for",
         )  # fmt: skip
-        law = self.figure.line(
+        chosen = self.figure.line(
             "x", "y", source=self._law, color=theme.model, line_width=4, line_dash="dashed",
-            legend_label="the chosen effect",
+            legend_label="what the chosen effect takes off",
         )  # fmt: skip
-        self._over = (asked, law)
+        self._over = (asked, chosen)
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
         self._draw_runs()
         legend(self.figure, "below", ncols=4)
@@ -134,14 +134,14 @@ class _Residual:
         else:
             self.figure.xaxis.ticker = BasicTicker()
             self.figure.xaxis.major_label_overrides = {}
-        law = next((p.force for p in best_forms(self._session.promises) if p.tag == self.chosen), None)
-        if law is None or law.size != z.size:
+        taken = law(fit, self._session.promises, self.chosen)
+        if taken is None or taken.size != z.size:
             self._law.data = {"x": [], "y": []}
         else:
             parts = bins(fit, against) if period is None else _parts(x, np.flatnonzero(use))
             self._law.data = {
                 "x": [float(np.median(axis[p])) for p in parts],
-                "y": [float(np.median(law[p] / floor[p])) for p in parts],
+                "y": [float(np.median(taken[p] / floor[p])) for p in parts],
             }
 
     def _period(self, unit: str) -> float | None:

@@ -17,7 +17,7 @@ from ..system.units import shown
 from .controls import BUTTON, Knobs, Message, Words
 from .figures import FEW, crosshair, figure, label, legend, look, source, unit_of
 from .free_panel import Free
-from .knobs import Knob, knobs, rows
+from .knobs import Knob, given, knobs, rows
 from .selection import choose, cycles, selected, worst
 from .session import Session, watch
 
@@ -108,6 +108,7 @@ def _sliders(session: Session) -> Knobs:
             of[0] = fitted
             made.clear()
             made.update(knobs(fitted))
+            part.given = given(fitted)
         part.param.update(rows=rows(fit, fitted, made, session.locked), closed=bool(session.busy))
 
     watch(session, ["steps", "at", "locked", "busy"], update)

@@ -38,7 +38,7 @@ def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
     session = Session(campaign=campaign, effects=own)
     if result.get("kind") == "diagnose":
         session.diagnosis = Diagnosis(campaign, None, result, {}, path)
-    elif KEY in result:
+    if KEY in result:
         session.saved = load_run(path)
     return session
 

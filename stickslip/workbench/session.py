@@ -200,19 +200,23 @@ class Session(param.Parameterized):
         """Fit a saved model anew, and set what was set by hand in it, as steps; none where it stands already."""
         fit, forms, name = self.fit, list(saved.effect_forms), saved.folder.name
         assert fit is not None and self.campaign is not None
-        if sorted(fit.effect_forms) != sorted(forms):
+        aside = list(saved.result.get("kept_aside", ()))
+        runs = {run.name for run in fit.force_fit.problem.runs}
+        if sorted(fit.effect_forms) != sorted(forms) or runs & set(aside):
             self.busy = f"fitting the model of {name}"
-            fit = _complete(self.campaign.fit(forms))
-            command = "stickslip fit campaign.toml " + " ".join(f"--add {form}" for form in forms)
-            self.take(Step(f"the model of {name}", fit, f"fit = campaign.fit({forms!r})", command.strip()))
+            options: dict[str, Any] = {"holdout": aside} if aside else {}
+            fit = _complete(self.campaign.fit(forms, **options))
+            asked = [f"--add {form}" for form in forms] + [f"--holdout {run}" for run in aside]
+            code = f"fit = campaign.fit({forms!r}{f', holdout={aside!r}' if aside else ''})"
+            self.take(Step(f"the model of {name}", fit, code, " ".join(["stickslip fit campaign.toml", *asked])))
         values, own = saved.parameters, fit.values
         moved = {
             n: values[n]["value"] for n, std in fit.std.items()
             if n in values and abs(values[n]["value"] - own[n]) > SAME * std
         }  # fmt: skip
         if moved:
-            code = f"fit = fit.with_values({moved!r})"
-            self.take(Step(f"{HAND}: as in {name}", fit.with_values(moved), code, "", moved))
+            line = f"fit = fit.with_values({moved!r})"
+            self.take(Step(f"{HAND}: as in {name}", fit.with_values(moved), line, "", moved))
 
     def _again(self) -> bool:
         """Where it was left; whether there was anything."""

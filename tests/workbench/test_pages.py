@@ -14,11 +14,12 @@ from stickslip.inference.force.first_order import promise
 from stickslip.inference.force.signatures import Explained
 from stickslip.objects import Diagnosis
 from stickslip.physics.effects import catalogue
+from stickslip.system.units import shown
 from stickslip.workbench import app, missing_page, model_page
-from stickslip.workbench.evidence import best_forms, rows, signature
+from stickslip.workbench.evidence import best_forms, bins, rows, signature
 from stickslip.workbench.figures import DARK, LIGHT
 from stickslip.workbench.free_panel import Free
-from stickslip.workbench.knobs import Knob, knobs
+from stickslip.workbench.knobs import Knob, given, knobs
 from stickslip.workbench.knobs import rows as knob_rows
 from stickslip.workbench.session import Session
 from stickslip.workbench.watching import Place
@@ -127,6 +128,28 @@ def test_the_effect_that_is_laid_over_is_drawn_over_all_else(session, base, prom
     made.update()
     last = made.figure.renderers[-1].data_source
     assert last is made._law and len(last.data["x"]) > 3
+
+
+def test_an_effect_in_the_model_is_laid_over_as_what_it_takes_off(campaign, base, aged):
+    session = Session(campaign=campaign)
+    session.first(aged)
+    made = missing_page._Residual(session)
+    made.chosen = "contact-ageing"
+    made.update()
+    x, y = (np.asarray(made._law.data[name]) for name in "xy")
+    bare = aged.with_values({"contact-ageing.rate": 0.0})
+    data, parts = aged.force, bins(aged, "age")
+    taken = (bare.force.residual - data.residual).values / data.floor.values
+    np.testing.assert_allclose(y, [np.median(taken[p]) for p in parts], rtol=1e-9)
+    assert x.size == len(parts) and np.ptp(y) > 1.0
+
+
+def test_what_the_file_states_of_the_rig_is_shown(base):
+    rig = base.campaign.rig
+    assert {row["label"]: row["text"] for row in given(base)} == {
+        "spring stiffness": shown(rig.spring_stiffness, "N/m"), "mass": shown(rig.mass, "kg"),
+    }  # fmt: skip
+    assert not set(knobs(base)) & {"rig.mass", "rig.spring_stiffness"}
 
 
 def test_an_error_of_five_floors_is_seen_beside_one_of_sixty():

@@ -185,6 +185,26 @@ def test_a_saved_model_stands_again(folder, base, aged, tmp_path, monkeypatch):
         assert session.fit is aged and session.saved is None
 
 
+def test_a_saved_model_stands_again_without_the_runs_it_had_not_seen(folder, base, aged, tmp_path, monkeypatch):
+    from stickslip.objects import Campaign
+
+    inputs = [{"file": str(folder / "campaign.toml"), "sha256": ""}]
+    result = {"kind": "fit", "inputs": inputs, KEY: record(base.fitted), "kept_aside": ["v400"]}
+    (tmp_path / "result.json").write_text(json_text(result))
+    asked = []
+
+    def fit(self, effects=(), holdout=()):
+        asked.append((list(effects), list(holdout)))
+        return aged if holdout else base
+
+    monkeypatch.setattr(Campaign, "fit", fit)
+    with closing(opened(tmp_path)) as session:
+        session.begin(keep=False)
+        assert asked == [([], []), ([], ["v400"])]
+        (_, step, *_) = session.steps
+        assert "holdout=['v400']" in step.code and step.command.endswith("--holdout v400")
+
+
 def test_what_lies_in_a_folder_is_offered(folder, tmp_path):
     (tmp_path / "scenario.toml").write_text("[block]\n")
     assert [p.name for p in offered(tmp_path)] in ([], ["campaign.toml"])

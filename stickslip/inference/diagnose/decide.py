@@ -3,8 +3,8 @@
 1. *Seen*: the fall of the cost is beyond what chance gives an effect with as many parameters, tried on as many
    members of its family, among as many effects; and the likelihood of unseen runs is better by more than 2.5 standard
    errors over their events. Parameters beyond where such values lie (``usual`` in the catalogue) have their price in
-   it: the range is four standard deviations wide. The amplitude lies inside its bounds: at one of them the law would
-   have to be stronger than such laws are, and stands for another.
+   it: the range is four standard deviations wide. The amplitude lies inside its bounds by more than its standard
+   deviation: at one of them the law would have to be stronger than such laws are, and stands for another.
 2. *Named*: the seen effect that predicts unseen runs best.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
@@ -23,6 +23,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ...physics.effects import catalogue
+from ...physics.params import specs
 from ..fit.parameters import Free
 from ..force.candidates import Candidate
 from ..force.fit import Fit
@@ -100,7 +101,9 @@ class Judged(Compared):
     @property
     def seen(self) -> bool:
         """Rule 1; what stands at a bound has no deviation."""
-        return super().seen and self.std > 0.0
+        spec = specs(catalogue.get(self.tag))[catalogue.get(self.tag).amplitude]
+        inside = min(self.amplitude - spec.lower, spec.upper - self.amplitude)
+        return super().seen and 0.0 < self.std < inside
 
 
 def odd(fit: Fit, tag: str) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -39,6 +39,7 @@ class Prepared:
         traces, segmentations: of the runs that take part, in order.
         scales: times of the campaign.
         dropped: what was left out, and why.
+        aside: names of runs that no fit sees.
         prescribed: whether the motion is and the force measured, with no driving spring between.
     """
 
@@ -48,6 +49,7 @@ class Prepared:
     segmentations: tuple[Segmentation, ...]
     scales: Scales
     dropped: tuple[str, ...]
+    aside: tuple[str, ...] = ()
     prescribed: bool = False
 
     @property
@@ -104,9 +106,10 @@ def prepare(
     for name in holdout:
         if name not in names:
             raise InputError("no run of this name to hold out", key="--holdout", value=name, hint=nearest(name, names))
-    used, given, dropped = [], [], []
+    used, given, dropped, kept_aside = [], [], [], []
     for trace, found in zip(traces, segmentations, strict=True):
         aside = trace.name in holdout or (not holdout and trace.role == "held-out")
+        kept_aside += [trace.name] * aside
         why = "kept aside: no fit sees it" if aside else _why_not(trace, found)
         if why and not aside and prescribed(trace, found):
             given.append((trace, found))
@@ -115,7 +118,7 @@ def prepare(
         else:
             used.append((trace, found))
     if not used and given:
-        return _prescribed(campaign, given)
+        return replace(_prescribed(campaign, given), aside=tuple(kept_aside))
     if not used:
         usable = [t for t in traces if t.displacement is not None and t.drive is not None]
         slips = max((len(s.events) for s in segmentations), default=0)
@@ -143,7 +146,7 @@ def prepare(
         problem, start = begin(rig, kept, segments, runs, times)
     except InputError as error:
         raise error.at(file=campaign.path) from None
-    return Prepared(problem, start, kept, segments, times, tuple(dropped))
+    return Prepared(problem, start, kept, segments, times, tuple(dropped), tuple(kept_aside))
 
 
 def _prescribed(campaign: Campaign, given: Sequence[tuple[Trace, Segmentation]]) -> Prepared:
@@ -160,7 +163,7 @@ def _prescribed(campaign: Campaign, given: Sequence[tuple[Trace, Segmentation]])
         )
     problem, start = begin_prescribed(shared_rig(campaign, [t.name for t in traces]), runs)
     step = 1.0 / min(t.sampling_rate for t in traces)
-    return Prepared(problem, start, traces, segments, Scales(step, 0.0, step), (SAID,), True)
+    return Prepared(problem, start, traces, segments, Scales(step, 0.0, step), (SAID,), prescribed=True)
 
 
 def _why_not(trace: Trace, found: Segmentation) -> str:

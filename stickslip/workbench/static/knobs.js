@@ -96,10 +96,21 @@ export function render({ model }) {
         group = row.group
         known.set(row.name, knob(row))
       }
+      if (model.given.length) part("div", "group", root, "stated by the campaign's file")
+      for (const row of model.given) {
+        const line = part("div", "given", root)
+        line.title = row.doc
+        part("span", "label", line, row.label)
+        part("span", "value", line, row.text)
+      }
     }
     for (const row of model.rows) known.get(row.name)(row)
   }
   model.on("rows", update)
+  model.on("given", () => {
+    known = new Map()
+    update()
+  })
   model.on("closed", update)
   update()
   return root
