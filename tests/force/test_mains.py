@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import stickslip as ss
 from stickslip.blind.generator.campaigns import Run
 from stickslip.blind.generator.rigs import draw_setup
 from stickslip.blind.generator.sensor import SILENT
@@ -52,6 +53,14 @@ def test_it_is_heard_where_it_is_and_nowhere_else(cases):
     assert told.frequency == 50.0
     assert told.amplitude == pytest.approx(SIZE, rel=0.03)
     assert heard(runs_of(cases[0.0]), cases[0.0].times.slip) == Hum()
+
+
+def test_it_is_told(cases, tmp_path_factory):
+    folder = tmp_path_factory.getbasetemp() / "long0"
+    told = {size: ss.load_campaign(folder / str(size) / "campaign.toml").prepare().dropped for size in cases}
+    assert not any("hum" in text for text in told[0.0])
+    (text,) = (text for text in told[SIZE] if "hum" in text)
+    assert "50 Hz, 3 nm" in text
 
 
 @pytest.mark.parametrize("frequency", [50.0, 60.0])

@@ -14,6 +14,7 @@ from ...data.segment import Segmentation
 from ...data.trace import Trace
 from ...errors import InputError, nearest
 from ...physics.effects.base import Effect
+from ...system.units import shown
 from ..features.measurement import Measurement, doubts, measure
 from ..fit.start import FALLBACK_PERIOD, ringing, shared_rig
 from ..force.knots import Knots, knots
@@ -137,6 +138,9 @@ def prepare(
         dropped.append(UNHEARD)
     rate = min(t.sampling_rate for t in kept)
     times = scales(used, period, rate)
+    if times.hum.frequency:
+        size = shown(times.hum.amplitude, "m", 2)
+        dropped.append(f"hum of the sensor at {times.hum.frequency:g} Hz, {size}, which is taken off the displacement")
     coarse = too_coarse(times, rate)
     if coarse is not None:
         dropped.append(coarse)
