@@ -10,7 +10,7 @@ machine, cost more than they share. It also makes last digits independent of how
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import TypeVar
@@ -31,12 +31,18 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="side by side")
 
 
-def side_by_side(call: Callable[[T], Found], items: Iterable[T]) -> list[Found]:
+def side_by_side(call: Callable[[T], Found], items: Iterable[T], sizes: Sequence[int]) -> list[Found]:
     """What a function gives for each item; it must spend its time in compiled code, and not call this again.
 
-    In a process among others that share the processors (see :func:`alone`) one after the other.
+    The largest are begun first, so that no processor waits for one that was begun last. In a process among others that
+    share the processors (see :func:`alone`) one after the other.
     """
-    return list(_pool().map(call, items)) if _ALONE else [call(item) for item in items]
+    given = list(items)
+    if not _ALONE:
+        return [call(item) for item in given]
+    order = sorted(range(len(given)), key=lambda i: -sizes[i])
+    found = dict(zip(order, _pool().map(call, [given[i] for i in order]), strict=True))
+    return [found[i] for i in range(len(given))]
 
 
 _ALONE = (os.cpu_count() or 1) > 1

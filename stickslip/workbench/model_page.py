@@ -286,14 +286,12 @@ class _Heat:
             self._labels.args = {"labels": labels}
         if list(self.figure.x_range.factors) != runs or list(self.figure.y_range.factors) != phases:
             self.figure.x_range.factors, self.figure.y_range.factors = runs, phases
-        values = table.to_numpy(float)
+        values, deviations = (t.loc[phases, runs].to_numpy(float).ravel() for t in (table, spread))
         top = max(float(np.nanmax(values)), WORST)
-        cells = [(r, p, float(table.loc[p, r])) for p in phases for r in runs]
-        colours = [heat(v, top) for _, _, v in cells]
+        colours = [heat(v, top) for v in values]
         self._data.data = {
-            "run": [c[0] for c in cells], "phase": [c[1] for c in cells], "error": [c[2] for c in cells],
-            "std": [float(spread.loc[p, r]) for r, p, _ in cells],
-            "text": ["" if np.isnan(c[2]) else f"{c[2]:.2f}" for c in cells],
+            "run": runs * len(phases), "phase": [p for p in phases for _ in runs], "error": values.tolist(),
+            "std": deviations.tolist(), "text": ["" if np.isnan(v) else f"{v:.2f}" for v in values],
             "colour": colours, "ink": [ink(c) for c in colours],
         }  # fmt: skip
 

@@ -330,7 +330,7 @@ class Problem:
                 np.asarray(a) for a in program(point.z[bent], point.phases[:, r] * phase_scale, *common, *arguments)
             ]
 
-        found = side_by_side(of_run, enumerate(self.run_arguments(point)))
+        found = side_by_side(of_run, enumerate(self.run_arguments(point)), [k.t.size for k in self.runs])
         p, kept = 0, []
         for r, (run, parts) in enumerate(zip(self.runs, found, strict=True)):
             n, s = run.t.size, slice(p, p + run.at.size)

@@ -48,6 +48,9 @@ export function render({ model }) {
     said.style.display = model.said ? "flex" : "none"
     words.textContent = model.said
     said.classList.toggle("well", model.well)
+  }
+  // by itself: a colour that is set anew has the style of everything found again, which every picture waits for
+  const paint = () => {
     const style = document.documentElement.style
     for (const [name, value] of Object.entries(model.colours)) style.setProperty(`--wb-${name}`, value)
     document.body.style.background = model.colours.page || ""
@@ -69,10 +72,12 @@ export function render({ model }) {
     }
   }
   document.addEventListener("keydown", typed)
-  for (const name of ["title", "model", "errors", "busy", "share", "searching", "searched", "said", "well", "dark", "colours"]) {
+  for (const name of ["title", "model", "errors", "busy", "share", "searching", "searched", "said", "well", "dark"]) {
     model.on(name, update)
   }
+  model.on("colours", paint)
   model.on("remove", () => document.removeEventListener("keydown", typed))
   update()
+  paint()
   return root
 }

@@ -9,6 +9,11 @@ function part(kind, classes, parent, text) {
   return made
 }
 
+// A text that is set anew has the whole page laid out again, which every picture then waits for.
+function put(element, key, value) {
+  if (element[key] !== value) element[key] = value
+}
+
 export function render({ model }) {
   const root = document.createElement("div")
   root.className = "knobs"
@@ -66,22 +71,22 @@ export function render({ model }) {
     slider.addEventListener("change", release)
     tick.addEventListener("change", () => model.send_msg({ kind: "lock", name: row.name, on: tick.checked }))
     return (now) => {
-      label.textContent = now.label
-      label.title = now.doc
-      value.textContent = now.text
-      std.textContent = now.std
-      prior.textContent = now.prior
-      prior.title = now.prior
-      low.textContent = now.low
-      high.textContent = now.high
-      slider.setAttribute("aria-label", now.label)
-      slider.disabled = model.closed || now.locked
-      tick.checked = now.locked
+      put(label, "textContent", now.label)
+      put(label, "title", now.doc)
+      put(value, "textContent", now.text)
+      put(std, "textContent", now.std)
+      put(prior, "textContent", now.prior)
+      put(prior, "title", now.prior)
+      put(low, "textContent", now.low)
+      put(high, "textContent", now.high)
+      put(slider, "ariaLabel", now.label)
+      put(slider, "disabled", model.closed || now.locked)
+      put(tick, "checked", now.locked)
       box.classList.toggle("effect", now.group !== "")
-      if (held !== row.name) slider.value = now.place
-      band.style.display = now.band[1] > now.band[0] ? "" : "none"
-      band.style.left = `${50 * (now.band[0] + now.band[1])}%`
-      band.style.width = `${100 * (now.band[1] - now.band[0])}%`
+      if (held !== row.name) put(slider, "value", String(now.place))
+      put(band.style, "display", now.band[1] > now.band[0] ? "" : "none")
+      put(band.style, "left", `${50 * (now.band[0] + now.band[1])}%`)
+      put(band.style, "width", `${100 * (now.band[1] - now.band[0])}%`)
     }
   }
 
