@@ -10,6 +10,7 @@ from bokeh.models import (
     BoxZoomTool,
     ColumnDataSource,
     CrosshairTool,
+    CustomJS,
     PanTool,
     ResetTool,
     SaveTool,
@@ -145,15 +146,15 @@ def legend(made: Any, place: str = "above", **more: Any) -> None:
 
 
 def _while_drawn(item: Any) -> None:
-    """An entry is there while its curves have data: without, its sign would be missing."""
+    """An entry is there while its curves have data: without, its sign would be missing.
+
+    The browser sees to it: of changes that are sent together, a document tells its own callbacks nothing.
+    """
     sources = [each.data_source for each in item.renderers]
-
-    def update(attr: str, old: Any, new: Any) -> None:
-        item.visible = any(len(column) for s in sources for column in s.data.values())
-
+    item.visible = any(len(column) for s in sources for column in s.data.values())
+    code = "item.visible = sources.some((s) => Object.values(s.data).some((column) => column.length > 0))"
     for each in sources:
-        each.on_change("data", update)
-    update("data", None, None)
+        each.js_on_change("data", CustomJS(args={"item": item, "sources": sources}, code=code))
 
 
 def source(**columns: Any) -> ColumnDataSource:

@@ -86,6 +86,7 @@ class Signals:
                 line_color=theme.model, fill_alpha=0.0,
             )  # fmt: skip
         made.min_border_left = LEFT
+        made.y_range.range_padding = 0.25  # room for the ring around a mark at the top
         made.on_event(Tap, self._tapped)
         return made
 

@@ -116,6 +116,20 @@ def test_the_model_is_saved_listed_and_its_report_shown(browser, home):
     assert not (home.parent / "elsewhere").exists()
 
 
+def test_the_legend_names_a_curve_once_it_is_there(browser):
+    names = """
+    const own = (r) => (r.data_source || {}).name === 'simulated'
+    return Bokeh.documents.flatMap((d) => [...d._all_models.values()]).filter((m) => m.type === 'LegendItem')
+      .filter((i) => i.renderers.some(own) && i.label.value !== 'model').map((i) => [i.label.value, i.visible])
+    """
+    browser.tab("Simulate")
+    browser.idle()
+    browser.press("button", "Simulate")
+    browser.wait(lambda: browser.js("return named('simulated').data.t.length"), 120)
+    (found,) = browser.wait(lambda: browser.js(names))
+    assert found[0].startswith("model: static + inertia") and found[1]
+
+
 def test_a_campaign_that_was_chosen_is_shown(tmp_path):
     shutil.copytree(SCENARIO, tmp_path / "rig")
     served = Served(tmp_path)
