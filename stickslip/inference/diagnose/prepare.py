@@ -11,6 +11,7 @@ import numpy as np
 from ...data.campaign import Campaign
 from ...data.prescribed import prescribed, with_motion
 from ...data.segment import Segmentation
+from ...data.shorten import first_cycles, shares
 from ...data.trace import Trace
 from ...errors import InputError, nearest
 from ...physics.effects.base import Effect
@@ -27,6 +28,7 @@ from ..force.starting_values import begin
 
 BOTH = 0.1  # of the force one way, which it takes the other way at least
 FEWEST = 2  # slips of a run that takes part
+MOST_EVENTS = 200  # that a fit sees: its memory and time grow with them
 MOST_CYCLES = 40  # of a run, that are run freely
 UNHEARD = "no ringing is heard after the slips, so the contact's stiffness is known from the creep alone"
 
@@ -132,6 +134,14 @@ def prepare(
             hint="record longer, drive slower or with a softer spring; others can be inspected and fitted with "
             f"--model static. {'; '.join(dropped)}{doubts(traces)}",
         )
+    counts = [len(s.events) for _, s in used]
+    for i, ((trace, found), most) in enumerate(zip(used, shares(counts, MOST_EVENTS), strict=True)):
+        used[i] = first_cycles(trace, found, max(most, FEWEST))
+        if len(used[i][1].events) < counts[i]:
+            dropped.append(
+                f"{trace.name}: of {counts[i]} slips those after the first {len(used[i][1].events)}, for {MOST_EVENTS} "
+                "take part in all (start and stop in the campaign's file choose another part of the record)"
+            )
     kept, segments = tuple(t for t, _ in used), tuple(s for _, s in used)
     period = ringing(kept, segments)
     if period is None:
