@@ -126,8 +126,15 @@ def crosshair(*figures: Any) -> None:
         each.add_tools(CrosshairTool(overlay=line))
 
 
-def legend(made: Any, place: str = "above", **more: Any) -> None:
-    """The legend of a figure, which lies beside it, so that it hides nothing; a click on an entry hides a curve."""
+def legend(made: Any, place: str = "above", steady: bool = False, **more: Any) -> None:
+    """The legend of a figure, which lies beside it, so that it hides nothing; a click on an entry hides a curve.
+
+    Args:
+        made: the figure.
+        place: of the legend.
+        steady: whether entries stay without data: where curves come and go with a hand, the page is else laid out anew.
+        more: properties of the legend.
+    """
     theme = look()
     for item in list(made.legend):
         found: Legend = item
@@ -140,7 +147,7 @@ def legend(made: Any, place: str = "above", **more: Any) -> None:
         found.label_text_font_size = "12px"
         found.update(padding=2, margin=2, spacing=12)
         found.update(**more)
-        for each in found.items:
+        for each in () if steady else found.items:
             _while_drawn(each)
         made.add_layout(found, place)
 

@@ -35,7 +35,7 @@ class Free:
             "t", "x", source=self._model, color=theme.model, line_width=2, line_dash="dashed",
             legend_label="model, to its arrest",
         )  # fmt: skip
-        legend(self.figure)
+        legend(self.figure, steady=True)
         self.words = Words(sizing_mode="stretch_width", margin=(0, 0, 8, 70))
         watch(session, ["steps", "at", "run", "event"], self.ask)
         watch(session, ["free"], self.update)

@@ -1,0 +1,177 @@
+"""How fast the workbench follows: what docs/workbench tabulates.
+
+``python -m tests.workbench.speed`` opens the shipped campaign, and one of five runs of a million samples that it makes,
+in Chromium without a screen, and writes ``docs/results/workbench.json``. It takes some minutes of a machine that does
+nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import statistics
+import tempfile
+import time
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import stickslip as ss
+from stickslip import __version__
+from stickslip.blind.generator import Run, make_campaign
+
+from .browser import DEEP, Browser, Served
+from .conftest import SCENARIO
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results" / "workbench.json"
+SLIDERS = ("weakening.drop", "contact.strength", "weakening.slip_distance", "rig.damping")
+MOVES, APART = 10, 0.6  # of each slider, and s between two
+SAMPLES = 1_000_000
+LONG = tuple(Run(f"v{v:03d}", 1e-6 * v, n) for v, n in ((50, 50), (100, 100), (200, 200), (400, 400), (600, 600)))
+MOVE = """
+const [name, place, done] = arguments
+const slider = all(`.knob[data-name="${name}"] .slider`)[0]
+const drawing = CanvasRenderingContext2D.prototype
+if (!window.watched) {
+  window.watched = true
+  for (const k of ['stroke', 'fill', 'fillText', 'fillRect', 'clearRect', 'drawImage']) {
+    const own = drawing[k]
+    drawing[k] = function (...a) { window.drawn = performance.now(); return own.apply(this, a) }
+  }
+}
+const began = performance.now()
+let told = 0
+const errors = new MutationObserver(() => { told = performance.now() - began })
+errors.observe(seen('.errors')[0], { childList: true, characterData: true, subtree: true })
+slider.value = place
+slider.dispatchEvent(new Event('input'))
+// a model is run freely when it has stood still for a quarter of a second
+const look = () => {
+  if (!told || performance.now() - began < told + 150) return setTimeout(look, 10)
+  errors.disconnect()
+  done([window.drawn - began, told])
+}
+look()
+"""
+GLIDE = """
+const [zoom, done] = arguments
+const range = named('signal displacement').x_range
+const [a, b] = [range.start, range.end]
+const drawing = CanvasRenderingContext2D.prototype
+const [stroke, image] = [drawing.stroke, drawing.drawImage]
+let calls = 0, before = 0, redraws = 0, frame = 0
+drawing.stroke = function (...x) { calls++; return stroke.apply(this, x) }
+drawing.drawImage = function (...x) { calls++; return image.apply(this, x) }
+const began = performance.now()
+const step = () => {
+  if (calls > before) redraws++
+  before = calls
+  frame++
+  const half = zoom ? (b - a) * Math.exp(-frame / 30) / 2 : (b - a) * 0.1
+  const middle = zoom ? (a + b) / 2 : a + (b - a) * (0.1 + 0.8 * ((frame * 0.004) % 1))
+  range.setv({ start: middle - half, end: middle + half })
+  if (performance.now() - began < 4000) return requestAnimationFrame(step)
+  drawing.stroke = stroke
+  drawing.drawImage = image
+  range.setv({ start: a, end: b })
+  done(redraws / 4)
+}
+requestAnimationFrame(step)
+"""
+THERE = "const d = named('data displacement'); return d && d.data.t.length"
+
+
+def browser() -> Browser:
+    """Chromium of this machine."""
+    return Browser(str(shutil.which("chromium")), str(shutil.which("chromedriver")), 1280, 1100)
+
+
+def opened(campaign: Path) -> tuple[Served, Browser, float, float]:
+    """A campaign in the browser; seconds from the command, and from the request, to the drawn record."""
+    seen = browser()
+    served = Served(campaign)
+    asked = time.monotonic()
+    seen.driver.get(served.url)
+    seen.wait(lambda: seen.js(THERE), 200)
+    return served, seen, time.monotonic() - served.began, time.monotonic() - asked
+
+
+def hand(seen: Browser) -> tuple[list[float], list[float]]:
+    """Milliseconds from a hand's move to the last drawing command, and to the errors in the head."""
+    seen.tab("Model")
+    seen.wait(lambda: seen.js("return seen('.knob').length"))
+    seen.idle()
+    time.sleep(3.0)
+    found = []
+    for name in SLIDERS:
+        seen.redraw(name, 0.5)
+        for i in range(MOVES):
+            time.sleep(APART)
+            found.append(seen.driver.execute_async_script(DEEP + MOVE, name, 0.45 + 0.02 * i))
+    return [d for d, _ in found], [t for _, t in found]
+
+
+def long_campaign(folder: Path) -> Path:
+    """Five runs of a million samples: cycles that the challenge's generator simulated, repeated."""
+    make_campaign(folder, 11, (), runs=LONG, spring_known=True)
+    campaign = ss.load_campaign(folder / "campaign.toml")
+    for trace, found in zip(campaign.traces, campaign.events, strict=True):
+        assert trace.resolution is not None and trace.drive_velocity is not None
+        file = folder / f"{trace.name}.csv"
+        head, body = file.read_text().split("\n", 1)
+        counts = np.array(body.split(), int)
+        first, last = (round(found.events[i].t_arrest * trace.sampling_rate) for i in (2, -1))
+        way = round(trace.drive_velocity * (last - first) / trace.sampling_rate / trace.resolution)
+        times = -(-(SAMPLES - last) // (last - first))
+        whole = np.concatenate([counts[:last], *(counts[first:last] + way * (i + 1) for i in range(times))])
+        file.write_text("\n".join([head, *map(str, whole[:SAMPLES].tolist())]) + "\n")
+    return folder / "campaign.toml"
+
+
+def spread(values: list[float], unit: str) -> str:
+    """Median, and from where to where nine of ten lie."""
+    low, high = np.quantile(values, [0.05, 0.95])
+    return f"{statistics.median(values):.0f} {unit} (nine of ten from {low:.0f} to {high:.0f} {unit})"
+
+
+def main() -> None:
+    """Measure and write."""
+    rows: list[list[str]] = []
+    with tempfile.TemporaryDirectory() as name:
+        short = Path(shutil.copytree(SCENARIO, Path(name) / "short"))
+        opened_short = []
+        for _ in range(3):
+            shutil.rmtree(short / ".stickslip-workbench", ignore_errors=True)
+            served, seen, since, asked = opened(short / "campaign.toml")
+            opened_short.append((since, asked))
+            if len(opened_short) == 3:
+                drawn, told = hand(seen)
+            seen.close(), served.end()
+        since, asked = (statistics.median(v) for v in zip(*opened_short, strict=True))
+        rows += [
+            ["the shipped campaign is drawn after the command", f"{since:.1f} s"],
+            ["of which after the browser has asked for the page", f"{asked:.1f} s"],
+            ["errors after a move of a slider", spread(told, "ms")],
+            ["all curves after it, but those of the free simulation", spread(drawn, "ms")],
+        ]
+        served, seen, since, asked = opened(long_campaign(Path(name) / "long"))
+        rows += [["five runs of a million samples are drawn after the command", f"{since:.1f} s"]]
+        for zoom, words in ((False, "moved along"), (True, "zoomed into")):
+            redraws = seen.driver.execute_async_script(DEEP + GLIDE, zoom)
+            rows += [[f"redraws in a second while such a run is {words}", f"{redraws:.0f}"]]
+            time.sleep(2.0)
+        seen.close(), served.end()
+    found: dict[str, Any] = {
+        "version": __version__, "date": date.today().isoformat(), "command": "python -m tests.workbench.speed",
+        "machine": f"{os.cpu_count()} processors, Chromium without a screen and without a graphics card",
+        "columns": ["what", "measured"], "rows": rows,
+    }  # fmt: skip
+    RESULTS.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    print(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()
