@@ -10,8 +10,8 @@ import pytest
 from stickslip.errors import FitError
 from stickslip.inference.force.candidates import Start, _at, _columns, try_effect, with_start
 from stickslip.inference.force.descent import SETTLED, descend
-from stickslip.inference.force.fit import fit
-from stickslip.inference.force.linearised import Linearised
+from stickslip.inference.force.fit import fit, refit
+from stickslip.inference.force.linearised import FARTHEST, Linearised
 from stickslip.inference.force.scatter import Whitening
 from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
@@ -48,6 +48,16 @@ def test_a_model_that_makes_room_stays_near_its_optimum(base, tag, size):
 
 
 @pytest.mark.parametrize("tag", ["tilt", "inertia", "sensor-gain"])
+def test_making_room_takes_no_more_of_the_strength_than_a_step_may(base):
+    strength = base.point.weights.sum()
+    for share in (0.5, 1.0, 10.0):
+        point, _ = base.yielding(-share * base.forces.held)
+        assert np.exp(-FARTHEST) * (1.0 - 1e-9) < point.weights.sum() / strength < 1.0
+    nothing = replace(base.point, weights=0.0 * base.point.weights)
+    with pytest.raises(FitError, match="no finite force"):
+        refit(base.problem, nothing, base)
+
+
 def test_a_refit_ends_no_higher_than_the_first_look_promises(base, tag):
     cls = catalogue.get(tag)
     for found in try_effect(base, Explained(base), tag, list(catalogue.forms(cls))):

@@ -86,10 +86,13 @@ class Fit:
 
         Returns:
             The point, and the share of the forces for which it is: less than 1 where all of them would take a
-            parameter further than a step of a fit goes.
+            parameter or the strength further than a step of a fit goes.
         """
         change, events, _ = self._system.alone(forces).step(DAMPING, np.inf)
         far = float(np.abs(change[: self.point.z.size]).max(initial=0.0))
+        first, whole = self.point.z.size + self.point.phases.size, self.point.weights.sum()
+        lost = -float(change[first : first + self.point.weights.size].sum()) / whole
+        far = max(far, FARTHEST * lost / -np.expm1(-FARTHEST))  # of the strength no more than a step may take
         share = min(1.0, FARTHEST / far) if far > 0.0 else 1.0
         return moved(self.point, share * change, self.point.events + share * events), share
 
@@ -216,7 +219,7 @@ def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
         FitError: the model gives no finite force at the start.
     """
     blocks, slopes = base.blocks, problem.evaluate(point)
-    if not slopes.finite:
+    if not slopes.finite or not point.weights.sum() > 0.0:
         raise FitError("the model gives no finite force along the motion")
     point, slopes, _, count, _ = descend(problem, point, slopes, base.scatter, base.known, blocks, last)
     return _like(base, problem, point, slopes, base.scatter, count + 1)
