@@ -47,7 +47,6 @@ def test_a_model_that_makes_room_stays_near_its_optimum(base, tag, size):
     assert none - start > 10.0 * float((left**2).sum())
 
 
-@pytest.mark.parametrize("tag", ["tilt", "inertia", "sensor-gain"])
 def test_making_room_takes_no_more_of_the_strength_than_a_step_may(base):
     strength = base.point.weights.sum()
     for share in (0.5, 1.0, 10.0):
@@ -58,6 +57,7 @@ def test_making_room_takes_no_more_of_the_strength_than_a_step_may(base):
         refit(base.problem, nothing, base)
 
 
+@pytest.mark.parametrize("tag", ["tilt", "inertia", "sensor-gain"])
 def test_a_refit_ends_no_higher_than_the_first_look_promises(base, tag):
     cls = catalogue.get(tag)
     for found in try_effect(base, Explained(base), tag, list(catalogue.forms(cls))):
