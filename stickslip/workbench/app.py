@@ -18,6 +18,7 @@ from .controls import BUTTON, Frame, Message, Words
 from .figures import dark, look
 from .selection import follow
 from .session import Note, Session, watch
+from .shipped import copied
 from .watching import Place, placed
 
 PAGES = ("data_page", "model_page", "missing_page", "simulate_page", "keep_page")
@@ -92,7 +93,8 @@ def offers(session: Session) -> Any:
             "<code>stickslip open campaign.toml</code>"
         ))  # fmt: skip
     for i, path in enumerate(session.offers):
-        button = pn.widgets.Button(name=f"Open {path}", width=560, sizing_mode="fixed", stylesheets=[BUTTON])
+        words = "the shipped example, in a copy below this folder" if copied(path, session.home) else str(path)
+        button = pn.widgets.Button(name=f"Open {words}", width=560, sizing_mode="fixed", stylesheets=[BUTTON])
         button.on_click(partial(_opened, session, i))
         made.append(button)
     if session.home is not None:

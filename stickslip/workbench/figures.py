@@ -155,10 +155,16 @@ def legend(made: Any, place: str = "above", steady: bool = False, **more: Any) -
 def _while_drawn(item: Any) -> None:
     """An entry is there while its curves have data: without, its sign would be missing.
 
-    The browser sees to it: of changes that are sent together, a document tells its own callbacks nothing.
+    In a window the browser sees to it: of changes that are sent together, a document tells its own callbacks nothing.
     """
     sources = [each.data_source for each in item.renderers]
-    item.visible = any(len(column) for s in sources for column in s.data.values())
+
+    def update(attr: str, old: Any, new: Any) -> None:
+        item.visible = any(len(column) for s in sources for column in s.data.values())
+
+    for each in sources:  # until the window has the page
+        each.on_change("data", update)
+    update("data", None, None)
     code = "item.visible = sources.some((s) => Object.values(s.data).some((column) => column.length > 0))"
     for each in sources:
         each.js_on_change("data", CustomJS(args={"item": item, "sources": sources}, code=code))

@@ -95,10 +95,17 @@ def _lines(session: Session) -> list[Any]:
     return [head("The same in Python, in the campaign's folder"), python, head("and as commands"), shell]
 
 
+CLOSED = (
+    '<meta http-equiv="Content-Security-Policy" '
+    "content=\"default-src 'none'; img-src data:; font-src data:; style-src 'unsafe-inline'\">"
+)
+
+
 def framed(content: str) -> str:
     """A report within a page: nothing in it is run, and it reaches nothing."""
+    closed = content.replace("<head>", f"<head>{CLOSED}", 1) if "<head>" in content else CLOSED + content
     return (
-        f'<iframe sandbox srcdoc="{escape(content, quote=True)}" title="report" '
+        f'<iframe sandbox srcdoc="{escape(closed, quote=True)}" title="report" '
         'style="width:100%;height:900px;border:1px solid var(--wb-line);background:white"></iframe>'
     )
 

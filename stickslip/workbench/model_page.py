@@ -174,7 +174,7 @@ class _Cycle:
 
     def _chosen(self, event: Any) -> None:
         if event.new and event.new != selected(self._session)[0]:
-            choose(self._session, event.new, self._session.event)
+            choose(self._session, event.new, selected(self._session)[1])
 
     def _go(self, step: int) -> None:
         name, event = selected(self._session)

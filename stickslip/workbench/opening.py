@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +12,12 @@ from ..objects import Diagnosis, load_campaign
 from ..objects.fitted_run import load_run
 from ..system.runstore import RESULT, read_result
 from .session import Session
+from .shipped import example
 
 CAMPAIGN = "campaign.toml"
 TRACES = "[[trace]]"
 MOST = 40  # campaigns that are offered
 LARGEST = 1 << 20  # bytes of a campaign file
-EXAMPLE = Path("hidden-effect") / CAMPAIGN
 
 
 def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
@@ -78,15 +76,3 @@ def offered(folder: Path) -> list[Path]:
     if shipped is None or any(path.resolve() == shipped.resolve() for path in found):
         return found
     return [*found, shipped]
-
-
-def example() -> Path | None:
-    """The campaign that is shipped: of a clone, or of the installed distribution; None where it was left out."""
-    of_clone = Path(__file__).parents[2] / "scenarios" / EXAMPLE
-    if of_clone.is_file():
-        return of_clone
-    with suppress(PackageNotFoundError):
-        for file in files("stickslip") or ():
-            if file.match(f"stickslip/{EXAMPLE.as_posix()}"):
-                return Path(str(file.locate())).resolve()
-    return None

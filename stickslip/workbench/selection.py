@@ -7,22 +7,23 @@ from typing import Any
 import numpy as np
 
 from ..objects import Fit
+from .picked import chosen, select
 from .session import Session
 
 
 def follow(session: Session, key: str) -> None:
     """The keyboard: left and right go through the cycles of a run, up and down through the runs."""
-    fit = session.fit
-    if fit is None:
+    if session.campaign is None:
         return
-    counts = cycles(session)
-    names = list(counts)
-    run = session.run if session.run in counts else names[0]
+    fitted = cycles(session)
+    modelled = bool(fitted) and (session.run in fitted or not session.run)
+    (run, event), choice = (selected(session), choose) if modelled else (chosen(session), select)
+    names = list(fitted) if modelled else list(session.campaign.names)
     if key in ("ArrowUp", "ArrowDown"):
         at = (names.index(run) + (1 if key == "ArrowDown" else -1)) % len(names)
-        choose(session, names[at], session.event)
+        choice(session, names[at], event)
     elif key in ("ArrowLeft", "ArrowRight"):
-        choose(session, run, session.event + (1 if key == "ArrowRight" else -1))
+        choice(session, run, event + (1 if key == "ArrowRight" else -1))
 
 
 def cycles(session: Session) -> dict[str, int]:

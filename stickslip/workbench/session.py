@@ -26,6 +26,7 @@ from ..system.progress import Cancelled
 from ..system.runstore import alone
 from . import searches
 from .journal import Journal
+from .shipped import to_work_in
 from .watching import watch
 from .work import Search, Worker, at_once, end_all
 
@@ -144,7 +145,11 @@ class Session(param.Parameterized):
 
         def job() -> None:
             with self._long(f"reading {self.offers[number]}"):
-                self.show_first(load_campaign(self.offers[number], self.effects))
+                try:
+                    path = to_work_in(self.offers[number], self.home)
+                except OSError as error:
+                    raise RunFolderError(f"the example cannot be copied here ({error.strerror or error})") from None
+                self.show_first(load_campaign(path, self.effects))
 
         if self.campaign is None and 0 <= number < len(self.offers):
             self.worker("", job)

@@ -253,11 +253,15 @@ def event_rows(
     return [*columns, "what happens"], [["measured", *_cells(measured), ""], [*model, verdict]]
 
 
+SAME = 1e-6  # share of a mean below which a deviation is rounding
+
+
 def _cells(values: dict[str, tuple[float, float, int]]) -> list[str]:
     out = []
     for key, unit in MEASURES.items():
         mean, std, count = values.get(key, (np.nan, np.nan, 0))
-        out.append("-" if not count else f"{shown(mean, unit, 4)} ± {shown(std, unit, 2)}")
+        scatter = f"± {shown(std, unit, 2)}" if std > SAME * abs(mean) else "all alike"
+        out.append("-" if not count else f"{shown(mean, unit, 4)} {scatter}")
     return out
 
 

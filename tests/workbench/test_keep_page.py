@@ -85,6 +85,8 @@ def test_a_folder_that_is_damaged_or_leads_elsewhere_is_left_out(tmp_path, saved
 def test_a_report_is_shown_in_a_frame_that_runs_nothing(tmp_path):
     shown = keep_page.framed(f'"><h1>{SCRIPT}</h1>')
     assert shown.startswith("<iframe sandbox srcdoc=") and SCRIPT not in shown and '"><h1>' not in shown
+    page = keep_page.framed("<html><head><title>t</title></head><body><img src='http://a/b.png'></body></html>")
+    assert page.index("Content-Security-Policy") < page.index("title&gt;")  # so that nothing is asked of the network
 
 
 def test_the_page_saves_lists_and_shows(session, folder):

@@ -152,6 +152,16 @@ def test_what_the_file_states_of_the_rig_is_shown(base):
     assert not set(knobs(base)) & {"rig.mass", "rig.spring_stiffness"}
 
 
+def test_legends_name_what_is_drawn_from_the_first_look_on(session):
+    cycle, ladder = model_page._Cycle(session), missing_page._Ladder(session)
+    for figure in (cycle.force, cycle.residual, cycle.creep, ladder.figure):
+        (legend,) = figure.legend
+        assert [item.visible for item in legend.items] == [True] * len(legend.items), figure.title.text
+    residual = missing_page._Residual(session)
+    hidden = [item.label.value for item in residual.figure.legend[0].items if not item.visible]
+    assert hidden == ["what the chosen effect takes off"]  # for none is chosen
+
+
 def test_an_error_of_five_floors_is_seen_beside_one_of_sixty():
     blue = [int(model_page.heat(value, 60.0)[5:], 16) for value in (1.0, 5.0, 60.0)]
     assert blue[0] - blue[1] > 0.3 * (blue[0] - blue[2]) > 0

@@ -17,11 +17,12 @@ from stickslip.cli import run
 from stickslip.errors import InputError
 from stickslip.inference.fit.serialised import KEY, record
 from stickslip.system.runstore import json_text
-from stickslip.workbench import opening, own
+from stickslip.workbench import own, shipped
 from stickslip.workbench.journal import FOLDER
 from stickslip.workbench.opening import campaign_of, offered, opened
 from stickslip.workbench.serve import _free
 from stickslip.workbench.session import Note, Session
+from stickslip.workbench.shipped import copied, example, to_work_in
 
 from .browser import Served
 
@@ -212,6 +213,23 @@ def test_what_lies_in_a_folder_is_offered(folder, tmp_path):
     assert folder / "campaign.toml" in found
 
 
+def test_the_shipped_example_is_worked_on_in_a_copy(tmp_path, monkeypatch, base):
+    from stickslip.objects import Campaign
+
+    of_package = example()
+    before = sorted(p.name for p in of_package.parent.iterdir())
+    assert (
+        copied(of_package, tmp_path) and not copied(of_package, of_package.parents[1]) and not copied(of_package, None)
+    )
+    monkeypatch.setattr(Campaign, "fit", lambda self: base)
+    with closing(Session(offers=(of_package,), home=tmp_path)) as session:
+        session.open(0)
+        assert session.campaign.description.path == tmp_path / "hidden-effect" / "campaign.toml"
+    assert sorted(p.name for p in of_package.parent.iterdir()) == before
+    again = to_work_in(of_package, tmp_path)  # which is not written over
+    assert again == tmp_path / "hidden-effect" / "campaign.toml"
+
+
 def test_one_of_what_is_offered_is_opened_and_nothing_else(folder, monkeypatch, base):
     from stickslip.objects import Campaign
 
@@ -269,9 +287,9 @@ def test_the_example_is_offered_without_a_clone(tmp_path, monkeypatch):
             return site / self
 
     listed = [Installed("stickslip/__init__.py"), Installed("../../share/stickslip/hidden-effect/campaign.toml")]
-    monkeypatch.setattr(opening, "__file__", str(site / "stickslip" / "workbench" / "opening.py"))
-    monkeypatch.setattr(opening, "files", lambda name: listed if name == "stickslip" else None)
+    monkeypatch.setattr(shipped, "__file__", str(site / "stickslip" / "workbench" / "shipped.py"))
+    monkeypatch.setattr(shipped, "files", lambda name: listed if name == "stickslip" else None)
     (tmp_path / "empty").mkdir()
     assert offered(tmp_path / "empty") == [campaign]
-    monkeypatch.setattr(opening, "files", lambda name: None)  # an editable install without its sources
+    monkeypatch.setattr(shipped, "files", lambda name: None)  # an editable install without its sources
     assert offered(tmp_path / "empty") == []

@@ -59,6 +59,20 @@ def test_a_step_says_how_it_is_done_in_python(session, base):
     ]
 
 
+def test_the_keyboard_goes_on_from_the_cycle_that_is_shown(session, campaign):
+    name, event = selected(session)
+    assert event > 0 and session.event == 0
+    follow(session, "ArrowRight")
+    assert selected(session) == (name, event + 1)
+    follow(session, "ArrowDown")
+    assert selected(session) == ("v100", event + 1)
+    bare = Session(campaign=campaign)  # before there is a model the data are gone through
+    follow(bare, "ArrowUp")
+    assert bare.run == campaign.names[-1]
+    follow(bare, "ArrowLeft")
+    assert bare.event == len(campaign.events[0].events) // 2 - 1
+
+
 @pytest.mark.parametrize("value", [5.0, "3 apples", float("nan")])
 def test_a_wrong_value_is_told_and_changes_nothing(session, base, value):
     session.by_hand({DROP: value})
