@@ -72,8 +72,8 @@ class _Asked:
         text: Any = partial(pn.widgets.TextInput, width=150, margin=(0, 10, 0, 0), **FIXED)
         self.run: Any = pn.widgets.Select(name="beside the run", options=[], width=170, margin=(0, 10, 0, 0), **FIXED)
         self.velocity = text(name="velocity of the drive")
-        self.hold = text(name="a hold of", placeholder="none, such as 10 s")
-        self.step = text(name="a step to the velocity", placeholder="none, such as 1 mm/s")
+        self.hold = text(name="a hold of", placeholder="such as 10 s")
+        self.step = text(name="a step to the velocity", placeholder="such as 1 mm/s")
         self.spring, self.mass = text(name="spring"), text(name="mass")
         self.events = pn.widgets.IntInput(
             name="number of slips",
