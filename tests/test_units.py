@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.system.units import _simple, shown, to_si, unit_registry
+from stickslip.system.units import _simple, shown, shown_with, to_si, unit_registry
 
 UNITS = ("m", "s", "kg", "N", "Pa", "Hz", "m/s", "N/m", "N s/m", "m/Hz**0.5", "m/s**0.5", "1/m", "m**2", "kg/s", "K")
 PREFIXES = ("", "p", "n", "u", "m", "k", "M", "G", "d", "c", "µ", "T")
@@ -103,3 +103,21 @@ def test_a_decimal_comma_is_never_taken_for_something_else(text):
 )
 def test_quantities_are_shown_with_the_prefix_that_suits(value, unit, text):
     assert shown(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "unit", "text"),
+    [
+        (1.72e-3, 9.6e-5, "1", "0.001720 ± 0.000096"),
+        (0.26624, 5.3e-5, "N", "266.240 ± 0.053 mN"),
+        (-0.7, 0.16, "1/m", "-0.70 ± 0.16 1/m"),
+        (0.0894, 1e-4, "kg", "89.40 ± 0.10 g"),
+        (1e-9, 5e-6, "m", "0.0 ± 5.0 µm"),
+        (0.99, 0.0996, "1", "0.99 ± 0.10"),
+        (1.2e-9, 5e-11, "1", "(1.2e-09 ± 5e-11)"),
+        (3.0, 0.0, "m", "3 m"),
+        (3.0, float("nan"), "m", "3 m"),
+    ],
+)
+def test_a_value_and_its_deviation_have_one_unit_and_end_at_one_place(value, std, unit, text):
+    assert shown_with(value, std, unit) == text

@@ -111,6 +111,24 @@ def shown(value: float, unit: str, digits: int = 4) -> str:
     return f"{_digits(value / 10.0**power, digits)} {PREFIXES[power]}{unit}"
 
 
+def shown_with(value: float, std: float, unit: str) -> str:
+    """A quantity with its standard deviation, in one unit and to the same place: ``1.72 ± 0.10 µm``."""
+    if not (math.isfinite(value) and math.isfinite(std) and std > 0.0):
+        return shown(value, unit, 3)
+    power = 0
+    if unit == "kg":
+        value, std, unit = 1e3 * value, 1e3 * std, "g"
+    largest = max(abs(value), std)
+    if takes_prefix(unit):
+        power = power_for(largest, 3)
+    value, std = value / 10.0**power, std / 10.0**power
+    places = 1 - math.floor(math.log10(float(f"{std:.1e}")))  # two digits of the deviation
+    if places > 6 or places < -3:
+        return f"({_digits(value, 3)} ± {_digits(std, 2)}) {PREFIXES[power]}{unit if unit != '1' else ''}".strip()
+    numbers = (f"{round(number, places):.{max(places, 0)}f}" for number in (value, std))
+    return f"{' ± '.join(numbers)} {PREFIXES[power]}{unit if unit != '1' else ''}".strip()
+
+
 def _digits(value: float, digits: int) -> str:
     """So many significant digits, without a power of ten for numbers below a hundred thousand."""
     text = f"{value:.{digits}g}"

@@ -13,7 +13,7 @@ from ..objects import Diagnosis, Fit
 from ..objects.picture import AGAINST
 from ..physics.effects import catalogue
 from ..physics.params import specs
-from ..system.units import shown
+from ..system.units import shown_with
 
 BINS = 12  # of a signature, each with as many points
 LEAST = 1.0  # fall of the cost that is shown at all
@@ -102,7 +102,7 @@ def _row(
     size = ""
     if np.isfinite(found.std) and found.fall > LEAST:
         name = catalogue.get(found.tag).amplitude.replace("_", " ")
-        size = f"{name} {shown(found.amplitude, found.unit, 3)} ± {shown(found.std, found.unit, 2)}"
+        size = f"{name} {shown_with(found.amplitude, found.std, found.unit)}"
     made = {
         **_empty(found.tag, chosen),
         "form": name_of(found),
@@ -130,8 +130,7 @@ def _in_model(fit: Fit, tag: str, parts: Sequence[np.ndarray], chosen: str) -> d
     size, picture = "", []
     if name in free:
         std = fit.std.get(name, 0.0)
-        size = shown(fit.values[name], free[name].unit, 3)
-        size += f" ± {shown(std, free[name].unit, 2)}" if std > 0.0 else ""
+        size = shown_with(fit.values[name], std, free[name].unit)
         bare = _without(fit, name, specs(cls)[cls.amplitude].null or 0.0)
         picture = signature(bare, law(fit, (), tag), parts)
     gain = fit.climbed.gains.get(tag)
@@ -153,7 +152,7 @@ def _gains(known: dict[str, Any]) -> dict[str, Any]:
     size = ""
     if np.isfinite(known.get("amplitude", np.nan)):
         unit = known.get("unit") or "1"
-        size = f"{shown(known['amplitude'], unit, 3)} ± {shown(known['std'], unit, 2)}"
+        size = shown_with(known["amplitude"], known["std"], unit)
     return {
         "gain": f"gains {known['gain']:.0f} when fitted",
         "unseen": f"on unseen runs {unseen:.0f} ± {known.get('+-', np.nan):.0f}" if np.isfinite(unseen) else "",

@@ -13,7 +13,7 @@ from scipy.interpolate import make_smoothing_spline
 
 from ..errors import InputError
 from ..objects.picture import AGAINST, PARTS, WIDEST
-from ..system.units import shown, to_si
+from ..system.units import shown_with, to_si
 from .controls import BUTTON, Catalogue, Message, Words
 from .evidence import bins, law, rows
 from .figures import figure, label, legend, look, source, unit_of
@@ -416,7 +416,7 @@ class _Backbone:
         a = line.attrs
         self.words.text = (
             f"{self._told}; nearest rough lines: H = {a['H']:.2f} ± {a['H_std']:.2f}, h_rms = "
-            f"{shown(a['h_rms'], 'm', 2)} ± {shown(a['h_rms_std'], 'm', 2)} (dotted: how such contacts differ)"
+            f"{shown_with(a['h_rms'], a['h_rms_std'], 'm')} (dotted: how such contacts differ)"
         )
 
 
