@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -87,6 +88,14 @@ def test_parameters_beyond_their_usual_range_have_a_price(amplitude, quarters):
     dear = judged("velocity-weakening", 300.0, 8.5, far=found)
     assert dear.price == pytest.approx(DISPERSION * quarters**2)
     assert dear.better == pytest.approx(float(dear.unseen.sum()) - dear.price)
+
+
+@pytest.mark.parametrize("amplitude, seen", [(-0.0185, True), (-0.0195, False), (-0.02, False), (0.0995, False)])
+def test_an_amplitude_at_its_bound_is_not_seen(amplitude, seen):
+    """Rate-and-state goes from -0.02 to 0.1."""
+    found = replace(judged("rate-and-state", 300.0, 4.0), amplitude=amplitude, std=0.001)
+    assert found.seen == seen
+    assert not replace(found, std=0.0).seen  # what the fit holds at a bound has no deviation
 
 
 def test_a_few_events_that_say_all_are_enough():

@@ -166,6 +166,19 @@ def test_sizes_are_found_in_what_was_drawn_from_them():
     assert spread[free].min() > 0.5 and spread.max() < 1.7, dict(zip(NAMES, spread, strict=True))
 
 
+def test_events_differ_no_more_than_they_may():
+    known = events(short=True)
+    residual, own = drawn(true(), known, 21), len(EVENTS_OWN)
+    least = Scatter(true() - 0.5)
+    free = estimate(Scatter(true()), residual, known, steps=200)
+    bound = estimate(Scatter(true()).within(least), residual, known, steps=200)
+    assert (free.sizes[:own] > least.sizes[:own]).all()
+    np.testing.assert_allclose(bound.sizes[:own], least.sizes[:own], rtol=1e-9)
+    assert _misfit(bound.sizes, residual, known)[0] > _misfit(free.sizes, residual, known)[0]
+    again = estimate(bound, residual, known, steps=200)  # the bound goes on with the sizes
+    assert (again.sizes[:own] <= least.sizes[:own] + 1e-9).all()
+
+
 def test_slopes_are_those_of_the_cost():
     known = events(short=True)
     residual = np.random.default_rng(3).standard_normal((EVENTS, POINTS)) * 1e-3 * STRENGTH * known.there

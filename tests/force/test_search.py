@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import FitError
-from stickslip.inference.force.candidates import Start, _at, _columns, try_effect, with_start
+from stickslip.inference.force.candidates import Candidate, Start, _at, _columns, from_end, try_effect, with_start
 from stickslip.inference.force.descent import SETTLED, descend
 from stickslip.inference.force.fit import fit, refit
 from stickslip.inference.force.linearised import FARTHEST, Linearised
@@ -58,6 +58,20 @@ def test_making_room_takes_no_more_of_the_strength_than_a_step_may(small):
     nothing = replace(found.point, weights=0.0 * found.point.weights)
     with pytest.raises(FitError, match="no finite force"):
         refit(found.problem, nothing, found)
+
+
+def test_an_effect_is_begun_where_it_stood(base):
+    """In a model with another effect more, whose parameters go between; also where it could not be fitted by itself."""
+    names, stood = ("tilt", "viscous-drag"), base
+    first = {tag: next(iter(catalogue.forms(catalogue.get(tag)))) for tag in names}
+    for tag in names:
+        (found,) = try_effect(stood, Explained(stood), tag, [first[tag]])
+        stood = found.fit
+    (drag,) = try_effect(base, Explained(base), "viscous-drag", [first["viscous-drag"]])
+    again = from_end(drag.fit, Candidate("tilt", first["tilt"], 0.0, None), stood)
+    assert {e.tag for e in again.fit.problem.composition.effects} == set(names)
+    assert again.fit.cost < stood.cost + 3.0
+    assert from_end(drag.fit, again, stood).fit.cost <= again.fit.cost
 
 
 @pytest.mark.parametrize("tag", ["tilt", "inertia", "sensor-gain"])

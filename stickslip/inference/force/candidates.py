@@ -146,7 +146,7 @@ def _better(one: Candidate, other: Candidate) -> Candidate:
 def from_end(base: Fit, c: Candidate, other: Fit) -> Candidate:
     """The candidate, or what is better than it: begun where another model with its effect ended."""
     effect, values = catalogue.get(c.tag)(**c.form), other.values
-    start = {name: values.get(f"{c.tag}.{name}", value) for name, value in c.start.items()}
+    start = {**c.start, **{n.partition(".")[2]: v for n, v in values.items() if n.startswith(f"{c.tag}.")}}
     z = np.array([f.inward(values[f.name]) for f in base.free])
     turns = {f.name: own * float(f.scale) for f, own in zip(_turned(other), other.point.phases, strict=True)}
     phases = np.array([turns[f.name] / float(f.scale) for f in _turned(base)]).reshape(-1, len(base.problem.runs))
