@@ -38,12 +38,14 @@ def stage(cycles: int) -> tuple[np.ndarray, np.ndarray]:
     return t, np.interp(t, knots, ends)
 
 
-def jenkins(x: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
+def jenkins(
+    x: np.ndarray, load: np.ndarray | None = None, caps: np.ndarray = CAPS, yields: np.ndarray = YIELDS
+) -> np.ndarray:
     """Force of a bank of Coulomb elements along a way, sample by sample; caps in proportion to a load about 1."""
     load = np.ones(x.size) if load is None else load
-    force, out = np.zeros(CAPS.size), np.zeros(x.size)
+    force, out = np.zeros(caps.size), np.zeros(x.size)
     for i, step in enumerate(np.diff(x), start=1):
-        force = np.clip(force + CAPS / YIELDS * step, -CAPS * load[i], CAPS * load[i])
+        force = np.clip(force + caps / yields * step, -caps * load[i], caps * load[i])
         out[i] = force.sum()
     return out
 
@@ -90,6 +92,25 @@ def test_the_backbone_of_the_bank_is_measured(plain):
 
 def test_what_the_bank_leaves_is_small(plain):
     assert np.sqrt(np.mean(plain.marginal**2)) < 2e-3 * CAPS.sum()
+
+
+def test_a_count_that_is_wider_than_the_stiffest_elements_yield_does_not_make_the_contact_weaker():
+    """After every turn the reading stands still while the force falls by a half."""
+    count, runs = 1e-5, []
+    caps, yields = np.append(CAPS, 0.5 * CAPS.sum()), np.append(YIELDS, 1e-6)
+    for seed in (1, 2, 3):
+        t = np.arange(0.0, 12.0, 1.0 / RATE)
+        x = 0.5 * STROKE * (1.0 - np.cos(np.pi * t)) + 1e-6 * seed
+        force = jenkins(x, caps=caps, yields=yields) + np.random.default_rng(seed).normal(0.0, NOISE, t.size)
+        read = count * np.round(x / count)
+        trace = Trace.from_arrays(f"{seed}", time=t, drive_position=read, spring_force=force, noise=NOISE)
+        runs.append(thinned(with_motion(trace)))
+    found = fit(*begin(Rig(), runs))
+    assert found.strength == pytest.approx(caps.sum(), rel=0.05)
+    curve = backbone(found)
+    true = np.array([np.minimum(caps, caps / yields * u).sum() for u in curve.displacement])
+    far = (curve.displacement > 2.0 * count) & (curve.displacement < YIELDS[-1])
+    np.testing.assert_allclose(curve.force[far], true[far], atol=0.05 * caps.sum())
 
 
 def test_an_uneven_fixture_is_found_with_its_size():

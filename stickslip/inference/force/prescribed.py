@@ -109,7 +109,8 @@ def thinned(trace: Trace) -> Knots:
     begins = _begins(parts, t, x)
     event = np.searchsorted(begins[1:], at, side="right")
     rate, bend = _rates(at, knots_x, piece)
-    stiffness = SOFT * steepest(knots_x, knots_force, piece)
+    unread = max(noise, count or 0.0)
+    stiffest = steepest(knots_x, knots_force, piece, unread)
     compared = np.arange(1, at.size)
     compared = compared[(event[compared] > 0) | trace.virgin]
     if not trace.virgin:
@@ -118,15 +119,19 @@ def thinned(trace: Trace) -> Knots:
     of = event[compared]
     empty = csr_array((compared.size, at.size))
     unmoved = csr_array((compared.size, t.size))
-    since = at[compared] - t[[s.first for s in parts]][piece[compared]]
+    firsts = np.array([s.first for s in parts])[piece[compared]]
+    since = at[compared] - t[firsts]
+    # a reading that stands still after a turn does not say how far the stiffest of the contact has been unloaded
+    turned = np.abs(knots_x[compared] - x[firsts]) < unread
+    force_noise = forced**2 / sizes[compared] + turned * (unread * stiffest) ** 2 / 12.0
     least = np.median(np.diff(t))
     return Knots(
         trace.name, at, knots_x, rate, knots_x, event, np.full(at.size, -1),
         csr_array((eye + bowed)[compared]), (empty, empty), at[compared], np.full(compared.size, CREEP), of,
         rate[compared], bend[compared], x, csr_array(made_of @ means), (unmoved, unmoved),
         np.log1p(since / least) / np.log(4.0) + PLACED_APART * piece[compared], at[compared] - begins[of],
-        np.diff(np.append(begins, t[-1])), noise, stiffness, trace.virgin, knots_force,
-        load_at(trace, at) if trace.normal_load is None else means @ trace.normal_load, forced**2 / sizes[compared],
+        np.diff(np.append(begins, t[-1])), noise, SOFT * stiffest, trace.virgin, knots_force,
+        load_at(trace, at) if trace.normal_load is None else means @ trace.normal_load, force_noise,
         np.zeros((x.size, 2)),
     )  # fmt: skip
 
@@ -161,9 +166,9 @@ def _rates(t: Array, x: Array, piece: Index) -> tuple[Array, Array]:
     return rate, bend
 
 
-def steepest(x: Array, force: Array, piece: Index) -> float:
+def steepest(x: Array, force: Array, piece: Index, noise: float) -> float:
     """Largest slope of force over displacement from the start of a stretch (N/m), beyond what is too near to tell."""
-    near = 1e-3 * float(np.ptp(x))
+    near = max(1e-3 * float(np.ptp(x)), 2.0 * noise)
     slopes = [0.0]
     for own in np.split(np.arange(x.size), np.flatnonzero(np.diff(piece)) + 1):
         way = np.abs(x[own] - x[own[0]])
