@@ -81,6 +81,7 @@ virgin = true
 PRESCRIBED = {
     "reciprocating-loops": "reciprocating-loops-200Hz",
     "drill-string": "torsional-rig-drillstring",
+    "robot-joint": "robot-breakaway-creep/test1",
     "robot-loops": "robot-breakaway-creep/test3",
     "friction-damper": "friction-damper-brfd",
     "rock-basalt": "rock-velocity-steps",
@@ -287,7 +288,7 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     try:
         made = campaign.diagnose()
     except InputError as error:
-        return {"title": campaign.title, "declined": error.what}
+        return {"title": campaign.title, "declined": error.what, "fitted": fitted(campaign)}
     made.save(DOCS.parent / "out" / "real-data" / name, force=True)
     assert made.found is not None
     rungs = [rung for rung in made.found.ladder if rung.fit is not None]
@@ -308,6 +309,16 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
             }
             for last, rung, told in zip([rungs[0], *rungs], rungs, made.result["ladder"][1:], strict=False)
         ],
+    }  # fmt: skip
+
+
+def fitted(campaign: ss.Campaign) -> dict[str, Any]:
+    """What a record too short for a diagnosis says of the law that such records are made for."""
+    fit = campaign.fit(["rate-and-state"])
+    own = fit.parameters.loc[[i for i in fit.parameters.index if i.startswith("rate-and-state.")]]
+    return {
+        "gain": float(fit.ladder["gain"].iloc[-1]), "error": fit.ladder["error"].tolist()[-2:],
+        "law": {name: [float(row["value"]), float(row["std"]), str(row["unit"])] for name, row in own.iterrows()},
     }  # fmt: skip
 
 

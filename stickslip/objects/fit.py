@@ -574,7 +574,7 @@ class Fit(Shown):
             "campaign": self.campaign.title,
             "model": " + ".join(self.parts),
             "error": f"{self.error:.3g} floors",
-            "on unseen runs": f"{self.unseen_error:.3g}",
+            "on unseen runs": f"{self.unseen_error:.3g}" if np.isfinite(self.unseen_error) else "one event holds none",
             "parameters": "set by hand" if self.by_hand else None,
         }
         return [facts(what), self.parameters[["value", "std", "unit"]], self.errors]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import stickslip as ss
 from stickslip.data.campaign import Rig
 from stickslip.data.prescribed import prescribed, with_motion
 from stickslip.data.segment import segment
 from stickslip.data.trace import Trace
+from stickslip.errors import InputError
 from stickslip.inference.diagnose.engine import Round, _end
 from stickslip.inference.diagnose.prepare import Prepared
 from stickslip.inference.force.backbone import backbone
@@ -173,6 +175,25 @@ def test_an_effect_is_tried_where_the_record_shows_what_it_needs(plain):
     one_way = Prepared(*begin(Rig(), runs), (), (), Scales(1.0, 0.0, 1.0), (), True)
     assert not one_way.shows(uneven)
     assert one_way.shows(loaded)
+
+
+def test_one_step_of_the_velocity_is_fitted_but_not_diagnosed():
+    t = np.arange(0.0, 4.0, 1.0 / RATE)
+    x = SPEED * (t + 4.0 * np.maximum(t - 2.0, 0.0))
+    step = 1.0 + 0.02 * (t > 2.0)
+    force = step * jenkins(x) + np.random.default_rng(1).normal(0.0, NOISE, t.size)
+    campaign = ss.Campaign.from_traces(
+        [Trace.from_arrays("step", time=t, drive_position=x, spring_force=force, noise=NOISE)]
+    )
+    found = campaign.fit()
+    assert found.error < 2.0
+    assert np.isnan(found.unseen_error)  # nothing can be held out
+    assert "one event holds none" in repr(found)
+    with pytest.raises(InputError, match="checked on what a fit has not seen"):
+        campaign.diagnose()
+    still = Trace.from_arrays("steady", time=t, drive_position=SPEED * t, spring_force=jenkins(SPEED * t), noise=NOISE)
+    with pytest.raises(InputError, match="never turns, stops or changes its speed"):
+        ss.Campaign.from_traces([still]).fit()
 
 
 def test_a_spring_that_was_stretched_when_the_record_began_pulls_one_way(tmp_path):

@@ -14,6 +14,7 @@ from ...data.campaign import Campaign
 from ...data.checks import Finding
 from ...data.segment import Segmentation, segment
 from ...data.trace import Trace
+from ...errors import InputError
 from ...physics.effects import catalogue
 from ..force.candidates import Candidate, every_form, from_end
 from ..force.fit import Fit, deviations, fit
@@ -29,7 +30,7 @@ from ..force.valleys import LEVEL, widened
 from .checkpoints import Store, kept, name_of
 from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named
-from .prepare import Prepared, prepare
+from .prepare import FEWEST, Prepared, prepare
 from .shape import Shape, shape_of, unshaped
 from .trials import Tell, trials
 
@@ -187,6 +188,14 @@ def diagnose(
     segmentations = [segment(t) for t in traces] if segmentations is None else segmentations
     tell("the measured force", 0.0)
     prepared = prepare(campaign, traces, segmentations, holdout)
+    if prepared.problem.events < FEWEST:
+        raise InputError(
+            "the motion turns, stops or changes its speed less than twice, so no effect could be checked on what a fit "
+            "has not seen",
+            file=campaign.path,
+            key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in prepared.traces[:4]),
+            hint="record it again: two loops, or a step up and down; stickslip fit takes it as it is",
+        )
     dropped = list(prepared.dropped)
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]
     if candidates is not None:

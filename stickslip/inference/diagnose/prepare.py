@@ -167,13 +167,12 @@ def _prescribed(campaign: Campaign, given: Sequence[tuple[Trace, Segmentation]])
     """Runs without a driving spring."""
     traces, segments = tuple(with_motion(t) for t, _ in given), tuple(s for _, s in given)
     runs = [thinned(t) for t in traces]
-    if sum(k.events for k in runs) < FEWEST:
+    if not any(k.events for k in runs):
         raise InputError(
-            "the motion turns, stops or changes its speed less than twice, so no effect could be checked on what a fit "
-            "has not seen",
+            "the motion never turns, stops or changes its speed, and where it begins the contact is not told to be virgin",
             file=campaign.path,
             key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in traces[:4]),
-            hint="record it again: two loops, or a step up and down",
+            hint="record a turn or a step of the velocity",
         )
     problem, start = begin_prescribed(shared_rig(campaign, [t.name for t in traces]), runs)
     step = 1.0 / min(t.sampling_rate for t in traces)

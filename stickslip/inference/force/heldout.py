@@ -116,8 +116,10 @@ def apart(fit: Fit) -> Array:
     """Residual force of runs left out, events alike (N), shape (p,), to be seen over the floor.
 
     It is as much smaller as the deviation of the prediction is larger than the floor: where only one run tells a
-    parameter, that run's being off is no error of the model.
+    parameter, that run's being off is no error of the model. Not a number where there is one event only.
     """
+    if fit.problem.events < 2:
+        return np.full(fit.problem.of.size, np.nan)
     held, floor = unseen(fit), deviations(fit)
     return held.residual * floor / np.hypot(floor, held.spread)
 
