@@ -169,7 +169,8 @@ def _prescribed(campaign: Campaign, given: Sequence[tuple[Trace, Segmentation]])
     runs = [thinned(t) for t in traces]
     if not any(k.events for k in runs):
         raise InputError(
-            "the motion never turns, stops or changes its speed, and where it begins the contact is not told to be virgin",
+            "the motion never turns, stops or changes its speed, and that the contact is virgin where it begins is not "
+            "stated",
             file=campaign.path,
             key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in traces[:4]),
             hint="record a turn or a step of the velocity",
