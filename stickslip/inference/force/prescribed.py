@@ -200,7 +200,7 @@ def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Pr
     ]  # fmt: skip
     composition = Composition(
         mass, reach * np.geomspace(*REACH, elements), tuple(free), {"rig.spring_stiffness": softest}, (),
-        (strength, 0.1),
+        (strength, 1.0),  # loops that end before break-away show a part of it
     )  # fmt: skip
     problem = Problem(composition, runs)
     flat = np.full(elements, strength / elements)
