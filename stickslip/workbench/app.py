@@ -13,6 +13,7 @@ import panel as pn
 from panel.theme.base import Inherit
 from panel.theme.native import Native
 
+from ..system.units import shown_with
 from .adding_form import FirstRun
 from .controls import BUTTON, Frame, Message, Words
 from .figures import dark, look
@@ -181,8 +182,12 @@ def frame(session: Session) -> Frame:
         if fit is None or fitted is None:
             made.errors = ""
             return
-        told = f"{fitted.error:.3f} fitted, {fitted.unseen_error:.3f} unseen"
-        made.errors = f"error {fit.error:.3f} by hand (before: {told})" if fit.by_hand else f"error {told}"
+        told = (
+            f"{shown_with(fitted.error, fitted.error_std)} fitted, "
+            f"{shown_with(fitted.unseen_error, fitted.unseen_error_std)} unseen"
+        )
+        own = shown_with(fit.error, fit.error_std)
+        made.errors = f"error {own} by hand (before: {told})" if fit.by_hand else f"error {told}"
 
     watch(session, ["campaign", "steps", "at", "busy", "share", "searching", "searched", "said"], update)
     watch(session, ["steps", "at"], errors)

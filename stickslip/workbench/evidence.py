@@ -135,13 +135,15 @@ def _in_model(fit: Fit, tag: str, parts: Sequence[np.ndarray], chosen: str) -> d
         picture = signature(bare, law(fit, (), tag), parts)
     gain = fit.climbed.gains.get(tag)
     rung = max((i for i, r in enumerate(fit.climbed.ladder) if r.added == tag), default=0)
-    before, after = fit.ladder["unseen error"].iloc[[rung - 1, rung]] if rung else (np.nan, np.nan)
+    rungs = fit.ladder.iloc[[rung - 1, rung]] if rung else fit.ladder.iloc[:0]
+    pairs = rungs[["unseen error", "unseen std"]].to_numpy(float)
+    errors = [shown_with(*pair) for pair in pairs] if np.isfinite(pairs[:, 0]).all() else []
     return {
         **_empty(tag, chosen),
         "on": True,
         "share": 1.0,
         "gain": "in the model" if gain is None else f"in the model, gained {gain:.0f}",
-        "unseen": f"error on unseen runs {before:.2f} to {after:.2f}" if np.isfinite(before + after) else "",
+        "unseen": f"error on unseen runs {' to '.join(errors)}" if errors else "",
         "picture": picture,
         "amplitude": f"{name.partition('.')[2].replace('_', ' ')} {size}" if size else "",
     }

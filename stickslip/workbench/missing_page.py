@@ -324,19 +324,13 @@ def _table(every: Any) -> str:
     head = "".join(f'<th style="{cell}">{name}</th>' for name in ("fitted", "unseen", "gain"))
     lines = [f'<tr><th style="text-align: left">model</th>{head}</tr>']
     for _, row in every.iterrows():
-        texts = [_pair(row["error"], row["error std"]), _pair(row["unseen error"], row["unseen std"])]
+        pairs = (("error", "error std"), ("unseen error", "unseen std"))
+        texts = [shown_with(row[own], row[std]) if np.isfinite(row[own]) else "" for own, std in pairs]
         texts.append(f"{row['gain']:.0f}" if np.isfinite(row["gain"]) else "")
         numbers = "".join(f'<td style="{cell}">{t}</td>' for t in texts)
         lines.append(f'<tr><td style="padding-right: 14px">{escape(str(row["step"]))}</td>{numbers}</tr>')
     note = f'<div style="color: var(--wb-soft); font-size: 12px; margin-top: 6px">{FLOORS}</div>'
     return f'<div style="{CARD} color: var(--wb-text); font-size: 13px"><table>{"".join(lines)}</table>{note}</div>'
-
-
-def _pair(value: float, std: float) -> str:
-    """An error in floors with its deviation."""
-    if not np.isfinite(value):
-        return ""
-    return f"{value:.3f} ± {std:.3f}" if np.isfinite(std) else f"{value:.3f}"
 
 
 class _Backbone:
@@ -395,7 +389,9 @@ class _Backbone:
         }  # fmt: skip
         self.figure.xaxis.axis_label = label("displacement from the force-free contact", length)
         self.figure.yaxis.axis_label = label("force", unit)
-        self._scale, self._told = (m, k), f"u_max = {u_max * m:.3g} {length}, p = {float(data.attrs['p']):.2f}"
+        own = data.attrs
+        self._scale = m, k
+        self._told = f"u_max = {shown_with(u_max, own['u_max_std'], 'm')}, p = {shown_with(own['p'], own['p_std'])}"
         self._widest = float(u[-1])
         self.words.text = self._told
         self._session.find_rough_line()
@@ -415,7 +411,7 @@ class _Backbone:
         }  # fmt: skip
         a = line.attrs
         self.words.text = (
-            f"{self._told}; nearest rough lines: H = {a['H']:.2f} ± {a['H_std']:.2f}, h_rms = "
+            f"{self._told}; nearest rough lines: H = {shown_with(a['H'], a['H_std'])}, h_rms = "
             f"{shown_with(a['h_rms'], a['h_rms_std'], 'm')} (dotted: how such contacts differ)"
         )
 

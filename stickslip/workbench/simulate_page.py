@@ -17,7 +17,7 @@ from ..inference.force.candidates import every_form
 from ..objects import Fit
 from ..physics.effects import catalogue
 from ..simulation.scenario.recording import Recording
-from ..system.units import shown, to_si
+from ..system.units import shown, shown_with, to_si
 from . import experiments
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Message, Words
@@ -260,8 +260,8 @@ def _cells(values: dict[str, tuple[float, float, int]]) -> list[str]:
     out = []
     for key, unit in MEASURES.items():
         mean, std, count = values.get(key, (np.nan, np.nan, 0))
-        scatter = f"± {shown(std, unit, 2)}" if std > SAME * abs(mean) else "all alike"
-        out.append("-" if not count else f"{shown(mean, unit, 4)} {scatter}")
+        alike = f"{shown(mean, unit, 4)} all alike"
+        out.append("-" if not count else shown_with(mean, std, unit) if std > SAME * abs(mean) else alike)
     return out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import urllib.error
 import urllib.request
 
@@ -14,8 +15,8 @@ from stickslip.inference.force.first_order import promise
 from stickslip.inference.force.signatures import Explained
 from stickslip.objects import Diagnosis
 from stickslip.physics.effects import catalogue
-from stickslip.system.units import shown
-from stickslip.workbench import app, missing_page, model_page
+from stickslip.system.units import shown, shown_with, to_si
+from stickslip.workbench import app, keep_page, missing_page, model_page
 from stickslip.workbench.evidence import best_forms, bins, rows, signature
 from stickslip.workbench.figures import DARK, LIGHT
 from stickslip.workbench.free_panel import Free
@@ -88,6 +89,22 @@ def test_the_nearest_rough_lines_are_drawn_beside_the_backbone(session, base):
     assert "H = " in made.words.text
     drawn, curve = np.array(made._line.data["force"]), np.array(made._data.data["force"])
     assert drawn.size == curve.size and np.abs(drawn - curve).max() < 0.2 * curve.max()
+
+
+def test_errors_and_the_law_of_the_backbone_have_their_deviations(session, base):
+    errors = [shown_with(base.error, base.error_std), shown_with(base.unseen_error, base.unseen_error_std)]
+    assert all("±" in text for text in errors)
+    assert app.frame(session).errors == f"error {errors[0]} fitted, {errors[1]} unseen"
+    assert keep_page.history(session)[0][3:5] == errors
+    assert all(text in missing_page._Ladder(session).table.object for text in errors)
+    law = base.backbone.attrs
+    told = missing_page._Backbone(session).words.text
+    assert (
+        f"u_max = {shown_with(law['u_max'], law['u_max_std'], 'm')}, p = {shown_with(law['p'], law['p_std'])}" in told
+    )
+    session.by_hand({"weakening.drop": base.values["weakening.drop"] * 1.02})
+    moved = session.fit
+    assert f"error {shown_with(moved.error, moved.error_std)} by hand" in app.frame(session).errors
 
 
 def test_the_pages_are_made_before_there_is_a_model(campaign):
@@ -250,8 +267,9 @@ def test_the_catalogue_is_in_the_order_of_what_it_shows(campaign, base, promises
 
 def test_an_effect_in_the_model_shows_what_it_takes_off(aged):
     (made,) = rows(aged, (), None, "age")
-    before, after = (float(text) for text in made["unseen"].removeprefix("error on unseen runs ").split(" to "))
-    assert after == pytest.approx(aged.unseen_error, abs=0.006) and before > 2.0 * after
+    before, after = made["unseen"].removeprefix("error on unseen runs ").split(" to ")
+    assert after == shown_with(aged.unseen_error, aged.unseen_error_std) and "±" in after
+    assert float(before.split()[0]) > 2.0 * aged.unseen_error
     residual, law, _ = (np.array(curve) for curve in made["picture"])
     assert np.corrcoef(residual[:, 1], law[:, 1])[0, 1] > 0.9
 
