@@ -53,7 +53,10 @@ def test_a_slider_shows_and_gives_back_its_value(base):
     for row in knob_rows(base, base, made, {"weakening.drop"}):
         assert row["band"][0] <= row["place"] <= row["band"][1]
         assert row["locked"] == (row["name"] == "weakening.drop")
-        assert row["text"] and row["std"].startswith("±")
+        number, deviation, unit = re.fullmatch(r"(-?[\d.]+) ± ([\d.]+) ?(.*)", row["text"]).groups()
+        assert len(number.partition(".")[2]) == len(deviation.partition(".")[2])  # to the same place, in one unit
+        shown_value = to_si(f"{number} {unit}".strip(), made[row["name"]].free.unit)
+        assert shown_value == pytest.approx(base.values[row["name"]], rel=0.1)
 
 
 def test_a_slider_reaches_the_bounds_of_a_parameter():
