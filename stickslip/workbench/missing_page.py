@@ -276,8 +276,9 @@ class _Ladder:
         self._of: Any = None
         self._data = source(rung=[], fitted=[], unseen=[], step=[])
         self.figure = figure(
-            "the ladder: error of every model on the way here", y="error / floors", height=230, output_backend="canvas"
-        )
+            "the ladder: error of every model on the way here", "model: what each rung added", "error / floors",
+            height=246, output_backend="canvas",
+        )  # fmt: skip
         for name, colour, dash, mark in (
             ("fitted", theme.measured, "solid", "circle"),
             ("unseen", theme.model, "dashed", "square"),

@@ -165,6 +165,7 @@ class _Beside:
                 )  # fmt: skip
             made.min_border_left = LEFT
             self.figures[key] = made
+        self.figures["x"].xaxis.major_label_text_font_size = "0px"  # it has that of the figure below
         legend(self.figures["x"])
         self._name = self.figures["x"].legend[0].items[1]
         self.figures["gap"].legend.visible = False

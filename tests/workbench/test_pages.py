@@ -7,6 +7,7 @@ import urllib.error
 import urllib.request
 
 import numpy as np
+import panel as pn
 import pytest
 
 from stickslip.inference.fit.parameters import effect_parameters
@@ -92,6 +93,16 @@ def test_the_nearest_rough_lines_are_drawn_beside_the_backbone(session, base):
     assert "H = " in made.words.text
     drawn, curve = np.array(made._line.data["force"]), np.array(made._data.data["force"])
     assert drawn.size == curve.size and np.abs(drawn - curve).max() < 0.2 * curve.max()
+
+
+@pytest.mark.parametrize("module", app.modules())
+def test_every_axis_says_what_is_on_it(session, module):
+    made = module.page(session)
+    for pane in made.select(pn.pane.Bokeh):
+        for axis in pane.object.axis:
+            below = axis.major_label_text_font_size == "0px"  # the axis of the figure below is its own
+            said = axis.axis_label or (axis in pane.object.yaxis and " / " in pane.object.title.text)
+            assert said or below or not pane.object.visible, pane.object.title.text
 
 
 def test_errors_and_the_law_of_the_backbone_have_their_deviations(session, base):
