@@ -16,7 +16,7 @@ from ..objects.picture import AGAINST, PARTS, WIDEST
 from ..system.units import shown_with, to_si
 from .controls import BUTTON, Catalogue, Message, Words
 from .evidence import bins, law, rows
-from .figures import figure, label, legend, look, source, unit_of
+from .figures import figure, label, legend, look, of_run, source, unit_of
 from .session import Session, watch
 
 TITLE = "What is missing"
@@ -87,13 +87,13 @@ class _Residual:
         self.update()
 
     def _draw_runs(self) -> None:
-        """A colour for every run that has none yet, under the two curves of all runs."""
-        runs = look().runs
+        """A colour and a dash for every run that has none yet, under the two curves of all runs."""
         for name in self._session.campaign.names if self._session.campaign is not None else ():
             if name not in self._points:
-                more = {"color": runs[len(self._points) % len(runs)], "legend_label": name[:24]}
+                more = {**of_run(len(self._points)), "legend_label": name[:24]}
                 self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])
-                self.figure.scatter("x", "y", source=self._points[name], size=3, alpha=0.35, **more)
+                marks = {"color": more["color"], "legend_label": more["legend_label"]}
+                self.figure.scatter("x", "y", source=self._points[name], size=3, alpha=0.35, **marks)
                 self.figure.line("x", "y", source=self._medians[name], line_width=2.5, **more)
         self.figure.renderers = [*(r for r in self.figure.renderers if r not in self._over), *self._over]
 

@@ -23,7 +23,7 @@ from .beside import Show, Tell, beside
 from .controls import BUTTON, Message, Words
 from .evidence import LEAST, best_forms
 from .experiments import MEASURES, Setting, Swept, Telling
-from .figures import crosshair, figure, label, legend, look, source, unit_of
+from .figures import crosshair, figure, label, legend, look, of_run, source, unit_of
 from .overview import record, reduced
 from .parts import Table, head, progress, row_of
 from .picked import chosen
@@ -35,7 +35,6 @@ LEFT = 76
 RIVALS = 4  # effects that are told apart at once
 FALLBACK = 1e-4  # m/s, where a run has no velocity of its own
 DONE = "Each is fitted, and run freely in experiments that are easily made."
-DASHES = ("solid", "dashed", "dotdash", "dotted")
 FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
 WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
 
@@ -477,18 +476,13 @@ class _Experiment:
         if telling is self._drawn or not telling.recordings or campaign is None:
             return
         self._drawn = telling
-        theme = look()
         made = [figure(name, height=280, output_backend="canvas") for name in ("displacement", "load point - block")]
         moved = {tag: r["displacement"].values for tag, r in telling.recordings.items()}
         k, unit = unit_of(np.concatenate([*moved.values()]), "m")
         for i, (tag, r) in enumerate(telling.recordings.items()):
             data = _thinned(r["time"].values, moved[tag] * k, (r["drive_position"].values - moved[tag]) * k)
-            look_of = {
-                "color": theme.runs[i % len(theme.runs)], "line_width": 2, "line_dash": DASHES[i % len(DASHES)],
-                "legend_label": tag,
-            }  # fmt: skip
             for name, own in zip(("x", "gap"), made, strict=True):
-                own.line(data["t"], data[name], **look_of)
+                own.line(data["t"], data[name], line_width=2, legend_label=tag, **of_run(i))
         for name, own in zip(("displacement", "load point - block"), made, strict=True):
             own.xaxis.axis_label, own.yaxis.axis_label = label("time from the start", "s"), label(name, unit)
             legend(own)

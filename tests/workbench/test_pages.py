@@ -95,6 +95,14 @@ def test_the_nearest_rough_lines_are_drawn_beside_the_backbone(session, base):
     assert drawn.size == curve.size and np.abs(drawn - curve).max() < 0.2 * curve.max()
 
 
+def test_curves_of_many_runs_can_be_told_apart(session, monkeypatch):
+    names = [f"run {i}" for i in range(28)]
+    monkeypatch.setattr(type(session.campaign), "names", names)
+    part = missing_page._Residual(session)
+    drawn = {r.data_source.id: (r.glyph.line_color, str(r.glyph.line_dash)) for r in part.figure.renderers}
+    assert len({drawn[part._medians[name].id] for name in names}) == len(names)
+
+
 @pytest.mark.parametrize("module", app.modules())
 def test_every_axis_says_what_is_on_it(session, module):
     made = module.page(session)
