@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from contextlib import closing
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.objects import Campaign
-from stickslip.workbench import data_page
+from stickslip.workbench import adding_form, data_page
 from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, guess, look
 from stickslip.workbench.adding_form import FirstRun, Form
 from stickslip.workbench.event_parts import PARTS, part
@@ -218,6 +219,25 @@ def test_what_is_wrong_is_said_in_the_form(own):
     form.velocity.value = "50 um/s"
     form.send()
     assert "sampling rate" in form.said.text
+
+
+def test_a_file_that_is_too_large_is_refused_by_the_server(own, monkeypatch):
+    monkeypatch.setattr(adding_form, "LARGEST", 0.01)
+    form = Form(Session(campaign=own))
+
+    def send(name: str, content: bytes, chunks: int) -> None:
+        for i, data in enumerate(np.array_split(np.frombuffer(content, np.uint8), chunks)):
+            given = {"name": name, "chunk": i + 1, "total_chunks": chunks, "data": data.tobytes(), "type": "text/csv"}
+            form.drop._process_event(SimpleNamespace(event_name="upload_event", data=given))
+
+    send("large.csv", _table(1000), 5)
+    assert "large.csv is larger than 0.01 MB" in form.said.text
+    assert form.dropped is None and not form.drop.value and not form.drop._file_buffer
+    send("run.csv", _table(), 3)
+    assert form.dropped == ("run.csv", _table()) and "400 rows" in form.said.text
+    send("other.csv", _table(300), 1)
+    send("run.csv", _table(), 1)
+    assert form.dropped[0] == "run.csv" and list(form.drop.value) == ["run.csv"]
 
 
 def test_a_file_that_is_dropped_where_nothing_is_open_begins_a_campaign(folder, base, tmp_path, monkeypatch):
