@@ -215,7 +215,7 @@ class _Beside:
             r = found.recording
             moved = r["displacement"].values
             self._model.data = _thinned(r["time"].values, moved * k, (r["drive_position"].values - moved) * g)
-        own = experiments.measured(campaign.events[campaign.names.index(run)])
+        own = experiments.measured(trace, campaign.events[campaign.names.index(run)])
         columns, rows = event_rows(own, found, trace, self._session.fit)
         self._table.param.update(columns=columns, rows=rows)
 
