@@ -28,7 +28,7 @@ from . import searches
 from .journal import Journal
 from .shipped import to_work_in
 from .watching import watch
-from .work import Search, Worker, at_once, end_all
+from .work import Search, Worker, at_once
 
 __all__ = ["BASE", "HAND", "Session", "Step", "watch"]
 
@@ -495,7 +495,8 @@ class Session(param.Parameterized):
     def close(self) -> None:
         """End all that goes on beside."""
         self.stop()
-        end_all()
+        if self._listing is not None:
+            self._listing.cancel()
         self._held.close()
 
     # effects of one's own

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import re
 import urllib.error
 import urllib.request
@@ -348,6 +349,31 @@ def test_a_notebook_shows_the_same_pages(campaign, base, monkeypatch):
     assert "<title>stickslip" in page and "cdn." not in page
     with pytest.raises(urllib.error.HTTPError):  # without the token
         urllib.request.urlopen(shown.url.rsplit("/", 2)[0] + "/", timeout=30)
+    assert "on the machine of the kernel" in repr(shown) and repr(shown) in shown._repr_html_()
+    with shown:
+        pass
+    assert "closed" in repr(shown) and "iframe" not in shown._repr_html_()
+    with pytest.raises(urllib.error.URLError, match="refused"):
+        urllib.request.urlopen(shown.url, timeout=30)
+    shown.close()
+
+
+def test_a_notebook_of_a_hub_shows_them_through_its_proxy(campaign, base, monkeypatch):
+    import stickslip as ss
+
+    monkeypatch.setattr(type(campaign), "fit", lambda self, **_: base)
+    monkeypatch.setattr(Session, "list_promises", lambda self: None)
+    monkeypatch.setenv("JUPYTERHUB_SERVICE_PREFIX", "/user/me/")
+    with ss.workbench(campaign) as shown:
+        port, token = re.fullmatch(r"/user/me/proxy/(\d+)/([\w-]+)/", shown.url).groups()
+        assert f'src="{shown.url}"' in shown._repr_html_() and "of the kernel" not in repr(shown)
+        connection = http.client.HTTPConnection(f"127.0.0.1:{port}", timeout=30)
+        upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}
+        key = {"Sec-WebSocket-Key": "MDEyMzQ1Njc4OWFiY2RlZg==", "Origin": "https://hub.example.org"}
+        connection.request("GET", f"/{token}/ws", headers={**upgrade, **key})
+        assert connection.getresponse().status != 403
+    with ss.workbench(campaign, proxy="") as shown:
+        assert shown.url.startswith("http://127.0.0.1:")
 
 
 def test_of_many_steps_the_first_by_hand_are_forgotten(session, base, monkeypatch):
