@@ -50,7 +50,8 @@ GONE = """
 document.getElementById("gone")?.remove()
 const line = document.createElement("div")
 line.id = "gone"
-line.textContent = "the server does not answer: reload this page, or start it again and go on at the address that it prints"
+line.textContent = "the server does not answer: reload this page, or start it again and go on at the address " +
+  "that it prints"
 line.style = "position: fixed; inset: 0 0 auto 0; z-index: 99; padding: 8px 18px; font-weight: 600; " +
   "background: var(--wb-surface); color: var(--wb-text); border-bottom: 4px solid var(--wb-model)"
 document.body.append(line)

@@ -6,6 +6,7 @@ import http.client
 import re
 import urllib.error
 import urllib.request
+from types import SimpleNamespace
 
 import numpy as np
 import panel as pn
@@ -18,7 +19,7 @@ from stickslip.inference.force.signatures import Explained
 from stickslip.objects import Diagnosis
 from stickslip.physics.effects import catalogue
 from stickslip.system.units import shown, shown_with, to_si
-from stickslip.workbench import app, keep_page, missing_page, model_page
+from stickslip.workbench import app, folding, keep_page, missing_page, model_page
 from stickslip.workbench.evidence import best_forms, bins, rows, signature
 from stickslip.workbench.figures import DARK, LIGHT
 from stickslip.workbench.free_panel import Free
@@ -162,6 +163,30 @@ def test_the_residual_is_folded_over_a_period(session, base):
     assert part.period.disabled
 
 
+def test_the_phase_of_the_drive_is_of_what_is_stated_or_of_a_periodic_effect_in_the_model(session, base, monkeypatch):
+    part = missing_page._Residual(session)
+    part.against.value = "phase of the drive"
+    assert "no effect in the model is periodic" in session.said
+    force = base.force
+    run = str(force.run.values[0])
+    use = (force.run.values == run) & ~force.left_out.values
+    for text, variable, period in (("20 um", "load_point", 20e-6), ("20 ms", "time", 0.02), ("40 Hz", "time", 0.025)):
+        part.period.value = text
+        turns = np.sort(np.mod(force[variable].values[use] / period, 1.0))
+        assert part._points[run].data["x"] == pytest.approx(turns), text
+        assert part.figure.xaxis.axis_label.startswith("phase of ") and "periods" in part.figure.xaxis.axis_label
+        assert session.said == ""
+    part.period.value = "5 kg"
+    assert "50 Hz" in session.said
+    for tag, name, value, found in (
+        ("drive-ripple", "pitch", 1e-4, ("load point", 1e-4)), ("load-modulation", "frequency", 25.0, ("time", 0.04)),
+    ):  # fmt: skip
+        effect = SimpleNamespace(tag=tag)
+        problem = SimpleNamespace(composition=SimpleNamespace(effects=(effect,)))
+        fit = SimpleNamespace(force_fit=SimpleNamespace(problem=problem), values={f"{tag}.{name}": value})
+        assert folding.drive("", fit) == found
+
+
 def test_the_effect_that_is_laid_over_is_drawn_over_all_else(session, base, promises):
     made = missing_page._Residual(session)
     session.promises, made.chosen = promises, promises[0].tag
@@ -261,7 +286,7 @@ def test_what_a_promise_takes_off_brings_the_cost_down(base, promises):
 
 
 def test_the_catalogue_has_its_rows(base, promises):
-    made = rows(base, promises, None, "age", "drive-ripple")
+    made = rows(base, promises, None, "age", chosen="drive-ripple")
     assert made[0]["tag"] == "contact-ageing"
     assert [r["tag"] for r in made if r["chosen"]] == ["drive-ripple"]
     assert made[0]["share"] == 1.0 and all(0.0 <= r["share"] <= 1.0 for r in made)
