@@ -28,6 +28,8 @@ from stickslip.workbench.knobs import rows as knob_rows
 from stickslip.workbench.session import Session
 from stickslip.workbench.watching import Place
 
+from .outline import OUTLINE, outline
+
 LISTED = ("contact-ageing", "drive-ripple", "sensor-drift", "viscous-drag")
 
 
@@ -95,6 +97,11 @@ def test_the_nearest_rough_lines_are_drawn_beside_the_backbone(session, base):
     assert "H = " in made.words.text
     drawn, curve = np.array(made._line.data["force"]), np.array(made._data.data["force"])
     assert drawn.size == curve.size and np.abs(drawn - curve).max() < 0.2 * curve.max()
+
+
+def test_the_pictures_of_the_docs_are_of_these_pages(session):
+    now, then = outline(session).splitlines(), OUTLINE.read_text(encoding="utf-8").splitlines()
+    assert now == then, "python docs/make_workbench.py makes them anew"
 
 
 def test_curves_of_many_runs_can_be_told_apart(session, monkeypatch):
