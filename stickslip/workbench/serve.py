@@ -23,11 +23,12 @@ from ..errors import InputError
 from . import own
 from .app import ready, view
 from .beside import close_all
-from .session import Session
+from .session import LOOKING, Session
 from .work import Worker, end_all
 
 LOOPBACK = "127.0.0.1"
 NAMES = ("127.0.0.1", "localhost")
+PATIENCE = 3.0  # s that the first window may take to come, before which nothing is fitted
 CLOSED = "stickslip workbench: closed"
 LOCAL = (
     "stickslip workbench: {url} (for a browser on the machine of the kernel; from another one through "
@@ -81,6 +82,7 @@ def serve(
     Raises:
         InputError: the port is taken, or the address is none of this machine.
     """
+    import panel as pn
     from panel.io.resources import DIST_DIR
     from panel.io.server import get_server
 
@@ -91,8 +93,21 @@ def serve(
     port = _free(address, port)
     session.worker, session.aside = workers = Worker(), Worker()
     origins = list(origins) or (["*"] if address not in NAMES else [f"{name}:{port}" for name in NAMES])
+    waiting = session.campaign is not None
+
+    def begin() -> None:
+        nonlocal waiting
+        if waiting:
+            waiting = False
+            session.begin(keep)
+
+    def page() -> Any:
+        made = view(session)
+        pn.state.onload(begin)
+        return made
+
     server: Any = get_server(
-        {"/": lambda: view(session)}, port=port, address=address, prefix=f"/{token}", websocket_origin=origins,
+        {"/": page}, port=port, address=address, prefix=f"/{token}", websocket_origin=origins,
         title="stickslip", start=False, show=False, loop=IOLoop.current(),
         extra_patterns=[(r"/(favicon\.ico)", StaticFileHandler, {"path": DIST_DIR / "images"})],
     )  # fmt: skip
@@ -104,8 +119,9 @@ def serve(
     url = f"http://{f'[{address}]' if ':' in address else address}:{port}/{token}/"
     tell(url)
     watcher = own.watch(session, session.effects) if session.effects else None
-    if session.campaign is not None:
-        session.begin(keep)
+    if waiting:  # a fit would keep the first window waiting
+        session.busy = LOOKING
+        server.io_loop.call_later(PATIENCE, begin)
     if browser:
         server.io_loop.add_callback(webbrowser.open, url)
     try:

@@ -29,8 +29,9 @@ from .steps import Step, complete, fewer, first, moved
 from .watching import watch
 from .work import Worker, at_once
 
-__all__ = ["Note", "Session", "watch"]
+__all__ = ["LOOKING", "Note", "Session", "watch"]
 
+LOOKING = "looking at the data"
 STILL = 0.25  # s without a move, after which a model that was moved is kept
 
 
@@ -163,7 +164,7 @@ class Session(param.Parameterized):
         self.begin(keep=keep)
 
     def _begin(self, campaign: Campaign) -> None:
-        with self._long("looking at the data"):
+        with self._long(LOOKING):
             if self._journal is None or not again.history(self, self._journal):
                 self.busy = "fitting the base model"
                 self.first(complete(campaign.fit()))
