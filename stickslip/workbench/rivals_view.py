@@ -23,6 +23,7 @@ from .session import Session, watch
 
 RIVALS = 4  # effects that are told apart at once
 FALLBACK = 1e-4  # m/s, where a run has no velocity of its own
+UNSEEN = "Choose effects; those that promise most are offered once What is missing has looked at them."
 DONE = "Each is fitted, and run freely in experiments that are easily made."
 
 
@@ -79,7 +80,8 @@ class Rivals:
         if self.effects.value == self._offered:  # nobody chose others
             best = [p.tag for p in best_forms(self._session.promises) if p.fall > LEAST]
             self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
-        self._said.text = f"The effects that promise most are offered; others can be chosen. {DONE}"
+        offered = "The effects that promise most are offered; others can be chosen."
+        self._said.text = f"{offered if self._session.promises else UNSEEN} {DONE}"
 
     def start(self) -> None:
         """Fit the model with each effect and simulate every experiment."""

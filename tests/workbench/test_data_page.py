@@ -290,6 +290,19 @@ def test_a_table_more_leaves_the_file_byte_for_byte():
         assert new.startswith(old) and new.endswith(b"[[trace]]" + end + b"file = 'x'" + end)
 
 
+def test_events_are_listed_in_the_unit_and_to_the_place_of_their_deviations(campaign):
+    found = data_page.Looked(campaign, campaign.events, campaign.inspect())
+    heads, rows = data_page.event_rows(found, "v050")
+    at = next(i for i, head in enumerate(heads) if head.startswith("slip / µm ± "))
+    std = heads[at].split("± ")[1]
+    trace = found.inspection.result["traces"][0]
+    assert float(std) == pytest.approx(1e6 * trace["features"]["slip"]["sensor"], rel=0.1)
+    for row, event in zip(rows, trace["events"], strict=True):
+        assert float(row[at]) == pytest.approx(1e6 * event["slip"], abs=float(std))
+        assert len(row[at].partition(".")[2]) == len(std.partition(".")[2])
+    assert rows[0][heads.index(next(h for h in heads if h.startswith("recurrence / s")))] == "-"
+
+
 def test_what_the_data_tell_is_said(campaign):
     session = Session(campaign=campaign)
     assert data_page.page(session) is not None
@@ -297,5 +310,5 @@ def test_what_the_data_tell_is_said(campaign):
     told = {g["head"]: g["items"] for g in data_page.groups(found)}
     assert told["Can tell"] == campaign.inspect().can and told["Mended or left out"] == ["nothing"]
     columns, rows = data_page.event_rows(found, "v100")
-    ringing = next(i for i, head in enumerate(columns) if head.startswith("ringing ± "))
-    assert len(rows) == 7 and "Hz" in columns[ringing] and "Hz" in rows[3][ringing]
+    ringing = next(i for i, head in enumerate(columns) if head.startswith("ringing / Hz ± "))
+    assert len(rows) == 7 and float(rows[3][ringing]) > 100.0

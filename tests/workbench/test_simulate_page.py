@@ -210,7 +210,7 @@ def test_usual_experiments_change_one_thing_each(base):
 
 def test_where_nothing_was_proposed_effects_can_be_chosen(session):
     made = Rivals(session, Asked(session))
-    assert "can be chosen" in made._said.text and {"wear", *RIVALS} <= set(made.effects.options)
+    assert "Choose effects" in made._said.text and {"wear", *RIVALS} <= set(made.effects.options)
     made.effects.value = ["wear"]
     made.start()
     assert "two effects" in beside(session, "rivals").said
