@@ -134,7 +134,7 @@ class _Residual:
         self._smooth.data = dict(zip("xy", smooth(axis[use], z[use]), strict=True))
         words = WORDS.get(against, against)
         if period is not None:
-            words = f"phase of {words}, period {shown(period, str(data[name].attrs['units']), 3)}"
+            words = f"phase of {words} over {shown(period, str(data[name].attrs['units']), 3)}"
         self.figure.xaxis.axis_label = label(words, text)
         if against in BENT:
             ticks, labels = _ticks(x)
