@@ -3,7 +3,8 @@
     python docs/make_workbench.py
 
 Writes workbench-data.png, -missing.png, -model.png, -simulate.png and -keep.png into docs/images, from the shipped
-campaign in a folder of its own.
+campaign in a folder of its own, and beside them workbench.txt: what the pages say, by which a test sees whether the
+pictures are of this version.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+import stickslip as ss
+from stickslip.workbench.session import Session
 from tests.workbench.browser import Browser, Served
+from tests.workbench.outline import OUTLINE, outline
 
 IMAGES = ROOT / "docs" / "images"
 SIZE = 1280, 1100
@@ -78,6 +82,10 @@ def main() -> None:
         finally:
             browser.close()
             served.end()
+    campaign = ss.load_campaign(ROOT / "scenarios" / "hidden-effect" / "campaign.toml")
+    session = Session(campaign=campaign)
+    session.first(campaign.fit())
+    OUTLINE.write_text(outline(session), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -215,6 +215,16 @@ class Fit(Shown):
         """Of all points on runs that were left out."""
         return float(self.unseen_errors.loc["all", "all"])
 
+    @property
+    def error_std(self) -> float:
+        """Standard deviation of :attr:`error`."""
+        return float(self.error_deviations.loc["all", "all"])
+
+    @property
+    def unseen_error_std(self) -> float:
+        """Standard deviation of :attr:`unseen_error`."""
+        return float(self.unseen_error_deviations.loc["all", "all"])
+
     @cached_property
     def ladder(self) -> pandas.DataFrame:
         """A row for each model on the way here: fitted and unseen error in floors, and by how much its effect helps.
@@ -235,7 +245,10 @@ class Fit(Shown):
 
     @cached_property
     def backbone(self) -> xarray.Dataset:
-        """The contact's backbone as measured (N over m) with its standard deviation, and a rough contact's law."""
+        """The contact's backbone as measured (N over m) with its standard deviation, and a rough contact's law.
+
+        Attributes ``u_max`` (m), ``p`` and their standard deviations, ``spread`` and ``misfit`` are of the law.
+        """
         import xarray
 
         curve = backbone(self._fit)
@@ -247,8 +260,11 @@ class Fit(Shown):
                 "law": ("displacement", law.force, {"units": "N", "long_name": "1 - (1 - u/u_max)^p"}),
             },
             coords={"displacement": ("displacement", curve.displacement, {"units": "m"})},
-            attrs={"u_max": law.u_max, "p": law.p, "spread": law.spread, "misfit": law.misfit},
-        )
+            attrs={
+                "u_max": law.u_max, "u_max_std": law.u_max_std, "p": law.p, "p_std": law.p_std, "spread": law.spread,
+                "misfit": law.misfit,
+            },
+        )  # fmt: skip
 
     @cached_property
     def rough_line(self) -> xarray.Dataset | None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import TwoSlopeNorm
-from matplotlib.figure import Figure
 
 from ..errors import InputError, nearest
 from ..show.plots.style import DARK, LIGHT, MIDDLE, figure, of_run, plain, scaled, signed_log, styled
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
     from .fit import Fit
 
@@ -206,6 +205,8 @@ def errors(fit: Fit) -> Figure:
     values = found.to_numpy(float)
     made, axes = figure(1, 1, width=1.8 + 1.1 * values.shape[1], height=1.2 + 0.5 * values.shape[0])
     ax = axes[0, 0]
+    from matplotlib.colors import TwoSlopeNorm
+
     norm = TwoSlopeNorm(1.0, 0.0, max(float(np.nanmax(values)), 2.0))
     ax.imshow(values, cmap="PuOr_r", norm=norm, aspect="auto")
     ax.grid(False)

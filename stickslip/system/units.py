@@ -111,7 +111,7 @@ def shown(value: float, unit: str, digits: int = 4) -> str:
     return f"{_digits(value / 10.0**power, digits)} {PREFIXES[power]}{unit}"
 
 
-def shown_with(value: float, std: float, unit: str) -> str:
+def shown_with(value: float, std: float, unit: str = "1") -> str:
     """A quantity with its standard deviation, in one unit and to the same place: ``1.72 ± 0.10 µm``."""
     if not (math.isfinite(value) and math.isfinite(std) and std > 0.0):
         return shown(value, unit, 3)

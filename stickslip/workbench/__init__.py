@@ -13,16 +13,30 @@ from typing import Any
 class _Callable(ModuleType):
     """A package that can be called: its name is the function's."""
 
-    def __call__(self, campaign: Any) -> Any:
-        """The pages of a campaign, for a notebook on this machine: a frame onto a server in its kernel.
+    def __call__(self, campaign: Any, *, tall: int = 1000, proxy: str | None = None) -> Any:
+        """The pages of a campaign, for a notebook: a frame onto a server in its kernel, on that machine only.
 
         Args:
             campaign: a :class:`stickslip.Campaign`; its base model is fitted beside (seconds).
+            tall: pixels of the frame.
+            proxy: path of Jupyter under which ``jupyter-server-proxy`` forwards ports, such as ``"/proxy"``, for a
+                browser on another machine; "" for none. Default: that of the JupyterHub that runs the kernel, if any.
+
+        Returns:
+            A :class:`stickslip.workbench.serve.Window`, which ends the server with ``close()`` or a ``with`` block.
+
+        Raises:
+            InputError: the server cannot listen.
         """
+        import os
+
         from .serve import Window
         from .session import Session
 
-        return Window(Session(campaign=campaign, effects=campaign.effects))
+        if proxy is None:
+            hub = os.environ.get("JUPYTERHUB_SERVICE_PREFIX", "")
+            proxy = f"{hub.rstrip('/')}/proxy" if hub else ""
+        return Window(Session(campaign=campaign, effects=campaign.effects), tall, proxy)
 
 
 sys.modules[__name__].__class__ = _Callable

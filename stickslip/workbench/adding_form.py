@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -18,7 +19,7 @@ from .parts import Table, head, progress
 from .places import new_place
 from .session import Session, watch
 
-LARGEST = "500MB"
+LARGEST = 500  # MB of a file
 ROWS = 3  # of the file that are shown
 DROP = """
 .filepond--panel-root { background-color: var(--wb-surface); }
@@ -32,6 +33,35 @@ WORDS = {
 
 
 _field: Any = partial(pn.widgets.TextInput, width=210, sizing_mode="fixed")
+
+
+class Dropper(pn.widgets.FileDropper):
+    """Takes a file whose size is counted here too, for a request need not come from a page that keeps to its bound.
+
+    Args:
+        refused: told the name of a file that is too large, of which nothing is held.
+        given: as of Panel's own.
+    """
+
+    def __init__(self, refused: Callable[[str], None], **given: Any) -> None:
+        super().__init__(multiple=False, max_file_size=f"{LARGEST}MB", chunk_size=4_000_000, **given)
+        self._refused, self._size = refused, 0
+
+    def _process_event(self, event: Any) -> None:
+        data, whole = event.data, self._file_buffer
+        if event.event_name == "upload_event":
+            if data["chunk"] == 1:
+                for held in (whole, self.value, self.mime_type):  # of a file before, or one that was given up
+                    held.clear()
+                self._size = 0
+            elif data["name"] not in whole:  # refused before
+                return
+            self._size += len(data["data"])
+            if self._size > LARGEST * 1_000_000:
+                whole.clear()
+                self._refused(data["name"])
+                return
+        super()._process_event(event)
 
 
 class Form:
@@ -50,10 +80,7 @@ class Form:
         self.dropped: tuple[str, bytes] | None = None
         self._columns: Columns | None = None
         fixed = {"sizing_mode": "fixed"}
-        self.drop = pn.widgets.FileDropper(
-            multiple=False, max_file_size=LARGEST, chunk_size=4_000_000, height=90, sizing_mode="stretch_width",
-            margin=(4, 0), stylesheets=[DROP],
-        )  # fmt: skip
+        self.drop = Dropper(self._refuse, height=90, sizing_mode="stretch_width", margin=(4, 0), stylesheets=[DROP])
         self.columns: dict[str, Any] = {
             name: pn.widgets.Select(name=words, options=[NONE], width=190, **fixed) for name, words in WORDS.items()
         }
@@ -95,6 +122,13 @@ class Form:
             return
         name, content = list(files.items())[-1]
         self.take(str(name), content.encode() if isinstance(content, str) else bytes(content))
+
+    def _refuse(self, name: str) -> None:
+        self.dropped, self._asked.visible = None, False
+        self.said.text = (
+            f"{name} is larger than {LARGEST} MB, the most that is taken here: put it beside the campaign's file "
+            "and write its [[trace]] table there"
+        )
 
     def take(self, name: str, content: bytes) -> None:
         """Look into a file and show what its columns seem to be."""

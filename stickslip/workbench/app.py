@@ -10,9 +10,11 @@ from types import ModuleType
 from typing import Any
 
 import panel as pn
+from bokeh.models import CustomJS
 from panel.theme.base import Inherit
 from panel.theme.native import Native
 
+from ..system.units import shown_with
 from .adding_form import FirstRun
 from .controls import BUTTON, Frame, Message, Words
 from .figures import dark, look
@@ -42,6 +44,19 @@ TABS = """
 :host > [style*="hidden"] { height: 0; min-height: 0 !important; overflow: hidden; }
 .bk-tab.bk-active { color: var(--wb-accent); background: var(--wb-surface); border-color: var(--wb-line); }
 """
+
+
+GONE = """
+document.getElementById("gone")?.remove()
+const line = document.createElement("div")
+line.id = "gone"
+line.textContent = "the server does not answer: reload this page, or start it again and go on at the address " +
+  "that it prints"
+line.style = "position: fixed; inset: 0 0 auto 0; z-index: 99; padding: 8px 18px; font-weight: 600; " +
+  "background: var(--wb-surface); color: var(--wb-text); border-bottom: 4px solid var(--wb-model)"
+document.body.append(line)
+"""
+BACK = 'document.getElementById("gone")?.remove()'
 
 
 class Plain(Native):
@@ -81,6 +96,9 @@ def view(session: Session) -> Any:
     show()
     if session.campaign is None:
         watch(session, ["campaign"], show)
+    if pn.state.curdoc is not None:
+        pn.state.curdoc.js_on_event("connection_lost", CustomJS(code=GONE))
+        pn.state.curdoc.js_on_event("client_reconnected", CustomJS(code=BACK))
     return pn.Column(head, body, sizing_mode="stretch_width")
 
 
@@ -181,8 +199,12 @@ def frame(session: Session) -> Frame:
         if fit is None or fitted is None:
             made.errors = ""
             return
-        told = f"{fitted.error:.3f} fitted, {fitted.unseen_error:.3f} unseen"
-        made.errors = f"error {fit.error:.3f} by hand (before: {told})" if fit.by_hand else f"error {told}"
+        told = (
+            f"{shown_with(fitted.error, fitted.error_std)} fitted, "
+            f"{shown_with(fitted.unseen_error, fitted.unseen_error_std)} unseen"
+        )
+        own = shown_with(fit.error, fit.error_std)
+        made.errors = f"error {own} by hand (before: {told})" if fit.by_hand else f"error {told}"
 
     watch(session, ["campaign", "steps", "at", "busy", "share", "searching", "searched", "said"], update)
     watch(session, ["steps", "at"], errors)

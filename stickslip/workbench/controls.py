@@ -89,7 +89,7 @@ class Knobs(Spoken):
     """A slider for every parameter.
 
     Attributes:
-        rows: tables with ``name``, ``label``, ``group``, ``text``, ``std``, ``prior``, ``place`` (0 to 1), ``band``,
+        rows: tables with ``name``, ``label``, ``group``, ``text``, ``prior``, ``place`` (0 to 1), ``band``,
             ``low``, ``high`` and ``locked``.
         given: tables with ``label``, ``text`` and ``doc`` of what no hand moves.
         closed: whether none can be moved at present.

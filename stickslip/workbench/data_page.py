@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from .adding_form import adding
 from .beside import Beside, Show, Tell, beside
 from .controls import Message
 from .event_view import EventView
+from .figures import label, unit_of
 from .parts import Sentences, Table, progress, row_of
 from .picked import chosen, select
 from .session import Session, watch
@@ -95,7 +97,7 @@ def run_rows(campaign: Campaign) -> tuple[list[str], list[list[str]]]:
 def event_rows(found: Looked, run: str) -> tuple[list[str], list[list[str]]]:
     """Columns and rows of the table of events of a run: what is known of them so far.
 
-    A column's head holds the standard deviation of its values by the sensor's noise, once that is known.
+    A column's head holds its unit, and the standard deviation of its values by the sensor's noise once that is known.
     """
     number = found.campaign.names.index(run)
     sensor: dict[str, float] = {}
@@ -110,19 +112,24 @@ def event_rows(found: Looked, run: str) -> tuple[list[str], list[list[str]]]:
         if "recurrence" in sensor:  # of two onsets
             sensor["t_onset"] = sensor["recurrence"] / np.sqrt(2.0)
     known = [key for key in MEASURES if key in units and any(_finite(e[key]) for e in events)]
-    rows = [[str(i + 1), *(_text(e[key], units[key]) for key in known)] for i, e in enumerate(events)]
-    heads = [
-        f"{MEASURES[key]} ± {shown(sensor[key], units[key], 2)}" if key in sensor else MEASURES[key] for key in known
-    ]
-    return ["event", *heads], rows
+    columns = [_column(MEASURES[key], [e[key] for e in events], sensor.get(key), units[key]) for key in known]
+    rows = [list(row) for row in zip(*(cells for _, cells in columns), strict=True)]
+    return ["event", *(head for head, _ in columns)], [[str(i + 1), *row] for i, row in enumerate(rows)]
 
 
 def _finite(value: Any) -> bool:
     return value is not None and bool(np.isfinite(float(value)))
 
 
-def _text(value: Any, unit: str) -> str:
-    return shown(float(value), unit, 4) if _finite(value) else "-"
+def _column(name: str, values: Sequence[Any], std: float | None, unit: str) -> tuple[str, list[str]]:
+    """Head and cells of a column in one unit, to the place of the values' standard deviation (SI) where it is known."""
+    known = np.array([float(v) if _finite(v) else np.nan for v in values])
+    k, shown_unit = unit_of(known, unit)
+    if not std:
+        return label(name, shown_unit), [f"{v * k:.4g}" if np.isfinite(v) else "-" for v in known]
+    places = max(1 - int(np.floor(np.log10(std * k))), 0)  # two digits of the deviation
+    cells = [f"{v * k:.{places}f}" if np.isfinite(v) else "-" for v in known]
+    return f"{label(name, shown_unit)} ± {std * k:.{places}f}", cells
 
 
 def groups(found: Looked | None) -> list[dict[str, Any]]:

@@ -35,7 +35,12 @@ def name_of(found: Promise) -> str:
 
 
 def rows(
-    fit: Fit, promises: Sequence[Promise], diagnosis: Diagnosis | None, against: str, chosen: str = ""
+    fit: Fit,
+    promises: Sequence[Promise],
+    diagnosis: Diagnosis | None,
+    against: str,
+    period: float | None = None,
+    chosen: str = "",
 ) -> list[dict[str, Any]]:
     """What the catalogue shows, a row for each effect: those in the model first, the others by what is shown of them.
 
@@ -44,13 +49,14 @@ def rows(
         promises: of effects on top of it.
         diagnosis: whose gains are shown beside.
         against: the variable over which signatures are drawn (see :data:`stickslip.objects.picture.AGAINST`).
+        period: over which it is folded (SI); None for not at all.
         chosen: tag of the row that is marked.
     """
     ranked = diagnosis.candidates if diagnosis is not None else None
     known = {} if ranked is None or not len(ranked) else ranked.to_dict("index")
     best = [p for p in best_forms(promises) if p.tag not in fit.effects]
     top = max([p.fall for p in best if np.isfinite(p.fall)] + [float(k["gain"]) for k in known.values()] + [1.0])
-    order = bins(fit, against)
+    order = bins(fit, against, period)
     said = {p.tag for p in best}
     out = [_row(fit, each, known.get(each.tag), top, order, chosen) for each in best]
     for tag, found in known.items():  # before the effects were looked at
@@ -60,11 +66,12 @@ def rows(
     return [*inside, *sorted(out, key=lambda row: -row["share"])]
 
 
-def bins(fit: Fit, against: str) -> list[np.ndarray]:
-    """Points in the order of a variable, in parts with as many each."""
+def bins(fit: Fit, against: str, period: float | None = None) -> list[np.ndarray]:
+    """Points in the order of a variable, or of its phase over a period, in parts with as many each."""
     data = fit.force
     use = np.flatnonzero(~data.left_out.values)
     x = np.asarray(data[AGAINST[against]].values, float)[use]
+    x = x if period is None else np.mod(x / period, 1.0)
     return [part for part in np.array_split(use[np.argsort(x, kind="stable")], BINS) if part.size]
 
 
@@ -135,13 +142,15 @@ def _in_model(fit: Fit, tag: str, parts: Sequence[np.ndarray], chosen: str) -> d
         picture = signature(bare, law(fit, (), tag), parts)
     gain = fit.climbed.gains.get(tag)
     rung = max((i for i, r in enumerate(fit.climbed.ladder) if r.added == tag), default=0)
-    before, after = fit.ladder["unseen error"].iloc[[rung - 1, rung]] if rung else (np.nan, np.nan)
+    rungs = fit.ladder.iloc[[rung - 1, rung]] if rung else fit.ladder.iloc[:0]
+    pairs = rungs[["unseen error", "unseen std"]].to_numpy(float)
+    errors = [shown_with(*pair) for pair in pairs] if np.isfinite(pairs[:, 0]).all() else []
     return {
         **_empty(tag, chosen),
         "on": True,
         "share": 1.0,
         "gain": "in the model" if gain is None else f"in the model, gained {gain:.0f}",
-        "unseen": f"error on unseen runs {before:.2f} to {after:.2f}" if np.isfinite(before + after) else "",
+        "unseen": f"error on unseen runs {' to '.join(errors)}" if errors else "",
         "picture": picture,
         "amplitude": f"{name.partition('.')[2].replace('_', ' ')} {size}" if size else "",
     }

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data.segment import Segmentation, segment
+from ..data.segment import Segmentation, crept, segment
 from ..data.trace import Drive, Trace
 from ..errors import InputError, StickslipError
 from ..objects import Campaign, Diagnosis, Fit
@@ -139,28 +139,25 @@ def spread(values: Any) -> tuple[float, float, int]:
     return (float(found.mean()), float(found.std()), int(found.size)) if found.size else (np.nan, np.nan, 0)
 
 
-def measured(found: Segmentation) -> dict[str, tuple[float, float, int]]:
-    """Mean, deviation and number of the events of a run, for those of :data:`MEASURES` that a record gives."""
-    return {key: spread([getattr(e, key) for e in found.events]) for key in ("recurrence", "slip", "peak_velocity")}
+def measured(trace: Trace, found: Segmentation) -> dict[str, tuple[float, float, int]]:
+    """Mean, deviation and number of the events of a run, for each of :data:`MEASURES`."""
+    own = {key: [getattr(e, key) for e in found.events] for key in ("recurrence", "slip", "peak_velocity")}
+    return {key: spread(values) for key, values in {**own, "creep_before_slip": crept(trace, found)}.items()}
 
 
-def segmented(recording: Recording, trace: Trace) -> Segmentation:
-    """Events of a simulated run, found as those of a measured one are: with its sensor and its smallest slip.
+def simulated(recording: Recording, trace: Trace) -> dict[str, tuple[float, float, int]]:
+    """The same of a simulated run beside a measured one: with its sensor and its smallest slip.
 
     The recorder's own slips begin earlier, where the block outruns the load point; the creep between is no error.
     """
     own = trace.leading == "displacement"
     t, drive = recording["time"].values, recording["drive_position"].values
-    return segment(Trace(
+    seen = Trace(
         trace.name, t, displacement=recording["displacement"].values, drive=Drive.sampled(t, drive),
         resolution=trace.resolution if own else None, noise=trace.noise if own else None, virgin=trace.virgin,
         minimum_slip=trace.minimum_slip,
-    ))  # fmt: skip
-
-
-def simulated(recording: Recording, trace: Trace) -> dict[str, tuple[float, float, int]]:
-    """The same of a simulated run beside a measured one, and the creep before its slips."""
-    return {**measured(segmented(recording, trace)), "creep_before_slip": spread(recording["creep_before_slip"].values)}
+    )  # fmt: skip
+    return measured(seen, segment(seen))
 
 
 def steady_runs(campaign: Campaign) -> dict[str, tuple[float, dict[str, tuple[float, float, int]]]]:
@@ -171,7 +168,7 @@ def steady_runs(campaign: Campaign) -> dict[str, tuple[float, dict[str, tuple[fl
             continue
         speeds = np.diff(trace.drive.positions) / np.diff(trace.drive.times)
         if np.ptp(speeds) <= 0.2 * np.abs(speeds).max():
-            out[trace.name] = (trace.drive.speed, measured(found))
+            out[trace.name] = (trace.drive.speed, measured(trace, found))
     return out
 
 
@@ -361,16 +358,13 @@ def difference(found: Mapping[str, Recording]) -> str:
 
 
 def scatter(campaign: Campaign) -> dict[str, float]:
-    """Measure -> standard deviation of one event over its mean, the median over the steady runs; at least 0.1 %.
-
-    The creep before a slip counts as its slip does.
-    """
+    """Measure -> standard deviation of one event over its mean, the median over the steady runs; at least 0.1 %."""
     every = [values for _, values in steady_runs(campaign).values()]
     out = {}
-    for key in ("recurrence", "slip", "peak_velocity"):
+    for key in MEASURES:
         shares = [values[key][1] / abs(values[key][0]) for values in every if values[key][2] > 1 and values[key][0]]
         out[key] = max(float(np.median(shares)), EXACT) if shares else EXACT
-    return {**out, "creep_before_slip": out["slip"]}
+    return out
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from bokeh.plotting import figure as bokeh_figure
 from ..show.plots.style import RUNS, scaled
 
 FEW = "canvas"  # what draws some hundred points quickest
+DASHES = ("solid", "dashed", "dotdash", "dotted")  # as many as have no factor in common with the number of colours
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,12 @@ def dark() -> bool:
 def look() -> Look:
     """Colours of this window."""
     return DARK if dark() else LIGHT
+
+
+def of_run(number: int) -> dict[str, Any]:
+    """Colour and dash of a curve, by the number of its run or model; those of the first 28 differ."""
+    runs = look().runs
+    return {"color": runs[number % len(runs)], "line_dash": DASHES[number % len(DASHES)]}
 
 
 def label(text: str, unit: str = "") -> str:

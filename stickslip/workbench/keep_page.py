@@ -11,6 +11,7 @@ import panel as pn
 
 from ..errors import StickslipError
 from ..objects import Diagnosis, Fit
+from ..system.units import shown_with
 from . import kept
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Message, Words
@@ -36,9 +37,9 @@ def history(session: Session) -> list[list[str]]:
     rows = []
     for i, step in enumerate(session.steps):
         fit = step.fit
-        unseen = "" if fit.by_hand else f"{fit.unseen_error:.3f}"
+        unseen = "" if fit.by_hand else shown_with(fit.unseen_error, fit.unseen_error_std)
         undone = "undone" if i > session.at else "shown" if i == session.at else ""
-        rows.append([str(i + 1), step.text, _when(step.when), f"{fit.error:.3f}", unseen, undone])
+        rows.append([str(i + 1), step.text, _when(step.when), shown_with(fit.error, fit.error_std), unseen, undone])
     return rows
 
 

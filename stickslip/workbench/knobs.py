@@ -12,7 +12,7 @@ import numpy as np
 from ..inference.fit.parameters import Free
 from ..objects import Fit
 from ..objects.fit import MEANINGS, STRENGTH
-from ..system.units import shown
+from ..system.units import shown, shown_with
 
 DEVIATIONS = 12.0  # of a parameter that a slider reaches to either side
 LEAST, MOST = 0.3, 3.5  # e-folds to either side on a logarithmic scale
@@ -53,8 +53,7 @@ class Knob:
             "name": free.name,
             "label": own.replace("_", " "),
             "group": "" if tag in BASE else tag,
-            "text": shown(value, free.unit),
-            "std": f"± {shown(std, free.unit, 2)}" if std > 0.0 else "",
+            "text": shown_with(value, std, free.unit) if std > 0.0 else shown(value, free.unit),
             "prior": self.prior,
             "doc": free.doc,
             "place": self.place(value),

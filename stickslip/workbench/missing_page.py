@@ -12,18 +12,20 @@ from bokeh.models.annotations import Span
 from scipy.interpolate import make_smoothing_spline
 
 from ..errors import InputError
+from ..objects import Fit
 from ..objects.picture import AGAINST, PARTS, WIDEST
-from ..system.units import shown_with, to_si
+from ..system.units import shown, shown_with
+from . import folding
 from .controls import BUTTON, Catalogue, Message, Words
 from .evidence import bins, law, rows
-from .figures import figure, label, legend, look, source, unit_of
+from .figures import figure, label, legend, look, of_run, source, unit_of
+from .folding import PHASE
 from .session import Session, watch
 
 TITLE = "What is missing"
 WORDS = {"age": "time in contact", "place": "displacement", "event": "number of the event"}
 MANY = 4  # models of a ladder, above which their names are written aslant
 BENT = ("age", "velocity")  # variables whose small values matter as much as their large ones
-WAYS = ("time", "place", "slip path", "load point")  # along which something may come back
 KNOTS, FEWEST = 40, 5  # medians of the smooth curve, and how many different ones it needs
 FLOORS = (
     "Errors are in floors: 1 is as good as noise and scatter of the data allow. All rungs are held against the floors "
@@ -51,19 +53,25 @@ def page(session: Session) -> Any:
 
 
 class _Residual:
-    """Residual force over its floor against a variable, by run, with the smooth curve of all and the effect's law."""
+    """Residual force over its floor against a variable, by run, with the smooth curve of all and the effect's law.
+
+    Attributes:
+        chosen: tag of the effect that is laid over it, "" for none.
+        drawn: the variable (of ``AGAINST``), and the period (SI) it is folded over, None for none.
+    """
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self.chosen = ""
+        self.chosen, self._wrong = "", ""
+        self.drawn: tuple[str, float | None] = "age", None
         theme = look()
         self.against = pn.widgets.Select(
-            name="residual force against", options={WORDS.get(a, a): a for a in AGAINST}, value="age", width=220,
-            sizing_mode="fixed",
+            name="residual force against", options={WORDS.get(a, a): a for a in (*AGAINST, PHASE)}, value="age",
+            width=220, sizing_mode="fixed",
         )  # fmt: skip
         self.period = pn.widgets.TextInput(
-            name="folded over a period of", placeholder="such as 100 um, or 20 ms; empty: none", value="", width=260,
-            sizing_mode="fixed", description="Shows the phase of a lead screw's turn, of a vibration, of a worn track",
+            name="folded over a period of", value="", width=260, sizing_mode="fixed",
+            description="Shows the phase of a lead screw's turn, of a vibration, of a modulation, of a worn track",
         )  # fmt: skip
         self.figure = figure(y="residual force / floor", height=330)
         self._points: dict[str, Any] = {}
@@ -77,7 +85,7 @@ class _Residual:
             "x", "y", source=self._law, color=theme.model, line_width=4, line_dash="dashed",
             legend_label="what the chosen effect takes off",
         )  # fmt: skip
-        self._over = (asked, chosen)
+        self._curves = (asked, chosen)
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
         self._draw_runs()
         legend(self.figure, "below", ncols=4)
@@ -87,15 +95,15 @@ class _Residual:
         self.update()
 
     def _draw_runs(self) -> None:
-        """A colour for every run that has none yet, under the two curves of all runs."""
-        runs = look().runs
+        """A colour and a dash for every run that has none yet, under the two curves of all runs."""
         for name in self._session.campaign.names if self._session.campaign is not None else ():
             if name not in self._points:
-                more = {"color": runs[len(self._points) % len(runs)], "legend_label": name[:24]}
+                more = {**of_run(len(self._points)), "legend_label": name[:24]}
                 self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])
-                self.figure.scatter("x", "y", source=self._points[name], size=3, alpha=0.35, **more)
+                marks = {"color": more["color"], "legend_label": more["legend_label"]}
+                self.figure.scatter("x", "y", source=self._points[name], size=3, alpha=0.35, **marks)
                 self.figure.line("x", "y", source=self._medians[name], line_width=2.5, **more)
-        self.figure.renderers = [*(r for r in self.figure.renderers if r not in self._over), *self._over]
+        self.figure.renderers = [*(r for r in self.figure.renderers if r not in self._curves), *self._curves]
 
     def update(self) -> None:
         """Draw it anew; only numbers change."""
@@ -103,13 +111,12 @@ class _Residual:
         fit = self._session.fit
         if fit is None:
             return
-        against = self.against.value
+        self.drawn = against, period = self._over(fit)
         data = fit.force
         name = AGAINST[against]
         x = np.asarray(data[name].values, float)
         floor, use = data.floor.values, ~data.left_out.values
         z = data.residual.values / floor
-        period = self._period(str(data[name].attrs.get("units", "1")))
         if period is not None:
             x, k, unit = np.mod(x / period, 1.0), 1.0, "periods"
         else:
@@ -125,7 +132,9 @@ class _Residual:
                 "x": np.array([np.median(axis[p]) for p in parts]), "y": np.array([np.median(z[p]) for p in parts]),
             }  # fmt: skip
         self._smooth.data = dict(zip("xy", smooth(axis[use], z[use]), strict=True))
-        words = WORDS.get(against, against) if period is None else f"phase of {WORDS.get(against, against)}"
+        words = WORDS.get(against, against)
+        if period is not None:
+            words = f"phase of {words} over {shown(period, str(data[name].attrs['units']), 3)}"
         self.figure.xaxis.axis_label = label(words, text)
         if against in BENT:
             ticks, labels = _ticks(x)
@@ -138,27 +147,31 @@ class _Residual:
         if taken is None or taken.size != z.size:
             self._law.data = {"x": [], "y": []}
         else:
-            parts = bins(fit, against) if period is None else _parts(x, np.flatnonzero(use))
+            parts = bins(fit, against, period)
             self._law.data = {
                 "x": [float(np.median(axis[p])) for p in parts],
                 "y": [float(np.median(taken[p] / floor[p])) for p in parts],
             }
 
-    def _period(self, unit: str) -> float | None:
-        """The period that was typed (SI); None where there is none, or the variable has another unit."""
-        self.period.disabled = self.against.value not in WAYS
-        text = str(self.period.value or "").strip()
-        if self.period.disabled or not text:
-            return None
+    def _over(self, fit: Fit) -> tuple[str, float | None]:
+        """The variable that is drawn (of ``AGAINST``), and the period (SI) it is folded over; None for none."""
+        against, text = self.against.value, str(self.period.value or "").strip()
+        drive = against == PHASE
+        self.period.disabled = not drive and against not in folding.WAYS
+        example = "100 um, 20 ms, 50 Hz; empty: of the model" if drive else "100 um or 20 ms; empty: none"
+        self.period.placeholder, period, wrong = example, None, ""
         try:
-            found = to_si(text, unit, key="period")
+            if drive:
+                against = "load point"
+                against, period = folding.drive(text, fit)
+            elif text and not self.period.disabled:
+                period = folding.period(text, str(fit.force[AGAINST[against]].attrs["units"]))
         except InputError as error:
-            self._session.said = str(error).split("\n")[0]
-            return None
-        if not found > 0.0:
-            self._session.said = "a period is larger than zero"
-            return None
-        return found
+            wrong = str(error)
+        if wrong or self._session.said == self._wrong:  # what was wrong is mended
+            self._session.said = wrong
+        self._wrong = wrong
+        return against, period
 
 
 def smooth(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -171,10 +184,6 @@ def smooth(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(0), np.zeros(0)
     along = np.linspace(at[apart[0]], at[apart[-1]], 200)
     return along, make_smoothing_spline(at[apart], middle[apart])(along)
-
-
-def _parts(x: np.ndarray, use: np.ndarray) -> list[np.ndarray]:
-    return [p for p in np.array_split(use[np.argsort(x[use], kind="stable")], PARTS) if p.size]
 
 
 def _knee(x: np.ndarray) -> float:
@@ -209,7 +218,8 @@ class _Listed:
         self.head = pn.Row(self._diagnose, self._words, sizing_mode="stretch_width", margin=(16, 0, 8, 0))
         self.part = Catalogue(heard=self._heard, sizing_mode="stretch_width")
         self.verdict = pn.pane.HTML("", sizing_mode="stretch_width", margin=(8, 0, 0, 0))
-        residual.against.param.watch(lambda event: self.update(), "value")
+        for field in (residual.against, residual.period):
+            field.param.watch(lambda event: self.update(), "value")
         watch(session, ["steps", "at", "promises", "listed", "diagnosis", "busy", "searching", "loaded"], self.update)
         watch(session, ["steps", "at", "loaded"], self._look)
         self._looked: Any = None
@@ -242,7 +252,7 @@ class _Listed:
             return
         diagnosis = session.diagnosis if not fit.effects else None  # its gains are those on top of the base
         self.part.param.update(
-            rows=rows(fit, session.promises, diagnosis, self._residual.against.value, self._residual.chosen),
+            rows=rows(fit, session.promises, diagnosis, *self._residual.drawn, self._residual.chosen),
             closed=bool(session.busy),
         )
         self._diagnose.disabled = bool(session.searching)
@@ -276,8 +286,9 @@ class _Ladder:
         self._of: Any = None
         self._data = source(rung=[], fitted=[], unseen=[], step=[])
         self.figure = figure(
-            "the ladder: error of every model on the way here", y="error / floors", height=230, output_backend="canvas"
-        )
+            "the ladder: error of every model on the way here", "model: what each rung added", "error / floors",
+            height=246, output_backend="canvas",
+        )  # fmt: skip
         for name, colour, dash, mark in (
             ("fitted", theme.measured, "solid", "circle"),
             ("unseen", theme.model, "dashed", "square"),
@@ -324,19 +335,13 @@ def _table(every: Any) -> str:
     head = "".join(f'<th style="{cell}">{name}</th>' for name in ("fitted", "unseen", "gain"))
     lines = [f'<tr><th style="text-align: left">model</th>{head}</tr>']
     for _, row in every.iterrows():
-        texts = [_pair(row["error"], row["error std"]), _pair(row["unseen error"], row["unseen std"])]
+        pairs = (("error", "error std"), ("unseen error", "unseen std"))
+        texts = [shown_with(row[own], row[std]) if np.isfinite(row[own]) else "" for own, std in pairs]
         texts.append(f"{row['gain']:.0f}" if np.isfinite(row["gain"]) else "")
         numbers = "".join(f'<td style="{cell}">{t}</td>' for t in texts)
         lines.append(f'<tr><td style="padding-right: 14px">{escape(str(row["step"]))}</td>{numbers}</tr>')
     note = f'<div style="color: var(--wb-soft); font-size: 12px; margin-top: 6px">{FLOORS}</div>'
     return f'<div style="{CARD} color: var(--wb-text); font-size: 13px"><table>{"".join(lines)}</table>{note}</div>'
-
-
-def _pair(value: float, std: float) -> str:
-    """An error in floors with its deviation."""
-    if not np.isfinite(value):
-        return ""
-    return f"{value:.3f} ± {std:.3f}" if np.isfinite(std) else f"{value:.3f}"
 
 
 class _Backbone:
@@ -395,7 +400,9 @@ class _Backbone:
         }  # fmt: skip
         self.figure.xaxis.axis_label = label("displacement from the force-free contact", length)
         self.figure.yaxis.axis_label = label("force", unit)
-        self._scale, self._told = (m, k), f"u_max = {u_max * m:.3g} {length}, p = {float(data.attrs['p']):.2f}"
+        own = data.attrs
+        self._scale = m, k
+        self._told = f"u_max = {shown_with(u_max, own['u_max_std'], 'm')}, p = {shown_with(own['p'], own['p_std'])}"
         self._widest = float(u[-1])
         self.words.text = self._told
         self._session.find_rough_line()
@@ -415,7 +422,7 @@ class _Backbone:
         }  # fmt: skip
         a = line.attrs
         self.words.text = (
-            f"{self._told}; nearest rough lines: H = {a['H']:.2f} ± {a['H_std']:.2f}, h_rms = "
+            f"{self._told}; nearest rough lines: H = {shown_with(a['H'], a['H_std'])}, h_rms = "
             f"{shown_with(a['h_rms'], a['h_rms_std'], 'm')} (dotted: how such contacts differ)"
         )
 

@@ -237,8 +237,9 @@ class _Heat:
         )
         self._data = source(run=[], phase=[], error=[], std=[], text=[], colour=[], ink=[])
         self._data.name = "heat"
-        self.figure = figure("error in floors; a click shows the worst cycle", height=264,
-                             x_range=["all"], y_range=["all"], output_backend=FEW)  # fmt: skip
+        self.figure = figure("error in floors; a click shows the worst cycle", "run, velocity of its drive",
+                             "phase of the cycle", height=284, x_range=["all"], y_range=["all"],
+                             output_backend=FEW)  # fmt: skip
         self.figure.rect(
             "run", "phase", 0.96, 0.94, source=self._data, fill_color="colour", line_color=None,
         )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import hmac
 import logging
 import queue
@@ -10,7 +11,7 @@ import signal
 import socket
 import threading
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from tornado.httputil import HTTPServerRequest
@@ -22,11 +23,17 @@ from ..errors import InputError
 from . import own
 from .app import ready, view
 from .beside import close_all
-from .session import Session
-from .work import Worker
+from .session import LOOKING, Session
+from .work import Worker, end_all
 
 LOOPBACK = "127.0.0.1"
 NAMES = ("127.0.0.1", "localhost")
+PATIENCE = 3.0  # s that the first window may take to come, before which nothing is fitted
+CLOSED = "stickslip workbench: closed"
+LOCAL = (
+    "stickslip workbench: {url} (for a browser on the machine of the kernel; from another one through "
+    "jupyter-server-proxy: ss.workbench(campaign, proxy=...))"
+)
 
 
 class Refuse(RequestHandler):
@@ -58,7 +65,7 @@ class Door(Router):
 
 def serve(
     session: Session, *, port: int = 0, address: str = LOOPBACK, browser: bool = True,
-    tell: Callable[[str], None] = print, token: str | None = None, keep: bool = True,
+    tell: Callable[[str], None] = print, token: str | None = None, keep: bool = True, origins: Sequence[str] = (),
 ) -> None:  # fmt: skip
     """Serve a session until interrupted.
 
@@ -70,10 +77,12 @@ def serve(
         tell: told the address.
         token: in the address; random unless given.
         keep: the history beside the campaign's file.
+        origins: hosts whose pages may talk to it; default: its own, or any where ``address`` is not this machine's.
 
     Raises:
         InputError: the port is taken, or the address is none of this machine.
     """
+    import panel as pn
     from panel.io.resources import DIST_DIR
     from panel.io.server import get_server
 
@@ -83,21 +92,36 @@ def serve(
     token = token or secrets.token_urlsafe(16)
     port = _free(address, port)
     session.worker, session.aside = workers = Worker(), Worker()
-    origins = ["*"] if address not in NAMES else [f"{name}:{port}" for name in NAMES]
+    origins = list(origins) or (["*"] if address not in NAMES else [f"{name}:{port}" for name in NAMES])
+    waiting = session.campaign is not None
+
+    def begin() -> None:
+        nonlocal waiting
+        if waiting:
+            waiting = False
+            session.begin(keep)
+
+    def page() -> Any:
+        made = view(session)
+        pn.state.onload(begin)
+        return made
+
     server: Any = get_server(
-        {"/": lambda: view(session)}, port=port, address=address, prefix=f"/{token}", websocket_origin=origins,
+        {"/": page}, port=port, address=address, prefix=f"/{token}", websocket_origin=origins,
         title="stickslip", start=False, show=False, loop=IOLoop.current(),
         extra_patterns=[(r"/(favicon\.ico)", StaticFileHandler, {"path": DIST_DIR / "images"})],
     )  # fmt: skip
     server._http.request_callback = Door(server._tornado, token)
     server.start()
-    if threading.current_thread() is threading.main_thread():
+    alone = threading.current_thread() is threading.main_thread()
+    if alone:
         signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
     url = f"http://{f'[{address}]' if ':' in address else address}:{port}/{token}/"
     tell(url)
     watcher = own.watch(session, session.effects) if session.effects else None
-    if session.campaign is not None:
-        session.begin(keep)
+    if waiting:  # a fit would keep the first window waiting
+        session.busy = LOOKING
+        server.io_loop.call_later(PATIENCE, begin)
     if browser:
         server.io_loop.add_callback(webbrowser.open, url)
     try:
@@ -110,44 +134,71 @@ def serve(
         for worker in workers:
             worker.close()
         close_all(session)
+        if alone:
+            end_all()
 
 
 class Window:
     """A workbench in a notebook: a frame onto a server of its own, in a thread of the notebook's kernel.
 
     Attributes:
-        url: its address, on this machine and with its token.
+        url: its address, on the kernel's machine and with its token; a path of Jupyter where that forwards it.
         tall: pixels of the frame.
 
     Args:
         session: what it shows.
         tall: of the frame.
+        proxy: path of Jupyter under which ports are forwarded, such as ``/user/me/proxy``; "" for none. Who sends the
+            requests is then known to the proxy only, so the token alone says who may come in.
 
     Raises:
         InputError: the server cannot listen.
     """
 
-    def __init__(self, session: Session, tall: int = 1000) -> None:
+    def __init__(self, session: Session, tall: int = 1000, proxy: str = "") -> None:
         self.tall = tall
+        self._proxy, self._loop = proxy.rstrip("/"), IOLoop(make_current=False)
         told: queue.SimpleQueue[str | Exception] = queue.SimpleQueue()
 
         def run() -> None:
+            self._loop.make_current()
             try:
-                serve(session, browser=False, tell=told.put, keep=False)
+                serve(session, browser=False, tell=told.put, keep=False, origins=("*",) if proxy else ())
             except Exception as error:  # whoever waits is told
                 told.put(error)
 
-        threading.Thread(target=run, name="stickslip workbench", daemon=True).start()
+        self._thread = threading.Thread(target=run, name="stickslip workbench", daemon=True)
+        self._thread.start()
         found = told.get()
         if isinstance(found, Exception):
             raise found
-        self.url = found
+        atexit.register(self.close)  # else its processes would be waited for
+        port, token = found.rstrip("/").rsplit(":", 1)[1].split("/")
+        self.url = f"{self._proxy}/{port}/{token}/" if proxy else found
+
+    def close(self) -> None:
+        """End the server and all that goes on in it; once more does nothing."""
+        if self._thread.is_alive():
+            self._loop.add_callback(self._loop.stop)
+            self._thread.join()
+        atexit.unregister(self.close)
+
+    def __enter__(self) -> Window:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
 
     def _repr_html_(self) -> str:
-        return f'<iframe src="{self.url}" style="width: 100%; height: {self.tall}px; border: 0"></iframe>'
+        if not self._thread.is_alive():
+            return CLOSED
+        frame = f'<iframe src="{self.url}" style="width: 100%; height: {self.tall}px; border: 0"></iframe>'
+        return frame if self._proxy else f"{frame}<p>{LOCAL.format(url=self.url)}</p>"
 
     def __repr__(self) -> str:
-        return f"stickslip workbench: {self.url}"
+        if not self._thread.is_alive():
+            return CLOSED
+        return f"stickslip workbench: {self.url}" if self._proxy else LOCAL.format(url=self.url)
 
 
 def _free(address: str, port: int) -> int:

@@ -8,8 +8,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,51 +15,28 @@ from typing import Any
 import param
 
 from ..errors import RunFolderError, StickslipError
-from ..inference.force.first_order import Promise
-from ..objects import Campaign, Diagnosis, Fit, load_campaign
+from ..objects import Campaign, Fit, load_campaign
 from ..objects.fitted_run import FittedRun
 from ..physics.effects import catalogue
 from ..simulation.conformance import load_effects
 from ..system.progress import Cancelled
 from ..system.runstore import alone
-from . import searches
+from . import again
 from .journal import Journal
+from .looking import Looking
 from .shipped import to_work_in
+from .steps import Step, complete, fewer, first, moved
 from .watching import watch
-from .work import Search, Worker, at_once, end_all
+from .work import Worker, at_once
 
-__all__ = ["BASE", "HAND", "Session", "Step", "watch"]
+__all__ = ["LOOKING", "Note", "Session", "watch"]
 
-BASE = "the base model"
-HAND = "by hand"
-MOST = 60  # steps that are kept
-SAME = 0.01  # standard deviations by which a parameter that was fitted anew may be off
+LOOKING = "looking at the data"
 STILL = 0.25  # s without a move, after which a model that was moved is kept
 
 
 class Note(str):
     """What is said where nothing is wrong."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step of the history.
-
-    Attributes:
-        text: what was done, in words.
-        fit: the model after it.
-        code: the line of Python that does the same.
-        command: the command that does the same, or "" where there is none.
-        changed: parameters that were set by hand in it, with their values (SI).
-        when: it was taken: day and time of this machine.
-    """
-
-    text: str
-    fit: Fit
-    code: str
-    command: str = ""
-    changed: Mapping[str, float | str] = field(default_factory=dict)
-    when: str = field(default_factory=lambda: datetime.now().strftime("%Y-%m-%d %H:%M:%S"))
 
 
 class Session(param.Parameterized):
@@ -113,15 +88,12 @@ class Session(param.Parameterized):
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
         self._journal: Journal | None = None
-        self._search: Search | None = None
-        self._listing: Search | None = None
-        self._looked: tuple[Fit | None, int] = (None, 0)
+        self._looking = Looking(self)
         self._moves: dict[str, float | str] = {}
         self._guard = threading.Lock()
         self._held = ExitStack()
         self._kept: tuple[Any, ...] = ()
         self._anew = False
-        self._promised: list[tuple[Fit, tuple[Promise, ...]]] = []
 
     @property
     def fit(self) -> Fit | None:
@@ -192,55 +164,14 @@ class Session(param.Parameterized):
         self.begin(keep=keep)
 
     def _begin(self, campaign: Campaign) -> None:
-        with self._long("looking at the data"):
-            if self._journal is None or not self._again():
+        with self._long(LOOKING):
+            if self._journal is None or not again.history(self, self._journal):
                 self.busy = "fitting the base model"
-                self.first(_complete(campaign.fit()))
+                self.first(complete(campaign.fit()))
             if self.saved is not None:
-                self._restore(self.saved)
+                again.model(self, self.saved)
                 self.saved = None
             self.keep()
-
-    def _restore(self, saved: FittedRun) -> None:
-        """Fit a saved model anew, and set what was set by hand in it, as steps; none where it stands already."""
-        fit, forms, name = self.fit, list(saved.effect_forms), saved.folder.name
-        assert fit is not None and self.campaign is not None
-        aside = list(saved.result.get("kept_aside", ()))
-        runs = {run.name for run in fit.force_fit.problem.runs}
-        if sorted(fit.effect_forms) != sorted(forms) or runs & set(aside):
-            self.busy = f"fitting the model of {name}"
-            options: dict[str, Any] = {"holdout": aside} if aside else {}
-            fit = _complete(self.campaign.fit(forms, **options))
-            asked = [f"--add {form}" for form in forms] + [f"--holdout {run}" for run in aside]
-            code = f"fit = campaign.fit({forms!r}{f', holdout={aside!r}' if aside else ''})"
-            self.take(Step(f"the model of {name}", fit, code, " ".join(["stickslip fit campaign.toml", *asked])))
-        values, own = saved.parameters, fit.values
-        moved = {
-            n: values[n]["value"] for n, std in fit.std.items()
-            if n in values and abs(values[n]["value"] - own[n]) > SAME * std
-        }  # fmt: skip
-        if moved:
-            line = f"fit = fit.with_values({moved!r})"
-            self.take(Step(f"{HAND}: as in {name}", fit.with_values(moved), line, "", moved))
-
-    def _again(self) -> bool:
-        """Where it was left; whether there was anything."""
-        assert self._journal is not None
-        try:
-            rows, fits, more = self._journal.read()
-            self.diagnosis = self._journal.diagnosed() or self.diagnosis
-            if not rows:
-                return False
-            _complete(fits[-1])
-            steps = tuple(Step(**row, fit=fit) for row, fit in zip(rows, fits, strict=True))
-            at = min(int(more.get("at", len(steps) - 1)), len(steps) - 1)
-            locked = frozenset(map(str, more.get("locked", ())))
-            run, event = str(more.get("run", "")), int(more.get("event", 0))
-        except (StickslipError, OSError, KeyError, ValueError, TypeError, AttributeError) as error:
-            self.said = f"what was open before cannot be shown again ({error}); it begins anew"
-            return False
-        self.param.update(steps=steps, at=at, locked=locked, run=run, event=event)
-        return True
 
     def keep(self) -> None:
         """Write the history beside the campaign, if it changed."""
@@ -272,7 +203,7 @@ class Session(param.Parameterized):
             step: what was done.
             over: take the place of the last step instead, as a slider does while it is being dragged.
         """
-        kept = _fewer(self.taken[:-1] if over and self.taken else self.taken)
+        kept = fewer(self.taken[:-1] if over and self.taken else self.taken)
         with param.parameterized.batch_call_watchers(self):
             self.steps = (*kept, step)
             self.at = len(self.steps) - 1
@@ -297,7 +228,7 @@ class Session(param.Parameterized):
 
     def first(self, fit: Fit) -> None:
         """Begin the history with the base model."""
-        self.take(Step(BASE, fit, "fit = campaign.fit()", "stickslip fit campaign.toml"))
+        self.take(first(fit))
 
     def by_hand(self, values: Mapping[str, float | str], over: bool = False) -> None:
         """Parameters set by hand.
@@ -319,11 +250,8 @@ class Session(param.Parameterized):
         if fit is None or not values:
             return
         over = over and bool(self.taken) and bool(self.taken[-1].changed)
-        every = {**(self.taken[-1].changed if over else {}), **values}
         with self._told():
-            text = f"{HAND}: {', '.join(n.rpartition('.')[2].replace('_', ' ') for n in every)}"
-            made = Step(text, fit.with_values(values), f"fit = fit.with_values({dict(every)!r})", "", every)
-            self.take(made, over)
+            self.take(moved(fit, values, self.taken[-1].changed if over else {}), over)
             self.said = ""
         self.worker("keep", self.keep, STILL)
 
@@ -367,7 +295,7 @@ class Session(param.Parameterized):
                 return
             with self._long(busy):
                 made = make(fit)
-                _complete(made)
+                complete(made)
                 if self.campaign is not fit.campaign:  # another was opened meanwhile
                     return
                 self.take(Step(text, made, code, command(fit)))
@@ -432,70 +360,19 @@ class Session(param.Parameterized):
 
     def list_promises(self) -> None:
         """Look at every effect on top of the model as it stands, in a process beside, unless that goes on already."""
-        fit = self.fitted
-        if fit is None or (self.listed < 1.0 and self._looked == (fit, self.loaded)):
-            return
-        self._looked = (fit, self.loaded)
-        if self._listing is not None:
-            self._listing.cancel()
-            self._listing = None
-        for known, found_before in self._promised:
-            if known is fit:
-                self.param.update(promises=found_before, listed=1.0)
-                return
-        self.param.update(promises=(), listed=0.0)
-        own: list[Search] = []
-
-        def current() -> bool:
-            return bool(own) and self._listing is own[0]
-
-        def found(part: Sequence[Promise], share: float) -> None:
-            if current():
-                self.param.update(promises=(*self.promises, *part), listed=share)
-                if share >= 1.0:
-                    self._promised = [*self._promised[-7:], (fit, self.promises)]
-
-        def failed(text: str) -> None:
-            if current():
-                self.listed, self.said = 1.0, f"the effects could not be looked at: {text}"
-
-        own.append(searches.promises(fit, self.effects, found, failed))
-        self._listing = own[0]
+        self._looking.promises()
 
     def diagnose(self) -> None:
         """The whole search, in a process of its own; finished pieces are kept and used again."""
-        if self.searching or self.campaign is None:
-            return
-        self.searching, self.searched = "beginning", 0.0
-
-        def tell(text: str, share: float) -> None:
-            with param.parameterized.batch_call_watchers(self):
-                self.searching, self.searched = text.splitlines()[0], share
-
-        def done(found: Diagnosis) -> None:
-            self._search = None
-            with param.parameterized.batch_call_watchers(self):
-                self.diagnosis, self.searching = found, ""
-
-        def failed(text: str) -> None:
-            self._search = None
-            with param.parameterized.batch_call_watchers(self):
-                self.searching, self.said = "", f"the diagnosis ended: {text}"
-
-        out = None if self._journal is None else self._journal.diagnosis
-        self._search = searches.diagnosis(self.campaign, self.effects, out, tell, done, failed)
+        self._looking.diagnose(None if self._journal is None else self._journal.diagnosis)
 
     def stop(self) -> None:
         """End the diagnosis; what it has finished is used when it is begun again."""
-        if self._search is not None:
-            self._search.cancel()
-            self._search = None
-        self.searching = ""
+        self._looking.stop()
 
     def close(self) -> None:
         """End all that goes on beside."""
-        self.stop()
-        end_all()
+        self._looking.close()
         self._held.close()
 
     # effects of one's own
@@ -518,7 +395,6 @@ class Session(param.Parameterized):
                 gone = [tag for tag in forms if tag not in catalogue.tags()]
                 if gone:
                     self.said += f"; {', '.join(gone)} is in the model and in no file any more: switch it off"
-                self._promised = []
                 self.loaded += 1
 
         self.worker("", job)
@@ -555,23 +431,3 @@ class _Long:
         if isinstance(error, Exception):
             self._session.said = f"a fault of the program, the model is as it was: {type(error).__name__}: {error}"
         return False
-
-
-def _fewer(steps: tuple[Step, ...]) -> tuple[Step, ...]:
-    """The steps, the first of those by hand in one with the next where they are too many: each holds some 10 MB."""
-    out = list(steps)
-    while len(out) > MOST:
-        at = next((i for i, step in enumerate(out[:-1]) if step.changed), None)
-        if at is None:
-            break
-        out[at + 1] = replace(out[at + 1], code=f"{out[at].code}\n{out[at + 1].code}")
-        del out[at]
-    return tuple(out)
-
-
-def _complete(fit: Fit) -> Fit:
-    """The fit with all that pages ask for, found while the bar still runs."""
-    for name in ("force", "errors", "unseen_errors", "ladder", "backbone", "std"):
-        getattr(fit, name)
-    fit.with_values({})  # what a slider needs is compiled before a hand moves it
-    return fit

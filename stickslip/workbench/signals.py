@@ -57,7 +57,9 @@ class Signals:
 
     def _make_whole(self) -> Any:
         theme = look()
-        made = figure("the whole run", height=120, output_backend=DRAWN, x_range=Range1d(start=0.0, end=1.0))
+        made = figure(
+            "the whole run", label("time", "s"), height=140, output_backend=DRAWN, x_range=Range1d(start=0.0, end=1.0)
+        )
         made.line("t", "y", source=self._line, color=theme.measured)
         made.toolbar_location = None
         made.min_border_left = LEFT

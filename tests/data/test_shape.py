@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip.data.segment import LEVELS, event_shapes, segment
+from stickslip.data.segment import LEVELS, crept, event_shapes, segment
 from stickslip.data.trace import Drive, Trace
 
 DECAY = {
@@ -105,6 +105,19 @@ def test_creep_before_an_onset_is_aligned_at_it(stick_slip):
         far = ahead > 4 * (event.t_onset - begin)
         assert far.sum() > 8
         assert shape.creep[far] == pytest.approx(exact[far], abs=5e-9)
+
+
+def test_creep_between_two_slips_is_that_from_where_the_block_has_settled(stick_slip):
+    model = stick_slip(events=4)
+    trace = record(model, 1e4, noise=0.0, ring=100e-9)
+    found = segment(trace)
+    told = crept(trace, found)
+    assert np.isnan(told[0]) and told.size == 4
+    duration = np.median([e.duration for e in found.events])
+    for before, event, value in zip(found.events, found.events[1:], told[1:], strict=False):
+        slipped = model.position(event.t_onset) - model.position(model.starts[event.index])
+        crawled = model.creep * (model.starts[event.index] - before.t_arrest - 2.53 * duration)
+        assert value == pytest.approx(slipped + crawled, abs=5e-9)
 
 
 def test_displacement_in_a_hold():

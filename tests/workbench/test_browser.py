@@ -253,6 +253,45 @@ def test_a_diagnosis_goes_on_beside_and_can_be_cancelled(tmp_path):
         served.end()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["fit", "diagnosis"])
+def test_a_server_that_is_killed_in_the_midst_of_long_work_comes_back_with_what_was_open(tmp_path, what):
+    path = _campaign(tmp_path)
+    served = Served(path)
+    browser = Browser(str(CHROMIUM), str(DRIVER))
+    try:
+        browser.open(served.url, "Model")
+        browser.idle()
+        browser.wait(lambda: browser.js("return seen('.knob').length"))
+        browser.redraw("weakening.drop", 0.6)
+        browser.js("all('.knob[data-name=\"weakening.drop\"] .slider')[0].dispatchEvent(new Event('change'))")
+        browser.press("button", "▶")
+        cycle = browser.wait(lambda: "cycle 5 of" in browser.text(".line") and browser.text(".line"))
+        errors = browser.wait(lambda: "by hand" in browser.text(".errors") and browser.text(".errors"))
+        time.sleep(1.0)  # what was done is kept when nothing else is to be done
+        if what == "fit":
+            browser.press("button", "Fit")
+            browser.wait(lambda: "fitting" in browser.text(".bar"))
+        else:
+            browser.tab("missing")
+            browser.press("button", "Diagnose")
+            browser.wait(lambda: "%" in browser.text(".bar .text"), 120)
+        served.kill()
+        browser.wait(lambda: "the server does not answer" in browser.text("#gone"))
+        served = Served(path)
+        browser.open(served.url, "Model")
+        browser.wait(lambda: browser.text(".errors") == errors, 60)
+        assert "2 of 2: by hand" in browser.text(".model") and not browser.text(".bar")
+        browser.wait(lambda: browser.text(".line") == cycle)
+        if what == "fit":
+            browser.press("button", "Fit")
+            browser.wait(lambda: "3 of 3" in browser.text(".model"), 200)
+        assert not browser.text("#gone") and not browser.elsewhere()
+    finally:
+        browser.close()
+        served.end()
+
+
 def verdict(browser: Browser) -> str:
     """The verdict's sentence, or nothing."""
     return str(browser.js("const e = all('.verdict')[0]; return e ? e.textContent : ''"))

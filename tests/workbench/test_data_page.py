@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from contextlib import closing
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.objects import Campaign
-from stickslip.workbench import data_page
+from stickslip.workbench import adding_form, data_page
 from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, guess, look
 from stickslip.workbench.adding_form import FirstRun, Form
 from stickslip.workbench.event_parts import PARTS, part
@@ -220,6 +221,25 @@ def test_what_is_wrong_is_said_in_the_form(own):
     assert "sampling rate" in form.said.text
 
 
+def test_a_file_that_is_too_large_is_refused_by_the_server(own, monkeypatch):
+    monkeypatch.setattr(adding_form, "LARGEST", 0.01)
+    form = Form(Session(campaign=own))
+
+    def send(name: str, content: bytes, chunks: int) -> None:
+        for i, data in enumerate(np.array_split(np.frombuffer(content, np.uint8), chunks)):
+            given = {"name": name, "chunk": i + 1, "total_chunks": chunks, "data": data.tobytes(), "type": "text/csv"}
+            form.drop._process_event(SimpleNamespace(event_name="upload_event", data=given))
+
+    send("large.csv", _table(1000), 5)
+    assert "large.csv is larger than 0.01 MB" in form.said.text
+    assert form.dropped is None and not form.drop.value and not form.drop._file_buffer
+    send("run.csv", _table(), 3)
+    assert form.dropped == ("run.csv", _table()) and "400 rows" in form.said.text
+    send("other.csv", _table(300), 1)
+    send("run.csv", _table(), 1)
+    assert form.dropped[0] == "run.csv" and list(form.drop.value) == ["run.csv"]
+
+
 def test_a_file_that_is_dropped_where_nothing_is_open_begins_a_campaign(folder, base, tmp_path, monkeypatch):
     monkeypatch.setattr(Campaign, "fit", lambda self, effects=(): base)
     with closing(Session(home=tmp_path)) as session:
@@ -270,6 +290,19 @@ def test_a_table_more_leaves_the_file_byte_for_byte():
         assert new.startswith(old) and new.endswith(b"[[trace]]" + end + b"file = 'x'" + end)
 
 
+def test_events_are_listed_in_the_unit_and_to_the_place_of_their_deviations(campaign):
+    found = data_page.Looked(campaign, campaign.events, campaign.inspect())
+    heads, rows = data_page.event_rows(found, "v050")
+    at = next(i for i, head in enumerate(heads) if head.startswith("slip / µm ± "))
+    std = heads[at].split("± ")[1]
+    trace = found.inspection.result["traces"][0]
+    assert float(std) == pytest.approx(1e6 * trace["features"]["slip"]["sensor"], rel=0.1)
+    for row, event in zip(rows, trace["events"], strict=True):
+        assert float(row[at]) == pytest.approx(1e6 * event["slip"], abs=float(std))
+        assert len(row[at].partition(".")[2]) == len(std.partition(".")[2])
+    assert rows[0][heads.index(next(h for h in heads if h.startswith("recurrence / s")))] == "-"
+
+
 def test_what_the_data_tell_is_said(campaign):
     session = Session(campaign=campaign)
     assert data_page.page(session) is not None
@@ -277,5 +310,5 @@ def test_what_the_data_tell_is_said(campaign):
     told = {g["head"]: g["items"] for g in data_page.groups(found)}
     assert told["Can tell"] == campaign.inspect().can and told["Mended or left out"] == ["nothing"]
     columns, rows = data_page.event_rows(found, "v100")
-    ringing = next(i for i, head in enumerate(columns) if head.startswith("ringing ± "))
-    assert len(rows) == 7 and "Hz" in columns[ringing] and "Hz" in rows[3][ringing]
+    ringing = next(i for i, head in enumerate(columns) if head.startswith("ringing / Hz ± "))
+    assert len(rows) == 7 and float(rows[3][ringing]) > 100.0

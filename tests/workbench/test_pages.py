@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import http.client
+import re
 import urllib.error
 import urllib.request
+from types import SimpleNamespace
 
 import numpy as np
+import panel as pn
 import pytest
 
 from stickslip.inference.fit.parameters import effect_parameters
@@ -14,8 +18,8 @@ from stickslip.inference.force.first_order import promise
 from stickslip.inference.force.signatures import Explained
 from stickslip.objects import Diagnosis
 from stickslip.physics.effects import catalogue
-from stickslip.system.units import shown
-from stickslip.workbench import app, missing_page, model_page
+from stickslip.system.units import shown, shown_with, to_si
+from stickslip.workbench import app, folding, keep_page, missing_page, model_page
 from stickslip.workbench.evidence import best_forms, bins, rows, signature
 from stickslip.workbench.figures import DARK, LIGHT
 from stickslip.workbench.free_panel import Free
@@ -23,6 +27,8 @@ from stickslip.workbench.knobs import Knob, given, knobs
 from stickslip.workbench.knobs import rows as knob_rows
 from stickslip.workbench.session import Session
 from stickslip.workbench.watching import Place
+
+from .outline import OUTLINE, outline
 
 LISTED = ("contact-ageing", "drive-ripple", "sensor-drift", "viscous-drag")
 
@@ -52,7 +58,10 @@ def test_a_slider_shows_and_gives_back_its_value(base):
     for row in knob_rows(base, base, made, {"weakening.drop"}):
         assert row["band"][0] <= row["place"] <= row["band"][1]
         assert row["locked"] == (row["name"] == "weakening.drop")
-        assert row["text"] and row["std"].startswith("±")
+        number, deviation, unit = re.fullmatch(r"(-?[\d.]+) ± ([\d.]+) ?(.*)", row["text"]).groups()
+        assert len(number.partition(".")[2]) == len(deviation.partition(".")[2])  # to the same place, in one unit
+        shown_value = to_si(f"{number} {unit}".strip(), made[row["name"]].free.unit)
+        assert shown_value == pytest.approx(base.values[row["name"]], rel=0.1)
 
 
 def test_a_slider_reaches_the_bounds_of_a_parameter():
@@ -90,6 +99,45 @@ def test_the_nearest_rough_lines_are_drawn_beside_the_backbone(session, base):
     assert drawn.size == curve.size and np.abs(drawn - curve).max() < 0.2 * curve.max()
 
 
+def test_the_pictures_of_the_docs_are_of_these_pages(session):
+    now, then = outline(session).splitlines(), OUTLINE.read_text(encoding="utf-8").splitlines()
+    assert now == then, "python docs/make_workbench.py makes them anew"
+
+
+def test_curves_of_many_runs_can_be_told_apart(session, monkeypatch):
+    names = [f"run {i}" for i in range(28)]
+    monkeypatch.setattr(type(session.campaign), "names", names)
+    part = missing_page._Residual(session)
+    drawn = {r.data_source.id: (r.glyph.line_color, str(r.glyph.line_dash)) for r in part.figure.renderers}
+    assert len({drawn[part._medians[name].id] for name in names}) == len(names)
+
+
+@pytest.mark.parametrize("module", app.modules())
+def test_every_axis_says_what_is_on_it(session, module):
+    made = module.page(session)
+    for pane in made.select(pn.pane.Bokeh):
+        for axis in pane.object.axis:
+            below = axis.major_label_text_font_size == "0px"  # the axis of the figure below is its own
+            said = axis.axis_label or (axis in pane.object.yaxis and " / " in pane.object.title.text)
+            assert said or below or not pane.object.visible, pane.object.title.text
+
+
+def test_errors_and_the_law_of_the_backbone_have_their_deviations(session, base):
+    errors = [shown_with(base.error, base.error_std), shown_with(base.unseen_error, base.unseen_error_std)]
+    assert all("±" in text for text in errors)
+    assert app.frame(session).errors == f"error {errors[0]} fitted, {errors[1]} unseen"
+    assert keep_page.history(session)[0][3:5] == errors
+    assert all(text in missing_page._Ladder(session).table.object for text in errors)
+    law = base.backbone.attrs
+    told = missing_page._Backbone(session).words.text
+    assert (
+        f"u_max = {shown_with(law['u_max'], law['u_max_std'], 'm')}, p = {shown_with(law['p'], law['p_std'])}" in told
+    )
+    session.by_hand({"weakening.drop": base.values["weakening.drop"] * 1.02})
+    moved = session.fit
+    assert f"error {shown_with(moved.error, moved.error_std)} by hand" in app.frame(session).errors
+
+
 def test_the_pages_are_made_before_there_is_a_model(campaign):
     session = Session(campaign=campaign)
     for module in (model_page, missing_page):
@@ -120,6 +168,30 @@ def test_the_residual_is_folded_over_a_period(session, base):
         assert session.said and "phase" not in part.figure.xaxis.axis_label
     part.against.value = "velocity"
     assert part.period.disabled
+
+
+def test_the_phase_of_the_drive_is_of_what_is_stated_or_of_a_periodic_effect_in_the_model(session, base, monkeypatch):
+    part = missing_page._Residual(session)
+    part.against.value = "phase of the drive"
+    assert "no effect in the model is periodic" in session.said
+    force = base.force
+    run = str(force.run.values[0])
+    use = (force.run.values == run) & ~force.left_out.values
+    for text, variable, period in (("20 um", "load_point", 20e-6), ("20 ms", "time", 0.02), ("40 Hz", "time", 0.025)):
+        part.period.value = text
+        turns = np.sort(np.mod(force[variable].values[use] / period, 1.0))
+        assert part._points[run].data["x"] == pytest.approx(turns), text
+        assert part.figure.xaxis.axis_label.startswith("phase of ") and "periods" in part.figure.xaxis.axis_label
+        assert session.said == ""
+    part.period.value = "5 kg"
+    assert "50 Hz" in session.said
+    for tag, name, value, found in (
+        ("drive-ripple", "pitch", 1e-4, ("load point", 1e-4)), ("load-modulation", "frequency", 25.0, ("time", 0.04)),
+    ):  # fmt: skip
+        effect = SimpleNamespace(tag=tag)
+        problem = SimpleNamespace(composition=SimpleNamespace(effects=(effect,)))
+        fit = SimpleNamespace(force_fit=SimpleNamespace(problem=problem), values={f"{tag}.{name}": value})
+        assert folding.drive("", fit) == found
 
 
 def test_the_effect_that_is_laid_over_is_drawn_over_all_else(session, base, promises):
@@ -221,7 +293,7 @@ def test_what_a_promise_takes_off_brings_the_cost_down(base, promises):
 
 
 def test_the_catalogue_has_its_rows(base, promises):
-    made = rows(base, promises, None, "age", "drive-ripple")
+    made = rows(base, promises, None, "age", chosen="drive-ripple")
     assert made[0]["tag"] == "contact-ageing"
     assert [r["tag"] for r in made if r["chosen"]] == ["drive-ripple"]
     assert made[0]["share"] == 1.0 and all(0.0 <= r["share"] <= 1.0 for r in made)
@@ -250,8 +322,9 @@ def test_the_catalogue_is_in_the_order_of_what_it_shows(campaign, base, promises
 
 def test_an_effect_in_the_model_shows_what_it_takes_off(aged):
     (made,) = rows(aged, (), None, "age")
-    before, after = (float(text) for text in made["unseen"].removeprefix("error on unseen runs ").split(" to "))
-    assert after == pytest.approx(aged.unseen_error, abs=0.006) and before > 2.0 * after
+    before, after = made["unseen"].removeprefix("error on unseen runs ").split(" to ")
+    assert after == shown_with(aged.unseen_error, aged.unseen_error_std) and "±" in after
+    assert float(before.split()[0]) > 2.0 * aged.unseen_error
     residual, law, _ = (np.array(curve) for curve in made["picture"])
     assert np.corrcoef(residual[:, 1], law[:, 1])[0, 1] > 0.9
 
@@ -308,10 +381,35 @@ def test_a_notebook_shows_the_same_pages(campaign, base, monkeypatch):
     assert "<title>stickslip" in page and "cdn." not in page
     with pytest.raises(urllib.error.HTTPError):  # without the token
         urllib.request.urlopen(shown.url.rsplit("/", 2)[0] + "/", timeout=30)
+    assert "on the machine of the kernel" in repr(shown) and repr(shown) in shown._repr_html_()
+    with shown:
+        pass
+    assert "closed" in repr(shown) and "iframe" not in shown._repr_html_()
+    with pytest.raises(urllib.error.URLError, match="refused"):
+        urllib.request.urlopen(shown.url, timeout=30)
+    shown.close()
+
+
+def test_a_notebook_of_a_hub_shows_them_through_its_proxy(campaign, base, monkeypatch):
+    import stickslip as ss
+
+    monkeypatch.setattr(type(campaign), "fit", lambda self, **_: base)
+    monkeypatch.setattr(Session, "list_promises", lambda self: None)
+    monkeypatch.setenv("JUPYTERHUB_SERVICE_PREFIX", "/user/me/")
+    with ss.workbench(campaign) as shown:
+        port, token = re.fullmatch(r"/user/me/proxy/(\d+)/([\w-]+)/", shown.url).groups()
+        assert f'src="{shown.url}"' in shown._repr_html_() and "of the kernel" not in repr(shown)
+        connection = http.client.HTTPConnection(f"127.0.0.1:{port}", timeout=30)
+        upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}
+        key = {"Sec-WebSocket-Key": "MDEyMzQ1Njc4OWFiY2RlZg==", "Origin": "https://hub.example.org"}
+        connection.request("GET", f"/{token}/ws", headers={**upgrade, **key})
+        assert connection.getresponse().status != 403
+    with ss.workbench(campaign, proxy="") as shown:
+        assert shown.url.startswith("http://127.0.0.1:")
 
 
 def test_of_many_steps_the_first_by_hand_are_forgotten(session, base, monkeypatch):
-    monkeypatch.setattr("stickslip.workbench.session.MOST", 3)
+    monkeypatch.setattr("stickslip.workbench.steps.MOST", 3)
     for share in (1.01, 1.02, 1.03, 1.04, 1.05):
         session.by_hand({"weakening.drop": base.values["weakening.drop"] * share})
     assert len(session.steps) == 4 and session.steps[0].fit is base

@@ -20,7 +20,7 @@ from stickslip.system.runstore import json_text
 from stickslip.workbench import own, shipped
 from stickslip.workbench.journal import FOLDER
 from stickslip.workbench.opening import campaign_of, offered, opened
-from stickslip.workbench.serve import _free
+from stickslip.workbench.serve import PATIENCE, _free
 from stickslip.workbench.session import Note, Session
 from stickslip.workbench.shipped import copied, example, to_work_in
 
@@ -57,7 +57,7 @@ def served(folder):
     assert made.end() == 0
 
 
-@pytest.mark.parametrize("after", [0.3, 1.0])
+@pytest.mark.parametrize("after", [0.3, PATIENCE + 0.3, PATIENCE + 1.0])
 def test_it_ends_cleanly_in_the_midst_of_a_fit(folder, after):
     for kept in (folder / FOLDER).glob("*"):
         kept.unlink()

@@ -177,7 +177,7 @@ def test_a_fit_of_a_campaign_that_is_not_open_any_more_is_no_step(base, session)
 
 
 def test_steps_that_are_dropped_leave_their_lines(base, session, monkeypatch):
-    monkeypatch.setattr("stickslip.workbench.session.MOST", 3)
+    monkeypatch.setattr("stickslip.workbench.steps.MOST", 3)
     for share in (1.01, 1.02, 1.03, 1.04):
         session.by_hand({DROP: base.values[DROP] * share})
     assert len(session.steps) == 4
@@ -251,7 +251,7 @@ def test_a_second_window_leaves_the_listing_that_goes_on(session, base, monkeypa
     begun[0][1]([], 1.0)
     session.list_promises()
     assert len(begun) == 1 and session.promises == ("one",)
-    session._promised, session.loaded = [], 1
+    session.loaded = 1
     session.list_promises()
     session.loaded = 2
     session.list_promises()

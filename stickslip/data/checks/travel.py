@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ..segment import Event, Segmentation, block_motion
 from ..trace import Drive, Trace
@@ -150,7 +150,7 @@ def _slope(drive: Drive, t: Array, x: Array, noise: float) -> tuple[float, float
         level = max(float(np.sqrt(np.sum(rest[use] ** 2) / free)), noise)
         inverse = np.linalg.inv(a[use].T @ a[use])
         # few slips know their own scatter badly
-        std = level * float(np.sqrt(inverse[-1, -1])) * float(student.ppf(0.8413, free))
+        std = level * float(np.sqrt(inverse[-1, -1])) * float(stdtrit(free, 0.8413))
         return float(found[-1]), std, span
 
 

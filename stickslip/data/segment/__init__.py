@@ -17,7 +17,7 @@ from .pick import directions, half_of, pick
 from .records import PHASES, Dropped, Event, Phase, Segmentation, Settings
 from .reduce import reduce_trace, thin
 from .ringing import LAWS, Ringing
-from .shape import LEVELS, Shape, Shapes, event_shapes
+from .shape import LEVELS, Shape, Shapes, crept, event_shapes
 
 __all__ = [
     "LAWS",
@@ -33,6 +33,7 @@ __all__ = [
     "Shapes",
     "block_motion",
     "choose_settings",
+    "crept",
     "estimate_resolution",
     "event_shapes",
     "noise_level",

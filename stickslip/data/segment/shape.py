@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,13 +122,35 @@ def _after(found: Segmentation, event: Event, end: float) -> float:
 def _overshoot(time: Array, position: Array, found: Segmentation, event: Event, duration: float) -> float:
     if event.arrest != "zero":
         return float("nan")  # the block did not stop, so its position there is no turning point
+    return event.direction * (event.x_arrest - _settled(time, position, found, event, duration))
+
+
+def _settled(time: Array, position: Array, found: Segmentation, event: Event, duration: float) -> float:
+    """Mean position (m) some slip durations after the arrest, where ringing averages out; NaN where it slips before."""
     centre, width = event.t_arrest + REST * duration, REST_WIDTH * duration
     if centre + width > _after(found, event, float(time[-1])):
         return float("nan")
     low, high = np.searchsorted(time, [centre - width / 2, centre + width / 2])
-    if high - low < 3:
-        return float("nan")
-    return event.direction * (event.x_arrest - float(np.mean(position[low:high])))
+    return float(np.mean(position[low:high])) if high - low >= 3 else float("nan")
+
+
+def crept(trace: Trace, found: Segmentation) -> Array:
+    """Displacement from where the block has settled after a slip to the next onset, along that slip (m).
+
+    Args:
+        trace, found: a run and its events.
+
+    Returns:
+        One for each event, shape (n,); NaN for the first, and where the block does not settle.
+    """
+    out = np.full(len(found.events), np.nan)
+    if out.size:
+        position, _, _, _ = block_motion(trace, gain=found.settings.gain)
+        duration = float(np.median([e.duration for e in found.events]))
+        for i, (before, event) in enumerate(pairwise(found.events), 1):
+            rest = _settled(trace.time, position, found, before, duration)
+            out[i] = event.direction * (event.x_onset - rest)
+    return out
 
 
 def _creep(time: Array, position: Array, found: Segmentation, event: Event, before: Array) -> Array:

@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from ...physics.effects import catalogue
 from ...physics.params import specs
@@ -162,7 +162,7 @@ class Judge:
     def beside(self, fit: Fit, number: int, members: int = 1, own: bool = False, price: float = 0.0) -> Compared:
         """A model with ``number`` parameters more, the best of ``members``; ``own`` where runs have their own."""
         gain = max(self.base.cost - fit.cost, 0.0)
-        chance = min(1.0, float(chi2.sf(max(gain - price, 0.0) / DISPERSION, number)) * members * self.tried)
+        chance = min(1.0, float(chdtrc(number, max(gain - price, 0.0) / DISPERSION)) * members * self.tried)
         without, predicted = self._unseen[own], unseen(fit, self._halves if own else self._runs)
         return Compared(fit, gain, chance, without.cost - predicted.cost)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from ...errors import InputError
 from ...physics.effects import catalogue
@@ -111,7 +111,7 @@ def judged(curve: Backbone, power: PowerLaw, found: Laws) -> Shape:
     laws = []
     for s in found.shaped:
         gain = s.gain - price(s.free, s.free.inward(s.amplitude))
-        chance = float(chi2.sf(max(gain, 0.0) / DISPERSION, 1)) * s.members * tried
+        chance = float(chdtrc(1, max(gain, 0.0) / DISPERSION)) * s.members * tried
         laws.append(Law(s, min(1.0, chance), gain))
     laws.sort(key=lambda law: -law.gain)
     seen = [law for law in laws if law.chance < CHANCE]

@@ -6,10 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import periodogram
-from scipy.signal.windows import hann
-from scipy.stats import chi2
-from scipy.stats import f as ratio_of_powers
+from scipy.special import chdtri, fdtri
 
 from ...data.segment import Event, Segmentation
 from ...data.trace import Trace
@@ -63,18 +60,18 @@ def _heard(traces: Sequence[Trace], segmentations: Sequence[Segmentation], lengt
     band = np.flatnonzero((frequency > low) & (frequency < rate / 5.0))
     if band.size < 3:
         return None
-    loud = np.mean([_power(y[:size], rate, length) for y, _ in found], axis=0)
+    loud = np.mean([_power(y[:size], length) for y, _ in found], axis=0)
     i = int(band[np.argmax(loud[band])])
     # the spectrum of a slow motion, or of noise that grows towards low frequencies, has no peak but an edge
     if loud[i] < loud[i - 1 : i + 2].max():
         return None
     bins = 2.0 * band.size / 8.0
     events = len(found)
-    limit = max(STANDS_OUT, chi2.isf(ALARM / bins, 2 * events) / chi2.median(2 * events))
+    limit = max(STANDS_OUT, chdtri(2 * events, ALARM / bins) / chdtri(2 * events, 0.5))
     excess = float(loud[i] / (limit * np.median(loud[band])))
-    calm = [_power(y[:size], rate, length) for _, rest in found for y in rest]
+    calm = [_power(y[:size], length) for _, rest in found for y in rest]
     if calm:
-        limit = max(LOUDER, ratio_of_powers.isf(ALARM / bins, 2 * events, 2 * len(calm)))
+        limit = max(LOUDER, fdtri(2 * events, 2 * len(calm), 1.0 - ALARM / bins))
         excess = min(excess, float(loud[i] / (limit * np.mean(calm, axis=0)[i])))
     return (float(frequency[i]), excess) if excess > 1.0 else None
 
@@ -94,14 +91,16 @@ def _windows(
     return position[first : first + n], [position[k : k + n] for k in starts]
 
 
-def _power(y: Array, rate: float, length: float) -> Array:
-    """Spectrum of a piece freed from slow motion; a short one is weighed where its ringing is loudest."""
+def _power(y: Array, length: float) -> Array:
+    """Spectrum of a piece freed from slow motion (of no scale); a short one is weighed where its ringing is loudest."""
     s = np.linspace(-1, 1, y.size)
     y = y - np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyfit(s, y, 3))
-    taper: Array = hann(y.size, sym=False)
+    taper = _hann(y.size)
     if length != LONG:
         rise = y.size // 4
-        taper = np.concatenate(
-            [hann(2 * rise, sym=False)[:rise], hann(2 * (y.size - rise), sym=False)[y.size - rise :]]
-        )
-    return np.asarray(periodogram(y, rate, window=taper, nfft=8 * y.size, detrend=False)[1], float)
+        taper = np.concatenate([_hann(2 * rise)[:rise], _hann(2 * (y.size - rise))[y.size - rise :]])
+    return np.asarray(np.abs(np.fft.rfft(y * taper, 8 * y.size)) ** 2)
+
+
+def _hann(n: int) -> Array:
+    return np.asarray(0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n) / n))

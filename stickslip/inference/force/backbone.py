@@ -49,6 +49,16 @@ class PowerLaw:
     misfit: float
     force: Array
 
+    @property
+    def u_max_std(self) -> float:
+        """Standard deviation of ``u_max`` (m)."""
+        return self.u_max * float(np.sqrt(self.covariance[0, 0]))
+
+    @property
+    def p_std(self) -> float:
+        """Standard deviation of ``p``."""
+        return (self.p - 1.0) * float(np.sqrt(self.covariance[1, 1]))
+
 
 def backbone(found: Fit) -> Backbone:
     """The measured backbone with its band."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from .fit import Fit
 from .knots import RING
@@ -95,7 +95,7 @@ def structures(fit: Fit, explained: Explained, dispersion: float = 1.0) -> list[
         if at.size < 3:
             continue
         fall, sizes = explained.gain(columns)
-        chance = float(chi2.sf(fall / dispersion, at.size) * len(VARIABLES))
+        chance = float(chdtrc(at.size, fall / dispersion) * len(VARIABLES))
         out.append(Structure(name, unit, fall, min(chance, 1.0), at, sizes * fit.strength))
     return sorted(out, key=lambda s: s.chance)
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from ...errors import InputError
 from .past import Past
@@ -103,6 +102,8 @@ class Curves:
 
     def seen(self, risen: float, gone: float, missing: Array) -> Array:
         """Likelihood of a rise over the last ``lag`` at each travel, shape (k,): Student's, for sticks are few."""
+        from scipy.stats import t as student  # half a second, which no other command needs
+
         mean = np.mean(self.missing_at(gone, self.lag) - missing, axis=0)
         coarse = np.gradient(mean) ** 2 / 12.0  # within one step of travel
         n = self.length.size

@@ -6,17 +6,16 @@ import functools
 import io
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
 from ...system.runstore import write_aside
 from ...system.units import PREFIXES, power_for, takes_prefix
+
+if TYPE_CHECKING:  # what only takes colours from here need not wait for matplotlib
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # dark, middle and light, so that a grey print keeps them apart; the line styles differ as well
 DARK, MIDDLE, LIGHT = "#14213d", "#c8553d", "#8d99ae"
@@ -51,6 +50,8 @@ def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
     @functools.wraps(draw)
     def wrapper(*args: Any, **kwargs: Any) -> Figure:
+        from matplotlib import rc_context
+
         with rc_context(_LOOK):
             return draw(*args, **kwargs)
 
@@ -59,6 +60,9 @@ def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
 def figure(rows: int = 1, columns: int = 1, *, width: float = 7.0, height: float = 4.2) -> tuple[Figure, np.ndarray]:
     """A figure and its axes, shape (rows, columns); sizes in inches of the whole."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     made = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(made)
     return made, np.asarray(made.subplots(rows, columns, squeeze=False))
@@ -83,6 +87,8 @@ def scaled(values: np.ndarray, unit: str) -> tuple[float, str]:
 
 def logarithmic(axes: Axes, which: str) -> None:
     """A logarithmic axis ("x" or "y") with plain numbers at 1, 2 and 5 of every decade."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     (axes.set_xscale if which == "x" else axes.set_yscale)("log")
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -97,6 +103,8 @@ def signed_log(axes: Axes, values: np.ndarray) -> None:
         axes: drawn in.
         values: that are drawn, in the axis' unit.
     """
+    from matplotlib.ticker import FixedLocator
+
     low, high = float(np.min(values)), float(np.max(values))
     top = max(-low, high, 1e-300)
     linear = 0.002 * top
@@ -116,6 +124,8 @@ def remark(axes: Axes, text: str) -> None:
 
 def save(figure: Figure, path: str | Path, dpi: int = 130) -> Path:
     """Write a PNG without time stamp or version, so that equal results are equal files."""
+    from matplotlib import rc_context
+
     path = Path(path)
     buffer = io.BytesIO()
     metadata: dict[str, Any] = {"Software": None}

@@ -26,7 +26,6 @@ export function render({ model }) {
     const head = part("div", "head", box)
     const label = part("span", "label", head)
     const value = part("span", "value", head)
-    const std = part("span", "std", head)
     const way = part("div", "way", box)
     const band = part("div", "band", part("div", "rail", way))
     band.title = "one standard deviation to either side of the value"
@@ -74,7 +73,6 @@ export function render({ model }) {
       put(label, "textContent", now.label)
       put(label, "title", now.doc)
       put(value, "textContent", now.text)
-      put(std, "textContent", now.std)
       put(prior, "textContent", now.prior)
       put(prior, "title", now.prior)
       put(low, "textContent", now.low)

@@ -1,0 +1,115 @@
+"""What is to be simulated, as it is written on the page, of which model, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import panel as pn
+
+from ..errors import InputError
+from ..objects import Fit
+from ..simulation.scenario.recording import Recording
+from ..system.units import shown
+from .controls import BUTTON
+from .experiments import Setting
+from .parts import head
+from .picked import chosen
+from .session import Session, watch
+
+FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
+WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """One simulated run, and what it was."""
+
+    fit: Fit
+    setting: Setting
+    recording: Recording
+
+
+def press(name: str, call: Any, width: int = 150) -> pn.widgets.Button:
+    made = pn.widgets.Button(name=name, width=width, stylesheets=[BUTTON], margin=(22, 8, 0, 0), **FIXED)
+    made.on_click(lambda event: call())
+    return made
+
+
+class Asked:
+    """What is to be simulated."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        text: Any = partial(pn.widgets.TextInput, width=150, margin=(0, 10, 0, 0), **FIXED)
+        self.run: Any = pn.widgets.Select(name="beside the run", options=[], width=170, margin=(0, 10, 0, 0), **FIXED)
+        self.velocity = text(name="velocity of the drive")
+        self.hold = text(name="a hold of", placeholder="such as 10 s")
+        self.step = text(name="a step to the velocity", placeholder="such as 1 mm/s")
+        self.spring, self.mass = text(name="spring"), text(name="mass")
+        self.events = pn.widgets.IntInput(
+            name="number of slips",
+            description="At a velocity written here, and in the sweep",
+            value=7,
+            start=1,
+            end=100,
+            width=150,
+            margin=(0, 10, 0, 0),
+            **FIXED,
+        )
+        asked = (self.run, self.velocity, self.hold, self.step, self.spring, self.mass, self.events)
+        self.row = pn.FlexBox(*asked, gap="6px 0")
+        self.view = pn.Column(head("What is left empty is as in the measured run."), self.row, **WIDE)
+        self.run.param.watch(lambda event: self._placeholders(), "value")
+        watch(session, ["campaign", "run"], self._runs)
+        watch(session, ["steps", "at"], self._placeholders)
+        self._runs()
+
+    def _runs(self) -> None:
+        campaign, fit = self._session.campaign, self._session.fit
+        if campaign is None:
+            return
+        names = campaign.names if fit is None else [k.name for k in fit.climbed.prepared.runs]
+        run = chosen(self._session)[0]
+        self.run.param.update(options=names, value=run if run in names else names[0])
+        self._placeholders()
+
+    def _placeholders(self) -> None:
+        """What it is in the measured run."""
+        campaign, fit = self._session.campaign, self._session.fit
+        if campaign is None or self.run.value not in campaign.names:
+            return
+        trace = campaign[self.run.value]
+        holds = trace.drive is not None and trace.drive.breakpoints.size > 0
+        speed = trace.drive_velocity
+        self.velocity.placeholder = "as measured" if speed is None or holds else shown(speed, "m/s")
+        if fit is not None:
+            spring = trace.spring_stiffness or fit.values.get("rig.spring_stiffness")
+            self.spring.placeholder = "" if spring is None else shown(spring, "N/m")
+            mass = fit.values.get("rig.mass", campaign.rig.mass)
+            self.mass.placeholder = shown(mass, "kg") if isinstance(mass, float) else ""
+
+    def setting(self) -> Setting:
+        """As it is written now."""
+        return Setting(
+            str(self.run.value), self.velocity.value, self.hold.value, self.spring.value, self.mass.value,
+            int(self.events.value or 1), self.step.value,
+        )  # fmt: skip
+
+
+def needed(session: Session) -> Fit:
+    """The model as it stands.
+
+    Raises:
+        InputError: there is none yet.
+    """
+    if session.fit is None:
+        raise InputError("there is no model yet", hint="wait until the base model is fitted")
+    return session.fit
+
+
+def named(fit: Fit, now: Fit | None) -> str:
+    """What a curve is of: the model as it stands, or one that stood before."""
+    parts = " + ".join(fit.parts)
+    return f"model: {parts}" if fit is now else f"a model before: {parts}"

@@ -1,0 +1,102 @@
+"""What goes on for a session in processes beside: every effect is looked at, and the whole diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import param
+
+from ..inference.force.first_order import Promise
+from ..objects import Diagnosis, Fit
+from . import searches
+from .work import Search
+
+if TYPE_CHECKING:
+    from .session import Session
+
+KEPT = 8  # models whose promises are kept
+
+
+class Looking:
+    """The processes of a session, which is told what they find.
+
+    Args:
+        session: whose ``promises``, ``listed``, ``diagnosis``, ``searching`` and ``searched`` are set.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._search: Search | None = None
+        self._listing: Search | None = None
+        self._at: tuple[Fit | None, int] = (None, 0)
+        self._known: list[tuple[Fit, int, tuple[Promise, ...]]] = []
+
+    def promises(self) -> None:
+        """Look at every effect on top of the model as it stands, unless that goes on or is known already."""
+        session, fit, loaded = self._session, self._session.fitted, self._session.loaded
+        if fit is None or (session.listed < 1.0 and self._at == (fit, loaded)):
+            return
+        self._at = (fit, loaded)
+        if self._listing is not None:
+            self._listing.cancel()
+            self._listing = None
+        for known, when, found_before in self._known:
+            if known is fit and when == loaded:
+                session.param.update(promises=found_before, listed=1.0)
+                return
+        session.param.update(promises=(), listed=0.0)
+        own: list[Search] = []
+
+        def current() -> bool:
+            return bool(own) and self._listing is own[0]
+
+        def found(part: Sequence[Promise], share: float) -> None:
+            if current():
+                session.param.update(promises=(*session.promises, *part), listed=share)
+                if share >= 1.0:
+                    self._known = [*self._known[1 - KEPT :], (fit, loaded, session.promises)]
+
+        def failed(text: str) -> None:
+            if current():
+                session.listed, session.said = 1.0, f"the effects could not be looked at: {text}"
+
+        own.append(searches.promises(fit, session.effects, found, failed))
+        self._listing = own[0]
+
+    def diagnose(self, out: Path | None) -> None:
+        """The whole search, with ``out`` for its run folder; finished pieces are kept and used again."""
+        session = self._session
+        if session.searching or session.campaign is None:
+            return
+        session.searching, session.searched = "beginning", 0.0
+
+        def tell(text: str, share: float) -> None:
+            with param.parameterized.batch_call_watchers(session):
+                session.searching, session.searched = text.splitlines()[0], share
+
+        def done(found: Diagnosis) -> None:
+            self._search = None
+            with param.parameterized.batch_call_watchers(session):
+                session.diagnosis, session.searching = found, ""
+
+        def failed(text: str) -> None:
+            self._search = None
+            with param.parameterized.batch_call_watchers(session):
+                session.searching, session.said = "", f"the diagnosis ended: {text}"
+
+        self._search = searches.diagnosis(session.campaign, session.effects, out, tell, done, failed)
+
+    def stop(self) -> None:
+        """End the diagnosis; what it has finished is used when it is begun again."""
+        if self._search is not None:
+            self._search.cancel()
+            self._search = None
+        self._session.searching = ""
+
+    def close(self) -> None:
+        """End all of it."""
+        self.stop()
+        if self._listing is not None:
+            self._listing.cancel()

@@ -1,0 +1,156 @@
+"""Rival effects in every experiment that is easily made, so that one sees which would tell them apart."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import panel as pn
+
+from ..inference.force.candidates import every_form
+from ..physics.effects import catalogue
+from ..system.units import to_si
+from . import experiments
+from .asked import FIXED, WIDE, Asked, needed, press
+from .beside import Show, Tell, beside
+from .controls import Message, Words
+from .evidence import LEAST, best_forms
+from .experiments import MEASURES, Telling
+from .figures import figure, label, legend, of_run, unit_of
+from .measures import cells, thinned
+from .parts import Table, head, progress, row_of
+from .session import Session, watch
+
+RIVALS = 4  # effects that are told apart at once
+FALLBACK = 1e-4  # m/s, where a run has no velocity of its own
+UNSEEN = "Choose effects; those that promise most are offered once What is missing has looked at them."
+DONE = "Each is fitted, and run freely in experiments that are easily made."
+
+
+class Rivals:
+    """Rival effects in every experiment that is easily made, so that one sees which would tell them apart."""
+
+    def __init__(self, session: Session, asked: Asked) -> None:
+        self._session, self._asked = session, asked
+        self._work = beside(session, "rivals")
+        self._sets: list[tuple[tuple[str, ...], str]] = []
+        self._drawn: Telling | None = None
+        self._offered: list[str] = []
+        self.which = pn.widgets.Select(
+            name="effects that these data cannot tell apart", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
+        )
+        self.effects: Any = pn.widgets.MultiChoice(
+            name="effects to tell apart, each in the model in place of the others", options=[], value=[],
+            max_items=RIVALS, width=420, margin=(0, 10, 0, 0), **FIXED,
+        )  # fmt: skip
+        self._button = press("Simulate each", self.start)
+        self._said = Words(**WIDE)
+        self._table = Table(heard=self._heard, columns=[], rows=[], **WIDE)
+        self._place = pn.Column(**WIDE)
+        self.view = pn.Column(
+            head("The experiment that would tell candidates apart"), self._said,
+            pn.FlexBox(self.which, self.effects, self._button, gap="6px 10px"), progress(self._work), self._table,
+            self._place, **WIDE,
+        )  # fmt: skip
+        self.which.param.watch(lambda event: self._propose(), "value")
+        watch(session, ["diagnosis", "promises", "loaded"], self._offer)
+        watch(session, ["campaign"], self._anew)
+        watch(self._work, ["found", "doing"], self.update)
+        self._offer()
+        self.update()
+
+    def _anew(self) -> None:
+        self._work.found = None
+        self._drawn, self._place[:], self._table.rows = None, [], []
+
+    def _offer(self) -> None:
+        self._sets = experiments.undecided(self._session.diagnosis)
+        options = {" or ".join(tags): i for i, (tags, _) in enumerate(self._sets)}
+        self.which.param.update(options=options, value=0 if options else None)
+        self.which.visible = bool(options)
+        self.effects.options = sorted({tag for tag, _ in every_form(catalogue.tags())})
+        self._propose()
+
+    def _propose(self) -> None:
+        if self._sets:
+            tags, text = self._sets[int(self.which.value or 0)]
+            self.effects.value = [tag for tag in tags if tag in self.effects.options][:RIVALS]
+            self._said.text = f"The diagnosis proposes: {text}. {DONE}"
+            return
+        if self.effects.value == self._offered:  # nobody chose others
+            best = [p.tag for p in best_forms(self._session.promises) if p.fall > LEAST]
+            self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
+        offered = "The effects that promise most are offered; others can be chosen."
+        self._said.text = f"{offered if self._session.promises else UNSEEN} {DONE}"
+
+    def start(self) -> None:
+        """Fit the model with each effect and simulate every experiment."""
+        campaign, tags, asked = self._session.campaign, list(self.effects.value), self._asked.setting()
+        if campaign is None:
+            return
+        if len(tags) < 2:
+            self._work.said = "choose two effects at least"
+            return
+        told = {} if self._session.diagnosis is None else self._session.diagnosis.verdict.get("forms", {})
+
+        def make(tell: Tell, show: Show) -> list[Telling]:
+            fit = needed(self._session)
+            scenario = experiments.scenario(fit, asked)
+            velocity = campaign[asked.run].drive_velocity or scenario.file.drive.velocity or FALLBACK
+            velocity = to_si(asked.velocity, "m/s", key="velocity") if asked.velocity.strip() else velocity
+            block = scenario.file.block
+            options = experiments.usual(asked, abs(velocity), block.spring_stiffness, block.mass)
+            if not asked.as_measured:
+                options = {"as asked for above": asked, **options}
+            fits = experiments.rivals(fit, tags, told, tell)
+            return experiments.tell_apart(fits, options, experiments.scatter(campaign), tell, show)
+
+        self._work.do("fitting each of them", make)
+
+    def _heard(self, message: Message) -> None:
+        number = row_of(message, len(self._work.found or ()))
+        if number is not None:
+            self._draw(self._work.found[number])
+
+    def update(self) -> None:
+        """List the experiments, and draw the one in which they differ most."""
+        self._button.disabled = bool(self._work.doing)
+        found: list[Telling] | None = self._work.found
+        if not found:
+            return
+        columns = ["experiment: a click draws it", "they differ most in", "by", "in scatters of one event"]
+        rows = [
+            [t.words, t.note or f"{t.measure.replace('_', ' ')} of slip {t.slip}",
+             "" if t.note else f"{100 * t.share:.2g} %", "" if t.note else f"{t.scatters:.2g}"]
+            for t in found
+        ]  # fmt: skip
+        self._table.param.update(columns=columns, rows=rows)
+        self._draw(found[0])
+
+    def _draw(self, telling: Telling) -> None:
+        """The models side by side in one experiment."""
+        found: list[Telling] = self._work.found
+        campaign = self._session.campaign
+        self._table.chosen = next((i for i, t in enumerate(found) if t is telling), -1)
+        if telling is self._drawn or not telling.recordings or campaign is None:
+            return
+        self._drawn = telling
+        made = [figure(name, height=280, output_backend="canvas") for name in ("displacement", "load point - block")]
+        moved = {tag: r["displacement"].values for tag, r in telling.recordings.items()}
+        k, unit = unit_of(np.concatenate([*moved.values()]), "m")
+        for i, (tag, r) in enumerate(telling.recordings.items()):
+            data = thinned(r["time"].values, moved[tag] * k, (r["drive_position"].values - moved[tag]) * k)
+            for name, own in zip(("x", "gap"), made, strict=True):
+                own.line(data["t"], data[name], line_width=2, legend_label=tag, **of_run(i))
+        for name, own in zip(("displacement", "load point - block"), made, strict=True):
+            own.xaxis.axis_label, own.yaxis.axis_label = label("time from the start", "s"), label(name, unit)
+            legend(own)
+        made[1].x_range = made[0].x_range
+        trace = campaign[telling.setting.run]
+        rows = [[tag, *cells(experiments.simulated(r, trace))] for tag, r in telling.recordings.items()]
+        columns = [
+            f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
+        ]  # fmt: skip
+        table = Table(columns=columns, rows=rows, choosing=False, **WIDE)
+        words = Words(text=experiments.difference(telling.recordings), **WIDE)
+        self._place[:] = [words, pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in made), **WIDE), table]

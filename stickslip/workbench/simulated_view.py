@@ -1,0 +1,110 @@
+"""One run of the model beside the measured one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import panel as pn
+from bokeh.core.properties import value
+
+from . import experiments
+from .asked import WIDE, Asked, Simulated, named, needed, press
+from .beside import Show, Tell, beside
+from .figures import crosshair, figure, label, legend, look, source, unit_of
+from .measures import event_rows, thinned
+from .overview import record
+from .parts import Table, progress
+from .session import Session, watch
+
+LEFT = 76
+
+
+class SimulatedView:
+    """One run of the model beside the measured one."""
+
+    def __init__(self, session: Session, asked: Asked) -> None:
+        self._session, self._asked = session, asked
+        self._work = beside(session, "simulation")
+        theme = look()
+        self._measured = source(t=[], x=[], gap=[])
+        self._model = source(t=[], x=[], gap=[])
+        self._model.name = "simulated"
+        self.figures: dict[str, Any] = {}
+        for key in ("x", "gap"):
+            linked = {"x_range": self.figures["x"].x_range} if self.figures else {}
+            made = figure(height=230, window_axis="x", output_backend="canvas", **linked)
+            for name, data, colour, dash in (
+                ("measured", self._measured, theme.measured, "solid"),
+                ("model", self._model, theme.model, "dashed"),
+            ):
+                made.line(
+                    "t", key, source=data, color=colour, line_width=2, line_dash=dash, legend_label=name,
+                )  # fmt: skip
+            made.min_border_left = LEFT
+            self.figures[key] = made
+        self.figures["x"].xaxis.major_label_text_font_size = "0px"  # it has that of the figure below
+        legend(self.figures["x"])
+        self._name = self.figures["x"].legend[0].items[1]
+        self.figures["gap"].legend.visible = False
+        crosshair(*self.figures.values())
+        self._table = Table(choosing=False, **WIDE)
+        self._button = press("Simulate", self.start)
+        asked.row.append(self._button)
+        self.view = pn.Column(
+            progress(self._work), *(pn.pane.Bokeh(f, **WIDE) for f in self.figures.values()), self._table, **WIDE
+        )
+        asked.run.param.watch(lambda event: self.update(), "value")
+        watch(self._work, ["found", "doing"], self.update)
+        watch(session, ["campaign", "steps", "at"], self.update)
+        self.update()
+
+    def start(self) -> None:
+        """Simulate what is asked for."""
+        setting = self._asked.setting()
+
+        def make(tell: Tell, show: Show) -> Simulated:
+            fit = needed(self._session)
+            tell("simulating", 0.0)
+            return Simulated(fit, setting, experiments.run(experiments.scenario(fit, setting), tell))
+
+        self._work.do("simulating", make)
+
+    def update(self) -> None:
+        """Draw both."""
+        self._button.disabled = bool(self._work.doing)
+        campaign, run = self._session.campaign, self._asked.run.value
+        if campaign is None or run not in campaign.names:
+            return
+        trace = campaign[run]
+        found: Simulated | None = self._work.found
+        if found is not None and (found.setting.run != run or found.fit.campaign is not campaign):
+            found = None
+        t, x, gap = _motion(trace, campaign.events[campaign.names.index(run)])
+        k, unit = unit_of(x, "m")
+        g, small = unit_of(gap, "m")
+        self._measured.data = thinned(t, x * k, gap * g)
+        self.figures["x"].yaxis.axis_label = label("displacement", unit)
+        self.figures["gap"].yaxis.axis_label = label("load point - block", small)
+        self.figures["gap"].xaxis.axis_label = label("time from the start", "s")
+        if found is None:
+            self._model.data = {"t": [], "x": [], "gap": []}
+        else:
+            self._name.label = value(named(found.fit, self._session.fit))
+            r = found.recording
+            moved = r["displacement"].values
+            self._model.data = thinned(r["time"].values, moved * k, (r["drive_position"].values - moved) * g)
+        own = experiments.measured(trace, campaign.events[campaign.names.index(run)])
+        columns, rows = event_rows(own, found, trace, self._session.fit)
+        self._table.param.update(columns=columns, rows=rows)
+
+
+def _motion(trace: Any, events: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time from the start (s), way of the block (m), and how far the load point is ahead of it (m)."""
+    own = record(trace, events)
+    t = own.time - own.time[0]
+    if own.unit != "m" or trace.drive is None:
+        return t, np.full(t.size, np.nan), np.full(t.size, np.nan)
+    x = own.position - own.position[0]
+    drive = trace.drive.position(own.time)
+    return t, x, drive - drive[0] - x

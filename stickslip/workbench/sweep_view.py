@@ -1,0 +1,124 @@
+"""Recurrence and slip over the velocity, measured and simulated."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import panel as pn
+from bokeh.core.properties import value
+from bokeh.models import FixedTicker
+
+from ..system.units import shown
+from . import experiments
+from .asked import FIXED, WIDE, Asked, named, needed, press
+from .beside import Show, Tell, beside
+from .experiments import Swept
+from .figures import figure, label, legend, look, source, unit_of
+from .parts import head, progress
+from .session import Session, watch
+
+
+def ticks(values: np.ndarray) -> list[float]:
+    """Numbers 1, 2 and 5 of every decade, around some values, for a logarithmic axis."""
+    known = values[np.isfinite(values) & (values > 0)]
+    if not known.size:
+        return []
+    low, high = float(known.min()), float(known.max())
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    every = [float(f"{m}e{d}") for d in decades for m in (1, 2, 5)]
+    return [v for v in every if 0.4 * low <= v <= 2.5 * high]
+
+
+class SweepView:
+    """Recurrence and slip over the velocity, measured and simulated."""
+
+    def __init__(self, session: Session, asked: Asked) -> None:
+        self._session, self._asked = session, asked
+        self._work = beside(session, "sweep")
+        theme = look()
+        text: Any = partial(pn.widgets.TextInput, width=130, margin=(0, 10, 0, 0), **FIXED)
+        self.low, self.high = text(name="velocities from"), text(name="to")
+        self.points = pn.widgets.IntInput(
+            name="how many", value=6, start=2, end=40, width=90, margin=(0, 10, 0, 0), **FIXED
+        )
+        self._button = press("Sweep", self.start)
+        self._model = source(v=[], recurrence=[], slip=[])
+        self._model.name = "sweep"
+        self._measured = source(v=[], recurrence=[], slip=[], run=[])
+        self._bars = {key: source(xs=[], ys=[]) for key in ("recurrence", "slip")}
+        self.figures: dict[str, Any] = {}
+        for key in ("recurrence", "slip"):
+            scales = {"x_axis_type": "log", "y_axis_type": "log" if key == "recurrence" else "linear"}
+            made = figure(height=280, output_backend="canvas", **scales)
+            made.line("v", key, source=self._model, color=theme.model, line_width=2, line_dash="dashed")
+            made.scatter("v", key, source=self._model, color=theme.model, size=7, marker="square", legend_label="model")
+            made.multi_line("xs", "ys", source=self._bars[key], color=theme.measured, line_width=1.5)
+            made.scatter("v", key, source=self._measured, color=theme.measured, size=9, legend_label="measured")
+            legend(made)
+            self.figures[key] = made
+        self._names = [made.legend[0].items[0] for made in self.figures.values()]
+        self.view = pn.Column(
+            head("A sweep of the velocity: means over the slips after the first, with their scatter"),
+            pn.FlexBox(self.low, self.high, self.points, self._button, gap="6px 0"),
+            progress(self._work),
+            pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in self.figures.values()), **WIDE),
+            **WIDE,
+        )
+        watch(self._work, ["found", "doing"], self.update)
+        watch(session, ["campaign"], self._anew)
+        watch(session, ["steps", "at"], self.update)
+        self._prepare()
+
+    def _anew(self) -> None:
+        self._work.found = None
+        self._prepare()
+
+    def _prepare(self) -> None:
+        campaign = self._session.campaign
+        if campaign is None:
+            return
+        self._steady = experiments.steady_runs(campaign)
+        speeds = [v for v, _ in self._steady.values()] or [t.drive_velocity or 1e-4 for t in campaign.traces]
+        self.low.value = shown(0.5 * min(speeds), "m/s", 3).replace("µ", "u")
+        self.high.value = shown(2.0 * max(speeds), "m/s", 3).replace("µ", "u")
+        self.update()
+
+    def start(self) -> None:
+        """Simulate one velocity after the other."""
+        setting, low, high, points = self._asked.setting(), self.low.value, self.high.value, int(self.points.value or 0)
+
+        def make(tell: Tell, show: Show) -> Any:
+            return experiments.sweep(needed(self._session), setting, low, high, points, tell, show)
+
+        self._work.do("sweeping the velocity", make)
+
+    def update(self) -> None:
+        """Draw what there is."""
+        self._button.disabled = bool(self._work.doing)
+        found: Swept | None = self._work.found
+        every = [v for v, _ in self._steady.values()]
+        velocities = np.array([*every, *([] if found is None else found.velocities)])
+        k, unit = unit_of(velocities, "m/s")
+        model: dict[str, Any] = {"v": velocities[len(every) :] * k}
+        measured: dict[str, Any] = {"v": np.array(every) * k, "run": list(self._steady)}
+        for key, si in (("recurrence", "s"), ("slip", "m")):
+            own = np.array([values[key][0] for _, values in self._steady.values()])
+            std = np.array([values[key][1] for _, values in self._steady.values()])
+            theirs = np.array([]) if found is None else found.mean(key)
+            f, written = unit_of(np.concatenate([own, theirs]), si)
+            model[key], measured[key] = theirs * f, own * f
+            self._bars[key].data = {
+                "xs": [[v * k, v * k] for v in every],
+                "ys": [[max(m - s, 1e-3 * m) * f, (m + s) * f] for m, s in zip(own, std, strict=True)],
+            }
+            self.figures[key].yaxis.axis_label = label(key, written)
+            self.figures[key].xaxis.axis_label = label("velocity of the drive", unit)
+            self.figures[key].xaxis.ticker = FixedTicker(ticks=ticks(velocities * k))
+            if key == "recurrence":
+                self.figures[key].yaxis.ticker = FixedTicker(ticks=ticks(np.concatenate([own, theirs]) * f))
+        self._model.data, self._measured.data = model, measured
+        if found is not None:
+            for item in self._names:
+                item.label = value(named(found.fit, self._session.fit))
