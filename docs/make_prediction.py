@@ -105,7 +105,8 @@ def main() -> None:
     records = Path(parser.parse_args().folder).resolve() / "paper-slider-ens"
     if not records.is_dir():
         raise SystemExit(f"there is no folder {records}; name the one above it, or set STICKSLIP_REAL_DATA")
-    rng, found = np.random.default_rng(SEED), {}
+    rng = np.random.default_rng(SEED)
+    found: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
         for file in records.glob("*.mat"):

@@ -72,6 +72,16 @@ class Fit(Shown):
         self.plot = FitPlots(self)
         self._confirmation: Confirmation | None = None
 
+    def bare(self) -> Fit:
+        """The same without what was found when asked for (some 20 MB), which is found again when asked for again."""
+        if self._moved is not None:
+            made = Fit(self.campaign, self._climbed, replace(self._moved))
+        else:
+            rungs = [replace(r, fit=None if r.fit is None else replace(r.fit)) for r in self._climbed.ladder]
+            made = Fit(self.campaign, replace(self._climbed, ladder=tuple(rungs)))
+        made._confirmation = self._confirmation
+        return made
+
     # what it is
 
     @property

@@ -11,6 +11,7 @@ from ..objects import Fit
 BASE = "the base model"
 HAND = "by hand"
 MOST = 60  # steps that are kept
+WHOLE = 5  # of the last of them, with all that was found of their models
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,9 @@ def moved(fit: Fit, values: Mapping[str, float | str], before: Mapping[str, floa
 
 
 def fewer(steps: tuple[Step, ...]) -> tuple[Step, ...]:
-    """The steps, the first of those by hand in one with the next where they are too many: each holds some 10 MB."""
-    out = list(steps)
+    """The steps, the first of those by hand in one with the next where they are too many, and old ones bare."""
+    old = max(len(steps) - WHOLE, 0)
+    out = [replace(step, fit=step.fit.bare()) for step in steps[:old]] + list(steps[old:])
     while len(out) > MOST:
         at = next((i for i, step in enumerate(out[:-1]) if step.changed), None)
         if at is None:

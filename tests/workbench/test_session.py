@@ -14,6 +14,7 @@ from stickslip.workbench import searches
 from stickslip.workbench.journal import FOLDER, Journal
 from stickslip.workbench.selection import choose, cycles, follow, selected, worst
 from stickslip.workbench.session import Session
+from stickslip.workbench.steps import complete, fewer, moved
 
 DROP = "weakening.drop"
 
@@ -256,3 +257,17 @@ def test_a_second_window_leaves_the_listing_that_goes_on(session, base, monkeypa
     session.loaded = 2
     session.list_promises()
     assert len(begun) == 3 and session.promises == () and len(cancelled) == 2
+
+
+def test_old_steps_hold_no_more_than_they_must(base):
+    """A model keeps what was found when asked for, some 20 MB; when a step is shown again it is found again."""
+    found = complete(base)
+    name = found.free[0].name
+    steps = tuple(moved(found, {name: found.values[name] * (1.0 + 1e-3 * i)}, {}) for i in range(8))
+    told = [complete(step.fit).error for step in steps]
+    kept = fewer(steps)
+    assert len(kept) == 8
+    assert kept[-1].fit is steps[-1].fit
+    assert "_system" in vars(steps[0].fit.force_fit)
+    assert "_system" not in vars(kept[0].fit.force_fit)
+    assert [step.fit.error for step in kept] == told
