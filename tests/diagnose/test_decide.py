@@ -28,13 +28,13 @@ EVENTS = 40
 
 def judged(
     tag: str, gain: float, each: float, *, spread: float = 1.0, chance: float = 1e-9,
-    form: dict[str, str] | None = None, parameters: int = 8, far: dict[str, float] | None = None,
+    form: dict[str, str] | None = None, parameters: int = 8, far: dict[str, float] | None = None, nearer: float = 1.0,
 ) -> Judged:  # fmt: skip
     """An effect whose gain on every unseen event is ``each``, give or take ``spread``."""
     swing = spread * np.where(np.arange(EVENTS) % 2, 1.0, -1.0)
     fit: Any = SimpleNamespace(free=range(parameters))
     return Judged(
-        fit, gain, chance, each + swing, Candidate(tag, form or {}, gain, None), 0.01, 0.001, far or {}
+        fit, gain, chance, each + swing, nearer + swing, Candidate(tag, form or {}, gain, None), 0.01, 0.001, far or {}
     )  # fmt: skip
 
 
@@ -48,6 +48,12 @@ def test_each_condition_of_being_seen_is_needed(change):
     assert judged("wear", 300.0, 4.0).seen
     assert not judged("wear", 300.0, 4.0, **change).seen
     assert named([judged("wear", 300.0, 4.0, **change)]) == []
+
+
+def test_the_error_of_unseen_runs_may_not_rise_beyond_its_standard_error():
+    error = 1.0 / np.sqrt(EVENTS)
+    assert judged("wear", 300.0, 4.0, nearer=-0.9 * error).seen
+    assert not judged("wear", 300.0, 4.0, nearer=-1.1 * error).seen
 
 
 def test_so_many_standard_errors_over_the_events():

@@ -21,7 +21,7 @@ def judged(tag: str, each: float) -> Judged:
     """An effect that predicts every unseen event better by ``each``."""
     fit: Any = SimpleNamespace(free=range(6), tag=tag)
     return Judged(
-        fit, EVENTS * each, 1e-9, np.full(EVENTS, each), Candidate(tag, {}, 1.0, fit), 0.01, 0.001
+        fit, EVENTS * each, 1e-9, np.full(EVENTS, each), np.ones(EVENTS), Candidate(tag, {}, 1.0, fit), 0.01, 0.001
     )  # fmt: skip
 
 

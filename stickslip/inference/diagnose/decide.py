@@ -4,7 +4,9 @@
    members of its family, among as many effects; and the likelihood of unseen runs is better by more than 2.5 standard
    errors over their events. Parameters beyond where such values lie (``usual`` in the catalogue) have their price in
    it: the range is four standard deviations wide. The amplitude lies inside its bounds by more than its standard
-   deviation: at one of them the law would have to be stronger than such laws are, and stands for another.
+   deviation: at one of them the law would have to be stronger than such laws are, and stands for another. And the error
+   of unseen runs with all events alike does not rise by more than its standard error: a law may describe the forces
+   within events better, and leave what is foretold of an event worse.
 2. *Named*: the seen effect that predicts unseen runs best.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
@@ -26,8 +28,8 @@ from ...physics.effects import catalogue
 from ...physics.params import specs
 from ..fit.parameters import Free
 from ..force.candidates import Candidate
-from ..force.fit import Fit
-from ..force.heldout import folds, halves, unseen
+from ..force.fit import Fit, deviations
+from ..force.heldout import Unseen, folds, halves, unseen
 from ..force.linearised import Array
 
 CHANCE = 1e-3  # of any effect at all being seen where nothing is missing
@@ -44,12 +46,14 @@ class Compared:
         gain: fall of the cost.
         chance: of such a fall by chance, corrected for all that was tried.
         unseen: fall of the predictive cost of every event left out, shape (E,).
+        nearer: fall of the squares of its error with all events alike, in units of their expected ones, shape (E,).
     """
 
     fit: Fit
     gain: float
     chance: float
     unseen: Array
+    nearer: Array
 
     @property
     def price(self) -> float:
@@ -69,7 +73,8 @@ class Compared:
     @property
     def seen(self) -> bool:
         """Rule 1."""
-        return self.chance < CHANCE and self.better > ERRORS * self.error
+        spread = float(np.sqrt(self.nearer.size) * np.std(self.nearer))
+        return self.chance < CHANCE and self.better > ERRORS * self.error and float(self.nearer.sum()) >= -spread
 
 
 @dataclass(frozen=True)
@@ -141,6 +146,7 @@ class Judge:
         self.base, self.tried = base, tried
         self._runs, self._halves = folds(base), halves(base)
         self._unseen = {False: unseen(base, self._runs), True: unseen(base, self._halves)}
+        self._floor = deviations(base)
 
     def __call__(self, candidate: Candidate) -> Judged | None:
         """The candidate beside it; None where it was not fitted."""
@@ -155,7 +161,7 @@ class Judge:
         name = candidate.name
         std = fit.std().get(name, np.inf)
         return Judged(
-            found.fit, found.gain, found.chance, found.unseen, candidate, fit.values[name], std,
+            found.fit, found.gain, found.chance, found.unseen, found.nearer, candidate, fit.values[name], std,
             far,
         )  # fmt: skip
 
@@ -164,7 +170,14 @@ class Judge:
         gain = max(self.base.cost - fit.cost, 0.0)
         chance = min(1.0, float(chdtrc(number, max(gain - price, 0.0) / DISPERSION)) * members * self.tried)
         without, predicted = self._unseen[own], unseen(fit, self._halves if own else self._runs)
-        return Compared(fit, gain, chance, without.cost - predicted.cost)
+        nearer = self._squares(without) - self._squares(predicted)
+        return Compared(fit, gain, chance, without.cost - predicted.cost, nearer)
+
+    def _squares(self, predicted: Unseen) -> Array:
+        """Of the error of every event left out over the floor of the model without, shape (E,)."""
+        base = self.base
+        over = predicted.residual / np.hypot(self._floor, predicted.spread)
+        return np.bincount(base.problem.of, over**2 * ~base.dropped, base.problem.events)
 
 
 def best_forms(judged: Sequence[Judged]) -> list[Judged]:
