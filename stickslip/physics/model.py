@@ -242,26 +242,30 @@ class Model(eqx.Module):
                 stiffness = stiffness * e.stiffness(m, motion, contact)
             if isinstance(e, BodyForce):
                 body = body + e.force(m, motion, contact)
-        dissipated = jnp.zeros(())
         slides = jnp.abs(state.force) >= (1.0 - 1e-9) * state.cap
         mean_cap = jnp.where(slides, 0.5 * (state.cap + cap), cap)
-        force, lost = _return_map(state.force + stiffness * motion.turn, stiffness, cap, mean_cap)
-        dissipated = dissipated + lost
+        trial = state.force + stiffness * motion.turn
+        force = _held_back(trial, cap)
+        slid = jnp.abs(trial - force)
         trial = force + stiffness * (motion.dx - motion.turn)
+        flow = jnp.zeros(())
         for e, m in zip(self.effects, memory, strict=True):
             if isinstance(e, Flow):
                 flowed = e.flow(m, motion, trial, contact)
-                dissipated = dissipated + jnp.sum((_held(trial, cap) - _held(flowed, cap)) * _compliance(stiffness))
+                flow = flow + jnp.sum((_held(trial, cap) - _held(flowed, cap)) * _compliance(stiffness))
                 trial = flowed
-        force, lost = _return_map(trial, stiffness, cap, mean_cap)
-        dissipated = dissipated + lost
+        force = _held_back(trial, cap)
+        slid = slid + jnp.abs(trial - force)
+        given = jnp.zeros(())
+        if any(isinstance(e, Stiffness) for e in self.effects):
+            given = 0.5 * jnp.sum(state.force**2 * (_compliance(stiffness) - _compliance(state.stiffness)))
         forces = Forces(
             spring=jnp.asarray(motion.pull),
             contact=jnp.sum(force),
             viscous=self.block.damping * motion.v,
             body=body,
-            dissipated=dissipated,
-            given=0.5 * jnp.sum(state.force**2 * (_compliance(stiffness) - _compliance(state.stiffness))),
+            dissipated=flow + jnp.sum(slid * _compliance(stiffness) * mean_cap),
+            given=given,
         )
         return State(motion.x, motion.v, force, cap, stiffness, psi, memory, state.work), forces
 
@@ -294,12 +298,11 @@ class Model(eqx.Module):
         return 0.5 * self.mass() * state.v**2 + jnp.sum(0.5 * state.force**2 * _compliance(state.stiffness))
 
 
-def _return_map(trial: Array, stiffness: Array, cap: Array, mean_cap: Array) -> tuple[Array, Array]:
-    """The cap on the elastic trial forces, and the energy lost in sliding against the mean cap of the increment (J)."""
+def _held_back(trial: Array, cap: Array) -> Array:
+    """Elastic trial forces (N), cut back to the cap."""
     # not jnp.clip, whose derivative weighs ties: a loop of derivatives takes a tenth longer with it;
     # asked so that a cap that is no number gives a force that is none
-    clipped = jnp.where(jnp.abs(trial) <= cap, trial, jnp.sign(trial) * cap)
-    return clipped, jnp.sum(abs(trial - clipped) * _compliance(stiffness) * mean_cap)
+    return jnp.where(jnp.abs(trial) <= cap, trial, jnp.where(trial < 0.0, -cap, cap))
 
 
 def _compliance(stiffness: Array) -> Array:

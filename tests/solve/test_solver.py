@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+
 import diffrax
 import jax
 import jax.numpy as jnp
@@ -14,6 +16,7 @@ from stickslip.physics.effects.base import BodyForce
 from stickslip.physics.effects.inertia import AddedMass
 from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
 from stickslip.simulation.solve.integrate import step_control
+from stickslip.system.traced import Program
 
 from .rig import rig
 
@@ -143,6 +146,24 @@ def test_steps_that_lead_nowhere_are_given_up_at_once():
     with pytest.raises(SolveError, match=r"steps advanced it by only .* force that jumps"):
         integrate(rig(effects=(_Rattle(),)), 4.0, progress=lambda now, piece: seen.append(now))
     assert len(seen) < 4
+
+
+def test_the_trace_of_a_run_is_kept_unless_a_law_is_not_of_this_package(monkeypatch):
+    """Code of one's own may change between two starts under the same name."""
+    module, names = importlib.import_module("stickslip.simulation.solve.integrate"), []
+
+    def noted(function, name):
+        names.append(name)
+        return Program(function, name)
+
+    monkeypatch.setattr(module, "Program", noted)
+    module._program.cache_clear()
+    for effects in ((), (AddedMass(),), (_Push(),)):
+        integrate(rig(effects=effects), 1e-3)
+    plain, loaded, own = names
+    assert plain != loaded
+    assert None not in (plain, loaded)
+    assert own is None
 
 
 def test_a_single_jump_in_time_is_stepped_over():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import diffrax
@@ -17,6 +18,7 @@ from ...physics.contact import Bank
 from ...physics.effects.base import Motion
 from ...physics.model import Model, State
 from ...physics.params import check
+from ...system.traced import Program, of_this_package
 from .stepper import ContactStepper, Increments, Step, Tolerance
 from .trajectory import Stats, Steps, Trajectory, energy_error
 
@@ -25,6 +27,8 @@ SMALLEST_STEP = 1e-10  # s; four orders below the period of any contact resonanc
 LEAST_ADVANCE = 1e-2  # of the contact's period in PIECE steps; the tightest tolerance takes a hundred times as much
 
 _TERM = Increments()
+_BLANK: Any = 0
+_CARRIED: Any = jax.tree.structure((Step(_BLANK, _BLANK), (_BLANK, _BLANK, _BLANK)))  # by solver and controller
 
 
 def error_norm(error: State) -> jax.Array:
@@ -68,16 +72,20 @@ def _leaves(t: Any, y: State, args: Any) -> list[jax.Array]:
     return jax.tree.leaves(y)
 
 
-@eqx.filter_jit
-def _piece(model: Model, bank: Bank, tolerance: Tolerance, times: jax.Array, y: State, carried: Any) -> Any:
-    """At most PIECE steps; ``times`` are start, end, first and largest step (s)."""
+def _piece(model: Model, bank: Bank, tolerance: Tolerance, times: Any, y: State, carried: Any) -> tuple:
+    """At most PIECE steps; ``times`` are start, end, first and largest step (s).
+
+    Returns:
+        Numbers of accepted and rejected steps, whether the solver was content, the leaves of what it carries on, the
+        fields of the steps, and the leaves of the state at the end.
+    """
     t0, t1, dt, dtmax = times
     saves = diffrax.SaveAt(
         subs=[diffrax.SubSaveAt(t0=True, steps=True, fn=observe), diffrax.SubSaveAt(t1=True, fn=_leaves)],
         solver_state=True,
         controller_state=True,
     )
-    solver_state, controller_state = (None, None) if carried is None else carried
+    solver_state, controller_state = (None, None) if carried is None else jax.tree.unflatten(_CARRIED, carried)
     solution = diffrax.diffeqsolve(
         _TERM,
         ContactStepper(tolerance=tolerance),
@@ -96,8 +104,35 @@ def _piece(model: Model, bank: Bank, tolerance: Tolerance, times: jax.Array, y: 
         made_jump=None if carried is None else False,
     )
     steps, leaves = solution.ys
-    last = jax.tree.unflatten(jax.tree.structure(y), leaves)
-    return solution.stats, solution.result, (solution.solver_state, solution.controller_state), steps, last
+    ends = diffrax.RESULTS.successful, diffrax.RESULTS.max_steps_reached
+    content = (solution.result == ends[0]) | (solution.result == ends[1])
+    carried = solution.solver_state, solution.controller_state
+    if jax.tree.structure(carried) != _CARRIED:
+        raise TypeError(f"this release of diffrax carries {jax.tree.structure(carried)} from step to step")
+    tried = solution.stats["num_accepted_steps"], solution.stats["num_rejected_steps"]
+    return *tried, content, tuple(jax.tree.leaves(carried)), tuple(steps), tuple(leaf[0] for leaf in leaves)
+
+
+@lru_cache(maxsize=64)
+def _program(arrays: Any, rest: Any, values: tuple, effects: Any) -> Program:
+    """`_piece` of arguments of one structure: of their arrays and, with its ``values``, of the rest.
+
+    Its trace is kept where all effects are this package's own.
+    """
+
+    def piece(*leaves: Any) -> tuple:
+        return _piece(*eqx.combine(jax.tree.unflatten(arrays, leaves), jax.tree.unflatten(rest, values)))
+
+    return Program(piece, f"piece {arrays} {rest} {values}" if of_this_package(effects) else None)
+
+
+def _run_piece(*args: Any) -> tuple:
+    """`_piece`, compiled; as by ``equinox.filter_jit`` what is no array is not traced."""
+    arrays, rest = eqx.partition(args, eqx.is_array)
+    leaves, structure = jax.tree.flatten(arrays)
+    values, others = jax.tree.flatten(rest)
+    found: tuple = _program(structure, others, tuple(values), jax.tree.structure(args[0].effects))(*leaves)
+    return found
 
 
 def integrate(
@@ -136,6 +171,7 @@ def integrate(
     bank = model.shaped()
     least = LEAST_ADVANCE / PIECE * _refuse_impossible(model, bank)
     state = model.rest(t0) if state is None else state
+    kind = jax.tree.structure(state)
     kinks = sorted({float(s) for s in stops if t0 < s < t1} | {float(t1)})
     pieces: list[Steps] = []
     accepted = rejected = 0
@@ -143,17 +179,17 @@ def integrate(
     for stop in kinks:
         while now < stop:
             times = jnp.asarray(np.array([now, stop, dt, largest_step]))
-            stats, result, carried, steps, last = _piece(model, bank, tolerance, times, state, carried)
-            state = jax.tree.map(lambda a: jnp.asarray(np.asarray(a)[0]), last)
-            n = int(stats["num_accepted_steps"])
-            accepted, rejected = accepted + n, rejected + int(stats["num_rejected_steps"])
+            n, missed, content, carried, made, last = _run_piece(model, bank, tolerance, times, state, carried)
+            n, missed, steps = int(n), int(missed), Steps(*made)
+            state = jax.tree.unflatten(kind, last)
+            accepted, rejected = accepted + n, rejected + missed
             piece = jax.tree.map(lambda a, n=n: np.asarray(a)[1 : n + 1], steps)
             if not pieces:
                 pieces.append(jax.tree.map(lambda a: np.asarray(a)[:1], steps))
             pieces.append(piece)
             reached = float(piece.t[-1]) if n else now
-            _refuse_failure(result, reached, state, accepted, most_steps)
-            tried = n + int(stats["num_rejected_steps"])
+            _refuse_failure(bool(content), reached, state, accepted, most_steps)
+            tried = n + missed
             if reached < stop and reached - now < least * tried:
                 raise SolveError(
                     f"the integration stopped at t = {reached:.6g} s (v = {float(state.v):.3g} m/s): {tried} steps "
@@ -188,11 +224,10 @@ def _refuse_impossible(model: Model, bank: Bank) -> float:
     return float(2.0 * np.pi * np.sqrt(mass / (stiffness.sum() + float(model.block.spring_stiffness))))
 
 
-def _refuse_failure(result: Any, now: float, state: State, accepted: int, most_steps: int) -> None:
+def _refuse_failure(content: bool, now: float, state: State, accepted: int, most_steps: int) -> None:
     """Turn what diffrax reports into an error that says when and what to change."""
-    good = diffrax.RESULTS.successful, diffrax.RESULTS.max_steps_reached
     finite = bool(np.isfinite(state.x)) and bool(np.isfinite(state.v))
-    if any(bool(result == r) for r in good) and finite and accepted < most_steps:
+    if content and finite and accepted < most_steps:
         return
     if accepted >= most_steps:
         why = f"{accepted} steps were not enough; loosen the tolerance, raise the damping, or simulate less time"
