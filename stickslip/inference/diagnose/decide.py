@@ -177,7 +177,7 @@ class Judge:
         """Of the error of every event left out over the floor of the model without, shape (E,)."""
         base = self.base
         over = predicted.residual / np.hypot(self._floor, predicted.spread)
-        return np.bincount(base.problem.of, over**2 * ~base.dropped, base.problem.events)
+        return np.asarray(np.bincount(base.problem.of, over**2 * ~base.dropped, base.problem.events), float)
 
 
 def best_forms(judged: Sequence[Judged]) -> list[Judged]:
