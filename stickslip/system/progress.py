@@ -107,6 +107,7 @@ class Cancelled(StickslipError):
 
 
 _asked: ContextVar[Callable[[], bool] | None] = ContextVar("asked", default=None)
+_shown: ContextVar[Callable[[float], None] | None] = ContextVar("shown", default=None)
 
 
 @contextmanager
@@ -119,12 +120,35 @@ def cancellable(asked: Callable[[], bool]) -> Iterator[None]:
         _asked.reset(before)
 
 
-def breathe() -> None:
+@contextmanager
+def showing(show: Callable[[float], None]) -> Iterator[None]:
+    """Within it ``show`` is told which share (0 to 1) of the work is done."""
+    before = _shown.set(show)
+    try:
+        yield
+    finally:
+        _shown.reset(before)
+
+
+@contextmanager
+def portion(low: float, high: float) -> Iterator[None]:
+    """Within it shares count from ``low`` to ``high`` of the work around it, whose part this is."""
+    whole = _shown.get()
+    with showing(lambda share: None if whole is None else whole(low + (high - low) * share)):
+        yield
+
+
+def breathe(share: float | None = None) -> None:
     """Called between the steps of long work, which ends here if that was asked for.
+
+    Args:
+        share: of the work that is done at most (0 to 1), where that can be said.
 
     Raises:
         Cancelled: it was.
     """
-    asked = _asked.get()
+    asked, show = _asked.get(), _shown.get()
     if asked is not None and asked():
         raise Cancelled("cancelled")
+    if share is not None and show is not None:
+        show(share)

@@ -19,7 +19,7 @@ from ..objects import Campaign, Fit, load_campaign
 from ..objects.fitted_run import FittedRun
 from ..physics.effects import catalogue
 from ..simulation.conformance import load_effects
-from ..system.progress import Cancelled
+from ..system.progress import Cancelled, showing
 from ..system.runstore import alone
 from . import again
 from .journal import Journal
@@ -413,14 +413,20 @@ class _Long:
 
     def __init__(self, session: Session, text: str) -> None:
         self._session, self._text = session, text
+        self._shows = showing(self._show)
+
+    def _show(self, share: float) -> None:
+        self._session.share = max(share, self._session.share)
 
     def __enter__(self) -> None:
         if self._text:
             with param.parameterized.batch_call_watchers(self._session):
                 self._session.busy, self._session.share = self._text, 0.0
+            self._shows.__enter__()
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> bool:
         if self._text:
+            self._shows.__exit__(None, None, None)
             self._session.busy = ""
         if isinstance(error, Cancelled):
             self._session.said = Note("cancelled; the model is as it was")

@@ -271,3 +271,12 @@ def test_old_steps_hold_no_more_than_they_must(base):
     assert "_system" in vars(steps[0].fit.force_fit)
     assert "_system" not in vars(kept[0].fit.force_fit)
     assert [step.fit.error for step in kept] == told
+
+
+def test_a_fit_tells_how_far_it_is(session):
+    shares: list[float] = []
+    session.param.watch(lambda event: shares.append(event.new), "share")
+    session.add("viscous-drag")
+    assert len(shares) > 3
+    assert shares == sorted(shares)
+    assert 0.5 < shares[-1] <= 1.0

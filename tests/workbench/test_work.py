@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.system.progress import Cancelled, breathe
+from stickslip.system.progress import Cancelled, breathe, portion, showing
 from stickslip.workbench.beside import beside, close_all
 from stickslip.workbench.session import Session
 from stickslip.workbench.work import Search, Worker
@@ -83,6 +83,20 @@ def test_a_job_ends_at_its_next_step_and_what_waits_is_forgotten():
 
 def test_outside_of_cancellable_work_nothing_is_asked():
     breathe()
+
+
+def test_shares_of_parts_add_up_to_the_whole():
+    told: list[float] = []
+    breathe(0.5)  # nobody is shown it
+    with showing(told.append):
+        breathe(0.0)
+        with portion(0.0, 0.5):
+            breathe(0.5)
+            with portion(0.5, 1.0):
+                breathe(0.5)
+        breathe(0.75)
+        breathe()
+    assert told == [0.0, 0.25, 0.375, 0.75]
 
 
 def test_a_job_that_fails_leaves_the_thread_alive(caplog):

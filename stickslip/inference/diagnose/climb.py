@@ -12,6 +12,7 @@ from ...errors import FitError, InputError
 from ...physics.effects import catalogue
 from ...physics.effects.base import Effect
 from ...physics.params import specs, variants
+from ...system.progress import portion
 from ..force.candidates import shapes_backbone, try_effect
 from ..force.fit import Fit, deviations, fit
 from ..force.signatures import Explained
@@ -117,12 +118,15 @@ def climb(prepared: Prepared, effects: Sequence[Form], tell: Tell) -> Climbed:
     for tag, form in effects:
         _acts(tag, form)
     tell("the base model", 0.0)
-    base = widened(fit(prepared.problem, prepared.start), [LEVEL], DISPERSION)
+    each = 1.0 / (len(effects) + 1)
+    with portion(0.0, each):
+        base = widened(fit(prepared.problem, prepared.start), [LEVEL], DISPERSION)
     first = Rung(("static",), None, static_residual(base), None, None)
     done = Climbed(prepared, (first, Rung.of(("static", "inertia"), "inertia", base)), {})
     for i, (tag, form) in enumerate(effects):
         tell(f"adding {tag}", (i + 1) / (len(effects) + 2))
-        done = extended(done, tag, form)
+        with portion((i + 1) * each, (i + 2) * each):
+            done = extended(done, tag, form)
     return done
 
 
@@ -134,10 +138,12 @@ def extended(done: Climbed, tag: str, form: Mapping[str, str]) -> Climbed:
     """
     _acts(tag, form)
     base = done.fit
-    (found,) = try_effect(base, Explained(base), tag, [dict(form)])
+    with portion(0.0, 0.5):
+        (found,) = try_effect(base, Explained(base), tag, [dict(form)])
     if found.fit is None:
         raise FitError(f"{tag} could not be fitted: {found.note or 'no finite model with it'}")
-    rung = Rung.of((*done.ladder[-1].model, tag), tag, settled(base, found))
+    with portion(0.5, 1.0):
+        rung = Rung.of((*done.ladder[-1].model, tag), tag, settled(base, found))
     gain = max(base.cost - found.fit.cost, 0.0)
     return replace(done, ladder=(*done.ladder, rung), gains={**done.gains, tag: gain})
 

@@ -15,6 +15,7 @@ from ...errors import StickslipError
 from ...physics.effects import catalogue
 from ...physics.effects.base import Effect, Geometry
 from ...physics.params import Spec, specs
+from ...system.progress import breathe, portion
 from ..fit.parameters import Free, effect_parameters
 from .fit import Fit, adapted, refit
 from .linearised import Array
@@ -242,9 +243,13 @@ def _best_of(base: Fit, effect: Effect, starts: Sequence[Start]) -> tuple[Fit, S
 
     Early costs say which starts lead nowhere, not which of the others lead furthest.
     """
-    ends = sorted(((_begun(base, effect, start), start) for start in starts), key=lambda end: end[0].cost)
-    finished = ((adapted(found), start) for found, start in ends[: (len(ends) + 1) // 2])
-    return min(finished, key=lambda end: end[0].cost)
+    tried = []
+    for i, start in enumerate(starts):
+        breathe(0.5 * i / len(starts))
+        tried.append((_begun(base, effect, start), start))
+    with portion(0.5, 1.0):
+        ends = sorted(tried, key=lambda end: end[0].cost)[: (len(tried) + 1) // 2]
+        return min(((adapted(found), start) for found, start in ends), key=lambda end: end[0].cost)
 
 
 def with_start(

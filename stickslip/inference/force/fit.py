@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FitError
+from ...system.progress import breathe, portion
 from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
@@ -24,6 +25,7 @@ ROUNDS = 10  # times that the scatter is estimated anew
 LAST = 30  # evaluations with the covariance as it was found
 STEPS = 4  # evaluations between
 NEWTON = 4  # steps of the sizes between
+FIRST = 0.6  # share of the rounds of a fit that begins in what it takes, at most
 LARGER = 1.0  # e-folds by which sizes are taken for larger where a search may stand in a dent
 
 
@@ -174,6 +176,7 @@ def fit(
     if not slopes.finite:
         raise FitError("the model gives no finite force along the motion")
     for turn in range(rounds):
+        breathe(FIRST * turn / rounds)
         if scatter is None and turn == PLACED:
             problem, point = placed(problem, point)
             slopes = problem.evaluate(point)
@@ -195,7 +198,8 @@ def fit(
             break
     made, around = known_of(problem, slopes, by_reading(problem, point, slopes), blocks, out), point
     point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, blocks, LAST)
-    return _arrived(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
+    with portion(FIRST, 1.0):
+        return _arrived(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
 
 
 def _arrived(found: Fit) -> Fit:
@@ -240,6 +244,7 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
     point, slopes, sizes, evaluations = found.point, found.slopes, found.scatter, found.evaluations
     damping = DAMPING
     for turn in range(rounds + 1):
+        breathe(turn / (rounds + 1))
         known = found.known.with_local(blocks(slopes.local))
         marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", known.local, point.events)
         before = misfit(sizes.sizes, marginal, known)
