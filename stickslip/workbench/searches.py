@@ -14,6 +14,7 @@ from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.signatures import Explained
 from ..objects import Campaign, Diagnosis, Fit, load_campaign
 from ..physics.effects import catalogue
+from ..simulation.conformance import blamed
 from .work import Search, Tell
 
 FIRST = (
@@ -47,6 +48,9 @@ def _promises(base: ForceFit, tags: Sequence[str], tell: Callable[[Promise, floa
             tell(promise(base, explained, tag, form), (i + 1) / len(forms))
         except StickslipError:
             continue
+        except Exception as error:
+            if blamed(error) is None:
+                raise
     return len(forms)
 
 

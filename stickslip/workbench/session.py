@@ -18,7 +18,7 @@ from ..errors import RunFolderError, StickslipError
 from ..objects import Campaign, Fit, load_campaign
 from ..objects.fitted_run import FittedRun
 from ..physics.effects import catalogue
-from ..simulation.conformance import load_effects
+from ..simulation.conformance import blamed, load_effects
 from ..system.progress import Cancelled, showing
 from ..system.runstore import alone
 from . import again
@@ -435,5 +435,8 @@ class _Long:
             self._session.said = str(error)
             return True
         if isinstance(error, Exception):
+            if (found := blamed(error)) is not None:
+                self._session.said = f"{found}; the model is as it was"
+                return True
             self._session.said = f"a fault of the program, the model is as it was: {type(error).__name__}: {error}"
         return False

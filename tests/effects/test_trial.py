@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from stickslip.errors import InputError
 from stickslip.physics.effects import catalogue
-from stickslip.simulation.conformance import load_effects, trial, try_laws
+from stickslip.simulation.conformance import blamed, load_effects, trial, try_laws
 
 LAW = """from jax import numpy as jnp
 from stickslip.effects import Memory, Threshold
@@ -89,3 +90,15 @@ def test_the_programs_own_are_not_tried(load, monkeypatch):
     assert tried == ["mine", "mine"]  # in both forms of its law
     try_laws([catalogue.get("wear"), mine])
     assert tried == ["mine"] * 4
+
+
+def test_a_law_that_fails_when_it_is_used_is_named_with_its_line(load):
+    path, (cls,) = load(("1.0 - self.size", "[1.0][int(state.size > 1)] - self.size"))
+    with pytest.raises(IndexError) as raised:
+        cls().strength(np.zeros(2), None, None)
+    found = blamed(raised.value)
+    assert found is not None
+    assert str(path) in str(found)
+    assert "line 18" in str(found)
+    assert "'mine' failed: IndexError" in str(found)
+    assert blamed(IndexError("of the program's own")) is None

@@ -49,6 +49,16 @@ def try_laws(classes: Iterable[type[Effect]]) -> None:
                 raise _refusal(cls, "its state or what it changes has another shape or type after an increment")
 
 
+def blamed(error: Exception) -> InputError | None:
+    """What a law that is not the program's own raised when it was used, with its file and line; None: it did not."""
+    for tag in catalogue.tags():
+        cls = catalogue.get(tag)
+        where = None if cls.__module__.startswith(_OURS) else _line(error, cls)
+        if where is not None:
+            return InputError(f"the law of '{tag}' failed: {first_line(error)}", file=_file(cls), key=where)
+    return None
+
+
 def first_line(error: Exception) -> str:
     """Kind and first line of what a foreign law raised."""
     return f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else ''}"
