@@ -43,6 +43,12 @@ def history(session: Session) -> list[list[str]]:
     return rows
 
 
+def told(session: Session) -> dict[str, Any]:
+    """The same for a run folder: the steps to the model as it stands, and lines and commands that do the same."""
+    steps = [{"step": step.text, "when": step.when, "error": step.fit.error} for step in session.taken]
+    return {"steps": steps, "python": session.code().splitlines(), "commands": commands(session).splitlines()}
+
+
 def _when(text: str) -> str:
     """Day and time, without the day if that is today."""
     return text.removeprefix(datetime.now().strftime("%Y-%m-%d ")) if text else ""
@@ -167,7 +173,7 @@ class _Folders:
 
         def make(tell: Tell, show: Show) -> Any:
             tell("saving", 0.0)
-            folder = kept.save(found, campaign, name, tell)
+            folder = kept.save(found, campaign, name, tell, told(session))
             self._work.said = f"saved as {folder.name}"
             return folder
 

@@ -84,8 +84,9 @@ def _errors(result: dict[str, Any]) -> str:
 
 
 def save(
-    found: Fit | Diagnosis, campaign: Campaign, name: str, tell: Callable[[str, float], None] | None = None
-) -> Path:
+    found: Fit | Diagnosis, campaign: Campaign, name: str, tell: Callable[[str, float], None] | None = None,
+    history: dict[str, Any] | None = None,
+) -> Path:  # fmt: skip
     """Keep a fit or a diagnosis as a run folder beside the campaign, as the command does.
 
     Args:
@@ -93,6 +94,7 @@ def save(
         campaign: with a file.
         name: of the folder.
         tell: told the progress.
+        history: how a model was come to, for its ``result.json``.
 
     Raises:
         InputError: the name cannot be used or is there already; the campaign has no folder; it cannot be written.
@@ -104,6 +106,7 @@ def save(
         return _copied(found.folder, folder)
     if isinstance(found, Fit):
         found.confirm(tell)
+        return found.save(folder, **({"history": history} if history else {}))
     return found.save(folder)
 
 

@@ -97,6 +97,10 @@ def test_the_page_saves_lists_and_shows(session, folder):
     assert beside(session, "saving").said == "saved as by the page"
     names = [row[0] for row in made._table.rows]
     assert "by the page" in names
+    history = json.loads((folder / "by the page" / "result.json").read_text())["history"]
+    assert [row["step"] for row in history["steps"]] == ["the base model"]
+    assert history["python"] == session.code().splitlines()
+    assert history["commands"] == keep_page.commands(session).splitlines()
     made._heard({"kind": "row", "row": names.index("by the page")})
     assert "<iframe" in made._frame.object and made._tab.visible
     made.save()
