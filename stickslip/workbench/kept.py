@@ -106,7 +106,8 @@ def save(
         return _copied(found.folder, folder)
     if isinstance(found, Fit):
         found.confirm(tell)
-        return found.save(folder, **({"history": history} if history else {}))
+        more: dict[str, Any] = {"history": history} if history else {}
+        return found.save(folder, **more)
     return found.save(folder)
 
 
