@@ -435,8 +435,8 @@ def main() -> None:
         made = (paper, together, robot, fault, prescribed, topographies)
         parts = {f.__name__: f(data, work) for f in made if asked.only is None or f.__name__ in asked.only}
     head = {"version": __version__, "date": date.today().isoformat(), "command": "python docs/make_real_data.py"}
-    if "prescribed" in parts:
-        parts["prescribed"] |= head
+    for name in parts.keys() & {"prescribed", "topographies"}:
+        parts[name] |= head
     path = DOCS / "results" / "real_data.json"
     known = json.loads(path.read_text(encoding="utf-8")) if asked.only is not None else {}
     text = json.dumps({**head, **known, **parts}, indent=1, ensure_ascii=False)

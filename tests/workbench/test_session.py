@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import closing
+from functools import partial
 
 import numpy as np
 import pytest
@@ -280,3 +281,23 @@ def test_a_fit_tells_how_far_it_is(session):
     assert len(shares) > 3
     assert shares == sorted(shares)
     assert 0.5 < shares[-1] <= 1.0
+
+
+@pytest.mark.parametrize("foreign", [True, False])
+def test_a_law_of_ones_own_that_fails_does_not_end_the_listing(base, monkeypatch, foreign):
+    told: list[str] = []
+
+    def fails(fit, explained, tag, form):
+        if tag == "wear":
+            raise ValueError("of the law")
+        return tag
+
+    monkeypatch.setattr(searches, "promise", fails)
+    monkeypatch.setattr(searches, "blamed", lambda error: ss.InputError("its law failed") if foreign else None)
+    listing = partial(searches._promises, base.force_fit, ["tilt", "wear"], lambda tag, share: told.append(tag))
+    if foreign:
+        listing()
+        assert set(told) == {"tilt"}
+    else:
+        with pytest.raises(ValueError, match="of the law"):
+            listing()
