@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from stickslip.inference.force.kernels import kernels
 from stickslip.inference.force.knots import CREEP, _between, bow, knots
+from stickslip.inference.force.reading import Reading
 from stickslip.inference.force.smoothing import onward
 
 RATE = 1e4
@@ -104,10 +106,11 @@ def test_windows_are_made_of_the_samples(small):
         slow = k.phase == CREEP
         knot = np.searchsorted(k.t, k.at[slow])
         np.testing.assert_array_equal(k.t[knot], k.at[slow])
-        np.testing.assert_allclose(k.reading[knot] @ k.samples, k.x[knot], rtol=0.0, atol=1e-15)
-        assert np.all(np.diff(k.reading.indptr)[knot] > 1)
+        made_of, count = k.reading.displacement[knot], k.reading.count
+        np.testing.assert_allclose(made_of @ k.reading.sums(k.reading.samples), k.x[knot], rtol=0.0, atol=1e-15)
+        assert np.all((made_of != 0.0) @ count > 1)
         np.testing.assert_allclose(k.drive[knot], trace.drive.position(k.at[slow]), atol=1e-13)
-        np.testing.assert_allclose(np.asarray(k.reading[knot].sum(axis=1)).ravel(), 1.0, atol=1e-12)
+        np.testing.assert_allclose(made_of @ count, 1.0, atol=1e-12)
         half = 0.25 * np.minimum(k.t[knot] - k.t[knot - 1], k.t[knot + 1] - k.t[knot])
         edges = np.searchsorted(trace.time, [k.t[knot] - half, k.t[knot] + half])
         far = np.diff(edges, axis=0)[0] > 20
@@ -198,3 +201,18 @@ def test_samples_and_other_events_are_not_made_to_go_on():
     assert found[5] == pytest.approx(0.0, abs=1e-20)
     assert np.all(np.diff(found[:5]) >= 0.0)
     assert np.all(np.diff(found[5:]) >= 0.0)
+
+
+def test_samples_that_count_alike_are_one_group():
+    """What a group holds is what its samples would by themselves, and neighbours that differ anywhere are apart."""
+    rng = np.random.default_rng(2)
+    groups = np.repeat(np.arange(5), [3, 1, 4, 2, 2])
+    parts = [csr_array(rng.standard_normal((4, 5)) * (rng.random((4, 5)) < 0.6)) for _ in range(3)]
+    dense = [part.toarray()[:, groups] for part in parts]
+    dense[2][0, 6] += 1.0  # the samples 4 to 7 of the third part into 4 and 5, 6, 7
+    samples, other = rng.standard_normal((2, 12))
+    made = Reading.of(samples, *map(csr_array, dense))
+    np.testing.assert_array_equal(made.count, [3, 1, 2, 1, 1, 2, 2])
+    for found, whole in zip((made.displacement, made.rate, made.acceleration), dense, strict=True):
+        np.testing.assert_allclose(found @ made.sums(other), whole @ other, atol=1e-13)
+        np.testing.assert_allclose((found * made.count) @ found.T.toarray(), whole @ whole.T, atol=1e-13)

@@ -87,7 +87,7 @@ def test_an_error_periodic_within_a_fringe_reaches_the_force_as_stated(small, tu
     blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
     shaken = []
     for trace, found, k in zip(small.traces, small.found, problem.runs, strict=True):
-        phase = 2.0 * np.pi * k.samples / FRINGE
+        phase = 2.0 * np.pi * k.reading.samples / FRINGE
         error = SMALL * (np.sin(phase + turn) + 0.25 * np.cos(2.0 * phase - turn))
         shaken.append(knots(trace, found, small.times, error))
     seen = blocks(Problem(problem.composition, shaken).evaluate(point).residual - slopes.residual)

@@ -15,7 +15,7 @@ from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
 from .linearised import FARTHEST, Array, Linearised, moved
-from .noise import beyond, by_reading, carrier, known_of
+from .noise import beyond, by_reading, carrier, known_of, left_out
 from .problem import Forces, Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
 from .sensor_walk import grown
@@ -190,7 +190,7 @@ def fit(
             more = beyond(made, sizes, marginal, blocks, out.size) & ~out
             if dropped is None and more.any():
                 out = out | more
-                made = known_of(problem, slopes, rows, blocks, out)
+                made = made.without(blocks(left_out(problem, out)))
                 sizes = estimate(sizes, marginal, made, NEWTON)
         point, slopes, total, count, damping = descend(problem, point, slopes, sizes, made, blocks, steps, damping)
         evaluations += count

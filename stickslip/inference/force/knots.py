@@ -19,6 +19,7 @@ from ...data.segment import Event, Segmentation
 from ...data.trace import Trace
 from .kernels import kernels
 from .mains import hum
+from .reading import Reading
 from .sampling import even
 from .scales import Scales
 from .smoothing import Smoother, onward, smoothed, unsteady
@@ -53,9 +54,7 @@ class Knots:
         phase: of the points, an index of PHASES.
         of: event of the points.
         rate, acceleration: of the reading at the points, under the test function (m/s, m/s2).
-        samples: the reading (m), shape (N,).
-        reading: (n, N) from the samples of the reading to the displacement at the knots.
-        moving: (p, N) from the samples to rate and acceleration at the points.
+        reading: samples, and what an error of theirs does at knots and points.
         place: coordinate along which misfits are alike, one unit apart little (1).
         elapsed: time since the arrest before, or the start (s).
         lasting: time of every event from the arrest before, or the start, to its own (s), shape (E,).
@@ -65,7 +64,8 @@ class Knots:
         force: measured force at the knots where the motion is prescribed, else zero (N).
         load: measured normal load at the knots (N), NaN where there is none.
         force_noise: variance of the force at the points where that is measured by itself, else zero (N^2).
-        hum: sine and cosine of the sensor's hum in the samples, each as large as is expected (m), shape (N, 2).
+        hum: what sine and cosine of the sensor's hum, each as large as is expected, add to the samples of each group
+            (m), shape (g, 2).
     """
 
     name: str
@@ -82,9 +82,7 @@ class Knots:
     of: Index
     rate: Array
     acceleration: Array
-    samples: Array
-    reading: csr_array
-    moving: tuple[csr_array, csr_array]
+    reading: Reading
     place: Array
     elapsed: Array
     lasting: Array
@@ -310,14 +308,13 @@ class _Pieces:
             turns.joined(y, own) for y, own in zip((knot_t, x, v, d), turns.at(knot_t, x, d), strict=True)
         )
         event = event[turns.source]
-        reading = turns.rows(reading)
+        told = Reading.of(samples, turns.rows(reading), moving[0], moving[1])
         knots_made = Knots(
             trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
-            made["at"], phase, of, made["rate"], made["acceleration"], samples,
-            reading, (moving[0], moving[1]),
+            made["at"], phase, of, made["rate"], made["acceleration"], told,
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, begun), np.diff(begun),
             noise, trace.spring_stiffness, trace.virgin, np.zeros(knot_t.size), load_at(trace, knot_t),
-            np.zeros(of.size), times.hum.at(t),
+            np.zeros(of.size), told.sums(times.hum.at(t)),
         )  # fmt: skip
         return selected(knots_made, keep)
 
@@ -394,8 +391,7 @@ def selected(k: Knots, keep: NDArray[np.bool_]) -> Knots:
     index = np.flatnonzero(keep)
     return replace(
         k, mean=k.mean[index], smooth=(k.smooth[0][index], k.smooth[1][index]),
-        moving=(k.moving[0][index], k.moving[1][index]),
-        **{n: getattr(k, n)[index] for n in POINTS},
+        reading=k.reading.points(index), **{n: getattr(k, n)[index] for n in POINTS},
     )  # fmt: skip
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, dia_array
 
-from ...physics.sensor.chain import FRINGE
 from .problem import Point, Problem, Slopes
 from .scatter import Blocks, Known, Scatter, weigh
 
@@ -33,14 +32,19 @@ def known_of(
     strength = problem.composition.nominal[0]  # not the model's: a weaker contact would have a smaller misfit allowed
     return Known(
         noise(problem, rows, blocks), periodic(problem, rows, blocks),
-        blocks(np.where(dropped, strength**2, 0.0)), blocks(slopes.local), blocks(problem.phase),
+        blocks(left_out(problem, dropped)), blocks(slopes.local), blocks(problem.phase),
         blocks(slopes.spring), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed),
         problem.lasting, problem.begins, blocks.there, strength,
     )  # fmt: skip
 
 
+def left_out(problem: Problem, dropped: NDArray[np.bool_]) -> Array:
+    """Variance (N^2) that takes the weight of points that are left out, shape (p,)."""
+    return np.where(dropped, problem.composition.nominal[0] ** 2, 0.0)
+
+
 def by_reading(problem: Problem, point: Point, slopes: Slopes) -> list[csr_array]:
-    """Of every run, what an error of the samples does to the force (N/m), shape (p, N).
+    """Of every run, what an error of one sample of each group does to the force (N/m), shape (p, g).
 
     A sample that is off by e changes the force of springs and contact by k e, that of inertia by m e'': together, so
     that near the resonance of the contact, where the one nearly undoes the other, little noise is left. An element that
@@ -51,15 +55,14 @@ def by_reading(problem: Problem, point: Point, slopes: Slopes) -> list[csr_array
     out = []
     weakening = 1.0 - values["weakening.drop"], values["weakening.slip_distance"], values["weakening.healing_time"]
     for r, (run, stiffness) in enumerate(zip(problem.runs, slopes.sticking, strict=True)):
-        rate, acceleration = run.moving
         spring = values.get("rig.spring_stiffness", 0.0) if run.stiffness is None else run.stiffness
         stiff = dia_array((stiffness + spring, 0), shape=(stiffness.size, stiffness.size))
         since = remembered(elements, stiffness, slopes.slides[r])
         slid = weakened(run.t, run.x, slopes.sliding[r], slopes.psi[r], *weakening)
         out.append(
-            (run.mean @ (stiff - since + slid)) @ run.reading
-            + values["rig.damping"] * rate
-            + values["rig.mass"] * acceleration
+            (run.mean @ (stiff - since + slid)) @ run.reading.displacement
+            + values["rig.damping"] * run.reading.rate
+            + values["rig.mass"] * run.reading.acceleration
         )
     return out
 
@@ -79,7 +82,8 @@ def noise(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Arr
     first = 0
     for run, rows in zip(problem.runs, carried, strict=True):
         own = slice(first, first + run.at.size)
-        pairs = (rows @ rows.T).tocoo()
+        scaled = rows @ dia_array((np.sqrt(run.reading.count), 0), shape=(rows.shape[1],) * 2)
+        pairs = (scaled @ scaled.T).tocoo()
         i, j = pairs.coords
         together = event[own][i] == event[own][j]
         i, j = i[together], j[together]
@@ -92,14 +96,9 @@ def noise(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Arr
 def periodic(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Array:
     """Covariance (N^2) by errors of the reading of 1 m that are periodic within a fringe, shape (E, n, n).
 
-    A fringe counter interpolates between fringes with an error periodic in half a wavelength, and about half as large
-    in a quarter of it. Its phase is an event's own: a slow walk of the reading turns it.
+    Their phase is an event's own: a slow walk of the reading turns it.
     """
-    columns = []
-    for run, rows in zip(problem.runs, carried, strict=True):
-        phase = 2.0 * np.pi * run.samples / FRINGE
-        waves = [np.sin(phase), np.cos(phase), 0.5 * np.sin(2.0 * phase), 0.5 * np.cos(2.0 * phase)]
-        columns.append(rows @ np.stack(waves, axis=1))
+    columns = [rows @ run.reading.fringe for run, rows in zip(problem.runs, carried, strict=True)]
     side = blocks(np.concatenate(columns))
     return np.asarray(side @ np.swapaxes(side, 1, 2))
 
@@ -145,6 +144,8 @@ def weakened(t: Array, x: Array, sliding: Array, psi: Array, ratio: float, reach
     place = np.arange(at.size) - np.repeat(np.cumsum(counts) - counts, counts)
     j = np.repeat(first, counts) + place
     value = (weight[at] * np.exp(ends[j] - ends[at])) * by_step[j]
-    later = place > 0  # the error of a step's begin
-    rows, columns = np.concatenate([at, at[later]]), np.concatenate([j, j[later] - 1])
-    return coo_array((np.concatenate([value, -value[later]]), (rows, columns)), shape=(t.size,) * 2).tocsr()
+    # an error at a knot lengthens the step that ends there, and shortens the next one
+    value -= np.where(j < at, np.append(value[1:], 0.0), 0.0)
+    stored = np.zeros(t.size + 1, int)
+    stored[slide + 1] = counts
+    return csr_array((value, j, np.cumsum(stored)), shape=(t.size,) * 2)

@@ -21,6 +21,7 @@ from ...physics.effects import catalogue
 from ..fit.parameters import Free, vector
 from .knots import CREEP, Knots, bow, load_at
 from .problem import OWN, Composition, Point, Problem
+from .reading import Reading
 from .smoothing import onward
 from .starting_values import ELEMENTS, REACH, known, with_weights
 
@@ -120,6 +121,7 @@ def thinned(trace: Trace) -> Knots:
     of = event[compared]
     empty = csr_array((compared.size, at.size))
     unmoved = csr_array((compared.size, t.size))
+    reading = Reading.of(x, csr_array(made_of @ means), unmoved, unmoved)
     firsts = np.array([s.first for s in parts])[piece[compared]]
     since = at[compared] - t[firsts]
     # a reading that stands still after a turn does not say how far the stiffest of the contact has been unloaded
@@ -129,11 +131,11 @@ def thinned(trace: Trace) -> Knots:
     return Knots(
         trace.name, at, knots_x, rate, knots_x, event, np.full(at.size, -1),
         csr_array((eye + bowed)[compared]), (empty, empty), at[compared], np.full(compared.size, CREEP), of,
-        rate[compared], bend[compared], x, csr_array(made_of @ means), (unmoved, unmoved),
+        rate[compared], bend[compared], reading,
         np.log1p(since / least) / np.log(4.0) + PLACED_APART * piece[compared], at[compared] - begins[of],
         np.diff(np.append(begins, t[-1])), noise, SOFT * stiffest, trace.virgin, knots_force,
         load_at(trace, at) if trace.normal_load is None else means @ trace.normal_load, force_noise,
-        np.zeros((x.size, 2)),
+        np.zeros((reading.count.size, 2)),
     )  # fmt: skip
 
 

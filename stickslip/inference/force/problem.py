@@ -228,7 +228,7 @@ class Problem:
         systematic = max(float(np.median([k.noise for k in runs])), 1e-12)
         alike = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
         self.hums = np.array([r for r, k in enumerate(runs) if k.hum.any()], int)
-        at_points = np.concatenate([k.mean @ (k.reading @ k.hum) for k in runs])
+        at_points = np.concatenate([k.mean @ (k.reading.displacement @ k.hum) for k in runs])
         self.readings = np.hstack([alike, self._by_run(at_points)])
         self.usual = np.concatenate([np.full(alike.shape[1], systematic), np.ones(2 * self.hums.size)])
         self.carrier: Array | None = None

@@ -141,8 +141,14 @@ class Known:
 
     def with_local(self, local: Array) -> Known:
         """The same with other derivatives in the events' own."""
-        other = replace(self, local=local)
-        other.__dict__.update(near=self.near, shifts=self.shifts, nodes=self.nodes)  # which do not depend on them
+        return self._with(replace(self, local=local))
+
+    def without(self, dropped: Array) -> Known:
+        """The same with other points left out: a variance (N^2) that takes their weight, shape (E, n)."""
+        return self._with(replace(self, dropped=dropped))
+
+    def _with(self, other: Known) -> Known:
+        other.__dict__.update(near=self.near, shifts=self.shifts, nodes=self.nodes)  # which depend on neither
         return other
 
     @cached_property
