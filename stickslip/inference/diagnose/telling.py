@@ -1,0 +1,116 @@
+"""How well an experiment would tell models apart: what they hold along its motion, over what is known of either.
+
+Along the motion of an experiment two models hold forces that differ by ``d``. With ``S`` the covariance of the
+residual force there (noise, scatter of events, and what the campaign leaves unknown of the parameters of both),
+``d' S^-1 d / 2`` is the logarithm of the likelihood ratio that the experiment is expected to give for the one that is
+true. From that follows the expected information about which model it is (Lindley, Ann. Math. Stat. 27 (1956) 986).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from ..force.fit import Fit
+from ..force.knots import Knots
+from ..force.linearised import Array
+from ..force.noise import by_reading, known_of
+from ..force.problem import PULL, Point, Problem
+from ..force.scatter import Blocks, Whitening, WithEvents
+from .decide import DISPERSION
+
+TURNS = 4  # phases of a run's own that are tried: the experiment may meet any
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A model along a run that its fit has not seen.
+
+    Attributes:
+        residual: force, all events alike (N), shape (p,).
+        unsure: what a standard deviation of each independent combination of its parameters does (N), shape (p, q).
+        white: the covariance of the residuals, the parameters known.
+        blocks: points by event.
+    """
+
+    residual: Array
+    unsure: Array
+    white: WithEvents
+    blocks: Blocks
+
+
+def margins(fits: Sequence[Fit], run: Knots) -> Array:
+    """Expected logarithm of the likelihood ratio of each model, were it true, over each other one, shape (m, m).
+
+    In units in which chance spreads as it should (the cost over its dispersion).
+
+    Args:
+        fits: models of one campaign.
+        run: the motion of the experiment.
+    """
+    held = [_held(fit, run) for fit in fits]
+    out = np.zeros((len(fits), len(fits)))
+    for i, ones in enumerate(held):
+        for j, others in enumerate(held):
+            if i != j:
+                out[i, j] = min(_margin(one, other) for one in ones for other in others)
+    return out
+
+
+def information(margins: Array) -> float:
+    """Expected information about which of some models is true, beforehand alike likely (nat), from :func:`margins`.
+
+    At most the logarithm of their number, where the experiment decides.
+    """
+    m = len(margins)
+    return float(np.log(m) - np.mean(logsumexp(-margins, axis=1)))
+
+
+def _margin(one: _Held, other: _Held) -> float:
+    side = np.column_stack([other.residual - one.residual, one.unsure, other.unsure])
+    white = one.white(one.blocks(side)).reshape(-1, side.shape[1])
+    difference, unsure = white[:, 0], white[:, 1:]
+    root = np.linalg.cholesky(unsure.T @ unsure + np.eye(unsure.shape[1]))
+    told = np.linalg.solve(root, unsure.T @ difference)
+    return 0.5 * float(difference @ difference - told @ told) / DISPERSION
+
+
+def _held(fit: Fit, run: Knots) -> list[_Held]:
+    """The model along the run, at each phase that the run may have of its own."""
+    periodic = [f.name for f in fit.problem.composition.phases if f.name != PULL]
+    return [_along(fit, run, 2.0 * np.pi * turn / TURNS) for turn in range(TURNS if periodic else 1)]
+
+
+def _along(fit: Fit, run: Knots, turn: float) -> _Held:
+    problem = Problem(fit.problem.composition, [run])
+    phases = problem.composition.phases
+    own = np.array([[0.0 if f.name == PULL else turn / float(f.scale)] for f in phases]).reshape(len(phases), 1)
+    alike = problem.readings.shape[1] - 2 * problem.hums.size
+    common = np.concatenate([fit.point.common[:alike], np.zeros(2 * problem.hums.size)])
+    point = Point(fit.point.z, own, fit.point.weights, np.zeros((problem.events, fit.point.events.shape[1])), common)
+    blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
+    known = known_of(problem, slopes, by_reading(problem, point, slopes), blocks, np.zeros(problem.of.size, bool))
+    white = Whitening(fit.scatter.sizes, known).with_events(blocks(slopes.local))
+    return _Held(slopes.residual, slopes.shared @ _deviations(fit, problem), white, blocks)
+
+
+def _deviations(fit: Fit, problem: Problem) -> Array:
+    """Of parameters of a problem of one run, by independent combinations: those of the campaign, and the run's own."""
+    a, k = fit.point.z.size, fit.point.weights.size
+    there, here = fit.point.phases.size, len(problem.composition.phases)
+    alike = problem.readings.shape[1] - 2 * problem.hums.size
+    known = np.concatenate([np.arange(a), a + there + np.arange(k + alike)])
+    part = fit.covariance[np.ix_(known, known)]
+    scale = np.sqrt(np.maximum(np.diag(part), 1e-300))  # metres beside newtons
+    values, vectors = np.linalg.eigh(part / scale[:, None] / scale)
+    told = np.concatenate([np.arange(a), a + here + np.arange(k + alike)])
+    total = a + here + k + problem.readings.shape[1]
+    own = np.setdiff1d(np.arange(total), told)
+    out = np.zeros((total, known.size + own.size))
+    out[np.ix_(told, np.arange(known.size))] = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    usual = [0.0 if f.name == PULL else np.pi / np.sqrt(3.0) / float(f.scale) for f in problem.composition.phases]
+    out[own, known.size + np.arange(own.size)] = np.concatenate([usual, problem.usual[alike:]])
+    return out
