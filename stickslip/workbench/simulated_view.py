@@ -9,8 +9,9 @@ import panel as pn
 from bokeh.core.properties import value
 
 from . import experiments
-from .asked import WIDE, Asked, Simulated, named, needed, press
+from .asked import WIDE, Asked, named, needed, press
 from .beside import Show, Tell, beside
+from .experiments import Simulated
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .measures import event_rows, thinned
 from .overview import record
