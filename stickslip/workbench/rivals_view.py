@@ -110,7 +110,7 @@ class Rivals:
         told = {} if self._session.diagnosis is None else self._session.diagnosis.verdict.get("forms", {})
 
         def make(tell: Tell, show: Show) -> list[Telling]:
-            fit = needed(self._session)
+            fit, code = needed(self._session), self._session.code()
             scenario = experiments.scenario(fit, asked)
             velocity = campaign[asked.run].drive_velocity or scenario.file.drive.velocity or FALLBACK
             velocity = to_si(asked.velocity, "m/s", key="velocity") if asked.velocity.strip() else velocity
@@ -120,7 +120,7 @@ class Rivals:
             if not asked.as_measured:
                 options = {"as asked for above": asked, **options}
             fits = experiments.rivals(fit, tags, told, tell)
-            return experiments.tell_apart(fits, options, experiments.scatter(campaign), tell, show)
+            return experiments.tell_apart(fit, fits, options, experiments.scatter(campaign), tell, show, code)
 
         self._work.do("fitting each of them", make)
 

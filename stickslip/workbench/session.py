@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import param
@@ -347,6 +348,10 @@ class Session(param.Parameterized):
         home = self.campaign.description.folder.resolve()
         own = path.resolve()
         return str(own.relative_to(home) if own.is_relative_to(home) else own)
+
+    def options(self) -> str:
+        """Options of a command that name the files with effects of one's own."""
+        return "".join(f" --effect {quote(self.shown(path))}" for path in self.effects)
 
     def code(self) -> str:
         """The lines of Python that lead to the model as it stands."""

@@ -65,9 +65,9 @@ class SimulatedView:
         setting = self._asked.setting()
 
         def make(tell: Tell, show: Show) -> Simulated:
-            fit = needed(self._session)
+            fit, code = needed(self._session), self._session.code()
             tell("simulating", 0.0)
-            return Simulated(fit, setting, experiments.run(experiments.scenario(fit, setting), tell))
+            return Simulated(fit, setting, experiments.run(experiments.scenario(fit, setting), tell), code)
 
         self._work.do("simulating", make)
 

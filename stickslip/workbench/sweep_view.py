@@ -90,7 +90,8 @@ class SweepView:
         setting, low, high, points = self._asked.setting(), self.low.value, self.high.value, int(self.points.value or 0)
 
         def make(tell: Tell, show: Show) -> Any:
-            return experiments.sweep(needed(self._session), setting, low, high, points, tell, show)
+            fit, code = needed(self._session), self._session.code()
+            return experiments.sweep(fit, setting, low, high, points, tell, show, code)
 
         self._work.do("sweeping the velocity", make)
 

@@ -188,7 +188,7 @@ def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(
     hold, wrong = Setting("v200", "200 um/s", "10 s"), Setting("v200", "200 um/s", mass="0 kg")
     options = {"as driven": plain, "a hold of 10 s": hold, "wrong": wrong}
     shown = []
-    found = experiments.tell_apart(fits, options, experiments.scatter(campaign), _silent, shown.append)
+    found = experiments.tell_apart(base, fits, options, experiments.scatter(campaign), _silent, shown.append)
     assert [t.words for t in found] == ["a hold of 10 s", "as driven", "wrong"] and len(shown) == 2
     assert found[0].scatters > 3.0 * found[1].scatters > 0.0 and "mass" in found[2].note and not found[2].recordings
     assert set(found[0].recordings) == set(RIVALS)

@@ -24,11 +24,17 @@ MEASURES = {"recurrence": "s", "slip": "m", "peak_velocity": "m/s", "creep_befor
 
 @dataclass(frozen=True)
 class Simulated:
-    """One simulated run, and what it was."""
+    """One simulated run, and what it was.
+
+    Attributes:
+        fit, setting, recording: the model, what it was put to, and what came of it.
+        code: the lines of Python that lead to the model.
+    """
 
     fit: Fit
     setting: Setting
     recording: Recording
+    code: str = ""
 
 
 def run(made: Scenario, tell: Tell | None = None, text: str = "simulating") -> Recording:

@@ -27,15 +27,18 @@ class Telling:
     Attributes:
         words: what is done.
         setting: the same.
+        model: in which the rivals stand in place of one another.
         fits: the models by their effects.
         recordings: of every model; empty where it cannot be simulated.
         measure, slip, share: where the models differ most, and by how much of the mean; slip 0 is the hold.
         scatters: the same in scatters of one such event.
         note: why there is nothing.
+        code: the lines of Python that lead to ``model``.
     """
 
     words: str
     setting: Setting
+    model: Fit
     fits: Mapping[str, Fit]
     recordings: Mapping[str, Recording]
     measure: str = ""
@@ -43,6 +46,7 @@ class Telling:
     share: float = 0.0
     scatters: float = 0.0
     note: str = ""
+    code: str = ""
 
 
 def rivals(
@@ -162,16 +166,18 @@ def scatter(campaign: Campaign) -> dict[str, float]:
 
 
 def tell_apart(
-    fits: Mapping[str, Fit], options: Mapping[str, Setting], scatters: Mapping[str, float], tell: Tell,
-    show: Callable[[Sequence[Telling]], None] = lambda found: None,
+    model: Fit, fits: Mapping[str, Fit], options: Mapping[str, Setting], scatters: Mapping[str, float], tell: Tell,
+    show: Callable[[Sequence[Telling]], None] = lambda found: None, code: str = "",
 ) -> list[Telling]:  # fmt: skip
     """Every experiment simulated for every model; the one first in which they differ most beyond the scatter.
 
     Args:
-        fits: the models.
+        model: in which the rivals stand in place of one another.
+        fits: with each of them.
         options: the experiments.
         scatters: as of :func:`scatter`.
         tell, show: told the progress, and what there is so far.
+        code: the lines of Python that lead to the model.
     """
     out: list[Telling] = []
     for i, (words, setting) in enumerate(options.items()):
@@ -182,17 +188,16 @@ def tell_apart(
         try:
             found = compare(fits, setting, within)
         except StickslipError as error:
-            out.append(Telling(words, setting, fits, {}, note=str(error).split("\n")[0]))
+            out.append(Telling(words, setting, model, fits, {}, note=str(error).split("\n")[0], code=code))
             continue
         best = farthest(found, scatters)
         if best is None:
-            out.append(Telling(words, setting, fits, found, note="no event differs"))
+            out.append(Telling(words, setting, model, fits, found, note="no event differs", code=code))
         else:
             key, slip, share = best
             values = np.array([signs(r)[key][slip] for r in found.values()])
-            out.append(
-                Telling(words, setting, fits, found, key, slip + 1, share, share / _scatter(key, values, scatters))
-            )
+            far = share / _scatter(key, values, scatters)
+            out.append(Telling(words, setting, model, fits, found, key, slip + 1, share, far, code=code))
         out.sort(key=lambda t: -t.scatters)
         show(list(out))
     return out

@@ -30,6 +30,7 @@ class Swept:
         velocities: m/s, as far as they are simulated.
         recordings: of each of them.
         events: the same, as of :func:`simulated`.
+        code: the lines of Python that lead to the model.
     """
 
     fit: Fit
@@ -38,6 +39,7 @@ class Swept:
     velocities: tuple[float, ...] = ()
     recordings: tuple[Recording, ...] = ()
     events: tuple[dict[str, Spread], ...] = ()
+    code: str = ""
 
     def mean(self, key: str) -> np.ndarray:
         """Means of one of :data:`MEASURES`, shape (n,); nan where there is no event."""
@@ -45,7 +47,8 @@ class Swept:
 
 
 def sweep(
-    fit: Fit, setting: Setting, low: str, high: str, points: int, tell: Tell, show: Callable[[Swept], None]
+    fit: Fit, setting: Setting, low: str, high: str, points: int, tell: Tell, show: Callable[[Swept], None],
+    code: str = "",
 ) -> Swept:  # fmt: skip
     """Events of the model over the velocity of the drive; shown as far as they are there.
 
@@ -55,6 +58,7 @@ def sweep(
         low, high: ends of the velocities, with units.
         points: how many.
         tell, show: told the progress, and what there is so far.
+        code: the lines of Python that lead to the model.
 
     Raises:
         InputError: a velocity that cannot be read, or too many of them.
@@ -66,7 +70,7 @@ def sweep(
         raise InputError("out of range", key="number of velocities", value=points, allowed=f"{FEWEST} to {MOST}")
     steady = replace(setting, velocity=low, hold="", step="", back=False)
     series = SweepTable(key="drive.velocity", start=ends[0], stop=ends[1], points=points)
-    done = Swept(fit, steady, series)
+    done = Swept(fit, steady, series, code=code)
     for i, (value, member) in enumerate(scenarios_of(scenario(fit, steady), series)):
         words = f"{i + 1} of {points}: {1e6 * value:.4g} µm/s"
 
