@@ -14,6 +14,7 @@ from .controls import BUTTON
 from .experiments import Setting
 from .parts import head
 from .picked import chosen
+from .remembering import Remembered
 from .session import Session, watch
 
 FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
@@ -58,10 +59,12 @@ class Asked:
         asked = self.fields.values()
         self.row = pn.FlexBox(*asked, gap="6px 0")
         self.view = pn.Column(head("What is left empty is as in the measured run."), self.row, **WIDE)
+        self._kept = Remembered(session, "simulate", self.fields)
         self.run.param.watch(lambda event: self._placeholders(), "value")
         watch(session, ["campaign", "run"], self._runs)
         watch(session, ["steps", "at"], self._placeholders)
         self._runs()
+        self._kept.restore()
 
     def _runs(self) -> None:
         campaign, fit = self._session.campaign, self._session.fit
@@ -69,7 +72,8 @@ class Asked:
             return
         names = campaign.names if fit is None else [k.name for k in fit.climbed.prepared.runs]
         run = chosen(self._session)[0]
-        self.run.param.update(options=names, value=run if run in names else names[0])
+        with self._kept.aside():
+            self.run.param.update(options=names, value=run if run in names else names[0])
         self._placeholders()
 
     def _placeholders(self) -> None:

@@ -19,6 +19,7 @@ from .experiments import MEASURES, Telling
 from .figures import figure, label, legend, of_run, unit_of
 from .measures import cells, thinned
 from .parts import Table, head, progress, row_of
+from .remembering import Remembered
 from .session import Session, watch
 
 RIVALS = 8  # effects that are told apart at once
@@ -63,11 +64,13 @@ class Rivals:
             pn.FlexBox(self.which, self.effects, self._button, gap="6px 10px"), progress(self._work), self._table,
             self._place, **WIDE,
         )  # fmt: skip
+        self._kept = Remembered(session, "rivals", {"effects": self.effects})
         self.which.param.watch(lambda event: self._propose(), "value")
         watch(session, ["diagnosis", "promises", "loaded"], self._offer)
         watch(session, ["campaign"], self._anew)
         watch(self._work, ["found", "doing"], self.update)
         self._offer()
+        self._kept.restore()
         self.update()
 
     def _anew(self) -> None:
@@ -85,12 +88,14 @@ class Rivals:
     def _propose(self) -> None:
         if self._sets:
             tags, text = self._sets[int(self.which.value or 0)]
-            self.effects.value = [tag for tag in tags if tag in self.effects.options][:RIVALS]
+            with self._kept.aside():
+                self.effects.value = [tag for tag in tags if tag in self.effects.options][:RIVALS]
             self._said.text = f"The diagnosis proposes: {text}. {_simulated(text)} {DONE}"
             return
         if self.effects.value == self._offered:  # nobody chose others
             best = [p.tag for p in best_forms(self._session.promises) if p.fall > LEAST]
-            self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
+            with self._kept.aside():
+                self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
         offered = "The effects that promise most are offered; others can be chosen."
         self._said.text = f"{offered if self._session.promises else UNSEEN} {DONE}"
 

@@ -58,6 +58,7 @@ class Session(param.Parameterized):
         effects: Python files with effects of one's own; ``loaded`` counts how often they were.
         worker: does what takes longer than a hand would wait; the same thread unless a server gives another.
         aside: does what no hand waits for, likewise.
+        view: what windows show besides the model, as plain data by page; ``restored`` counts how often it came back.
         rough: a fitted model, and the rough lines nearest to its backbone (None where the rig says too little of them).
         free: a model, the name of a run, and that model run freely through it; None where that cannot be done.
     """
@@ -85,6 +86,8 @@ class Session(param.Parameterized):
     aside = param.Parameter(at_once)
     free = param.Parameter((None, "", None))
     rough = param.Parameter((None, None))
+    view = param.Dict({})
+    restored = param.Integer(0)
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
@@ -176,20 +179,26 @@ class Session(param.Parameterized):
 
     def keep(self) -> None:
         """Write the history beside the campaign, if it changed."""
-        now = (self.steps, self.at, self.run, self.event, self.locked)
-        if self._journal is None or now == self._kept:
+        now = (self.steps, self.at, self.run, self.event, self.locked, self.view)
+        if self._journal is None or not self.steps or now == self._kept:
             return
         self._kept = now
         rows = [
             {"text": s.text, "code": s.code, "command": s.command, "changed": dict(s.changed), "when": s.when}
             for s in self.steps
         ]
-        more = {"at": self.at, "run": self.run, "event": self.event, "locked": sorted(self.locked)}
+        more = {"at": self.at, "run": self.run, "event": self.event, "locked": sorted(self.locked), "view": self.view}
         try:
             self._journal.write(rows, [s.fit for s in self.steps], more)
         except OSError as error:
             self._journal = None
             self.said = f"the history cannot be kept beside the campaign ({error.strerror or error})"
+
+    def remember(self, key: str, value: Any) -> None:
+        """Keep what a page shows, as plain data, so that it comes back."""
+        if self.view.get(key) != value:
+            self.view = {**self.view, key: value}
+            self.later()
 
     def later(self) -> None:
         """Keep what is selected when nothing else is to be done."""

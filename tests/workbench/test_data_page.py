@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 from contextlib import closing
 from types import SimpleNamespace
@@ -17,7 +18,7 @@ from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, 
 from stickslip.workbench.adding_form import FirstRun, Form
 from stickslip.workbench.event_parts import PARTS, part
 from stickslip.workbench.event_view import EventView
-from stickslip.workbench.overview import AROUND, DISPLACEMENT, GAP, Levels, Window, record, reduced
+from stickslip.workbench.overview import AROUND, DISPLACEMENT, FORCE, GAP, Levels, Window, record, reduced
 from stickslip.workbench.places import new_place
 from stickslip.workbench.session import Session
 from stickslip.workbench.signals import Signals
@@ -81,7 +82,7 @@ def test_what_was_sent_serves_until_the_hand_leaves_it():
 def test_the_page_shows_the_runs_and_what_is_selected(campaign):
     session = Session(campaign=campaign)
     signals, event = Signals(session), EventView(session)
-    assert not signals.figures["spring force"].visible and signals.figures[GAP].visible
+    assert all(signals.figures[name].visible for name in (DISPLACEMENT, FORCE, GAP))
     data_page.select(session, "holds", 4)
     assert data_page.chosen(session) == ("holds", 4)
     onset = campaign.events[4].events[4].t_onset
@@ -96,10 +97,25 @@ def test_the_page_shows_the_runs_and_what_is_selected(campaign):
 def test_every_axis_has_its_unit(campaign):
     session = Session(campaign=campaign)
     signals, event = Signals(session), EventView(session)
-    shown = [f for f in signals.figures.values() if f.visible]
-    assert all("/ µm" in f.yaxis.axis_label for f in shown)
-    assert shown[-1].xaxis.axis_label == "time / s"
+    units = {name: f.yaxis.axis_label.partition(" / ")[2] for name, f in signals.figures.items() if f.visible}
+    assert units == {DISPLACEMENT: "µm", FORCE: "mN", GAP: "µm"}
+    assert signals.figures[GAP].xaxis.axis_label == "time / s"
     assert all("/ s" in f.xaxis.axis_label and "/ " in f.yaxis.axis_label for f in event.figures.values())
+
+
+def test_a_spring_force_that_nobody_measured_follows_from_the_stated_stiffness(campaign, base, monkeypatch):
+    session = Session(campaign=campaign)
+    made = Signals(session)
+    gap, force = (made._curves[name][0].values for name in (GAP, FORCE))
+    np.testing.assert_allclose(force, campaign.traces[0].spring_stiffness * gap, rtol=1e-12)
+    assert made.figures[FORCE].visible and "not measured: stated stiffness, 980 N/m" in made.figures[FORCE].title.text
+    unknown = [dataclasses.replace(t, spring_stiffness=None) for t in campaign.traces]
+    monkeypatch.setattr(type(campaign), "__getitem__", lambda self, name: unknown[self.names.index(name)])
+    bare = Signals(session)
+    assert FORCE not in bare._curves and not bare.figures[FORCE].visible
+    monkeypatch.setattr(type(base), "values", {**base.values, "rig.spring_stiffness": 500.0})
+    session.first(base)
+    assert "fitted stiffness, 500 N/m" in bare.figures[FORCE].title.text and bare.figures[FORCE].visible
 
 
 def test_a_tap_near_a_mark_selects_and_one_far_from_it_does_not(campaign):
