@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
+import threading
+import time
 from contextlib import closing
 from types import SimpleNamespace
 
@@ -16,12 +18,14 @@ from stickslip.objects import Campaign
 from stickslip.workbench import adding_form, data_page
 from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, guess, look
 from stickslip.workbench.adding_form import FirstRun, Form
+from stickslip.workbench.beside import close_all
 from stickslip.workbench.event_parts import PARTS, part
 from stickslip.workbench.event_view import EventView
 from stickslip.workbench.overview import AROUND, DISPLACEMENT, FORCE, GAP, Levels, Window, record, reduced
 from stickslip.workbench.places import new_place
 from stickslip.workbench.session import Session
 from stickslip.workbench.signals import Signals
+from stickslip.workbench.work import Worker
 
 MARKUP = "<img src=x onerror=alert(1)>"
 CSV = "time [s],x [um],F [mN]\n"
@@ -235,6 +239,32 @@ def test_what_is_wrong_is_said_in_the_form(own):
     form.velocity.value = "50 um/s"
     form.send()
     assert "sampling rate" in form.said.text
+
+
+def test_a_dropped_file_is_read_beside_and_only_its_own_window_asks(own, monkeypatch):
+    seen, begin = [], threading.Event()
+
+    def slow(name, content):
+        seen.append(threading.current_thread())
+        assert begin.wait(20)
+        return look(name, content)
+
+    monkeypatch.setattr(adding_form, "look", slow)
+    session = Session(campaign=own, worker=Worker())
+    try:
+        form, other = Form(session), Form(session)
+        form.take("run.csv", _table())
+        other.take("other.csv", _table())
+        assert form.dropped is None and "another file" in other.said.text
+        begin.set()
+        end = time.monotonic() + 20
+        while form.dropped is None and time.monotonic() < end:
+            time.sleep(0.01)
+        assert form.dropped == ("run.csv", _table()) and other.dropped is None
+        assert seen != [threading.main_thread()] and len(seen) == 1
+    finally:
+        close_all(session)
+        session.worker.close()
 
 
 def test_a_file_that_is_too_large_is_refused_by_the_server(own, monkeypatch):

@@ -56,7 +56,7 @@ def session(campaign, base, monkeypatch):
     monkeypatch.setattr(Session, "list_promises", lambda self: None)
     made = Session(campaign=campaign)
     made.first(base)
-    made._journal = Journal(campaign)
+    made._keeper.journal = Journal(campaign)
     return made
 
 
@@ -98,6 +98,6 @@ def test_what_is_damaged_or_of_another_version_is_left_alone(session, damage):
 def test_nothing_is_written_over_a_history_that_was_not_read_yet(campaign, session):
     session.remember("page", "keep_page")
     again = Session(campaign=campaign)
-    again._journal = Journal(campaign)
+    again._keeper.journal = Journal(campaign)
     again.remember("page", "model_page")
     assert Journal(campaign).read()[2]["view"] == {"page": "keep_page"}
