@@ -46,7 +46,8 @@ def creep(
     force:
         Replace an existing run folder.
     """
-    from .simulate import input_records, outside, scenario_arguments
+    from ..show.simulated import input_records
+    from .simulate import outside, scenario_arguments
 
     path, changes = scenario_arguments(scenario, more, set)
     if not 2 <= points <= 1_000_000:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..system.runstore import Run, file_record, json_text, open_run, refuse_existing, versions
+from ..system.runstore import Run, json_text, open_run, refuse_existing
 from . import show
 
 if TYPE_CHECKING:
@@ -60,13 +59,15 @@ def simulate(
     path, changes = scenario_arguments(scenario, more, set)
     if out is not None:
         refuse_existing(out, force)
+    from ..show.simulated import head
+
     began = time.perf_counter()
     loaded = _load(path, changes, trace, effect, sweep)
     series = loaded.file.sweep
     with open_run(out, force=force) if out is not None else nullcontext() as run:
         work = _single(loaded, run) if series is None else _series(loaded, series, run)
         work["warnings"] = [*outside(loaded), *work["warnings"]]
-        result = {**_head(loaded), **work, "seconds": round(time.perf_counter() - began, 3)}
+        result = {**head(loaded), **work, "seconds": round(time.perf_counter() - began, 3)}
         if run is not None:
             run.json(result)
     for text in result["warnings"]:
@@ -112,30 +113,6 @@ def scenario_arguments(scenario: str, more: tuple[str, ...], changes: tuple[str,
     return paths[0], [*changes, *(word for word in words if word not in paths)]
 
 
-def _head(scenario: Scenario) -> dict[str, Any]:
-    file = scenario.file
-    return {
-        "schema": 1,
-        "kind": "simulate",
-        "title": scenario.title,
-        "scenario": file.model_dump(by_alias=True, exclude_none=True),
-        "changes": [f"{key}={value}" for key, value in scenario.changes],
-        "inputs": input_records(scenario),
-        "versions": versions(),
-        "seeds": {
-            "lines": getattr(file.contact, "seed", None),
-            "sensor": file.sensor.seed if file.sensor else None,
-        },
-    }
-
-
-def input_records(scenario: Scenario) -> list[dict[str, str]]:
-    """Name and SHA-256 of the scenario file and of those it names."""
-    inputs = [file_record(scenario.path)] if scenario.path else []
-    parts = (scenario.file.drive.file, getattr(scenario.file.contact, "file", None))
-    return inputs + [file_record(scenario.folder / part) for part in parts if part]
-
-
 def outside(scenario: Scenario) -> list[str]:
     """Files that the scenario names and that do not lie in its folder or below: read, but said."""
     home = scenario.folder.resolve()
@@ -148,46 +125,22 @@ def outside(scenario: Scenario) -> list[str]:
 
 
 def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
+    from ..show.simulated import numbers, write_single
     from ..simulation.scenario import record
 
     with show.progress_bar() as watch:
         recording = record(scenario, watch)
     if run is not None:
-        from ..show.plots import save, static_against_inertial, trace_figure
-
-        run.arrays(recording)
-        save(trace_figure(recording), run.path("trace.png"))
-        save(static_against_inertial([recording], [scenario.title]), run.path("static_vs_inertial.png"))
-        if scenario.file.output.trace:
-            from ..simulation.scenario.writers import write_campaign
-
-            write_campaign(run.folder, [scenario], [recording])
-    return _numbers(recording.variables, recording.attrs)
-
-
-def _numbers(variables: Mapping[Any, Any], attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """What `result.json` says of one run: its event table and the facts."""
-    columns = {str(name): v for name, v in variables.items() if v.dims == ("event",)}
-    rows = [
-        dict(zip(columns, row, strict=True)) for row in zip(*(v.values.tolist() for v in columns.values()), strict=True)
-    ]
-    units = {name: v.attrs["units"] for name, v in columns.items()}
-    facts = {key: value for key, value in attributes.items() if key not in ("title", "versions", "warnings")}
-    return {
-        "events": rows,
-        "units": units,
-        "facts": facts,
-        "verdict": attributes["verdict"],
-        "warnings": [text for text in str(attributes["warnings"]).split("\n") if text],
-    }
+        write_single(run, scenario, recording)
+    return numbers(recording)
 
 
 def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str, Any]:
+    from ..show.simulated import series_numbers, write_series
     from ..simulation.scenario.series import scenarios_of, simulate_series, summary
 
     members = scenarios_of(scenario, sweep)
     done: list[xarray.Dataset] = []
-    interrupted = False
     with show.progress_bar() as watch:
         try:
             for data in simulate_series(members, lambda number, p: watch(p)):
@@ -198,55 +151,10 @@ def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str,
         except KeyboardInterrupt:
             if run is None or not done:
                 raise
-            interrupted = True
-    values = [value for value, _ in members]
-    table = summary(scenario, sweep.key, values, done)
+    table = summary(scenario, sweep.key, [value for value, _ in members], done)
     if run is not None:
-        _write_series(run, scenario, members, table, done)
-    warnings = {text: None for data in done for text in str(data.attrs["warnings"]).split("\n") if text}
-    result: dict[str, Any] = {
-        "kind": "series",
-        "key": sweep.key,
-        "runs": [
-            {"value": value, **_numbers(data.data_vars, data.attrs)}
-            for value, data in zip(values[: len(done)], done, strict=True)
-        ],
-        "table": {str(name): table[name].values.tolist() for name in table},
-        "units": {str(name): table[name].attrs["units"] for name in table},
-        "verdict": f"{sum(1 for d in done if d.sizes['event'])} of {len(done)} runs show slip events",
-        "warnings": list(warnings),
-    }
-    if interrupted:
-        result["interrupted"] = f"{len(done)} of {len(members)} runs were finished and are kept"
-    return result
-
-
-def _write_series(
-    run: Run,
-    scenario: Scenario,
-    members: list[tuple[float, Scenario]],
-    table: xarray.Dataset,
-    done: list[xarray.Dataset],
-) -> None:
-    from ..show.plots import save, series_figure, static_against_inertial
-
-    run.arrays(table)
-    run.text(_csv(table), "series.csv")
-    save(series_figure(table), run.path("series.png"))
-    unit = table["value"].attrs["units"]
-    labels = [show.quantity(float(value), unit, 3) for value in table["value"].values]
-    save(static_against_inertial(done, labels), run.path("static_vs_inertial.png"))
-    if scenario.file.output.trace:
-        from ..simulation.scenario.writers import write_campaign
-
-        write_campaign(run.folder, [member for _, member in members[: len(done)]], done)
-
-
-def _csv(table: xarray.Dataset) -> str:
-    names = [str(name) for name in table]
-    header = ",".join(f"{name} [{table[name].attrs['units']}]" for name in names)
-    rows = zip(*(table[name].values.tolist() for name in names), strict=True)
-    return "\n".join([header, *(",".join(repr(cell) for cell in row) for row in rows)]) + "\n"
+        write_series(run, members, table, done)
+    return series_numbers(sweep, members, table, done)
 
 
 def _report(result: dict[str, Any], out: Path | None) -> str:

@@ -18,6 +18,7 @@ from ..inference.diagnose.summary import fitted_sections
 from ..inference.fit.parameters import Free, effect_parameters
 from ..inference.fit.serialised import Fitted
 from ..inference.force.backbone import backbone, power_law
+from ..inference.force.errors import deviation, error, of_all, sums
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at, deviations
 from ..inference.force.fit import fit as fit_force
@@ -31,7 +32,7 @@ from ..show.report.diagnosis_result import trace_sections
 from ..show.report.identifiability import identifiability
 from ..simulation.conformance import try_laws
 from ..system.units import shown, to_si
-from .error_tables import by_phase, deviation, error, of_all, sums
+from .error_tables import by_phase
 from .picture import FitPlots
 from .run import Tell, dataset, head, save, silent
 from .shown import Shown, facts, table

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -64,6 +65,24 @@ class Dropper(pn.widgets.FileDropper):
         super()._process_event(event)
 
 
+@dataclass(frozen=True)
+class Read:
+    """A file that was dropped, and what was found in it.
+
+    Attributes:
+        form: into which it was dropped; other windows have their own.
+        name, content: of the file.
+        columns: of it, None where it cannot be read.
+        said: why it cannot be.
+    """
+
+    form: Form
+    name: str
+    content: bytes
+    columns: Columns | None
+    said: str = ""
+
+
 class Form:
     """What is asked for of a file that was dropped, which becomes a run of the campaign.
 
@@ -76,7 +95,7 @@ class Form:
     doing = "adding the run"
 
     def __init__(self, session: Session) -> None:
-        self._session, self._work = session, beside(session, "adding")
+        self._session, self._work, self._reading = session, beside(session, "adding"), beside(session, "reading")
         self.dropped: tuple[str, bytes] | None = None
         self._columns: Columns | None = None
         fixed = {"sizing_mode": "fixed"}
@@ -109,12 +128,14 @@ class Form:
             self.drop,
             self.said,
             self._asked,
+            progress(self._reading),
             progress(self._work, stopping=False),
             sizing_mode="stretch_width",
         )
         self.drop.param.watch(self._dropped, "value")
         self.add.on_click(lambda event: self.send())
         watch(self._work, ["doing", "found"], self._update)
+        watch(self._reading, ["found"], self._read)
 
     def _dropped(self, event: Any) -> None:
         files = dict(event.new or {})
@@ -131,15 +152,33 @@ class Form:
         )
 
     def take(self, name: str, content: bytes) -> None:
-        """Look into a file and show what its columns seem to be."""
+        """Look into a file, beside all else, and show what its columns seem to be."""
         self._asked.visible = False
         self.dropped = None
-        try:
-            self._columns = look(name, content)
-        except (InputError, OSError, ValueError) as error:
-            self.said.text = str(error)
+        if self._reading.doing:
+            self.said.text = "another file is being read: drop this one again when that is done"
             return
-        self.dropped = (name, content)
+
+        def make(tell: Tell, show: Show) -> Read:
+            tell(f"reading {name}", 0.0)
+            try:
+                return Read(self, name, content, look(name, content))
+            except (InputError, OSError, ValueError) as error:
+                return Read(self, name, content, None, str(error))
+
+        self._reading.do(f"reading {name}", make)
+
+    def _read(self) -> None:
+        """Show what was found in a file that was dropped here."""
+        found: Read | None = self._reading.found
+        if found is None or found.form is not self:
+            return
+        self._reading.found = None
+        self._columns, name = found.columns, found.name
+        if self._columns is None:
+            self.said.text = found.said
+            return
+        self.dropped = (name, found.content)
         self.stored.value = name
         self.fill(guess(self._columns, self._session.campaign))
         made = self._columns

@@ -27,10 +27,12 @@ def history(session: Session, journal: Journal) -> bool:
         at = min(int(more.get("at", len(steps) - 1)), len(steps) - 1)
         locked = frozenset(map(str, more.get("locked", ())))
         run, event = str(more.get("run", "")), int(more.get("event", 0))
+        view = dict(more.get("view", {}))
     except (StickslipError, OSError, KeyError, ValueError, TypeError, AttributeError) as error:
         session.said = f"what was open before cannot be shown again ({error}); it begins anew"
         return False
-    session.param.update(steps=steps, at=at, locked=locked, run=run, event=event)
+    session.param.update(steps=steps, at=at, locked=locked, run=run, event=event, view=view)
+    session.restored += 1
     return True
 
 

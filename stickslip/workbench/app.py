@@ -134,6 +134,14 @@ def tabs(session: Session) -> pn.Tabs:
         *((module.TITLE, place) for module, place in zip(every, places, strict=True)),
         sizing_mode="stretch_width", stylesheets=[TABS],
     )  # fmt: skip
+    asked = pn.state.location is not None and "page=" in str(pn.state.location.search)
+
+    def restore() -> None:
+        page = session.view.get("page")
+        if not asked and page in PAGES:
+            made.active = PAGES.index(page)
+
+    restore()
     if pn.state.location is not None:
         pn.state.location.sync(made, {"active": "page"})
 
@@ -151,6 +159,8 @@ def tabs(session: Session) -> pn.Tabs:
 
     show()
     made.param.watch(show, "active")
+    made.param.watch(lambda event: session.remember("page", PAGES[event.new]), "active")
+    watch(session, ["restored"], restore)
     return made
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -10,25 +9,16 @@ import panel as pn
 
 from ..errors import InputError
 from ..objects import Fit
-from ..simulation.scenario.recording import Recording
 from ..system.units import shown
 from .controls import BUTTON
 from .experiments import Setting
 from .parts import head
 from .picked import chosen
+from .remembering import Remembered
 from .session import Session, watch
 
 FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
 WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
-
-
-@dataclass(frozen=True)
-class Simulated:
-    """One simulated run, and what it was."""
-
-    fit: Fit
-    setting: Setting
-    recording: Recording
 
 
 def press(name: str, call: Any, width: int = 150) -> pn.widgets.Button:
@@ -58,13 +48,23 @@ class Asked:
             margin=(0, 10, 0, 0),
             **FIXED,
         )
-        asked = (self.run, self.velocity, self.hold, self.step, self.spring, self.mass, self.events)
+        self.load = text(name="normal load, in its own", placeholder="such as 0.5 or 2")
+        self.back: Any = pn.widgets.Checkbox(
+            name="and back over the same track", value=False, width=210, margin=(24, 10, 0, 0), **FIXED
+        )
+        self.fields: dict[str, Any] = {
+            "run": self.run, "velocity": self.velocity, "hold": self.hold, "step": self.step, "spring": self.spring,
+            "mass": self.mass, "load": self.load, "events": self.events, "back": self.back,
+        }  # fmt: skip
+        asked = self.fields.values()
         self.row = pn.FlexBox(*asked, gap="6px 0")
         self.view = pn.Column(head("What is left empty is as in the measured run."), self.row, **WIDE)
+        self._kept = Remembered(session, "simulate", self.fields)
         self.run.param.watch(lambda event: self._placeholders(), "value")
         watch(session, ["campaign", "run"], self._runs)
         watch(session, ["steps", "at"], self._placeholders)
         self._runs()
+        self._kept.restore()
 
     def _runs(self) -> None:
         campaign, fit = self._session.campaign, self._session.fit
@@ -72,7 +72,8 @@ class Asked:
             return
         names = campaign.names if fit is None else [k.name for k in fit.climbed.prepared.runs]
         run = chosen(self._session)[0]
-        self.run.param.update(options=names, value=run if run in names else names[0])
+        with self._kept.aside():
+            self.run.param.update(options=names, value=run if run in names else names[0])
         self._placeholders()
 
     def _placeholders(self) -> None:
@@ -94,7 +95,7 @@ class Asked:
         """As it is written now."""
         return Setting(
             str(self.run.value), self.velocity.value, self.hold.value, self.spring.value, self.mass.value,
-            int(self.events.value or 1), self.step.value,
+            int(self.events.value or 1), self.step.value, self.load.value, bool(self.back.value),
         )  # fmt: skip
 
 

@@ -13,6 +13,8 @@ from ..errors import InputError, RunFolderError
 from ..objects import Campaign, Diagnosis, Fit
 from ..show.report.html import REPORT
 from ..system.runstore import RESULT, read_result
+from ..system.units import shown_with
+from . import pictures
 from .places import new_place
 
 MOST = 100  # run folders that are listed
@@ -30,7 +32,7 @@ class Kept:
         kind: fit, diagnose, inspect, ...
         words: verdict or error.
         when: it was written.
-        report: whether it has one.
+        report: whether it has one, or pictures.
     """
 
     name: str
@@ -48,6 +50,8 @@ def listed(folder: Path) -> list[Kept]:
     found = []
     for path in paths:
         own = path.parent
+        if (own.parent / RESULT).is_file():  # a part of what is listed
+            continue
         hidden = any(part.startswith(".") for part in own.relative_to(folder).parts)
         if hidden or not path.resolve().is_relative_to(home):
             continue
@@ -56,7 +60,7 @@ def listed(folder: Path) -> list[Kept]:
         except (RunFolderError, OSError):
             continue
         when = datetime.fromtimestamp(written).strftime("%Y-%m-%d %H:%M")
-        report = (own / REPORT).is_file() and (own / REPORT).resolve().is_relative_to(home)
+        report = any(p.resolve().is_relative_to(home) for p in (own / REPORT, *pictures.of(own)) if p.is_file())
         name = own.relative_to(folder).as_posix()
         found.append((written, Kept(name, own, str(result.get("kind", "")), words(result), when, report)))
     return [kept for _, kept in sorted(found, key=lambda pair: -pair[0])[:MOST]]
@@ -78,8 +82,11 @@ def words(result: dict[str, Any]) -> str:
 
 def _errors(result: dict[str, Any]) -> str:
     rung = (result.get("ladder") or [{}])[-1]
-    own, unseen = rung.get("train_error"), rung.get("heldout_error")
-    texts = [f"{name} {value:.3f}" for name, value in (("error", own), ("on unseen runs", unseen)) if value is not None]
+    texts = [
+        f"{name} {shown_with(rung[key], rung.get(f'{key}_std') or 0.0)}"
+        for name, key in (("error", "train_error"), ("on unseen runs", "heldout_error"))
+        if rung.get(key) is not None
+    ]
     return f": {', '.join(texts)}" if texts else ""
 
 
@@ -124,13 +131,15 @@ def _copied(folder: Path, to: Path) -> Path:
 
 
 def report(kept: Kept) -> str:
-    """The report of a run folder.
+    """The report of a run folder, or a page of its pictures where it has none.
 
     Raises:
-        InputError: it has none, or one that is too large to be shown.
+        InputError: it has neither, or one that is too large to be shown.
     """
     path = kept.folder / REPORT
-    if not kept.report or not path.is_file():
+    if kept.report and not path.is_file():
+        return pictures.page(kept.folder, kept.name, kept.words)
+    if not kept.report:
         raise InputError("this run folder has no report", value=kept.name)
     if path.stat().st_size > LARGEST:
         raise InputError("the report is too large to be shown here", value=kept.name, hint=f"open {REPORT} itself")

@@ -8,8 +8,8 @@ from ..data.trace import Trace
 from ..objects import Fit
 from ..system.units import shown, shown_with
 from . import experiments
-from .asked import Simulated, named
-from .experiments import MEASURES
+from .asked import named
+from .experiments import MEASURES, Simulated
 from .overview import reduced
 
 POINTS = 4000  # that are drawn of a curve

@@ -19,12 +19,24 @@ from .experiments import MEASURES, Telling
 from .figures import figure, label, legend, of_run, unit_of
 from .measures import cells, thinned
 from .parts import Table, head, progress, row_of
+from .remembering import Remembered
 from .session import Session, watch
 
-RIVALS = 4  # effects that are told apart at once
+RIVALS = 8  # effects that are told apart at once
 FALLBACK = 1e-4  # m/s, where a run has no velocity of its own
 UNSEEN = "Choose effects; those that promise most are offered once What is missing has looked at them."
 DONE = "Each is fitted, and run freely in experiments that are easily made."
+
+
+def _simulated(text: str) -> str:
+    """What of a proposal is simulated, in words."""
+    names = list(experiments.proposed(text, experiments.Setting(""), 1.0, 1.0, 1.0))
+    if not names:
+        return "In these words nothing is recognised that can be simulated; what is easily made is."
+    words = ", ".join(names)
+    if experiments.beyond(text):
+        return f"That needs more than the rig and its sensor; what comes nearest is simulated: {words}."
+    return f"Simulated for it: {words}."
 
 
 class Rivals:
@@ -52,11 +64,13 @@ class Rivals:
             pn.FlexBox(self.which, self.effects, self._button, gap="6px 10px"), progress(self._work), self._table,
             self._place, **WIDE,
         )  # fmt: skip
+        self._kept = Remembered(session, "rivals", {"effects": self.effects})
         self.which.param.watch(lambda event: self._propose(), "value")
         watch(session, ["diagnosis", "promises", "loaded"], self._offer)
         watch(session, ["campaign"], self._anew)
         watch(self._work, ["found", "doing"], self.update)
         self._offer()
+        self._kept.restore()
         self.update()
 
     def _anew(self) -> None:
@@ -74,14 +88,20 @@ class Rivals:
     def _propose(self) -> None:
         if self._sets:
             tags, text = self._sets[int(self.which.value or 0)]
-            self.effects.value = [tag for tag in tags if tag in self.effects.options][:RIVALS]
-            self._said.text = f"The diagnosis proposes: {text}. {DONE}"
+            with self._kept.aside():
+                self.effects.value = [tag for tag in tags if tag in self.effects.options][:RIVALS]
+            self._said.text = f"The diagnosis proposes: {text}. {_simulated(text)} {DONE}"
             return
         if self.effects.value == self._offered:  # nobody chose others
             best = [p.tag for p in best_forms(self._session.promises) if p.fall > LEAST]
-            self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
+            with self._kept.aside():
+                self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
         offered = "The effects that promise most are offered; others can be chosen."
         self._said.text = f"{offered if self._session.promises else UNSEEN} {DONE}"
+
+    def _proposal(self) -> str:
+        """The experiment that the diagnosis proposes for the chosen set; "" for none."""
+        return self._sets[int(self.which.value or 0)][1] if self._sets else ""
 
     def start(self) -> None:
         """Fit the model with each effect and simulate every experiment."""
@@ -91,19 +111,21 @@ class Rivals:
         if len(tags) < 2:
             self._work.said = "choose two effects at least"
             return
+        proposal = self._proposal()
         told = {} if self._session.diagnosis is None else self._session.diagnosis.verdict.get("forms", {})
 
         def make(tell: Tell, show: Show) -> list[Telling]:
-            fit = needed(self._session)
+            fit, code = needed(self._session), self._session.code()
             scenario = experiments.scenario(fit, asked)
             velocity = campaign[asked.run].drive_velocity or scenario.file.drive.velocity or FALLBACK
             velocity = to_si(asked.velocity, "m/s", key="velocity") if asked.velocity.strip() else velocity
             block = scenario.file.block
-            options = experiments.usual(asked, abs(velocity), block.spring_stiffness, block.mass)
+            known = asked, abs(velocity), block.spring_stiffness, block.mass
+            options = {**experiments.proposed(proposal, *known), **experiments.usual(*known)}
             if not asked.as_measured:
                 options = {"as asked for above": asked, **options}
             fits = experiments.rivals(fit, tags, told, tell)
-            return experiments.tell_apart(fits, options, experiments.scatter(campaign), tell, show)
+            return experiments.tell_apart(fit, fits, options, experiments.scatter(campaign), tell, show, code)
 
         self._work.do("fitting each of them", make)
 
@@ -120,7 +142,7 @@ class Rivals:
             return
         columns = ["experiment: a click draws it", "they differ most in", "by", "in scatters of one event"]
         rows = [
-            [t.words, t.note or f"{t.measure.replace('_', ' ')} of slip {t.slip}",
+            [t.words, t.note or experiments.where(t.measure, t.slip),
              "" if t.note else f"{100 * t.share:.2g} %", "" if t.note else f"{t.scatters:.2g}"]
             for t in found
         ]  # fmt: skip
@@ -152,5 +174,6 @@ class Rivals:
             f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
         ]  # fmt: skip
         table = Table(columns=columns, rows=rows, choosing=False, **WIDE)
-        words = Words(text=experiments.difference(telling.recordings), **WIDE)
+        best = (telling.measure, telling.slip - 1, telling.share) if telling.measure else None
+        words = Words(text=experiments.difference(telling.recordings, best), **WIDE)
         self._place[:] = [words, pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in made), **WIDE), table]

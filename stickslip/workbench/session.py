@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import param
@@ -18,14 +18,13 @@ from ..errors import RunFolderError, StickslipError
 from ..objects import Campaign, Fit, load_campaign
 from ..objects.fitted_run import FittedRun
 from ..physics.effects import catalogue
-from ..simulation.conformance import blamed, load_effects
-from ..system.progress import Cancelled, showing
-from ..system.runstore import alone
+from ..simulation.conformance import load_effects
 from . import again
-from .journal import Journal
+from .keeper import Keeper
 from .looking import Looking
 from .shipped import to_work_in
 from .steps import Step, complete, fewer, first, moved
+from .telling import Long, Note
 from .watching import watch
 from .work import Worker, at_once
 
@@ -33,10 +32,6 @@ __all__ = ["LOOKING", "Note", "Session", "watch"]
 
 LOOKING = "looking at the data"
 STILL = 0.25  # s without a move, after which a model that was moved is kept
-
-
-class Note(str):
-    """What is said where nothing is wrong."""
 
 
 class Session(param.Parameterized):
@@ -57,6 +52,7 @@ class Session(param.Parameterized):
         effects: Python files with effects of one's own; ``loaded`` counts how often they were.
         worker: does what takes longer than a hand would wait; the same thread unless a server gives another.
         aside: does what no hand waits for, likewise.
+        view: what windows show besides the model, as plain data by page; ``restored`` counts how often it came back.
         rough: a fitted model, and the rough lines nearest to its backbone (None where the rig says too little of them).
         free: a model, the name of a run, and that model run freely through it; None where that cannot be done.
     """
@@ -84,15 +80,15 @@ class Session(param.Parameterized):
     aside = param.Parameter(at_once)
     free = param.Parameter((None, "", None))
     rough = param.Parameter((None, None))
+    view = param.Dict({})
+    restored = param.Integer(0)
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
-        self._journal: Journal | None = None
+        self._keeper = Keeper(self)
         self._looking = Looking(self)
         self._moves: dict[str, float | str] = {}
         self._guard = threading.Lock()
-        self._held = ExitStack()
-        self._kept: tuple[Any, ...] = ()
         self._anew = False
 
     @property
@@ -116,7 +112,7 @@ class Session(param.Parameterized):
         """Open one of what is offered."""
 
         def job() -> None:
-            with self._long(f"reading {self.offers[number]}"):
+            with Long(self, f"reading {self.offers[number]}"):
                 try:
                     path = to_work_in(self.offers[number], self.home)
                 except OSError as error:
@@ -141,31 +137,21 @@ class Session(param.Parameterized):
         campaign = self.campaign
         assert campaign is not None
         if keep and campaign.description.filed:
-            journal = Journal(campaign)
-            self._held.close()  # of what was open before
-            self._kept = ()
-            try:
-                self._held.enter_context(alone(journal.file))
-                self._journal = journal
-            except RunFolderError:
-                self.said = (
-                    "another workbench has this campaign open, or nothing can be written beside it: nothing done here "
-                    "is kept"
-                )
+            self._keeper.begin(campaign)
         self.worker("", partial(self._begin, campaign))
 
     def reopen(self, campaign: Campaign) -> None:
         """Another campaign in place of the open one, such as the same with a run more; the history begins anew."""
         self.stop()
         self.cancel()
-        keep = self._journal is not None
+        keep = self._keeper.journal is not None
         with param.parameterized.batch_call_watchers(self):
             self.param.update(campaign=campaign, steps=(), at=-1, diagnosis=None, locked=frozenset(), run="", event=0)
         self.begin(keep=keep)
 
     def _begin(self, campaign: Campaign) -> None:
-        with self._long(LOOKING):
-            if self._journal is None or not again.history(self, self._journal):
+        with Long(self, LOOKING):
+            if self._keeper.journal is None or not again.history(self, self._keeper.journal):
                 self.busy = "fitting the base model"
                 self.first(complete(campaign.fit()))
             if self.saved is not None:
@@ -175,20 +161,13 @@ class Session(param.Parameterized):
 
     def keep(self) -> None:
         """Write the history beside the campaign, if it changed."""
-        now = (self.steps, self.at, self.run, self.event, self.locked)
-        if self._journal is None or now == self._kept:
-            return
-        self._kept = now
-        rows = [
-            {"text": s.text, "code": s.code, "command": s.command, "changed": dict(s.changed), "when": s.when}
-            for s in self.steps
-        ]
-        more = {"at": self.at, "run": self.run, "event": self.event, "locked": sorted(self.locked)}
-        try:
-            self._journal.write(rows, [s.fit for s in self.steps], more)
-        except OSError as error:
-            self._journal = None
-            self.said = f"the history cannot be kept beside the campaign ({error.strerror or error})"
+        self._keeper.write()
+
+    def remember(self, key: str, value: Any) -> None:
+        """Keep what a page shows, as plain data, so that it comes back."""
+        if self.view.get(key) != value:
+            self.view = {**self.view, key: value}
+            self.later()
 
     def later(self) -> None:
         """Keep what is selected when nothing else is to be done."""
@@ -250,7 +229,7 @@ class Session(param.Parameterized):
         if fit is None or not values:
             return
         over = over and bool(self.taken) and bool(self.taken[-1].changed)
-        with self._told():
+        with Long(self):
             self.take(moved(fit, values, self.taken[-1].changed if over else {}), over)
             self.said = ""
         self.worker("keep", self.keep, STILL)
@@ -293,7 +272,7 @@ class Session(param.Parameterized):
             fit = self.fit
             if fit is None:
                 return
-            with self._long(busy):
+            with Long(self, busy):
                 made = make(fit)
                 complete(made)
                 if self.campaign is not fit.campaign:  # another was opened meanwhile
@@ -348,6 +327,10 @@ class Session(param.Parameterized):
         own = path.resolve()
         return str(own.relative_to(home) if own.is_relative_to(home) else own)
 
+    def options(self) -> str:
+        """Options of a command that name the files with effects of one's own."""
+        return "".join(f" --effect {quote(self.shown(path))}" for path in self.effects)
+
     def code(self) -> str:
         """The lines of Python that lead to the model as it stands."""
         assert self.campaign is not None
@@ -364,7 +347,8 @@ class Session(param.Parameterized):
 
     def diagnose(self) -> None:
         """The whole search, in a process of its own; finished pieces are kept and used again."""
-        self._looking.diagnose(None if self._journal is None else self._journal.diagnosis)
+        journal = self._keeper.journal
+        self._looking.diagnose(None if journal is None else journal.diagnosis)
 
     def stop(self) -> None:
         """End the diagnosis; what it has finished is used when it is begun again."""
@@ -373,7 +357,7 @@ class Session(param.Parameterized):
     def close(self) -> None:
         """End all that goes on beside."""
         self._looking.close()
-        self._held.close()
+        self._keeper.close()
 
     # effects of one's own
 
@@ -381,7 +365,7 @@ class Session(param.Parameterized):
         """A file with effects was saved: load it anew, and fit the model anew if it has one of them."""
 
         def job() -> None:
-            with self._told():
+            with Long(self):
                 classes = load_effects([path])
                 tags = [cls.tag for cls in classes]
                 self.said = Note(f"{path.name} was loaded anew: {', '.join(tags)}")
@@ -389,7 +373,7 @@ class Session(param.Parameterized):
                 forms = {} if fit is None else dict(zip(fit.effects, fit.effect_forms, strict=True))
                 for tag in tags:
                     if fit is not None and tag in forms:
-                        with self._long(f"fitting with the new {tag}"):
+                        with Long(self, f"fitting with the new {tag}"):
                             fit = fit.remove(tag).add(forms[tag])
                             self.take(Step(f"new {tag}", fit, f"fit = fit.remove({tag!r}).add({forms[tag]!r})"))
                 gone = [tag for tag in forms if tag not in catalogue.tags()]
@@ -398,45 +382,3 @@ class Session(param.Parameterized):
                 self.loaded += 1
 
         self.worker("", job)
-
-    # how it is told
-
-    def _long(self, text: str) -> _Long:
-        return _Long(self, text)
-
-    def _told(self) -> _Long:
-        return _Long(self, "")
-
-
-class _Long:
-    """While it lasts the session is busy; errors that are made on purpose are said, others go on."""
-
-    def __init__(self, session: Session, text: str) -> None:
-        self._session, self._text = session, text
-        self._shows = showing(self._show)
-
-    def _show(self, share: float) -> None:
-        self._session.share = max(share, self._session.share)
-
-    def __enter__(self) -> None:
-        if self._text:
-            with param.parameterized.batch_call_watchers(self._session):
-                self._session.busy, self._session.share = self._text, 0.0
-            self._shows.__enter__()
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> bool:
-        if self._text:
-            self._shows.__exit__(None, None, None)
-            self._session.busy = ""
-        if isinstance(error, Cancelled):
-            self._session.said = Note("cancelled; the model is as it was")
-            return True
-        if isinstance(error, StickslipError):
-            self._session.said = str(error)
-            return True
-        if isinstance(error, Exception):
-            if (found := blamed(error)) is not None:
-                self._session.said = f"{found}; the model is as it was"
-                return True
-            self._session.said = f"a fault of the program, the model is as it was: {type(error).__name__}: {error}"
-        return False

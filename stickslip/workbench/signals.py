@@ -11,13 +11,15 @@ from bokeh.models import Range1d, RangeTool
 
 from ..data.segment import Segmentation
 from ..objects import Campaign
+from ..system.units import shown
 from .figures import crosshair, figure, label, look, source, unit_of
-from .overview import DISPLACEMENT, FORCE, GAP, Record, Window, record
+from .overview import DISPLACEMENT, FORCE, GAP, Levels, Record, Window, record
 from .picked import chosen, select
 from .session import Session, watch
 
 CURVES = (DISPLACEMENT, FORCE, GAP)
 WHOLE = 2500  # points of the overview
+ZOOM = "zoom"  # of what is remembered
 PAUSE = 25  # ms between two answers to a hand that pans
 NEAR = 0.015  # of the window, within which a tap hits an event
 DRAWN = "canvas"  # some thousand points at 40 redraws a second; WebGL without a graphics processor: 4
@@ -43,6 +45,7 @@ class Signals:
         self._waiting = False
         self._document = pn.state.curdoc
         self.range: Any = Range1d(start=0.0, end=1.0)
+        self._curves: dict[str, tuple[Levels, str]] = {}
         self._line = source(t=[], y=[])
         self._data = {name: source(t=[], y=[]) for name in CURVES}
         self._marks = {name: source(t=[], y=[]) for name in (DISPLACEMENT, GAP)}
@@ -53,7 +56,20 @@ class Signals:
         for end in ("start", "end"):
             self.range.on_change(end, self._moved)
         watch(session, ["run", "event", "campaign"], self.update)
+        watch(session, ["steps"], self._fitted)
+        watch(session, ["restored"], self._restore)
         self.update()
+        self._restore()
+
+    def _restore(self) -> None:
+        """Show the part of the run that was shown before."""
+        kept = self._session.view.get(ZOOM)
+        if self._of is None or self._record is None or not isinstance(kept, dict) or kept.get("run") != self._of[1]:
+            return
+        begin, last = float(self._record.time[0]), float(self._record.time[-1])
+        ends = [min(max(float(v), begin), last) for v in (kept.get("from"), kept.get("to")) if isinstance(v, float)]
+        if len(ends) == 2 and ends[0] < ends[1]:
+            self.range.update(start=ends[0], end=ends[1])
 
     def _make_whole(self) -> Any:
         theme = look()
@@ -107,19 +123,38 @@ class Signals:
                 mark.data = {"t": onset, "y": self._at(name, onset)}
             self._bring(float(onset[0]))
 
+    def _fitted(self) -> None:
+        """A spring that nobody measured is known from a fit on."""
+        if self._of is not None and FORCE not in self._curves and GAP in self._curves:
+            self._show(*self._of)
+
+    def _force(self, campaign: Campaign, run: str, own: Record) -> tuple[dict[str, tuple[Levels, str]], str]:
+        """All curves, with the spring's force from its elongation where nobody measured it, and what that is."""
+        if FORCE in own.curves or GAP not in own.curves:
+            return own.curves, ""
+        fit, stated = self._session.fitted, campaign[run].spring_stiffness
+        spring = stated or (None if fit is None else fit.values.get("rig.spring_stiffness"))
+        if not spring:
+            return own.curves, ""
+        told = f"not measured: {'stated' if stated else 'fitted'} stiffness, {shown(spring, 'N/m', 3)}, times "
+        force = own.curves[GAP][0].times(spring)
+        return {**own.curves, FORCE: (force, "N")}, f"{told}load point - block, from its start"
+
     def _show(self, campaign: Campaign, run: str) -> None:
         number = campaign.names.index(run)
         self._found = campaign.events[number]
         self._record = own = record(campaign.traces[number], self._found)
+        self._curves, told = self._force(campaign, run, own)
+        self.figures[FORCE].title.text = told
         begin, end = float(own.time[0]), float(own.time[-1])
         self._window = Window((begin, end))
         self._factors = {}
-        last = [name for name in CURVES if name in own.curves][-1]
+        last = [name for name in CURVES if name in self._curves][-1]
         for name, made in self.figures.items():
-            made.visible = name in own.curves
+            made.visible = name in self._curves
             made.xaxis.axis_label = label("time", "s") if name == last else None
             made.xaxis.major_label_text_font_size = "12px" if name == last else "0px"
-        for name, (curve, si) in own.curves.items():
+        for name, (curve, si) in self._curves.items():
             self._factors[name], unit = unit_of(curve.values, si)
             self.figures[name].yaxis.axis_label = label(name, unit)
         first = GAP if GAP in own.curves else DISPLACEMENT
@@ -163,6 +198,9 @@ class Signals:
     def _later(self) -> None:
         self._waiting = False
         self._send()
+        if self._of is not None and self.range.start is not None and self.range.end is not None:
+            shown = {"run": self._of[1], "from": float(self.range.start), "to": float(self.range.end)}
+            self._session.remember(ZOOM, shown)
 
     def _send(self) -> None:
         """Send what is looked at and something around it, where what was sent does not serve any more."""
@@ -171,7 +209,7 @@ class Signals:
         needed = self._window.needed(float(self.range.start), float(self.range.end))
         if needed is None:
             return
-        for name, (curve, _) in self._record.curves.items():
+        for name, (curve, _) in self._curves.items():
             t, y = curve(*needed)
             self._data[name].data = {"t": t, "y": y * self._factors[name]}
 

@@ -9,8 +9,9 @@ import panel as pn
 from bokeh.core.properties import value
 
 from . import experiments
-from .asked import WIDE, Asked, Simulated, named, needed, press
+from .asked import WIDE, Asked, named, needed, press
 from .beside import Show, Tell, beside
+from .experiments import Simulated
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .measures import event_rows, thinned
 from .overview import record
@@ -64,9 +65,9 @@ class SimulatedView:
         setting = self._asked.setting()
 
         def make(tell: Tell, show: Show) -> Simulated:
-            fit = needed(self._session)
+            fit, code = needed(self._session), self._session.code()
             tell("simulating", 0.0)
-            return Simulated(fit, setting, experiments.run(experiments.scenario(fit, setting), tell))
+            return Simulated(fit, setting, experiments.run(experiments.scenario(fit, setting), tell), code)
 
         self._work.do("simulating", make)
 

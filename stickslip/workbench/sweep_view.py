@@ -17,6 +17,7 @@ from .beside import Show, Tell, beside
 from .experiments import Swept
 from .figures import figure, label, legend, look, source, unit_of
 from .parts import head, progress
+from .remembering import Remembered
 from .session import Session, watch
 
 
@@ -43,6 +44,7 @@ class SweepView:
         self.points = pn.widgets.IntInput(
             name="how many", value=6, start=2, end=40, width=90, margin=(0, 10, 0, 0), **FIXED
         )
+        self._kept = Remembered(session, "sweep", {"low": self.low, "high": self.high, "points": self.points})
         self._button = press("Sweep", self.start)
         self._model = source(v=[], recurrence=[], slip=[])
         self._model.name = "sweep"
@@ -70,6 +72,7 @@ class SweepView:
         watch(session, ["campaign"], self._anew)
         watch(session, ["steps", "at"], self.update)
         self._prepare()
+        self._kept.restore()
 
     def _anew(self) -> None:
         self._work.found = None
@@ -81,8 +84,9 @@ class SweepView:
             return
         self._steady = experiments.steady_runs(campaign)
         speeds = [v for v, _ in self._steady.values()] or [t.drive_velocity or 1e-4 for t in campaign.traces]
-        self.low.value = shown(0.5 * min(speeds), "m/s", 3).replace("µ", "u")
-        self.high.value = shown(2.0 * max(speeds), "m/s", 3).replace("µ", "u")
+        with self._kept.aside():
+            self.low.value = shown(0.5 * min(speeds), "m/s", 3).replace("µ", "u")
+            self.high.value = shown(2.0 * max(speeds), "m/s", 3).replace("µ", "u")
         self.update()
 
     def start(self) -> None:
@@ -90,7 +94,8 @@ class SweepView:
         setting, low, high, points = self._asked.setting(), self.low.value, self.high.value, int(self.points.value or 0)
 
         def make(tell: Tell, show: Show) -> Any:
-            return experiments.sweep(needed(self._session), setting, low, high, points, tell, show)
+            fit, code = needed(self._session), self._session.code()
+            return experiments.sweep(fit, setting, low, high, points, tell, show, code)
 
         self._work.do("sweeping the velocity", make)
 

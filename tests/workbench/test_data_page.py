@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
+import threading
+import time
 from contextlib import closing
 from types import SimpleNamespace
 
@@ -15,12 +18,14 @@ from stickslip.objects import Campaign
 from stickslip.workbench import adding_form, data_page
 from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, guess, look
 from stickslip.workbench.adding_form import FirstRun, Form
+from stickslip.workbench.beside import close_all
 from stickslip.workbench.event_parts import PARTS, part
 from stickslip.workbench.event_view import EventView
-from stickslip.workbench.overview import AROUND, DISPLACEMENT, GAP, Levels, Window, record, reduced
+from stickslip.workbench.overview import AROUND, DISPLACEMENT, FORCE, GAP, Levels, Window, record, reduced
 from stickslip.workbench.places import new_place
 from stickslip.workbench.session import Session
 from stickslip.workbench.signals import Signals
+from stickslip.workbench.work import Worker
 
 MARKUP = "<img src=x onerror=alert(1)>"
 CSV = "time [s],x [um],F [mN]\n"
@@ -81,7 +86,7 @@ def test_what_was_sent_serves_until_the_hand_leaves_it():
 def test_the_page_shows_the_runs_and_what_is_selected(campaign):
     session = Session(campaign=campaign)
     signals, event = Signals(session), EventView(session)
-    assert not signals.figures["spring force"].visible and signals.figures[GAP].visible
+    assert all(signals.figures[name].visible for name in (DISPLACEMENT, FORCE, GAP))
     data_page.select(session, "holds", 4)
     assert data_page.chosen(session) == ("holds", 4)
     onset = campaign.events[4].events[4].t_onset
@@ -96,10 +101,25 @@ def test_the_page_shows_the_runs_and_what_is_selected(campaign):
 def test_every_axis_has_its_unit(campaign):
     session = Session(campaign=campaign)
     signals, event = Signals(session), EventView(session)
-    shown = [f for f in signals.figures.values() if f.visible]
-    assert all("/ µm" in f.yaxis.axis_label for f in shown)
-    assert shown[-1].xaxis.axis_label == "time / s"
+    units = {name: f.yaxis.axis_label.partition(" / ")[2] for name, f in signals.figures.items() if f.visible}
+    assert units == {DISPLACEMENT: "µm", FORCE: "mN", GAP: "µm"}
+    assert signals.figures[GAP].xaxis.axis_label == "time / s"
     assert all("/ s" in f.xaxis.axis_label and "/ " in f.yaxis.axis_label for f in event.figures.values())
+
+
+def test_a_spring_force_that_nobody_measured_follows_from_the_stated_stiffness(campaign, base, monkeypatch):
+    session = Session(campaign=campaign)
+    made = Signals(session)
+    gap, force = (made._curves[name][0].values for name in (GAP, FORCE))
+    np.testing.assert_allclose(force, campaign.traces[0].spring_stiffness * gap, rtol=1e-12)
+    assert made.figures[FORCE].visible and "not measured: stated stiffness, 980 N/m" in made.figures[FORCE].title.text
+    unknown = [dataclasses.replace(t, spring_stiffness=None) for t in campaign.traces]
+    monkeypatch.setattr(type(campaign), "__getitem__", lambda self, name: unknown[self.names.index(name)])
+    bare = Signals(session)
+    assert FORCE not in bare._curves and not bare.figures[FORCE].visible
+    monkeypatch.setattr(type(base), "values", {**base.values, "rig.spring_stiffness": 500.0})
+    session.first(base)
+    assert "fitted stiffness, 500 N/m" in bare.figures[FORCE].title.text and bare.figures[FORCE].visible
 
 
 def test_a_tap_near_a_mark_selects_and_one_far_from_it_does_not(campaign):
@@ -219,6 +239,32 @@ def test_what_is_wrong_is_said_in_the_form(own):
     form.velocity.value = "50 um/s"
     form.send()
     assert "sampling rate" in form.said.text
+
+
+def test_a_dropped_file_is_read_beside_and_only_its_own_window_asks(own, monkeypatch):
+    seen, begin = [], threading.Event()
+
+    def slow(name, content):
+        seen.append(threading.current_thread())
+        assert begin.wait(20)
+        return look(name, content)
+
+    monkeypatch.setattr(adding_form, "look", slow)
+    session = Session(campaign=own, worker=Worker())
+    try:
+        form, other = Form(session), Form(session)
+        form.take("run.csv", _table())
+        other.take("other.csv", _table())
+        assert form.dropped is None and "another file" in other.said.text
+        begin.set()
+        end = time.monotonic() + 20
+        while form.dropped is None and time.monotonic() < end:
+            time.sleep(0.01)
+        assert form.dropped == ("run.csv", _table()) and other.dropped is None
+        assert seen != [threading.main_thread()] and len(seen) == 1
+    finally:
+        close_all(session)
+        session.worker.close()
 
 
 def test_a_file_that_is_too_large_is_refused_by_the_server(own, monkeypatch):

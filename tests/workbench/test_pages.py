@@ -19,7 +19,18 @@ from stickslip.inference.force.signatures import Explained
 from stickslip.objects import Diagnosis
 from stickslip.physics.effects import catalogue
 from stickslip.system.units import shown, shown_with, to_si
-from stickslip.workbench import app, folding, keep_page, missing_page, model_page
+from stickslip.workbench import (
+    app,
+    backbone_view,
+    curves,
+    folding,
+    heat_view,
+    history,
+    ladder_view,
+    missing_page,
+    model_page,
+    residual_view,
+)
 from stickslip.workbench.evidence import best_forms, bins, rows, signature
 from stickslip.workbench.figures import DARK, LIGHT
 from stickslip.workbench.free_panel import Free
@@ -93,7 +104,7 @@ def test_the_slip_is_run_freely_and_follows_the_model(session, base):
 
 
 def test_the_nearest_rough_lines_are_drawn_beside_the_backbone(session, base):
-    made = missing_page._Backbone(session)
+    made = backbone_view.Backbone(session)
     assert "H = " in made.words.text
     drawn, curve = np.array(made._line.data["force"]), np.array(made._data.data["force"])
     assert drawn.size == curve.size and np.abs(drawn - curve).max() < 0.2 * curve.max()
@@ -107,7 +118,7 @@ def test_the_pictures_of_the_docs_are_of_these_pages(session):
 def test_curves_of_many_runs_can_be_told_apart(session, monkeypatch):
     names = [f"run {i}" for i in range(28)]
     monkeypatch.setattr(type(session.campaign), "names", names)
-    part = missing_page._Residual(session)
+    part = residual_view.Residual(session)
     drawn = {r.data_source.id: (r.glyph.line_color, str(r.glyph.line_dash)) for r in part.figure.renderers}
     assert len({drawn[part._medians[name].id] for name in names}) == len(names)
 
@@ -126,10 +137,15 @@ def test_errors_and_the_law_of_the_backbone_have_their_deviations(session, base)
     errors = [shown_with(base.error, base.error_std), shown_with(base.unseen_error, base.unseen_error_std)]
     assert all("±" in text for text in errors)
     assert app.frame(session).errors == f"error {errors[0]} fitted, {errors[1]} unseen"
-    assert keep_page.history(session)[0][3:5] == errors
-    assert all(text in missing_page._Ladder(session).table.object for text in errors)
+    assert history.rows(session)[0][3:5] == errors
+    ladder = ladder_view.Ladder(session)
+    assert all(text in ladder.table.object for text in errors)
+    hover = [ladder._data.data[name][-1] for name in ("fitted_text", "unseen_text")]
+    assert hover == [shown_with(base.error, base.error_std), shown_with(base.unseen_error, base.unseen_error_std)]
+    texts = heat_view.Heat(session)._data.data["text"]
+    assert f"{base.error:.2f}\n±{base.error_std:.2f}" in texts and sum("±" in t for t in texts) > 0.8 * len(texts)
     law = base.backbone.attrs
-    told = missing_page._Backbone(session).words.text
+    told = backbone_view.Backbone(session).words.text
     assert (
         f"u_max = {shown_with(law['u_max'], law['u_max_std'], 'm')}, p = {shown_with(law['p'], law['p_std'])}" in told
     )
@@ -154,7 +170,7 @@ def test_a_page_that_fails_says_so_and_leaves_the_others(session):
 
 
 def test_the_residual_is_folded_over_a_period(session, base):
-    part = missing_page._Residual(session)
+    part = residual_view.Residual(session)
     part.against.value, part.period.value = "load point", "20 um"
     assert "phase of load point" in part.figure.xaxis.axis_label
     force = base.force
@@ -171,7 +187,7 @@ def test_the_residual_is_folded_over_a_period(session, base):
 
 
 def test_the_phase_of_the_drive_is_of_what_is_stated_or_of_a_periodic_effect_in_the_model(session, base, monkeypatch):
-    part = missing_page._Residual(session)
+    part = residual_view.Residual(session)
     part.against.value = "phase of the drive"
     assert "no effect in the model is periodic" in session.said
     force = base.force
@@ -195,7 +211,7 @@ def test_the_phase_of_the_drive_is_of_what_is_stated_or_of_a_periodic_effect_in_
 
 
 def test_the_effect_that_is_laid_over_is_drawn_over_all_else(session, base, promises):
-    made = missing_page._Residual(session)
+    made = residual_view.Residual(session)
     session.promises, made.chosen = promises, promises[0].tag
     made.update()
     last = made.figure.renderers[-1].data_source
@@ -205,7 +221,7 @@ def test_the_effect_that_is_laid_over_is_drawn_over_all_else(session, base, prom
 def test_an_effect_in_the_model_is_laid_over_as_what_it_takes_off(campaign, base, aged):
     session = Session(campaign=campaign)
     session.first(aged)
-    made = missing_page._Residual(session)
+    made = residual_view.Residual(session)
     made.chosen = "contact-ageing"
     made.update()
     x, y = (np.asarray(made._law.data[name]) for name in "xy")
@@ -225,17 +241,17 @@ def test_what_the_file_states_of_the_rig_is_shown(base):
 
 
 def test_legends_name_what_is_drawn_from_the_first_look_on(session):
-    cycle, ladder = model_page._Cycle(session), missing_page._Ladder(session)
+    cycle, ladder = model_page._Cycle(session), ladder_view.Ladder(session)
     for figure in (cycle.force, cycle.residual, cycle.creep, ladder.figure):
         (legend,) = figure.legend
         assert [item.visible for item in legend.items] == [True] * len(legend.items), figure.title.text
-    residual = missing_page._Residual(session)
+    residual = residual_view.Residual(session)
     hidden = [item.label.value for item in residual.figure.legend[0].items if not item.visible]
     assert hidden == ["what the chosen effect takes off"]  # for none is chosen
 
 
 def test_an_error_of_five_floors_is_seen_beside_one_of_sixty():
-    blue = [int(model_page.heat(value, 60.0)[5:], 16) for value in (1.0, 5.0, 60.0)]
+    blue = [int(heat_view.heat(value, 60.0)[5:], 16) for value in (1.0, 5.0, 60.0)]
     assert blue[0] - blue[1] > 0.3 * (blue[0] - blue[2]) > 0
 
 
@@ -419,14 +435,14 @@ def test_of_many_steps_the_first_by_hand_are_forgotten(session, base, monkeypatc
 def test_the_smooth_curve_is_that_of_the_law_and_not_of_the_noise():
     rng = np.random.default_rng(0)
     x = rng.uniform(0.0, 6.0, 4000)
-    at, curve = missing_page.smooth(x, np.sin(x) + rng.normal(size=x.size))
+    at, curve = curves.smooth(x, np.sin(x) + rng.normal(size=x.size))
     assert np.sqrt(np.mean((curve - np.sin(at)) ** 2)) < 0.08 and at.size == 200
-    assert missing_page.smooth(np.ones(100), np.ones(100))[0].size == 0
-    assert missing_page.smooth(np.zeros(0), np.zeros(0))[0].size == 0
+    assert curves.smooth(np.ones(100), np.ones(100))[0].size == 0
+    assert curves.smooth(np.zeros(0), np.zeros(0))[0].size == 0
 
 
 def test_what_all_runs_ask_for_is_drawn(session):
-    part = missing_page._Residual(session)
+    part = residual_view.Residual(session)
     for against in ("age", "velocity", "event", "time"):
         part.against.value = against
         assert np.isfinite(part._smooth.data["y"]).all() and len(part._smooth.data["x"]) == 200

@@ -95,7 +95,7 @@ def test_moved_by_hand_the_last_fit_is_still_at_hand(session, base):
 
 
 def test_what_was_open_comes_back(campaign, base, session, monkeypatch):
-    session._journal = Journal(campaign)
+    session._keeper.journal = Journal(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
     session.lock(DROP, True)
     choose(session, "v200", 3)
@@ -117,7 +117,7 @@ def test_what_was_open_comes_back(campaign, base, session, monkeypatch):
 
 
 def test_a_history_does_not_depend_on_how_its_path_is_written(campaign, base, session, folder, monkeypatch):
-    session._journal = Journal(campaign)
+    session._keeper.journal = Journal(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
     monkeypatch.chdir(folder)
     assert len(Journal(ss.load_campaign("campaign.toml")).read()[0]) == 2
@@ -130,9 +130,9 @@ def _elsewhere(kept):
 
 @pytest.mark.parametrize("damage", [_elsewhere, lambda kept: [], lambda kept: {**kept, "event": None}])
 def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, monkeypatch, damage):
-    session._journal = Journal(campaign)
+    session._keeper.journal = Journal(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
-    path = session._journal.file
+    path = session._keeper.journal.file
     path.write_text(json.dumps(damage(json.loads(path.read_text()))))
     monkeypatch.setattr(type(campaign), "fit", lambda self: base)
     with closing(Session(campaign=campaign)) as again:
@@ -141,7 +141,7 @@ def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, monke
 
 
 def test_a_history_of_other_data_is_left_alone(campaign, base, session, folder):
-    session._journal = Journal(campaign)
+    session._keeper.journal = Journal(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
     file = folder / "campaign.toml"
     text = file.read_text()
@@ -187,7 +187,7 @@ def test_steps_that_are_dropped_leave_their_lines(base, session, monkeypatch):
 
 
 def test_models_of_forgotten_steps_are_removed(campaign, base, session, folder):
-    session._journal = Journal(campaign)
+    session._keeper.journal = Journal(campaign)
     for share in (1.01, 1.02, 1.03):
         session.by_hand({DROP: base.values[DROP] * share})
     count = len(list((folder / FOLDER).glob("*.npz")))
@@ -235,7 +235,7 @@ def test_a_campaign_can_be_begun_again(campaign, base, monkeypatch):
     with closing(Session(campaign=campaign)) as session:
         session.begin()
         session.begin()
-        assert session._journal is not None and "another workbench" not in session.said
+        assert session._keeper.journal is not None and "another workbench" not in session.said
 
 
 def test_a_second_window_leaves_the_listing_that_goes_on(session, base, monkeypatch):

@@ -10,12 +10,16 @@ import pytest
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.objects import Diagnosis
+from stickslip.physics.effects import catalogue
+from stickslip.simulation.scenario import make_scenario
 from stickslip.system.progress import Cancelled, cancellable
 from stickslip.system.units import to_si
 from stickslip.workbench import experiments, simulate_page
 from stickslip.workbench.asked import Asked
 from stickslip.workbench.beside import beside
 from stickslip.workbench.experiments import Setting
+from stickslip.workbench.experiments.rivals import CREEP as HELD
+from stickslip.workbench.experiments.rivals import signs
 from stickslip.workbench.rivals_view import Rivals
 from stickslip.workbench.session import Session
 from stickslip.workbench.simulated_view import SimulatedView
@@ -184,7 +188,7 @@ def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(
     hold, wrong = Setting("v200", "200 um/s", "10 s"), Setting("v200", "200 um/s", mass="0 kg")
     options = {"as driven": plain, "a hold of 10 s": hold, "wrong": wrong}
     shown = []
-    found = experiments.tell_apart(fits, options, experiments.scatter(campaign), _silent, shown.append)
+    found = experiments.tell_apart(base, fits, options, experiments.scatter(campaign), _silent, shown.append)
     assert [t.words for t in found] == ["a hold of 10 s", "as driven", "wrong"] and len(shown) == 2
     assert found[0].scatters > 3.0 * found[1].scatters > 0.0 and "mass" in found[2].note and not found[2].recordings
     assert set(found[0].recordings) == set(RIVALS)
@@ -193,7 +197,7 @@ def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(
     beside(session, "rivals").found = found
     assert made._table.rows[0][0] == "a hold of 10 s" and made._table.chosen == 0
     words, _, table = made._place
-    assert words.text == experiments.difference(found[0].recordings) and table.rows[0][0] == "contact-ageing"
+    assert words.text.startswith("They differ most in the") and table.rows[0][0] == "contact-ageing"
     made._heard({"kind": "row", "row": 1})
     assert made._table.chosen == 1 and made._drawn is found[1]
 
@@ -206,6 +210,47 @@ def test_usual_experiments_change_one_thing_each(base):
     assert made["a quarter of the velocity"].drive.velocity == pytest.approx(5e-5)
     assert made["a block twice as heavy"].block.mass == pytest.approx(0.2)
     assert made["a spring half as stiff"].block.spring_stiffness == pytest.approx(500.0)
+
+
+def test_every_proposal_of_the_catalogue_has_experiments_that_are_simulated():
+    texts = {text for cls in catalogue.all().values() for text in cls.confused_with.values()}
+    texts.add("add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s")
+    known = Setting("v200", events=2), 2e-4, 1000.0, 0.1
+    assert [t for t in texts if not experiments.proposed(t, *known)] == []
+    held = experiments.proposed("holds of 1 s and 25 s: only ageing remembers them", *known)
+    assert {words: s.hold for words, s in held.items()} == {"a hold of 1 s": "1 s", "a hold of 25 s": "25 s"}
+    assert list(experiments.proposed("load series", *known)) == ["half the load", "twice the load"]
+    assert not experiments.beyond("load series") and experiments.beyond("a second laser on the base")
+    assert experiments.proposed("ask a colleague", *known) == {}
+
+
+def test_a_load_and_a_way_back_are_simulated(base):
+    loaded = experiments.scenario(base, Setting("v400", "400 um/s", events=2, load="2")).file
+    plain = experiments.scenario(base, Setting("v400", "400 um/s", events=2)).file
+    assert loaded.contact.normal_force == pytest.approx(2.0 * plain.contact.normal_force)
+    assert loaded.contact.u_max == pytest.approx(2.0 ** (1.0 / plain.contact.p) * plain.contact.u_max)
+    heavy, light = (experiments.run(experiments.scenario(base, Setting("v050", "50 um/s", events=3, load=n)))
+                    for n in ("2", "1"))  # fmt: skip
+    assert heavy["slip"].values[1:] == pytest.approx(2.0 * light["slip"].values[1:], rel=0.03)  # the drop over k
+    back = experiments.run(experiments.scenario(base, Setting("v400", "400 um/s", back=True)))
+    way = back["drive_position"].values
+    turned = back["time"].values[np.argmax(way)]
+    assert way[-1] < 0.5 * way.max() and np.sum(back["onset"].values > turned) >= 2
+    assert experiments.simulated(back, base.campaign["v400"])["slip"][2] > 2
+    with pytest.raises(InputError, match="load"):
+        experiments.scenario(base, Setting("v400", load="-1"))
+
+
+def test_models_that_differ_in_a_hold_only_are_told_apart(base):
+    """As the sensor reads it: a drift shows in no motion of the block."""
+    setting = Setting("v400", "400 um/s", hold="2 s")
+    drifting = base.scenario().content | {"effect": [{"type": "sensor-drift", "rate": 2e-8}]}
+    changes = experiments.changes(base, setting)
+    made = {"plain": experiments.scenario(base, setting), "drift": make_scenario(drifting).with_changes(changes)}
+    found = {name: experiments.run(scenario) for name, scenario in made.items()}
+    key, number, _ = experiments.farthest(found, {})
+    creep = [signs(r)[HELD][0] for r in found.values()]
+    assert (key, number) == (HELD, 0) and creep[1] - creep[0] == pytest.approx(4e-8, rel=0.05)
 
 
 def test_where_nothing_was_proposed_effects_can_be_chosen(session):

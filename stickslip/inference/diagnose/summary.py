@@ -12,6 +12,7 @@ from ...system.units import shown
 from ..fit.composition import run_of
 from ..fit.equations import solved
 from ..fit.serialised import KEY, Fitted, record
+from ..force.errors import of_all, sums
 from ..force.fit import Fit
 from ..force.heldout import apart
 from ..force.knots import PHASES
@@ -110,6 +111,11 @@ def by_phase(residual: Array, d: Diagnosis) -> dict[str, float]:
     return {name: error(residual, d, phase == i) for i, name in enumerate(PHASES) if (phase == i).any()}
 
 
+def _chance(residual: Array, d: Diagnosis) -> float:
+    """Standard deviation of :func:`error`, by how much events differ."""
+    return of_all(sums(d.fit, residual, d.floor))[1]
+
+
 def _rung(rung: Rung, d: Diagnosis) -> dict[str, Any]:
     run = d.fit.problem.run
     return {
@@ -117,7 +123,9 @@ def _rung(rung: Rung, d: Diagnosis) -> dict[str, Any]:
         "added": rung.added,
         "removed": rung.removed,
         "train_error": error(rung.residual, d),
+        "train_error_std": _chance(rung.residual, d),
         "heldout_error": None if rung.unseen is None else error(rung.unseen, d),
+        "heldout_error_std": None if rung.unseen is None else _chance(rung.unseen, d),
         "by_phase": by_phase(rung.residual, d),
         "heldout_by_phase": {} if rung.unseen is None else by_phase(rung.unseen, d),
         "by_run": {k.name: error(rung.residual, d, run == r) for r, k in enumerate(d.prepared.runs)},

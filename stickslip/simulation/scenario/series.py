@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,8 @@ from .simulation import Progress, simulate
 
 if TYPE_CHECKING:
     import xarray
+
+    from .recording import Recording
 
 _KNOWN_UNITS = {
     "drive.velocity": "m/s",
@@ -65,7 +67,9 @@ def simulate_series(
         yield simulate(scenario, watch)
 
 
-def summary(scenario: Scenario, key: str, values: list[float], runs: list[xarray.Dataset]) -> xarray.Dataset:
+def summary(
+    scenario: Scenario, key: str, values: list[float], runs: Sequence[xarray.Dataset | Recording]
+) -> xarray.Dataset:
     """Means and spreads of the events of every run, those after the first, virgin one where there are more.
 
     Returns:

@@ -1,0 +1,94 @@
+"""The same simulations as lines of Python and as commands."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from shlex import quote
+from typing import Any
+
+from .events import Simulated
+from .rivals import Telling
+from .setting import Setting, changes
+from .sweeps import Swept
+
+Found = Simulated | Swept | Sequence[Telling]
+
+
+def python(found: Found) -> list[str]:
+    """What leads from ``fit``, the model that was simulated, to the same recordings."""
+    if isinstance(found, Simulated):
+        return [f"scenario = {_scenario('fit', found)}", "recording = ss.simulate(scenario)"]
+    if isinstance(found, Swept):
+        each = "ss.simulate(scenario.with_changes([('drive.velocity', v)]))"
+        return [f"scenario = {_scenario('fit', found)}", f"velocities = {list(found.velocities)!r}",
+                f"recordings = [{each} for v in velocities]"]  # fmt: skip
+    made = [f"base = {_base(found[0])}", f"rivals = {_rivals(found[0])}"] if found else []
+    for telling in (t for t in found if t.recordings):
+        asked = _scenario("rival", telling)
+        made += [f"# {telling.words}", f"recordings = {{tag: ss.simulate({asked}) for tag, rival in rivals.items()}}"]
+    return made
+
+
+def command(found: Simulated | Swept, model: str, out: str, effects: str = "") -> str:
+    """The command that simulates the same.
+
+    Args:
+        found: what was simulated.
+        model: run folder of the model.
+        out: run folder that it writes.
+        effects: options that name files with effects of one's own.
+    """
+    return _command(found, found.setting, model, out, effects)
+
+
+def commands(found: Sequence[Telling], model: Mapping[str, str], out: str, effects: str = "") -> list[str]:
+    """The same of experiments; ``model`` is the run folder of each rival's model."""
+    done = [t for t in found if t.recordings]
+    return [
+        _command(telling, telling.setting, model[tag], f"{out}-{number}-{tag}", effects)
+        for number, telling in enumerate(done, start=1) for tag in telling.recordings
+    ]  # fmt: skip
+
+
+def _command(found: Simulated | Swept | Telling, setting: Setting, model: str, out: str, effects: str) -> str:
+    sets = "".join(f" --set {quote(f'{key}={_toml(value)}')}" for key, value in changes(_fit(found), setting))
+    sweep = ""
+    if isinstance(found, Swept):
+        series = found.series
+        sweep = f" --sweep {series.key}={series.start!r}:{series.stop!r}:{series.points}"
+    run = f" --trace {quote(setting.run)}"
+    return f"stickslip simulate {quote(model)}{run}{sets}{sweep}{effects} --out {quote(out)}"
+
+
+def _fit(found: Simulated | Swept | Telling) -> Any:
+    return next(iter(found.fits.values())) if isinstance(found, Telling) else found.fit
+
+
+def _scenario(name: str, found: Simulated | Swept | Telling) -> str:
+    setting = found.setting
+    made = f"{name}.scenario(run={setting.run!r}, events={setting.events})"
+    changed = changes(_fit(found), setting)
+    return f"{made}.with_changes({changed!r})" if changed else made
+
+
+def _base(telling: Telling) -> str:
+    return "fit" + "".join(f".remove({tag!r})" for tag in telling.fits if tag in telling.model.effects)
+
+
+def _rivals(telling: Telling) -> str:
+    fits = [f"{tag!r}: {_one(telling, tag)}" for tag in telling.fits]
+    return "{" + ", ".join(fits) + "}"
+
+
+def _one(telling: Telling, tag: str) -> str:
+    fit = telling.fits[tag]
+    return "fit" if fit is telling.model else f"base.add({fit.effect_forms[fit.effects.index(tag)]!r})"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_toml(own)}" for key, own in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value) if isinstance(value, str) else repr(value)

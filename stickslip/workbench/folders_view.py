@@ -1,0 +1,136 @@
+"""Run folders beside the campaign: what can be saved, what was, and the report of one of them."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import panel as pn
+
+from ..errors import StickslipError
+from . import kept
+from .beside import Show, Tell, beside
+from .controls import BUTTON, Message, Words
+from .experiments import keeping
+from .history import SIMULATIONS, told, when
+from .parts import Table, head, progress, row_of
+from .session import Session, watch
+
+MODEL, DIAGNOSIS = "the model as it stands", "the diagnosis"
+SIMULATED = dict(zip(("the simulation", "the sweep", "the experiments"), SIMULATIONS, strict=True))
+FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
+WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
+
+CLOSED = (
+    '<meta http-equiv="Content-Security-Policy" '
+    "content=\"default-src 'none'; img-src data:; font-src data:; style-src 'unsafe-inline'\">"
+)
+
+
+def framed(content: str) -> str:
+    """A report within a page: nothing in it is run, and it reaches nothing."""
+    closed = content.replace("<head>", f"<head>{CLOSED}", 1) if "<head>" in content else CLOSED + content
+    return (
+        f'<iframe sandbox srcdoc="{escape(closed, quote=True)}" title="report" '
+        'style="width:100%;height:900px;border:1px solid var(--wb-line);background:white"></iframe>'
+    )
+
+
+class Folders:
+    """Run folders beside the campaign.
+
+    Attributes:
+        view: what can be saved, and what was.
+        shown: the report of one of them.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._work = beside(session, "saving")
+        self._listed: list[kept.Kept] = []
+        self.what: Any = pn.widgets.Select(
+            name="what is saved", options=[MODEL, DIAGNOSIS, *SIMULATED], value=MODEL, width=210, margin=(0, 10, 0, 0),
+            **FIXED,
+        )  # fmt: skip
+        self.name: Any = pn.widgets.TextInput(
+            name="name of the run folder", placeholder="first", width=160, margin=(0, 10, 0, 0), **FIXED
+        )
+        self._save = pn.widgets.Button(name="Save", width=80, stylesheets=[BUTTON], margin=(18, 0, 0, 0), **FIXED)
+        self._save.on_click(lambda event: self.save())
+        self._table = Table(
+            columns=["run folder", "of", "verdict or error", "when"], heard=self._heard, tall=360, **WIDE
+        )
+        self._said = Words(**WIDE)
+        self._frame = pn.pane.HTML("", **WIDE)
+        self._tab = pn.widgets.Button(
+            name="Open it in a tab of its own", width=220, visible=False, stylesheets=[BUTTON], **FIXED
+        )
+        self._tab.js_on_click(args={"pane": self._frame}, code=_OPEN)
+        again = pn.widgets.Button(name="Look again", width=110, stylesheets=[BUTTON], **FIXED)
+        again.on_click(lambda event: self.update())
+        filed = session.campaign is not None and session.campaign.description.filed
+        self.view = pn.Column(
+            head("Save as a run folder beside the campaign, as the command writes it"),
+            pn.FlexBox(self.what, self.name, self._save), progress(self._work),
+            pn.Row(head("Run folders there; a click shows the report"), again, **WIDE),
+            self._table, self._said, visible=filed, **WIDE,
+        )  # fmt: skip
+        self.shown = pn.Column(self._tab, self._frame, **WIDE)
+        watch(self._work, ["doing"], self.update)
+        watch(session, ["campaign", "steps", "diagnosis"], self.update)
+        self.update()
+
+    def save(self) -> None:
+        """Save what is chosen."""
+        session, name, what = self._session, self.name.value_input or self.name.value, self.what.value
+        campaign = session.campaign
+        found: Any = session.fit if what == MODEL else session.diagnosis if what == DIAGNOSIS else None
+        if what in SIMULATED:
+            found = beside(session, SIMULATED[what]).found
+        if campaign is None:
+            return
+        if found is None:
+            self._work.said = f"{what} {'are' if what.endswith('s') else 'is'} not there yet"
+            return
+
+        def make(tell: Tell, show: Show) -> Any:
+            tell("saving", 0.0)
+            if what in SIMULATED:
+                folder = keeping.save(found, campaign, name, tell, session.options())
+            else:
+                folder = kept.save(found, campaign, name, tell, told(session))
+            self._work.said = f"saved as {folder.name}"
+            return folder
+
+        self._work.do("saving", make)
+
+    def update(self) -> None:
+        """List what is there now."""
+        campaign = self._session.campaign
+        self._save.disabled = bool(self._work.doing)
+        if campaign is None or not campaign.description.filed:
+            return
+        self._listed = kept.listed(campaign.description.folder)
+        rows = [[k.name, k.kind, k.words, when(k.when)] for k in self._listed]
+        self._table.param.update(rows=rows, chosen=-1)
+
+    def _heard(self, message: Message) -> None:
+        number = row_of(message, len(self._listed))
+        if number is None:
+            return
+        try:
+            self._frame.object = framed(kept.report(self._listed[number]))
+            self._said.text, self._tab.visible, self._table.chosen = "", True, number
+        except (StickslipError, OSError) as error:
+            self._said.text, self._tab.visible, self._frame.object = str(error), False, ""
+
+
+# a page of its own whose only content is the frame, in which nothing is run
+_OPEN = """
+const page = document.createElement("textarea")
+page.innerHTML = pane.text
+const frame = page.value.replace("height:900px", "height:97vh")
+const head = "<!doctype html><meta charset='utf-8'><title>report</title><body style='margin:0'>"
+const whole = new Blob([head + frame], {type: "text/html"})
+window.open(URL.createObjectURL(whole), "_blank", "noopener")
+"""
