@@ -26,7 +26,8 @@ from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .fit import Fit
 from .forecast import wander, wander_sentence
-from .run import Tell, dataset, head, save
+from .next_experiment import next_experiment
+from .run import Tell, dataset, head, save, silent
 from .shown import Shown, facts, table
 
 if TYPE_CHECKING:
@@ -61,6 +62,18 @@ class Diagnosis(Shown):
         """What would tell apart what these data cannot: ``text`` and the effects it ``separates``."""
         found = self.result["next_experiment"]
         return None if found is None else dict(found)
+
+    @property
+    def experiments(self) -> pandas.DataFrame:
+        """A row for each experiment that was simulated to tell the first set apart, the best first.
+
+        ``information`` about which effect is the true one is expected of it (nat, at most the logarithm of their
+        number); ``margin`` is the expected logarithm of the likelihood ratio of the true one over another one, the
+        least of all.
+        """
+        rows = (self.next_experiment or {}).get("experiments", ())
+        return table({row["experiment"]: {k: v for k, v in row.items() if k != "experiment"} for row in rows},
+                     "experiment")  # fmt: skip
 
     @property
     def best(self) -> Fit:
@@ -198,7 +211,7 @@ def diagnose(
             for finding in reversed(stopping(rig)):  # with the sign wrong in every run there are no slips to fit
                 error = error.with_hint(finding.sentence, first=True)
             raise error.at(file=campaign.description.path) from None
-        return _made(campaign, done, able, round(time.perf_counter() - began, 1))
+        return _made(campaign, done, able, began, progress or silent)
 
     if out is None:
         return found(None, 0)
@@ -223,14 +236,16 @@ def diagnose(
     return made
 
 
-def _made(campaign: Campaign, done: Found, able: Any, seconds: float) -> Diagnosis:
+def _made(campaign: Campaign, done: Found, able: Any, began: float, tell: Tell) -> Diagnosis:
     sections, variables = summary(done, campaign.rig)
+    proposed = next_experiment(campaign, done, sections["next_experiment"], tell)
     traces, segmentations = campaign.displaced[0], campaign.scaled[0]
     described, pictured = trace_sections(traces, segmentations)
     follows = wander(campaign)
     result: dict[str, Any] = {
         **head(campaign, "diagnose"),
         **sections,
+        "next_experiment": proposed,
         "rig": [f.plain() for f in dict.fromkeys((*campaign.findings, *done.wrong))],
         "wander": follows,
         "notes": [
@@ -242,7 +257,7 @@ def _made(campaign: Campaign, done: Found, able: Any, seconds: float) -> Diagnos
         "cannot": list(able.cannot),
         "dropped": [*campaign.lost, *sections["dropped"]],
         **described,
-        "seconds": seconds,
+        "seconds": round(time.perf_counter() - began, 1),
     }
     return Diagnosis(campaign, done, result, variables | pictured)
 

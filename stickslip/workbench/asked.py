@@ -9,9 +9,9 @@ import panel as pn
 
 from ..errors import InputError
 from ..objects import Fit
+from ..objects.experiments import Setting
 from ..system.units import shown
 from .controls import BUTTON
-from .experiments import Setting
 from .parts import head
 from .picked import chosen
 from .remembering import Remembered

@@ -8,10 +8,9 @@ from typing import Any
 import panel as pn
 
 from ..errors import StickslipError
-from . import kept
+from . import kept, kept_simulations
 from .beside import Show, Tell, beside
 from .controls import BUTTON, Message, Words
-from .experiments import keeping
 from .history import SIMULATIONS, told, when
 from .parts import Table, head, progress, row_of
 from .session import Session, watch
@@ -96,7 +95,7 @@ class Folders:
         def make(tell: Tell, show: Show) -> Any:
             tell("saving", 0.0)
             if what in SIMULATED:
-                folder = keeping.save(found, campaign, name, tell, session.options())
+                folder = kept_simulations.save(found, campaign, name, tell, session.options())
             else:
                 folder = kept.save(found, campaign, name, tell, told(session))
             self._work.said = f"saved as {folder.name}"

@@ -7,8 +7,8 @@ from shlex import quote
 from typing import Any
 
 from ..system.units import shown_with
+from . import simulation_lines
 from .beside import beside
-from .experiments import lines
 from .session import Session
 
 RIVALS = "rivals"
@@ -56,7 +56,7 @@ def commands(session: Session) -> str:
         if fit is None or by_hand or name == RIVALS or found.code != session.code():
             made.append(f"# {name}: saved as a run folder it holds its model, and the command in its result.json")
         else:
-            made.append(lines.command(found, "fit", name, own))
+            made.append(simulation_lines.command(found, "fit", name, own))
     return "\n".join(made)
 
 
@@ -68,7 +68,7 @@ def python(session: Session) -> str:
         first = found[0] if name == RIVALS else found
         made += ["", f"# {name}{'' if first.code == code else ', of the model that these lines lead to'}"]
         made += [] if first.code == code else [first.code]
-        made += lines.python(found)
+        made += simulation_lines.python(found)
     return "\n".join(made)
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..data.trace import Trace
-from ..objects import Fit
+from ..objects import Fit, experiments
+from ..objects.experiments import MEASURES, Simulated
 from ..system.units import shown, shown_with
-from . import experiments
 from .asked import named
-from .experiments import MEASURES, Simulated
 from .overview import reduced
 
 POINTS = 4000  # that are drawn of a curve

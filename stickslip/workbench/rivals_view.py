@@ -8,14 +8,14 @@ import numpy as np
 import panel as pn
 
 from ..inference.force.candidates import every_form
+from ..objects import Diagnosis, experiments
+from ..objects.experiments import MEASURES, Telling
 from ..physics.effects import catalogue
 from ..system.units import to_si
-from . import experiments
 from .asked import FIXED, WIDE, Asked, needed, press
 from .beside import Show, Tell, beside
 from .controls import Message, Words
 from .evidence import LEAST, best_forms
-from .experiments import MEASURES, Telling
 from .figures import figure, label, legend, of_run, unit_of
 from .measures import cells, thinned
 from .parts import Table, head, progress, row_of
@@ -28,15 +28,13 @@ UNSEEN = "Choose effects; those that promise most are offered once What is missi
 DONE = "Each is fitted, and run freely in experiments that are easily made."
 
 
-def _simulated(text: str) -> str:
-    """What of a proposal is simulated, in words."""
-    names = list(experiments.proposed(text, experiments.Setting(""), 1.0, 1.0, 1.0))
-    if not names:
-        return "In these words nothing is recognised that can be simulated; what is easily made is."
-    words = ", ".join(names)
-    if experiments.beyond(text):
-        return f"That needs more than the rig and its sensor; what comes nearest is simulated: {words}."
-    return f"Simulated for it: {words}."
+def _undecided(diagnosis: Diagnosis | None) -> list[tuple[tuple[str, ...], str]]:
+    """Sets of effects that the data cannot tell apart, each with the experiment that would."""
+    found = None if diagnosis is None else diagnosis.next_experiment
+    if not found:
+        return []
+    every = [found, *found.get("others", ())]
+    return [(tuple(e["separates"]), str(e["text"])) for e in every if len(e.get("separates", ())) > 1]
 
 
 class Rivals:
@@ -78,7 +76,7 @@ class Rivals:
         self._drawn, self._place[:], self._table.rows = None, [], []
 
     def _offer(self) -> None:
-        self._sets = experiments.undecided(self._session.diagnosis)
+        self._sets = _undecided(self._session.diagnosis)
         options = {" or ".join(tags): i for i, (tags, _) in enumerate(self._sets)}
         self.which.param.update(options=options, value=0 if options else None)
         self.which.visible = bool(options)
@@ -90,7 +88,7 @@ class Rivals:
             tags, text = self._sets[int(self.which.value or 0)]
             with self._kept.aside():
                 self.effects.value = [tag for tag in tags if tag in self.effects.options][:RIVALS]
-            self._said.text = f"The diagnosis proposes: {text}. {_simulated(text)} {DONE}"
+            self._said.text = f"The diagnosis proposes: {text}. {DONE}"
             return
         if self.effects.value == self._offered:  # nobody chose others
             best = [p.tag for p in best_forms(self._session.promises) if p.fall > LEAST]
@@ -98,10 +96,6 @@ class Rivals:
                 self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
         offered = "The effects that promise most are offered; others can be chosen."
         self._said.text = f"{offered if self._session.promises else UNSEEN} {DONE}"
-
-    def _proposal(self) -> str:
-        """The experiment that the diagnosis proposes for the chosen set; "" for none."""
-        return self._sets[int(self.which.value or 0)][1] if self._sets else ""
 
     def start(self) -> None:
         """Fit the model with each effect and simulate every experiment."""
@@ -111,7 +105,6 @@ class Rivals:
         if len(tags) < 2:
             self._work.said = "choose two effects at least"
             return
-        proposal = self._proposal()
         told = {} if self._session.diagnosis is None else self._session.diagnosis.verdict.get("forms", {})
 
         def make(tell: Tell, show: Show) -> list[Telling]:
@@ -120,12 +113,12 @@ class Rivals:
             velocity = campaign[asked.run].drive_velocity or scenario.file.drive.velocity or FALLBACK
             velocity = to_si(asked.velocity, "m/s", key="velocity") if asked.velocity.strip() else velocity
             block = scenario.file.block
-            known = asked, abs(velocity), block.spring_stiffness, block.mass
-            options = {**experiments.proposed(proposal, *known), **experiments.usual(*known)}
+            options = experiments.practicable(asked, abs(velocity), block.spring_stiffness, block.mass)
             if not asked.as_measured:
                 options = {"as asked for above": asked, **options}
-            fits = experiments.rivals(fit, tags, told, tell)
-            return experiments.tell_apart(fit, fits, options, experiments.scatter(campaign), tell, show, code)
+            fits = experiments.rivals(fit, tags, told, lambda text, share: tell(text, 0.5 * share))
+            after = lambda text, share: tell(text, 0.5 + 0.5 * share)  # noqa: E731
+            return experiments.tell_apart(fit, fits, options, after, show, code)
 
         self._work.do("fitting each of them", make)
 
@@ -140,10 +133,16 @@ class Rivals:
         found: list[Telling] | None = self._work.found
         if not found:
             return
-        columns = ["experiment: a click draws it", "they differ most in", "by", "in scatters of one event"]
+        columns = [
+            "experiment: a click draws it",
+            "the true one becomes",
+            "they differ most in",
+            "by",
+        ]
         rows = [
-            [t.words, t.note or experiments.where(t.measure, t.slip),
-             "" if t.note else f"{100 * t.share:.2g} %", "" if t.note else f"{t.scatters:.2g}"]
+            [t.words, t.note] if t.note else
+            [t.words, t.tells, experiments.where(t.measure, t.slip), f"{100 * t.share:.2g} %"] if t.measure else
+            [t.words, t.tells, "nothing", ""]
             for t in found
         ]  # fmt: skip
         self._table.param.update(columns=columns, rows=rows)
@@ -174,6 +173,17 @@ class Rivals:
             f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
         ]  # fmt: skip
         table = Table(columns=columns, rows=rows, choosing=False, **WIDE)
-        best = (telling.measure, telling.slip - 1, telling.share) if telling.measure else None
-        words = Words(text=experiments.difference(telling.recordings, best), **WIDE)
+        words = Words(text=_difference(telling), **WIDE)
         self._place[:] = [words, pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in made), **WIDE), table]
+
+
+def _difference(telling: Telling) -> str:
+    """By how much an experiment tells the models apart, in words."""
+    words = f"After {telling.words} the true one is expected to be {telling.tells} as any other."
+    if telling.measure:
+        place = experiments.where(telling.measure, telling.slip)
+        words += f" They differ most in the {place}: by {100 * telling.share:.2g} % of its mean."
+    if len({r.sizes["event"] for r in telling.recordings.values()}) > 1:
+        counts = ", ".join(f"{tag} {r.sizes['event']}" for tag, r in telling.recordings.items())
+        words += f" The number of slips differs: {counts}."
+    return words

@@ -6,7 +6,7 @@ from typing import Any
 
 import panel as pn
 
-from . import experiments
+from . import synthetic
 from .asked import FIXED, WIDE, Asked, needed, press
 from .beside import Show, Tell, beside
 from .parts import head, progress
@@ -52,7 +52,7 @@ class _Synthetic:
             return
 
         def make(tell: Tell, show: Show) -> Any:
-            folder = experiments.write(needed(self._session), setting, campaign, name, tell)
+            folder = synthetic.write(needed(self._session), setting, campaign, name, tell)
             self._work.said = f"written: stickslip open {folder.name}/campaign.toml"
             return folder
 

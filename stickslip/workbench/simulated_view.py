@@ -8,10 +8,10 @@ import numpy as np
 import panel as pn
 from bokeh.core.properties import value
 
-from . import experiments
+from ..objects import experiments
+from ..objects.experiments import Simulated
 from .asked import WIDE, Asked, named, needed, press
 from .beside import Show, Tell, beside
-from .experiments import Simulated
 from .figures import crosshair, figure, label, legend, look, source, unit_of
 from .measures import event_rows, thinned
 from .overview import record

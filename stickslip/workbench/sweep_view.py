@@ -10,11 +10,11 @@ import panel as pn
 from bokeh.core.properties import value
 from bokeh.models import FixedTicker
 
+from ..objects import experiments
+from ..objects.experiments import Swept
 from ..system.units import shown
-from . import experiments
 from .asked import FIXED, WIDE, Asked, named, needed, press
 from .beside import Show, Tell, beside
-from .experiments import Swept
 from .figures import figure, label, legend, look, source, unit_of
 from .parts import head, progress
 from .remembering import Remembered

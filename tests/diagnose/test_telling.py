@@ -58,11 +58,11 @@ def _dense(one, other, run):
 
 def test_the_margin_is_that_of_the_whole_covariance(pair):
     run = pair[0].problem.runs[1]
-    found = margins(pair, run)
+    found = margins(pair, [run, run])
     assert found[0, 1] == pytest.approx(_dense(*pair, run), rel=1e-6)
     assert found[1, 0] == pytest.approx(_dense(*pair[::-1], run), rel=1e-6)
     assert found[0, 0] == found[1, 1] == 0.0
-    assert margins((pair[0], pair[0]), run).max() == 0.0
+    assert margins((pair[0], pair[0]), [run, run]).max() == 0.0
 
 
 def test_what_the_campaign_leaves_unknown_of_the_parameters_tells_nothing(pair):
@@ -71,7 +71,7 @@ def test_what_the_campaign_leaves_unknown_of_the_parameters_tells_nothing(pair):
     sure = [replace(fit, valleys=()) for fit in pair]
     for fit in sure:
         fit.__dict__["_judged"] = (*fit._judged[:2], 1e-12 * fit._judged[2])
-    assert margins(sure, run)[0, 1] > 2.0 * margins(pair, run)[0, 1]
+    assert margins(sure, [run, run])[0, 1] > 2.0 * margins(pair, [run, run])[0, 1]
 
 
 def test_information_of_an_experiment():

@@ -9,7 +9,7 @@ true. From that follows the expected information about which model it is (Lindle
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -22,7 +22,17 @@ from ..force.problem import PULL, Point, Problem
 from ..force.scatter import Blocks, Whitening, WithEvents
 from .decide import DISPERSION
 
+MASS = "rig.mass"
 TURNS = 4  # phases of a run's own that are tried: the experiment may meet any
+
+
+@dataclass(frozen=True)
+class Changed:
+    """What an experiment changes of the rig: factors on the mass, the normal load, and on all yield displacements."""
+
+    mass: float = 1.0
+    load: float = 1.0
+    stretch: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -42,21 +52,22 @@ class _Held:
     blocks: Blocks
 
 
-def margins(fits: Sequence[Fit], run: Knots) -> Array:
+def margins(fits: Sequence[Fit], runs: Sequence[Knots], changed: Changed | None = None) -> Array:
     """Expected logarithm of the likelihood ratio of each model, were it true, over each other one, shape (m, m).
 
     In units in which chance spreads as it should (the cost over its dispersion).
 
     Args:
         fits: models of one campaign.
-        run: the motion of the experiment.
+        runs: the motion of the experiment by each of them.
+        changed: what the experiment changes of the rig.
     """
-    held = [_held(fit, run) for fit in fits]
     out = np.zeros((len(fits), len(fits)))
-    for i, ones in enumerate(held):
-        for j, others in enumerate(held):
+    for i, run in enumerate(runs):
+        held = [_held(fit, run, changed or Changed()) for fit in fits]
+        for j in range(len(fits)):
             if i != j:
-                out[i, j] = min(_margin(one, other) for one in ones for other in others)
+                out[i, j] = min(_margin(one, other) for one in held[i] for other in held[j])
     return out
 
 
@@ -78,26 +89,38 @@ def _margin(one: _Held, other: _Held) -> float:
     return 0.5 * float(difference @ difference - told @ told) / DISPERSION
 
 
-def _held(fit: Fit, run: Knots) -> list[_Held]:
+def _held(fit: Fit, run: Knots, changed: Changed) -> list[_Held]:
     """The model along the run, at each phase that the run may have of its own."""
     periodic = [f.name for f in fit.problem.composition.phases if f.name != PULL]
-    return [_along(fit, run, 2.0 * np.pi * turn / TURNS) for turn in range(TURNS if periodic else 1)]
+    return [_along(fit, run, changed, 2.0 * np.pi * i / TURNS) for i in range(TURNS if periodic else 1)]
 
 
-def _along(fit: Fit, run: Knots, turn: float) -> _Held:
-    problem = Problem(fit.problem.composition, [run])
-    phases = problem.composition.phases
+def _along(fit: Fit, run: Knots, changed: Changed, turn: float) -> _Held:
+    known, z = fit.problem.composition, fit.point.z
+    (level, width), names = known.nominal, [f.name for f in known.shared]
+    if MASS in names:
+        z = z + np.log(changed.mass) * (np.array(names) == MASS)
+    problem = Problem(
+        replace(
+            known, mass=changed.mass * known.mass, reach=changed.stretch * known.reach,
+            nominal=(changed.load * level, width),
+        ),
+        [run],
+    )  # fmt: skip
+    phases = known.phases
     own = np.array([[0.0 if f.name == PULL else turn / float(f.scale)] for f in phases]).reshape(len(phases), 1)
     alike = problem.readings.shape[1] - 2 * problem.hums.size
     common = np.concatenate([fit.point.common[:alike], np.zeros(2 * problem.hums.size)])
-    point = Point(fit.point.z, own, fit.point.weights, np.zeros((problem.events, fit.point.events.shape[1])), common)
+    events = np.zeros((problem.events, fit.point.events.shape[1]))
+    point = Point(z, own, changed.load * fit.point.weights, events, common)
     blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
-    known = known_of(problem, slopes, by_reading(problem, point, slopes), blocks, np.zeros(problem.of.size, bool))
-    white = Whitening(fit.scatter.sizes, known).with_events(blocks(slopes.local))
-    return _Held(slopes.residual, slopes.shared @ _deviations(fit, problem), white, blocks)
+    rows, none = by_reading(problem, point, slopes), np.zeros(problem.of.size, bool)
+    white = Whitening(fit.scatter.sizes, known_of(problem, slopes, rows, blocks, none))
+    unsure = slopes.shared @ _deviations(fit, problem, changed.load)
+    return _Held(slopes.residual, unsure, white.with_events(blocks(slopes.local)), blocks)
 
 
-def _deviations(fit: Fit, problem: Problem) -> Array:
+def _deviations(fit: Fit, problem: Problem, load: float) -> Array:
     """Of parameters of a problem of one run, by independent combinations: those of the campaign, and the run's own."""
     a, k = fit.point.z.size, fit.point.weights.size
     there, here = fit.point.phases.size, len(problem.composition.phases)
@@ -111,6 +134,7 @@ def _deviations(fit: Fit, problem: Problem) -> Array:
     own = np.setdiff1d(np.arange(total), told)
     out = np.zeros((total, known.size + own.size))
     out[np.ix_(told, np.arange(known.size))] = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    out[a + here : a + here + k] *= load
     usual = [0.0 if f.name == PULL else np.pi / np.sqrt(3.0) / float(f.scale) for f in problem.composition.phases]
     out[own, known.size + np.arange(own.size)] = np.concatenate([usual, problem.usual[alike:]])
     return out

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import InputError
-from ...objects import Fit
 from ...simulation.scenario.recording import Recording
 from ...simulation.scenario.schema import SweepTable
 from ...simulation.scenario.series import scenarios_of
 from ...system.units import to_si
+from ..fit import Fit
 from .events import Spread, Tell, run, simulated
 from .setting import Setting, scenario
 

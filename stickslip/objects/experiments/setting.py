@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...objects import Fit
+from ...inference.diagnose.telling import Changed
 from ...simulation.scenario import Scenario
 from ...system.units import to_si
+from ..fit import Fit
 
 LONGEST_HOLD = 300.0  # s; a record of one takes a gigabyte of memory
 STICKS = (1.6, 2.6)  # mean recurrences of drive before and after a hold, so that it begins and ends between slips
@@ -93,6 +94,15 @@ def scenario(fit: Fit, setting: Setting) -> Scenario:
     """
     made: Scenario = fit.scenario(run=setting.run, events=setting.events)
     return made.with_changes(changes(fit, setting))
+
+
+def changed(fit: Fit, setting: Setting) -> Changed:
+    """What a setting changes of the rig of its measured run, as factors."""
+    base, file = fit.scenario(run=setting.run, events=setting.events).file, scenario(fit, setting).file
+    load, stretch = (
+        float(file.contact.of(0, key) / base.contact.of(0, key)) for key in ("normal_force", "u_max")
+    )  # fmt: skip
+    return Changed(file.block.mass / base.block.mass, load, stretch)
 
 
 def _positive(text: str, unit: str, key: str) -> float:

@@ -7,22 +7,22 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from ...errors import InputError
-from ...inference.fit.serialised import KEY
-from ...inference.fit.serialised import record as model_record
-from ...objects import Campaign, Fit
-from ...show.simulated import head, numbers, series_numbers, write_series, write_single
-from ...simulation.scenario import Scenario
-from ...simulation.scenario.recording import Recording
-from ...simulation.scenario.series import scenarios_of, summary
-from ...system.progress import breathe
-from ...system.runstore import Run, open_run, versions
-from ..places import new_place
-from .events import Simulated, Tell
-from .lines import Found, command, commands, python
-from .rivals import Telling, where
-from .setting import Setting, scenario
-from .sweeps import Swept
+from ..errors import InputError
+from ..inference.fit.serialised import KEY
+from ..inference.fit.serialised import record as model_record
+from ..objects import Campaign, Fit
+from ..objects.experiments.events import Simulated, Tell
+from ..objects.experiments.rivals import Telling
+from ..objects.experiments.setting import Setting, scenario
+from ..objects.experiments.sweeps import Swept
+from ..show.simulated import head, numbers, series_numbers, write_series, write_single
+from ..simulation.scenario import Scenario
+from ..simulation.scenario.recording import Recording
+from ..simulation.scenario.series import scenarios_of, summary
+from ..system.progress import breathe
+from ..system.runstore import Run, open_run, versions
+from .places import new_place
+from .simulation_lines import Found, command, commands, python
 
 AGAIN = "again"
 KIND = "experiments"
@@ -101,17 +101,15 @@ def _experiments(
             again = {"python": told["python"], "commands": [_again(telling, tag, own, effects)]}
             _single(inner, telling.fits[tag], telling.setting, recording, again)
         rows.append({
-            "experiment": telling.words, "setting": asdict(telling.setting), "measure": telling.measure,
-            "slip": telling.slip, "share": telling.share, "scatters": telling.scatters, "note": telling.note,
-            "folders": folders,
+            "experiment": telling.words, "setting": asdict(telling.setting), "information": telling.information,
+            "margin": telling.margin, "measure": telling.measure, "slip": telling.slip, "share": telling.share,
+            "note": telling.note, "folders": folders,
         })  # fmt: skip
     model = {tag: f"{run.target.name}/1-{tag}" for tag in done[0].recordings}
     lines = commands(found, model, f"{run.target.name}-{AGAIN}", effects)
     failed = [{"experiment": t.words, "note": t.note} for t in found if not t.recordings]
     best = done[0]
-    verdict = f"{' or '.join(best.fits)}: told apart by {best.words}" + (
-        f", in the {where(best.measure, best.slip)} by {best.scatters:.2g} scatters" if best.measure else ""
-    )
+    verdict = f"{' or '.join(best.fits)}: after {best.words} the true one is expected to be {best.tells} as any other"
     run.json({
         "schema": 1, "kind": KIND, "title": campaign.title, "verdict": verdict, "inputs": campaign.inputs(),
         "versions": versions(), "experiments": [*rows, *failed], "history": {**told, "commands": lines},

@@ -1,11 +1,10 @@
 """What the model as it stands foretells: one run under another drive or rig, a sweep, and rivals in one experiment."""
 
 from .events import MEASURES, Simulated, measured, run, simulated, spread, steady_runs
-from .proposed import beyond, proposed, undecided, usual
-from .rivals import Telling, compare, difference, farthest, rivals, scatter, tell_apart, where
+from .practicable import practicable
+from .rivals import Telling, rivals, tell_apart, where
 from .setting import Setting, changes, scenario
 from .sweeps import Swept, sweep
-from .synthetic import write
 
 __all__ = [
     "MEASURES",
@@ -13,24 +12,16 @@ __all__ = [
     "Simulated",
     "Swept",
     "Telling",
-    "beyond",
     "changes",
-    "compare",
-    "difference",
-    "farthest",
     "measured",
-    "proposed",
+    "practicable",
     "rivals",
     "run",
-    "scatter",
     "scenario",
     "simulated",
     "spread",
     "steady_runs",
     "sweep",
     "tell_apart",
-    "undecided",
-    "usual",
     "where",
-    "write",
 ]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from ...errors import InputError
-from ...objects import Campaign, Fit
-from ...simulation.scenario.writers import write_campaign
-from ..places import new_place
-from .events import Tell, run
-from .setting import Setting, scenario
+from ..errors import InputError
+from ..objects import Campaign, Fit
+from ..objects.experiments.events import Tell, run
+from ..objects.experiments.setting import Setting, scenario
+from ..simulation.scenario.writers import write_campaign
+from .places import new_place
 
 RATE = 10_000.0  # Hz at which a synthetic record is written
 COUNT = 7.91e-9  # m, where the campaign's runs have no count of their own

@@ -10,11 +10,12 @@ import numpy as np
 
 from ...data.segment import Segmentation, crept, segment
 from ...data.trace import Drive, Trace
-from ...objects import Campaign, Fit
 from ...simulation.scenario import Scenario
 from ...simulation.scenario.recording import Recording
 from ...simulation.scenario.simulation import Progress, record
 from ...system.progress import breathe
+from ..campaign import Campaign
+from ..fit import Fit
 from .setting import Setting
 
 Tell = Callable[[str, float], None]

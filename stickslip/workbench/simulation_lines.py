@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from shlex import quote
 from typing import Any
 
-from .events import Simulated
-from .rivals import Telling
-from .setting import Setting, changes
-from .sweeps import Swept
+from ..objects.experiments.events import Simulated
+from ..objects.experiments.rivals import Telling
+from ..objects.experiments.setting import Setting, changes
+from ..objects.experiments.sweeps import Swept
 
 Found = Simulated | Swept | Sequence[Telling]
 

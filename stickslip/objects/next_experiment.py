@@ -1,0 +1,74 @@
+"""The experiment that would tell apart what a campaign cannot, simulated for each of the effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..inference.diagnose.climb import Climbed
+from ..inference.diagnose.engine import Diagnosis as Found
+from ..inference.diagnose.engine import Round, Rung
+from .campaign import Campaign
+from .experiments import Setting, Telling, practicable, scenario, tell_apart
+from .fit import Fit
+from .run import Tell
+
+
+def next_experiment(
+    campaign: Campaign, found: Found, known: dict[str, Any] | None, tell: Tell
+) -> dict[str, Any] | None:  # fmt: skip
+    """What the catalogue knows to separate the effects of each set, with the experiments that are easily made.
+
+    Args:
+        campaign: that was diagnosed.
+        found: where the search ended.
+        known: of :func:`stickslip.inference.diagnose.summary.next_experiment`.
+        tell: told the progress.
+    """
+    if known is None or found.prepared.prescribed or not found.in_time:
+        return known
+    rounds = {tuple(j.tag for j in done.close): done for done in found.named.values() if len(done.close) > 1}
+    every = [{key: value for key, value in known.items() if key != "others"}, *known.get("others", ())]
+    made = [_with(campaign, found, one, rounds.get(tuple(one["separates"])), tell) for one in every]
+    return {**made[0], "others": made[1:]} if len(made) > 1 else made[0]
+
+
+def _with(
+    campaign: Campaign, found: Found, known: dict[str, Any], done: Round | None, tell: Tell
+) -> dict[str, Any]:  # fmt: skip
+    if done is None:  # laws of the backbone have no model of their own along the motion
+        return known
+    fits = {j.tag: _fit(campaign, found, done, j.tag, j.candidate.fit) for j in done.close}
+    options = tell_apart(next(iter(fits.values())), fits, _options(next(iter(fits.values()))), tell)
+    rows = [
+        {
+            "experiment": t.words, "information": t.information, "margin": t.margin, "tells": t.tells, "note": t.note,
+        }
+        for t in options
+    ]  # fmt: skip
+    return {**known, "text": _text(known["text"], options), "experiments": rows}
+
+
+def _fit(campaign: Campaign, found: Found, done: Round, tag: str, model: Any) -> Fit:
+    """The model of a round with one effect of its set."""
+    inertial = found.ladder[1].model
+    parts = (*inertial, *(e.tag for e in done.base.problem.composition.effects), tag)
+    return Fit(campaign, Climbed(found.prepared, (*found.ladder[:2], Rung.of(parts, tag, model)), {}))
+
+
+def _options(model: Fit) -> dict[str, Setting]:
+    """The experiments, beside the run of the middle velocity."""
+    runs = sorted(model.fitted.runs, key=lambda run: abs(run.velocity))
+    run = runs[len(runs) // 2]
+    plain = Setting(run.name)
+    block = scenario(model, replace(plain, velocity=f"{run.velocity:.6g} m/s")).file.block
+    return practicable(plain, abs(run.velocity), block.spring_stiffness, block.mass)
+
+
+def _text(known: str, options: list[Telling]) -> str:
+    best = options[0]
+    if best.note or best.margin < np.log(2.0):
+        return f"{known} (no experiment of the usual kind is expected to tell them apart)"
+    return f"{best.words}, after which the true one is expected to be {best.tells} as any other; or {known}"

@@ -1,0 +1,73 @@
+"""Effects that a campaign cannot tell apart, and the experiment that would."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.blind.detection import detection
+from stickslip.blind.generator import Run, make_campaign
+from stickslip.blind.generator.forms import EFFECTS
+from stickslip.inference.diagnose.engine import Round
+from stickslip.objects import Diagnosis
+from stickslip.objects import next_experiment as module
+from stickslip.objects.next_experiment import next_experiment
+
+SET = ("contact-ageing", "viscous-drag")
+FORM = "logarithm"
+KNOWN = {"text": "holds of 1 s and 10 s", "separates": list(SET)}
+
+
+@pytest.fixture(scope="module")
+def undecided(tmp_path_factory):
+    """A campaign with contact ageing hidden, and a search that took it or a drag for what is missing."""
+    folder = tmp_path_factory.mktemp("undecided") / "case"
+    hidden = [("contact-ageing", 2.0 * detection(EFFECTS["contact-ageing"], FORM), FORM)]
+    make_campaign(folder, 11, hidden, runs=(Run("v100", 1e-4, 4), Run("v400", 4e-4, 4)), spring_known=True)
+    campaign = ss.load_campaign(folder / "campaign.toml")
+    base = campaign.fit()
+    fits = [base.add(tag) for tag in SET]
+    close = tuple(
+        SimpleNamespace(tag=t, candidate=SimpleNamespace(fit=f.force_fit)) for t, f in zip(SET, fits, strict=True)
+    )
+    ladder, prepared = base.climbed.ladder, base.climbed.prepared
+    named = {SET[0]: Round(base.force_fit, (), (), close)}
+    return campaign, SimpleNamespace(prepared=prepared, ladder=ladder, named=named, in_time=True)
+
+
+def test_every_experiment_is_simulated_and_the_best_is_proposed(undecided, monkeypatch):
+    campaign, found = undecided
+    few = {"a hold of 1 s", "a hold of 100 s", "a block twice as heavy", "half the load"}
+    usual = module.practicable
+    monkeypatch.setattr(module, "practicable", lambda *args: {k: v for k, v in usual(*args).items() if k in few})
+    said = []
+    made = next_experiment(campaign, found, KNOWN, lambda text, share: said.append((text, share)))
+    rows = made["experiments"]
+    assert {row["experiment"] for row in rows} == few
+    done = [row for row in rows if not row["note"]]
+    assert len(done) == len(few)
+    informed = [round(row["information"], 3) for row in done]
+    assert informed == sorted(informed, reverse=True) and min(informed) >= 0.0 and max(informed) <= np.log(2.0) + 1e-9
+    margins = {row["experiment"]: row["margin"] for row in done}
+    assert margins["a hold of 100 s"] > margins["a hold of 1 s"] > 0.0  # ageing grows with the time in contact
+    assert made["text"].startswith(rows[0]["experiment"]) and made["text"].endswith(KNOWN["text"])
+    assert made["separates"] == list(SET) and json.loads(json.dumps(made)) == made
+    assert said and all(0.0 <= share <= 1.0 for _, share in said)
+    table = Diagnosis(campaign, None, {"next_experiment": made}, {}).experiments
+    assert list(table.index) == [row["experiment"] for row in rows] and table["margin"].iloc[0] == rows[0]["margin"]
+
+
+def test_without_models_or_time_the_words_of_the_catalogue_stand(undecided):
+    campaign, found = undecided
+    late = SimpleNamespace(**{**vars(found), "in_time": False})
+    of_geometry = SimpleNamespace(**{**vars(found), "named": {}})
+    for other in (late, of_geometry):
+        assert next_experiment(campaign, other, KNOWN, lambda text, share: None) == KNOWN
+    assert next_experiment(campaign, found, None, lambda text, share: None) is None
+    sets = {**KNOWN, "others": [{"text": "weigh it", "separates": ["curvature", "roll-off"]}]}
+    made = next_experiment(campaign, of_geometry, sets, lambda text, share: None)
+    assert made == sets
