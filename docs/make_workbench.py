@@ -2,9 +2,9 @@
 
     python docs/make_workbench.py
 
-Writes workbench-data.png, -missing.png, -model.png, -simulate.png and -keep.png into docs/images, from the shipped
-campaign in a folder of its own, and beside them workbench.txt: what the pages say, by which a test sees whether the
-pictures are of this version.
+Writes workbench-data.png, -events.png, -drop.png, -missing.png, -backbone.png, -simulate.png, -sweep.png, -rivals.png,
+-keep.png, -model.png and -dark.png into docs/images, from the shipped campaign in a folder of its own, and beside them
+workbench.txt: what the pages say, by which a test sees whether the pictures are of this version.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ sys.path.insert(0, str(ROOT))
 
 import stickslip as ss
 from stickslip.workbench.session import Session
-from tests.workbench.browser import Browser, Served
+from tests.workbench.browser import DEEP, Browser, Served
 from tests.workbench.outline import OUTLINE, outline
 
 IMAGES = ROOT / "docs" / "images"
@@ -37,48 +37,122 @@ return true
 """
 
 
-def picture(browser: Browser, name: str) -> None:
-    """Save the page as it stands."""
+TOP = """
+const [words, above] = arguments
+const head = seen('.head, h3, th, .line, b').find((e) => e.textContent.startsWith(words))
+if (!head) return false
+window.scrollBy(0, head.getBoundingClientRect().top - above)
+return true
+"""
+LISTED = "return seen('.line').some((e) => e.textContent.startsWith('by the fall'))"
+FREE = "return seen('.line').some((e) => e.textContent.includes('ms early') || e.textContent.includes('ms late'))"
+DONE = "return seen('.work .fill').length === 0"
+
+
+def picture(browser: Browser, name: str, words: str = "", tall: int = SIZE[1], above: int = 8) -> None:
+    """Save what is seen.
+
+    Args:
+        browser: which shows it.
+        name: of the picture.
+        words: with which a heading begins that is brought to the top.
+        tall: pixels of the window.
+        above: pixels over the heading.
+    """
+    browser.driver.set_window_size(SIZE[0], tall)
+    if words:
+        browser.wait(lambda: browser.js(TOP, words, above))
+    else:
+        browser.js("window.scrollTo(0, 0)")
     time.sleep(SETTLED)
-    browser.driver.save_screenshot(str(IMAGES / f"{name}.png"))
+    if words:  # what was drawn meanwhile has moved it
+        browser.js(TOP, words, above)
+        time.sleep(SETTLED)
+    browser.driver.save_screenshot(str(IMAGES / f"workbench-{name}.png"))
+
+
+def data(browser: Browser, folder: Path) -> None:
+    """Runs and signals, events, and a file that is dropped."""
+    browser.wait(lambda: "Can tell" in browser.text("h3, h4, .head, .group"), 120)
+    browser.wait(lambda: browser.js("return seen('th').some((e) => e.textContent.startsWith('overshoot'))"), 120)
+    picture(browser, "data")
+    picture(browser, "events", "event", 700, 310)
+    dropped = folder.parent / "another.csv"
+    dropped.write_text((folder / "v200.csv").read_text(encoding="utf-8"), encoding="utf-8")
+    root = browser.driver.execute_script(DEEP + "return all('input[type=file]')[0]")
+    root.send_keys(str(dropped))
+    browser.wait(lambda: "Are these the columns?" in browser.text(".line"), 60)
+    picture(browser, "drop", "Add a run", 620)
+
+
+def missing(browser: Browser) -> None:
+    """The residual and the effects; the one that promises most switched on; the ladder and the backbone."""
+    browser.tab("What is missing")
+    browser.wait(lambda: browser.js(LISTED), 300)
+    browser.js("seen('.effect-row[data-tag=\"contact-ageing\"]')[0].click()")
+    picture(browser, "missing")
+    browser.press('.effect-row[data-tag="contact-ageing"] button', "Switch on")
+    browser.wait(lambda: "contact-ageing" in browser.text(".model"), 120)
+    browser.idle()
+    browser.wait(lambda: "nearest rough lines" in browser.text(".line"), 120)
+    picture(browser, "backbone", "u_max", 860, 790)
+
+
+def simulated(browser: Browser) -> None:
+    """One run, a sweep, and rivals in every experiment."""
+    browser.tab("Simulate")
+    browser.press("button", "Simulate")
+    browser.wait(lambda: "model" in browser.text("td"), 120)
+    picture(browser, "simulate", tall=900)
+    browser.press("button", "Sweep")
+    browser.wait(lambda: browser.js("return named('sweep').data.v.length === 6"), 200)
+    browser.wait(lambda: browser.js(DONE), 60)
+    picture(browser, "sweep", "A sweep of the velocity", 480)
+    browser.press("button", "Simulate each")
+    browser.wait(lambda: browser.js("return seen('.work .fill').length"), 60)
+    browser.wait(lambda: browser.js(DONE), 500)
+    picture(browser, "rivals", "The experiment that would", 1050)
+
+
+def kept(browser: Browser) -> None:
+    """The history, and the model saved as a run folder."""
+    browser.tab("Keep")
+    browser.wait(lambda: browser.js(WRITE, "first"))
+    browser.press("button", "Save")
+    browser.wait(lambda: "first" in browser.text("td"), 200)
+    browser.js("seen('.choosing tbody tr').find((e) => e.cells[0].textContent === 'first').click()")
+    browser.wait(lambda: browser.js("return seen('iframe').length"))
+    picture(browser, "keep")
+
+
+def model(browser: Browser, url: str) -> None:
+    """Sliders, one cycle and its slip run freely, the map of the error; the same in the dark."""
+    browser.tab("Model")
+    browser.wait(lambda: browser.js("return seen('.knob').length"))
+    browser.idle()
+    browser.wait(lambda: browser.js(FREE), 120)
+    picture(browser, "model")
+    browser.open(url, "Model", theme="dark")
+    browser.idle()
+    browser.wait(lambda: browser.js(FREE), 120)
+    picture(browser, "dark")
 
 
 def main() -> None:
     """Open, look, switch the effect on, look."""
-    with tempfile.TemporaryDirectory() as folder:
-        for path in (ROOT / "scenarios" / "hidden-effect").iterdir():
-            if path.is_file():
-                shutil.copy(path, folder)
-        served = Served(Path(folder) / "campaign.toml")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / "campaign"
+        shutil.copytree(ROOT / "scenarios" / "hidden-effect", folder)
+        served = Served(folder / "campaign.toml")
         browser = Browser(str(shutil.which("chromium")), str(shutil.which("chromedriver")), *SIZE)
         try:
             browser.open(served.url, "Data")
             browser.idle()
-            browser.wait(lambda: "Can tell" in browser.text("h3, h4, .head, .group"), 120)
-            picture(browser, "workbench-data")
-            browser.tab("What is missing")
-            browser.wait(
-                lambda: browser.js("return seen('.line').some((e) => e.textContent.startsWith('by the fall'))"), 300
-            )
-            browser.js("seen('.effect-row[data-tag=\"contact-ageing\"]')[0].click()")
-            picture(browser, "workbench-missing")
-            browser.press('.effect-row[data-tag="contact-ageing"] button', "Switch on")
-            browser.wait(lambda: "contact-ageing" in browser.text(".model"), 120)
-            browser.tab("Model")
-            browser.wait(lambda: browser.js("return seen('.knob').length"))
-            browser.idle()
-            picture(browser, "workbench-model")
-            browser.tab("Simulate")
-            browser.press("button", "Simulate")
-            browser.wait(lambda: "model" in browser.text("td"), 120)
-            picture(browser, "workbench-simulate")
-            browser.tab("Keep")
-            browser.wait(lambda: browser.js(WRITE, "first"))
-            browser.press("button", "Save")
-            browser.wait(lambda: "first" in browser.text("td"), 200)
-            browser.js("seen('.choosing tbody tr').find((e) => e.cells[0].textContent === 'first').click()")
-            browser.wait(lambda: browser.js("return seen('iframe').length"))
-            picture(browser, "workbench-keep")
+            data(browser, folder)
+            missing(browser)
+            simulated(browser)
+            kept(browser)
+            model(browser, served.url)
         finally:
             browser.close()
             served.end()

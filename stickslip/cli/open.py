@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import ipaddress
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +13,6 @@ from ..errors import InputError
 
 NEEDED = ("panel", "bokeh", "tsdownsample", "watchfiles")
 LOOPBACK = "127.0.0.1"
-OWN = (LOOPBACK, "localhost", "::1")
 
 
 def open(
@@ -65,10 +65,18 @@ def open(
         session = Session(offers=tuple(offered(Path())), home=Path().resolve())
     else:
         session = opened(_simulated(campaign) if _is_scenario(campaign) else campaign, effect)
-    if address not in OWN:
+    if not _own(address):
         print(f"stickslip: the workbench is reached from other machines under {address}", flush=True)
     serve(session, port=port, address=address, browser=browser, tell=tell)
     return 0
+
+
+def _own(address: str) -> bool:
+    """Whether an address is that of this machine for itself."""
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
 
 
 def _is_scenario(path: Path) -> bool:

@@ -32,7 +32,7 @@ class Look:
     Attributes:
         text, soft, line, surface, page: of the page: text, its softer form, lines, cards, what is behind them.
         measured, model, band: of the two curves and of what noise and scatter allow.
-        runs: of the runs, after Okabe and Ito: to be told apart by the colour-blind.
+        runs: of the runs: to be told apart by the colour-blind.
         accent: of what can be pressed.
         low, middle, high: of the heat map: better than the data can tell, as good, worse.
     """
@@ -59,7 +59,7 @@ LIGHT = Look(
 )  # fmt: skip
 DARK = Look(
     "#e6e9ef", "#a3adbd", "#39424f", "#1d232c", "#14181f", "#e6e9ef", "#ff8f70", "#6c7a92",
-    ("#56b4e9", "#ff9a3c", "#2dc59a", "#e39ac4", "#f0e442", "#9ad0ff", "#a3adbd"), "#6db3f2",
+    ("#56b4e9", "#ff9a3c", "#b0ffa9", "#9e59f9", "#aa806b", "#b70e82", "#934d01"), "#6db3f2",
     "#9a7fd1", "#2b323c", "#e08214",
 )  # fmt: skip
 

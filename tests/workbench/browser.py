@@ -39,8 +39,10 @@ class Served:
             env={**os.environ, "PYTHONPATH": str(ROOT)},
         )  # fmt: skip
         assert self.process.stdout is not None
-        line = self.process.stdout.readline()
-        assert "http://127.0.0.1:" in line, line + self.process.stdout.read()
+        self.said = ""  # before the address
+        while "http://127.0.0." not in (line := self.process.stdout.readline()):
+            assert line, self.said
+            self.said += line
         self.url = line.split()[-1]
         self.started = time.monotonic() - self.began
 

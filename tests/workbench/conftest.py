@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -36,3 +37,12 @@ def base(campaign):
 def aged(base):
     """The base model with the hidden effect, fitted once."""
     return base.add("contact-ageing")
+
+
+def numbers(thing: Any, where: str = "") -> dict[str, float]:
+    """Every number of a result, by the way to it."""
+    if isinstance(thing, dict):
+        return {k: v for key, value in thing.items() for k, v in numbers(value, f"{where}/{key}").items()}
+    if isinstance(thing, list):
+        return {k: v for i, value in enumerate(thing) for k, v in numbers(value, f"{where}/{i}").items()}
+    return {where: thing} if isinstance(thing, (int, float)) else {}

@@ -12,7 +12,7 @@ import pytest
 from stickslip.cli import run
 
 from .browser import DEEP, Browser, Served
-from .conftest import SCENARIO
+from .conftest import SCENARIO, numbers
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -22,7 +22,7 @@ QUICK = 1000.0  # ms in which a slider is answered on a machine that does other 
 PAUSE = 0.3  # s between two moves
 
 
-def _campaign(folder: Path) -> Path:
+def campaign_in(folder: Path) -> Path:
     for path in SCENARIO.iterdir():
         if path.is_file():
             shutil.copy(path, folder)
@@ -31,7 +31,7 @@ def _campaign(folder: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    return _campaign(tmp_path_factory.mktemp("opened"))
+    return campaign_in(tmp_path_factory.mktemp("opened"))
 
 
 @pytest.fixture(scope="module")
@@ -158,9 +158,38 @@ def test_the_keyboard_goes_to_the_next_cycle(browser):
     assert browser.wait(lambda: browser.js("return seen('select')[0].value") != run)
 
 
+LOCK = "all('.knob[data-name=\"weakening.drop\"] .lock input')[0]"
+VALUE = "return all('.knob[data-name=\"weakening.drop\"] .value')[0].textContent"
+
+
+def test_a_fit_is_cancelled_and_a_locked_parameter_stays(browser):
+    browser.tab("Model")
+    browser.wait(lambda: browser.js("return seen('.knob').length"))
+    fitted = float(browser.js(VALUE).split()[0])
+    browser.redraw("weakening.drop", 0.8)
+    browser.js("all('.knob[data-name=\"weakening.drop\"] .slider')[0].dispatchEvent(new Event('change'))")
+    browser.wait(lambda: "by hand" in browser.text(".errors"))
+    before, moved = browser.text(".errors"), float(browser.js(VALUE).split()[0])
+    assert moved != pytest.approx(fitted, rel=5e-3)
+    browser.press("button", "Fit")
+    browser.wait(lambda: "fitting" in browser.text(".bar"))
+    browser.press(".bar .stop")
+    browser.wait(lambda: "cancelled" in browser.text(".said"), 60)
+    assert browser.text(".errors") == before and float(browser.js(VALUE).split()[0]) == moved
+    browser.js(f"{LOCK}.click()")
+    browser.wait(lambda: browser.js("return all('.knob[data-name=\"weakening.drop\"] .slider')[0].disabled"))
+    browser.press("button", "Fit")
+    browser.wait(lambda: "by hand" not in browser.text(".errors") and ": fit" in browser.text(".model"), 120)
+    assert float(browser.js(VALUE).split()[0]) == pytest.approx(moved, rel=5e-4)  # to the places that are shown
+    assert browser.js(f"return {LOCK}.checked")
+    browser.js(f"{LOCK}.click()")
+    browser.wait(lambda: not browser.js(f"return {LOCK}.checked"))
+    browser.press("button", "Base")
+
+
 @pytest.mark.slow
 def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_crash(tmp_path):
-    path = _campaign(tmp_path)
+    path = campaign_in(tmp_path)
     served = Served(path)
     browser = Browser(str(CHROMIUM), str(DRIVER))
     try:
@@ -180,7 +209,14 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         browser.idle()
         assert browser.unseen_error() < CAUGHT
         assert browser.js("return all('table').some((t) => t.textContent.includes('contact-ageing'))")
+        browser.press('.effect-row[data-tag="contact-ageing"] button', "Switch off")
+        browser.wait(lambda: "without contact-ageing" in browser.text(".model"), 120)
+        browser.idle()
+        assert browser.unseen_error() == pytest.approx(base, abs=2e-3)
+        assert browser.js("return all('table').some((t) => t.textContent.includes('without contact-ageing'))")
         browser.tab("Model")
+        browser.press("button", "Undo")
+        browser.wait(lambda: browser.unseen_error() < CAUGHT)
         browser.press("button", "Undo")
         browser.wait(lambda: abs(browser.unseen_error() - base) < 1e-9)
         browser.press("button", "Redo")
@@ -196,8 +232,16 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         browser.press("button", "Save")
         browser.wait(lambda: (tmp_path / "mine" / "result.json").is_file(), 300)
 
+        browser.tab("Simulate")
+        browser.wait(lambda: browser.js(WRITE, "such as 10 s", "3 s"))
+        browser.tab("missing")
+        browser.js("seen('.effect-row[data-tag=\"contact-ageing\"]')[0].click()")
+        browser.wait(lambda: browser.js("return seen('.effect-row.chosen').length"))
+        browser.wait(lambda: browser.js(CHOOSE, "place"))
+
         browser.open(served.url)  # a reload
         browser.idle()
+        _as_it_was(browser)
         found = browser.unseen_error()
         assert found < CAUGHT and "2 of 2" in browser.text(".model")
         time.sleep(1.0)  # what was done is kept when nothing else is to be done
@@ -209,6 +253,7 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         print(f"back after {served.started + time.monotonic() - began:.1f} s")
         browser.idle()
         assert browser.unseen_error() == pytest.approx(found, abs=2e-3)
+        _as_it_was(browser)
         browser.tab("Model")
         browser.press("button", "Base")
         browser.wait(lambda: abs(browser.unseen_error() - base) < 2e-3)
@@ -225,7 +270,7 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
 
 @pytest.mark.slow
 def test_a_diagnosis_goes_on_beside_and_can_be_cancelled(tmp_path):
-    served = Served(_campaign(tmp_path))
+    served = Served(campaign_in(tmp_path))
     browser = Browser(str(CHROMIUM), str(DRIVER))
     try:
         browser.open(served.url)
@@ -245,6 +290,19 @@ def test_a_diagnosis_goes_on_beside_and_can_be_cancelled(tmp_path):
         browser.wait(lambda: verdict(browser), 500)
         assert "contact-ageing" in verdict(browser)
         assert "when fitted" in browser.js("return seen('.effect-row')[0].textContent")
+        browser.tab("Keep")
+        browser.wait(lambda: browser.js(CHOOSE, "the diagnosis"))
+        browser.wait(lambda: browser.js(WRITE, "first", "found"))
+        time.sleep(PAUSE)
+        browser.press("button", "Save")
+        browser.wait(lambda: (tmp_path / "found" / "result.json").is_file(), 60)
+        assert run(["diagnose", str(tmp_path / "campaign.toml"), "--out", str(tmp_path / "its")]) == 0
+        mine, its = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("found", "its"))
+        assert mine["verdict"]["kind"] == its["verdict"]["kind"] == "missing"
+        for result in (mine, its):
+            result.pop("seconds", None)
+        mine, its = numbers(mine), numbers(its)
+        assert len(mine) > 1000 and mine == pytest.approx(its, rel=1e-6, abs=1e-12, nan_ok=True)
         browser.open(served.url, "missing")  # a reload
         browser.wait(lambda: "contact-ageing" in verdict(browser))
         assert not browser.complaints()
@@ -256,7 +314,7 @@ def test_a_diagnosis_goes_on_beside_and_can_be_cancelled(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["fit", "diagnosis"])
 def test_a_server_that_is_killed_in_the_midst_of_long_work_comes_back_with_what_was_open(tmp_path, what):
-    path = _campaign(tmp_path)
+    path = campaign_in(tmp_path)
     served = Served(path)
     browser = Browser(str(CHROMIUM), str(DRIVER))
     try:
@@ -290,6 +348,35 @@ def test_a_server_that_is_killed_in_the_midst_of_long_work_comes_back_with_what_
     finally:
         browser.close()
         served.end()
+
+
+WRITE = """
+const field = seen('input').find((e) => e.placeholder === arguments[0])
+if (!field) return false
+field.value = arguments[1]
+for (const kind of ['input', 'change']) field.dispatchEvent(new Event(kind, { bubbles: true }))
+return true
+"""
+CHOOSE = """
+const field = seen('select').find((e) => [...e.options].some((o) => o.value === arguments[0]))
+if (!field) return false
+field.value = arguments[0]
+field.dispatchEvent(new Event('change', { bubbles: true }))
+return true
+"""
+CHOSEN = "return seen('select').map((e) => e.value)"
+WRITTEN = "return seen('input').filter((e) => e.placeholder === 'such as 10 s').map((e) => e.value)"
+
+
+def _as_it_was(browser: Browser) -> None:
+    """The page, the variable of the residual, the chosen effect and a field of Simulate."""
+    browser.wait(lambda: "place" in browser.js(CHOSEN), 60)
+    browser.wait(
+        lambda: browser.js("return seen('.effect-row.chosen').map((e) => e.dataset.tag)") == ["contact-ageing"]
+    )
+    browser.tab("Simulate")
+    browser.wait(lambda: browser.js(WRITTEN) == ["3 s"], 60)
+    browser.tab("missing")
 
 
 def verdict(browser: Browser) -> str:

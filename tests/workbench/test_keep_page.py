@@ -21,6 +21,8 @@ from stickslip.workbench.session import Session
 from stickslip.workbench.simulated_view import SimulatedView
 from stickslip.workbench.sweep_view import SweepView
 
+from .conftest import numbers
+
 SCRIPT = "<script>alert(1)</script>"
 
 
@@ -48,19 +50,10 @@ def test_saving_writes_what_fit_save_writes(saved, base, folder, tmp_path):
     assert {p.name for p in saved.iterdir()} == {p.name for p in (tmp_path / "same").iterdir()}
 
 
-def _numbers(thing, where=""):
-    """Every number of a result, by the way to it."""
-    if isinstance(thing, dict):
-        return {k: v for key, value in thing.items() for k, v in _numbers(value, f"{where}/{key}").items()}
-    if isinstance(thing, list):
-        return {k: v for i, value in enumerate(thing) for k, v in _numbers(value, f"{where}/{i}").items()}
-    return {where: thing} if isinstance(thing, (int, float)) else {}
-
-
-def test_the_command_writes_the_same_numbers(saved, folder, tmp_path):
+def test_the_command_writes_the_samenumbers(saved, folder, tmp_path):
     out = tmp_path / "by the command"
     assert run(["fit", str(folder / "campaign.toml"), "--model", "inertial", "--out", str(out)]) == 0
-    mine, its = _numbers(_plain(saved)), _numbers(_plain(out))
+    mine, its = numbers(_plain(saved)), numbers(_plain(out))
     assert len(mine) > 300 and mine == pytest.approx(its, rel=1e-9, abs=1e-15, nan_ok=True)
 
 
@@ -165,7 +158,7 @@ def _by_command(told, folder, monkeypatch):
 
 def _the_same(mine, its, keys):
     for key in keys:
-        assert _numbers(mine[key]) == pytest.approx(_numbers(its[key]), rel=1e-9, abs=1e-15, nan_ok=True), key
+        assert numbers(mine[key]) == pytest.approx(numbers(its[key]), rel=1e-9, abs=1e-15, nan_ok=True), key
 
 
 def _by_python(told, folder, monkeypatch):

@@ -25,6 +25,7 @@ from stickslip.workbench.session import Note, Session
 from stickslip.workbench.shipped import copied, example, to_work_in
 
 from .browser import Served
+from .conftest import SCENARIO
 
 EFFECT = '''"""An effect of one's own."""
 
@@ -144,6 +145,58 @@ def test_a_port_that_is_taken_is_said():
         _free("127.0.0.1", 70000)
     with pytest.raises(InputError):
         _free("192.0.2.1", 0)
+
+
+def test_the_port_of_ones_choice_is_taken(folder):
+    port = _free("127.0.0.1", 0)
+    served = Served(folder / "campaign.toml", "--port", str(port))
+    try:
+        assert served.url.startswith(f"http://127.0.0.1:{port}/")
+        assert urllib.request.urlopen(served.url, timeout=30).status == 200
+    finally:
+        assert served.end() == 0
+
+
+def test_another_address_answers_in_place_of_the_usual_one(folder):
+    served = Served(folder / "campaign.toml", "--address", "127.0.0.2")
+    try:
+        assert served.url.startswith("http://127.0.0.2:") and "from other machines" not in served.said
+        assert urllib.request.urlopen(served.url, timeout=30).status == 200
+        with pytest.raises(urllib.error.HTTPError):  # the token is asked for there too
+            urllib.request.urlopen(served.url.rsplit("/", 2)[0] + "/", timeout=30)
+        with pytest.raises(urllib.error.URLError, match="refused"):
+            urllib.request.urlopen(served.url.replace("127.0.0.2", "127.0.0.1"), timeout=30)
+    finally:
+        assert served.end() == 0
+
+
+@pytest.mark.parametrize(("address", "said"), [("192.0.2.7", True), ("0.0.0.0", True), ("127.0.0.1", False)])
+def test_an_address_that_others_reach_is_said_to_be(folder, monkeypatch, capsys, address, said):
+    asked = {}
+    monkeypatch.setattr("stickslip.workbench.serve.serve", lambda session, **more: asked.update(more))
+    assert run(["open", str(folder / "campaign.toml"), "--address", address]) == 0
+    assert asked["address"] == address and asked["port"] == 0
+    assert (f"reached from other machines under {address}" in capsys.readouterr().out) == said
+
+
+def test_a_scenario_is_simulated_and_opened(tmp_path):
+    scenario = tmp_path / "rig.toml"
+    scenario.write_text((SCENARIO.parent / "grzemba2014.toml").read_text())
+    served = Served(scenario)
+    try:
+        assert "written to rig-simulated" in served.said
+        page = urllib.request.urlopen(served.url, timeout=30).read().decode()
+        assert "<title>stickslip" in page
+        result = tmp_path / "rig-simulated" / "result.json"
+        written = result.stat().st_mtime_ns
+        assert opened(tmp_path / "rig-simulated").campaign.traces[0].time.size > 1000
+    finally:
+        assert served.end() == 0
+    served = Served(scenario)  # the same scenario is not simulated anew
+    try:
+        assert not served.said and result.stat().st_mtime_ns == written
+    finally:
+        assert served.end() == 0
 
 
 def test_what_is_missing_to_run_it_is_said(monkeypatch, capsys):

@@ -19,8 +19,9 @@ if TYPE_CHECKING:  # what only takes colours from here need not wait for matplot
 
 # dark, middle and light, so that a grey print keeps them apart; the line styles differ as well
 DARK, MIDDLE, LIGHT = "#14213d", "#c8553d", "#8d99ae"
-# of runs, in reports and in the workbench: after Okabe and Ito, to be told apart by the colour-blind
-RUNS = ("#0072b2", "#d55e00", "#009e73", "#b8578c", "#9a7400", "#3a93c9", "#5b6577")
+# of runs, in reports and in the workbench: the first three of Okabe and Ito, the others as far from all as may be
+# for those who see red or green otherwise, which a test computes
+RUNS = ("#0072b2", "#d55e00", "#009e73", "#7e5de8", "#949db1", "#fd0e60", "#792419")
 _DASHES = ("-", "--", "-.", ":")
 _LOOK: Any = {
     "font.size": 10,
