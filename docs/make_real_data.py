@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 import xarray
+from scipy.io import loadmat
 from scipy.signal import welch
 
 import stickslip as ss
@@ -34,6 +35,8 @@ from stickslip.cli import run
 from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.segment import segment
 from stickslip.errors import InputError
+from stickslip.inference.force.heldout import halves, unseen
+from stickslip.inference.force.problem import BESIDE
 from stickslip.physics.contact import default_loads, equal_bodies, from_heights, heights_from_scan
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
@@ -86,6 +89,7 @@ PRESCRIBED = {
     "robot-joint": "robot-breakaway-creep/test1",
     "robot-loops": "robot-breakaway-creep/test3",
     "friction-damper": "friction-damper-brfd",
+    "bolted-joint": "bolted-joint-brb",
     "rock-basalt": "rock-velocity-steps",
     "rock-sepiolite": "rock-velocity-steps",
 }
@@ -283,9 +287,13 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     """One of them: the ladder, what the program says, and a picture."""
     work.mkdir(parents=True)
     path = Path(shutil.copy(DOCS.parent / "scenarios" / "real" / f"{name}.toml", work))
+    if name == "bolted-joint":
+        first_mode(records, work)
+        records = work
     for trace in tomllib.loads(path.read_text(encoding="utf-8"))["trace"]:
         for channel in (trace, *(c for c in trace.values() if isinstance(c, dict) and "file" in c)):
-            shutil.copy(records / channel["file"], work)
+            if records != work:
+                shutil.copy(records / channel["file"], work)
     campaign = ss.load_campaign(path)
     try:
         made = campaign.diagnose()
@@ -295,12 +303,18 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     assert made.found is not None
     rungs = [rung for rung in made.found.ladder if rung.fit is not None]
     fits = [rung.fit for rung in rungs]
-    level = float(np.quantile(np.abs(fits[0].forces.measured), 0.95))
+    problem = fits[0].problem
+    level = float(np.quantile(np.abs(np.concatenate([k.mean @ k.force for k in problem.runs])), 0.95))
     if name in PICTURES:
         save(hysteresis(fits[0], fits[-1], name), DOCS / "figures" / f"{PICTURES[name]}.png")
+    joint: dict[str, Any] = {}
+    if name == "bolted-joint":
+        joint = {"linear": [v / level for v in linear(fits[0])], "swings": (seen := swings(fits)),
+               "stuck": [fits[0].values[BESIDE], fits[0].std()[BESIDE]]}  # fmt: skip
+        save(amplitudes(seen), DOCS / "figures" / "real-bolted-joint.png", dpi=80)
     verdict = made.result["verdict"]
     return {
-        "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
+        **joint, "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
         "says": f"{verdict['kind']}: {verdict['text']}",
         "scatter": fits[-1].scatter.named(),
         "ladder": [
@@ -311,6 +325,92 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
             }
             for last, rung, told in zip([rungs[0], *rungs], rungs, made.result["ladder"][1:], strict=False)
         ],
+    }  # fmt: skip
+
+
+def first_mode(records: Path, work: Path) -> None:
+    """The first bending mode of the bolted beam, as its campaign file says: displacement and acceleration."""
+    data = loadmat(records / "HammerImpact.mat", simplify_cells=True)["HIdata"]
+    t, a = data["time"], data["acc3"]
+    f = np.fft.rfftfreq(t.size, t[1] - t[0])
+    mode = np.fft.rfft(a) * np.exp(-0.5 * ((f - 80.4) / 5.0) ** 2)
+    x = np.fft.irfft(-mode / (2.0 * np.pi * np.maximum(f, 1.0)) ** 2, t.size)
+    rows = np.column_stack([t, x, np.fft.irfft(mode, t.size)])
+    np.savetxt(work / "first_mode.csv", rows, header="t,x,a", delimiter=",", comments="")
+
+
+def linear(fit: Any) -> list[float]:
+    """Rms of the force (N) that a spring and a dashpot leave, fitted and on halves of runs left out."""
+    problem = fit.problem
+    force, x, v = along_runs(problem)
+    columns = np.column_stack([x, v, problem.run[:, None] == np.arange(len(problem.runs))])
+
+    def left(seen: np.ndarray, own: np.ndarray) -> np.ndarray:
+        return force[own] - columns[own] @ np.linalg.lstsq(columns[seen], force[seen], rcond=None)[0]
+
+    everything = np.ones(force.size, bool)
+    apart = [np.isin(problem.of, part) for part in halves(fit)]
+    return [rms(left(everything, everything)), rms(np.concatenate([left(~own, own) for own in apart]))]
+
+
+def along_runs(problem: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Force (N), displacement from the start (m) and velocity (m/s) at the points."""
+    runs = problem.runs
+    force, x = (np.concatenate([k.mean @ y for k, y in zip(runs, ys, strict=True)])
+                for ys in ([k.force for k in runs], [k.x - k.x[0] for k in runs]))  # fmt: skip
+    return force, x, np.concatenate([k.rate for k in runs])
+
+
+def swings(fits: list[Any]) -> dict[str, Any]:
+    """Of every full swing: amplitude (m), and frequency (Hz) and loss over 2 (1) of measured and unseen model force."""
+    problem = fits[0].problem
+    force, x, v = along_runs(problem)
+    forces = {"measured": force, **{"base" if f is fits[0] else f.problem.composition.effects[-1].tag:
+                                    force - unseen(f).residual for f in fits}}  # fmt: skip
+    out: dict[str, Any] = {"amplitude": [], **{name: {"frequency": [], "damping": []} for name in forces}}
+    for e in range(problem.events - 1):
+        own = (problem.of == e) | (problem.of == e + 1)
+        if np.unique(problem.run[own]).size > 1 or own.sum() < 20:
+            continue
+        columns = np.column_stack([x[own], v[own], np.ones(own.sum())])
+        out["amplitude"].append(0.5 * float(np.ptp(x[own])))
+        for name, values in forces.items():
+            k, c, _ = np.linalg.lstsq(columns, values[own], rcond=None)[0]
+            out[name]["frequency"].append(float(np.sqrt(k) / (2.0 * np.pi)))
+            out[name]["damping"].append(float(0.5 * c / np.sqrt(k)))
+    return out
+
+
+@styled
+def amplitudes(seen: dict[str, Any]) -> Any:
+    """Frequency and damping of a swing against its amplitude, measured and of models on parts left out."""
+    made, axes = figure(1, 2, width=10.0, height=4.0)
+    x = 1e6 * np.array(seen["amplitude"])
+    for axis, what, k, unit in zip(
+        axes[0], ("frequency", "damping"), (1.0, 100.0), ("Hz", "% of critical"), strict=True
+    ):
+        for name, mark, color in zip([n for n in seen if n != "amplitude"], "o^s", (DARK, LIGHT, MIDDLE), strict=False):
+            axis.plot(x, k * np.array(seen[name][what]), mark, ms=3, color=color, label=plain(name))
+        axis.axhline(k * np.mean(seen["measured"][what]), color=DARK, lw=0.8, ls="--", label="linear joint")
+        axis.set(xlabel="amplitude / µm", ylabel=f"{what} / {unit}")
+    axes[0][0].legend(fontsize="x-small")
+    return made
+
+
+def classroom(data: Path, work: Path) -> dict[str, Any]:
+    """The classroom slider: what an inspection says, what the level follows, and the forecast."""
+    work = work / "classroom"
+    work.mkdir()
+    path = Path(shutil.copy(DOCS.parent / "scenarios" / "real" / "classroom-slider.toml", work))
+    shutil.copy(data / "classroom-slider" / "Force7.txt", work)
+    seen, arrays = result(str(path), work / "inspect", "inspect")
+    save(trace_picture(arrays, 0, seen["traces"][0]), DOCS / "figures" / "real-classroom.png", dpi=90)
+    found = ss.load_campaign(path).forecast().result
+    sizes = [e["slip"] for e in seen["traces"][0]["events"]]
+    return {
+        "slips": len(sizes), "size_s": [mean(sizes), stdev(sizes)], "says": [*seen["can"], *seen["cannot"]],
+        "levels": found["levels"], "coordinate": found["coordinate"]["text"], "methods": found["methods"],
+        "gains": found["gains"], "train": found["train"],
     }  # fmt: skip
 
 
@@ -424,7 +524,7 @@ def scaled_to(values: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?", default=os.environ.get("STICKSLIP_REAL_DATA", str(DEFAULT)))
-    parser.add_argument("--only", nargs="*", help="parts to make anew; the others stay as they are")
+    parser.add_argument("--only", nargs="*", help="parts or records to make anew; the others stay")
     asked = parser.parse_args()
     data = Path(asked.folder).resolve()
     if not data.is_dir():
@@ -432,13 +532,17 @@ def main() -> None:
     (DOCS / "figures").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
-        made = (paper, together, robot, fault, prescribed, topographies)
-        parts = {f.__name__: f(data, work) for f in made if asked.only is None or f.__name__ in asked.only}
+        made = (paper, together, robot, fault, classroom, prescribed, topographies)
+        only = asked.only
+        parts = {f.__name__: f(data, work) for f in made if only is None or f.__name__ in only}
+        single = {n: diagnosed(n, data / f, work / n) for n, f in PRESCRIBED.items() if only and n in only}
     head = {"version": __version__, "date": date.today().isoformat(), "command": "python docs/make_real_data.py"}
-    for name in parts.keys() & {"prescribed", "topographies"}:
+    for name in parts.keys() & {"prescribed", "topographies", "classroom"}:
         parts[name] |= head
     path = DOCS / "results" / "real_data.json"
     known = json.loads(path.read_text(encoding="utf-8")) if asked.only is not None else {}
+    for name, record in single.items():
+        known["prescribed"]["records"][name] = record
     text = json.dumps({**head, **known, **parts}, indent=1, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")
 

@@ -11,6 +11,7 @@ from stickslip.data.prescribed import prescribed, with_motion
 from stickslip.data.segment import segment
 from stickslip.data.trace import Trace
 from stickslip.errors import InputError
+from stickslip.inference.diagnose.confirm import confirm
 from stickslip.inference.diagnose.engine import Round, _end
 from stickslip.inference.diagnose.prepare import Prepared
 from stickslip.inference.force.backbone import backbone
@@ -214,6 +215,14 @@ def test_an_effect_is_tried_where_the_record_shows_what_it_needs(plain):
     one_way = Prepared(*begin(Rig(), runs), (), (), Scales(1.0, 0.0, 1.0), (), True)
     assert not one_way.shows(uneven)
     assert one_way.shows(loaded)
+
+
+def test_nothing_is_run_freely_and_the_report_says_so_in_words(plain):
+    loops = Prepared(plain.problem, plain.point, (), (), Scales(1.0, 0.0, 1.0), (), prescribed=True)
+    found = confirm({("static", "inertia"): plain}, ("static", "inertia"), loops)
+    assert not found.models
+    assert found.notes[0].startswith("no model is run freely: the motion is prescribed")
+    assert "Error" not in found.notes[0]
 
 
 def test_one_step_of_the_velocity_is_fitted_but_not_diagnosed():
