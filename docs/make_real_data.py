@@ -20,6 +20,7 @@ import shutil
 import tempfile
 import tomllib
 from datetime import date
+from itertools import pairwise
 from pathlib import Path
 from statistics import mean, median, stdev
 from typing import Any
@@ -27,7 +28,7 @@ from typing import Any
 import numpy as np
 import xarray
 from scipy.io import loadmat
-from scipy.signal import welch
+from scipy.signal import savgol_filter, welch
 
 import stickslip as ss
 from stickslip import __version__
@@ -307,14 +308,16 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     level = float(np.quantile(np.abs(np.concatenate([k.mean @ k.force for k in problem.runs])), 0.95))
     if name in PICTURES:
         save(hysteresis(fits[0], fits[-1], name), DOCS / "figures" / f"{PICTURES[name]}.png")
-    joint: dict[str, Any] = {}
+    own: dict[str, Any] = {"free": [v / level for v in freely(fits[0])]} if problem.loaded else {}
     if name == "bolted-joint":
-        joint = {"linear": [v / level for v in linear(fits[0])], "swings": (seen := swings(fits)),
+        own = {"linear": [v / level for v in linear(fits[0])], "swings": (seen := swings(fits)),
                "stuck": [fits[0].values[BESIDE], fits[0].std()[BESIDE]]}  # fmt: skip
         save(amplitudes(seen), DOCS / "figures" / "real-bolted-joint.png", dpi=80)
+    if name == "friction-damper":
+        own = {"ringing": ringing(campaign)}
     verdict = made.result["verdict"]
     return {
-        **joint, "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
+        **own, "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
         "says": f"{verdict['kind']}: {verdict['text']}",
         "scatter": fits[-1].scatter.named(),
         "ladder": [
@@ -341,15 +344,51 @@ def first_mode(records: Path, work: Path) -> None:
 
 def linear(fit: Any) -> list[float]:
     """Rms of the force (N) that a spring and a dashpot leave, fitted and on halves of runs left out."""
-    problem = fit.problem
-    force, x, v = along_runs(problem)
-    columns = np.column_stack([x, v, problem.run[:, None] == np.arange(len(problem.runs))])
+    _, x, v = along_runs(fit.problem)
+    return least(fit, np.column_stack([x, v, fit.problem.run[:, None] == np.arange(len(fit.problem.runs))]))
+
+
+def freely(fit: Any) -> list[float]:
+    """The same of any function of the speed, other where it falls, that is linear in the measured load."""
+    runs = fit.problem.runs
+    _, _, v = along_runs(fit.problem)
+    load = np.concatenate([k.mean @ k.load for k in runs])
+    falls = np.concatenate([k.acceleration for k in runs]) < 0.0
+    nodes = np.unique(np.quantile(v, np.linspace(0.0, 1.0, 13)))
+    hats = np.stack([np.interp(v, nodes, row) for row in np.eye(nodes.size)], axis=1)
+    loaded = np.hstack([hats, hats * (load / np.median(load) - 1.0)[:, None]])
+    return least(fit, np.hstack([loaded, loaded * falls[:, None]]))
+
+
+def ringing(campaign: ss.Campaign) -> list[list[float]]:
+    """Of every stroke of 20 mm: its way (m), and frequency (Hz) and rms (N) of what the force swings between turns."""
+    out = []
+    for trace in campaign.traces:
+        t, x, force = trace.time, trace.displacement, trace.spring_force
+        assert x is not None
+        assert force is not None
+        step = t[1] - t[0]
+        turns = np.flatnonzero(np.diff(np.sign(savgol_filter(x, 31, 2, deriv=1))))
+        for a, b in pairwise(turns.tolist()):
+            if abs(x[b] - x[a]) < 0.02:
+                continue
+            sliding = force[a + 100 : b - 40]
+            swing = sliding - savgol_filter(sliding, 121, 2)
+            f = np.fft.rfftfreq(8192, step)
+            power = np.abs(np.fft.rfft(swing * np.hanning(swing.size), 8192)) * ((f > 8.0) & (f < 80.0))
+            out.append([float(x[b] - x[a]), float(f[np.argmax(power)]), float(swing.std())])
+    return out
+
+
+def least(fit: Any, columns: np.ndarray) -> list[float]:
+    """Rms of the force (N) that a linear model leaves, fitted and on halves of runs left out."""
+    force, _, _ = along_runs(fit.problem)
 
     def left(seen: np.ndarray, own: np.ndarray) -> np.ndarray:
         return force[own] - columns[own] @ np.linalg.lstsq(columns[seen], force[seen], rcond=None)[0]
 
     everything = np.ones(force.size, bool)
-    apart = [np.isin(problem.of, part) for part in halves(fit)]
+    apart = [np.isin(fit.problem.of, part) for part in halves(fit)]
     return [rms(left(everything, everything)), rms(np.concatenate([left(~own, own) for own in apart]))]
 
 
