@@ -83,6 +83,30 @@ def compared(own: np.ndarray, seen: np.ndarray) -> dict[str, Any]:
     }  # fmt: skip
 
 
+LONG = 1.6  # medians, from which a wait is looked at by itself
+
+
+def long_waits(levels: Any, k: float, v: float) -> dict[str, Any]:
+    """Where the long waits of a record come from: how far the slider goes in a stick, and how far the force rises."""
+    waits = levels["recurrence"].values[1:]
+    rise = levels["onset"].values[1:] - levels["arrest"].values[:-1]
+    loaded = v * (levels["time_onset"].values[1:] - levels["time_arrest"].values[:-1])
+    gone = (loaded - rise / k) / loaded
+    far = waits > LONG * np.median(waits)
+    return {
+        "of": int(waits.size),
+        **{
+            name: {
+                "waits": int(own.sum()), "mean": float(waits[own].mean()), "std": float(waits[own].std()),
+                "gone": float(np.median(gone[own])), "rise": float(rise[own].mean()),
+                "slip_before": float(levels["slip"].values[:-1][own].mean()),
+            }
+            for name, own in (("long", far), ("others", ~far))
+        },
+        "next_to_next": float(np.corrcoef(waits[1:], waits[:-1])[0, 1]),
+    }  # fmt: skip
+
+
 @styled
 def quantiles(found: dict[str, Any]) -> Any:
     """Predicted against measured quantiles."""
@@ -127,6 +151,7 @@ def main() -> None:
                 "slides": False, "law": str(law), "simulated": {"slip": slip, "recurrence": period},
                 "slip": compared(slips, levels["slip"].values),
                 "recurrence": compared(waits, levels["recurrence"].values[1:]),
+                "long_waits": long_waits(levels, STIFF, 1e-6 * v),
             }  # fmt: skip
     save(quantiles(found), DOCS / "figures" / "real-prediction.png", dpi=80)
     head = {"version": __version__, "date": date.today().isoformat(), "command": "python docs/make_prediction.py"}

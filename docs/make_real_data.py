@@ -20,13 +20,15 @@ import shutil
 import tempfile
 import tomllib
 from datetime import date
+from itertools import pairwise
 from pathlib import Path
 from statistics import mean, median, stdev
 from typing import Any
 
 import numpy as np
 import xarray
-from scipy.signal import welch
+from scipy.io import loadmat
+from scipy.signal import savgol_filter, welch
 
 import stickslip as ss
 from stickslip import __version__
@@ -34,6 +36,8 @@ from stickslip.cli import run
 from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.segment import segment
 from stickslip.errors import InputError
+from stickslip.inference.force.heldout import halves, unseen
+from stickslip.inference.force.problem import BESIDE
 from stickslip.physics.contact import default_loads, equal_bodies, from_heights, heights_from_scan
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
@@ -86,6 +90,7 @@ PRESCRIBED = {
     "robot-joint": "robot-breakaway-creep/test1",
     "robot-loops": "robot-breakaway-creep/test3",
     "friction-damper": "friction-damper-brfd",
+    "bolted-joint": "bolted-joint-brb",
     "rock-basalt": "rock-velocity-steps",
     "rock-sepiolite": "rock-velocity-steps",
 }
@@ -283,9 +288,13 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     """One of them: the ladder, what the program says, and a picture."""
     work.mkdir(parents=True)
     path = Path(shutil.copy(DOCS.parent / "scenarios" / "real" / f"{name}.toml", work))
+    if name == "bolted-joint":
+        first_mode(records, work)
+        records = work
     for trace in tomllib.loads(path.read_text(encoding="utf-8"))["trace"]:
         for channel in (trace, *(c for c in trace.values() if isinstance(c, dict) and "file" in c)):
-            shutil.copy(records / channel["file"], work)
+            if records != work:
+                shutil.copy(records / channel["file"], work)
     campaign = ss.load_campaign(path)
     try:
         made = campaign.diagnose()
@@ -295,12 +304,20 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
     assert made.found is not None
     rungs = [rung for rung in made.found.ladder if rung.fit is not None]
     fits = [rung.fit for rung in rungs]
-    level = float(np.quantile(np.abs(fits[0].forces.measured), 0.95))
+    problem = fits[0].problem
+    level = float(np.quantile(np.abs(np.concatenate([k.mean @ k.force for k in problem.runs])), 0.95))
     if name in PICTURES:
         save(hysteresis(fits[0], fits[-1], name), DOCS / "figures" / f"{PICTURES[name]}.png")
+    own: dict[str, Any] = {"free": [v / level for v in freely(fits[0])]} if problem.loaded else {}
+    if name == "bolted-joint":
+        own = {"linear": [v / level for v in linear(fits[0])], "swings": (seen := swings(fits)),
+               "stuck": [fits[0].values[BESIDE], fits[0].std()[BESIDE]]}  # fmt: skip
+        save(amplitudes(seen), DOCS / "figures" / "real-bolted-joint.png", dpi=80)
+    if name == "friction-damper":
+        own = {"ringing": ringing(campaign)}
     verdict = made.result["verdict"]
     return {
-        "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
+        **own, "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
         "says": f"{verdict['kind']}: {verdict['text']}",
         "scatter": fits[-1].scatter.named(),
         "ladder": [
@@ -311,6 +328,128 @@ def diagnosed(name: str, records: Path, work: Path) -> dict[str, Any]:
             }
             for last, rung, told in zip([rungs[0], *rungs], rungs, made.result["ladder"][1:], strict=False)
         ],
+    }  # fmt: skip
+
+
+def first_mode(records: Path, work: Path) -> None:
+    """The first bending mode of the bolted beam, as its campaign file says: displacement and acceleration."""
+    data = loadmat(records / "HammerImpact.mat", simplify_cells=True)["HIdata"]
+    t, a = data["time"], data["acc3"]
+    f = np.fft.rfftfreq(t.size, t[1] - t[0])
+    mode = np.fft.rfft(a) * np.exp(-0.5 * ((f - 80.4) / 5.0) ** 2)
+    x = np.fft.irfft(-mode / (2.0 * np.pi * np.maximum(f, 1.0)) ** 2, t.size)
+    rows = np.column_stack([t, x, np.fft.irfft(mode, t.size)])
+    np.savetxt(work / "first_mode.csv", rows, header="t,x,a", delimiter=",", comments="")
+
+
+def linear(fit: Any) -> list[float]:
+    """Rms of the force (N) that a spring and a dashpot leave, fitted and on halves of runs left out."""
+    _, x, v = along_runs(fit.problem)
+    return least(fit, np.column_stack([x, v, fit.problem.run[:, None] == np.arange(len(fit.problem.runs))]))
+
+
+def freely(fit: Any) -> list[float]:
+    """The same of any function of the speed, other where it falls, that is linear in the measured load."""
+    runs = fit.problem.runs
+    _, _, v = along_runs(fit.problem)
+    load = np.concatenate([k.mean @ k.load for k in runs])
+    falls = np.concatenate([k.acceleration for k in runs]) < 0.0
+    nodes = np.unique(np.quantile(v, np.linspace(0.0, 1.0, 13)))
+    hats = np.stack([np.interp(v, nodes, row) for row in np.eye(nodes.size)], axis=1)
+    loaded = np.hstack([hats, hats * (load / np.median(load) - 1.0)[:, None]])
+    return least(fit, np.hstack([loaded, loaded * falls[:, None]]))
+
+
+def ringing(campaign: ss.Campaign) -> list[list[float]]:
+    """Of every stroke of 20 mm: its way (m), and frequency (Hz) and rms (N) of what the force swings between turns."""
+    out = []
+    for trace in campaign.traces:
+        t, x, force = trace.time, trace.displacement, trace.spring_force
+        assert x is not None
+        assert force is not None
+        step = t[1] - t[0]
+        turns = np.flatnonzero(np.diff(np.sign(savgol_filter(x, 31, 2, deriv=1))))
+        for a, b in pairwise(turns.tolist()):
+            if abs(x[b] - x[a]) < 0.02:
+                continue
+            sliding = force[a + 100 : b - 40]
+            swing = sliding - savgol_filter(sliding, 121, 2)
+            f = np.fft.rfftfreq(8192, step)
+            power = np.abs(np.fft.rfft(swing * np.hanning(swing.size), 8192)) * ((f > 8.0) & (f < 80.0))
+            out.append([float(x[b] - x[a]), float(f[np.argmax(power)]), float(swing.std())])
+    return out
+
+
+def least(fit: Any, columns: np.ndarray) -> list[float]:
+    """Rms of the force (N) that a linear model leaves, fitted and on halves of runs left out."""
+    force, _, _ = along_runs(fit.problem)
+
+    def left(seen: np.ndarray, own: np.ndarray) -> np.ndarray:
+        return force[own] - columns[own] @ np.linalg.lstsq(columns[seen], force[seen], rcond=None)[0]
+
+    everything = np.ones(force.size, bool)
+    apart = [np.isin(fit.problem.of, part) for part in halves(fit)]
+    return [rms(left(everything, everything)), rms(np.concatenate([left(~own, own) for own in apart]))]
+
+
+def along_runs(problem: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Force (N), displacement from the start (m) and velocity (m/s) at the points."""
+    runs = problem.runs
+    force, x = (np.concatenate([k.mean @ y for k, y in zip(runs, ys, strict=True)])
+                for ys in ([k.force for k in runs], [k.x - k.x[0] for k in runs]))  # fmt: skip
+    return force, x, np.concatenate([k.rate for k in runs])
+
+
+def swings(fits: list[Any]) -> dict[str, Any]:
+    """Of every full swing: amplitude (m), and frequency (Hz) and loss over 2 (1) of measured and unseen model force."""
+    problem = fits[0].problem
+    force, x, v = along_runs(problem)
+    forces = {"measured": force, **{"base" if f is fits[0] else f.problem.composition.effects[-1].tag:
+                                    force - unseen(f).residual for f in fits}}  # fmt: skip
+    out: dict[str, Any] = {"amplitude": [], **{name: {"frequency": [], "damping": []} for name in forces}}
+    for e in range(problem.events - 1):
+        own = (problem.of == e) | (problem.of == e + 1)
+        if np.unique(problem.run[own]).size > 1 or own.sum() < 20:
+            continue
+        columns = np.column_stack([x[own], v[own], np.ones(own.sum())])
+        out["amplitude"].append(0.5 * float(np.ptp(x[own])))
+        for name, values in forces.items():
+            k, c, _ = np.linalg.lstsq(columns, values[own], rcond=None)[0]
+            out[name]["frequency"].append(float(np.sqrt(k) / (2.0 * np.pi)))
+            out[name]["damping"].append(float(0.5 * c / np.sqrt(k)))
+    return out
+
+
+@styled
+def amplitudes(seen: dict[str, Any]) -> Any:
+    """Frequency and damping of a swing against its amplitude, measured and of models on parts left out."""
+    made, axes = figure(1, 2, width=10.0, height=4.0)
+    x = 1e6 * np.array(seen["amplitude"])
+    for axis, what, k, unit in zip(
+        axes[0], ("frequency", "damping"), (1.0, 100.0), ("Hz", "% of critical"), strict=True
+    ):
+        for name, mark, color in zip([n for n in seen if n != "amplitude"], "o^s", (DARK, LIGHT, MIDDLE), strict=False):
+            axis.plot(x, k * np.array(seen[name][what]), mark, ms=3, color=color, label=plain(name))
+        axis.axhline(k * np.mean(seen["measured"][what]), color=DARK, lw=0.8, ls="--", label="linear joint")
+        axis.set(xlabel="amplitude / µm", ylabel=f"{what} / {unit}")
+    axes[0][0].legend(fontsize="x-small")
+    return made
+
+
+def classroom(data: Path, work: Path) -> dict[str, Any]:
+    """The classroom slider: what an inspection says, what the level follows, and the forecast."""
+    work = work / "classroom"
+    work.mkdir()
+    path = Path(shutil.copy(DOCS.parent / "scenarios" / "real" / "classroom-slider.toml", work))
+    shutil.copy(data / "classroom-slider" / "Force7.txt", work)
+    seen, arrays = result(str(path), work / "inspect", "inspect")
+    save(trace_picture(arrays, 0, seen["traces"][0]), DOCS / "figures" / "real-classroom.png", dpi=90)
+    found = ss.load_campaign(path).forecast().result
+    sizes = [e["slip"] for e in seen["traces"][0]["events"]]
+    return {
+        "slips": len(sizes), "size_s": [mean(sizes), stdev(sizes)], "says": [*seen["can"], *seen["cannot"]],
+        "levels": found["levels"], "coordinate": found["coordinate"]["text"], "methods": found["methods"],
+        "gains": found["gains"], "train": found["train"],
     }  # fmt: skip
 
 
@@ -424,7 +563,7 @@ def scaled_to(values: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?", default=os.environ.get("STICKSLIP_REAL_DATA", str(DEFAULT)))
-    parser.add_argument("--only", nargs="*", help="parts to make anew; the others stay as they are")
+    parser.add_argument("--only", nargs="*", help="parts or records to make anew; the others stay")
     asked = parser.parse_args()
     data = Path(asked.folder).resolve()
     if not data.is_dir():
@@ -432,13 +571,17 @@ def main() -> None:
     (DOCS / "figures").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
-        made = (paper, together, robot, fault, prescribed, topographies)
-        parts = {f.__name__: f(data, work) for f in made if asked.only is None or f.__name__ in asked.only}
+        made = (paper, together, robot, fault, classroom, prescribed, topographies)
+        only = asked.only
+        parts = {f.__name__: f(data, work) for f in made if only is None or f.__name__ in only}
+        single = {n: diagnosed(n, data / f, work / n) for n, f in PRESCRIBED.items() if only and n in only}
     head = {"version": __version__, "date": date.today().isoformat(), "command": "python docs/make_real_data.py"}
-    for name in parts.keys() & {"prescribed", "topographies"}:
+    for name in parts.keys() & {"prescribed", "topographies", "classroom"}:
         parts[name] |= head
     path = DOCS / "results" / "real_data.json"
     known = json.loads(path.read_text(encoding="utf-8")) if asked.only is not None else {}
+    for name, record in single.items():
+        known["prescribed"]["records"][name] = record
     text = json.dumps({**head, **known, **parts}, indent=1, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")
 

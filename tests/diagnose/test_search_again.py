@@ -50,6 +50,8 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(engine, "one_round", one_round)
     monkeypatch.setattr(engine, "replace", lambda point, **_: point)
     monkeypatch.setattr(engine, "fit", lambda problem, *_, **__: problem)
+    worse: list[tuple[str, ...]] = []
+    monkeypatch.setattr(engine, "foretells", lambda before, after: after.tags not in worse)
     monkeypatch.setattr(engine, "settled", lambda base, c, *_: Model((*base.tags, c.tag)))
     monkeypatch.setattr(
         engine.Rung,
@@ -58,7 +60,7 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Any:
     )
     ladder = [engine.Rung.of(("static", "inertia"), "inertia", Model(()))]
     made = engine.Search(Model(()), ladder, 1, lambda *_: None, lambda: True, None)
-    made.table = table
+    made.table, made.worse = table, worse
     return made
 
 
@@ -96,6 +98,27 @@ def test_what_another_replaces_is_exchanged(search):
     assert list(search.named) == ["wear", "tilt"]
     assert (search.ladder[-1].added, search.ladder[-1].removed) == ("wear", "sensor-gain")
     assert set(search.ladder[-1].model) == {"static", "inertia", "tilt", "wear"}
+
+
+def test_what_takes_the_place_of_another_and_foretells_less_is_not_kept(search):
+    search.table |= {
+        (): {"wear": 20.0, "tilt": 15.0}, ("wear",): {"tilt": 9.0, "sensor-gain": 8.0}, ("tilt",): {},
+        ("sensor-gain",): {"wear": 19.0}, ("wear", "sensor-gain"): {},
+    }  # fmt: skip
+    search.worse.append(("tilt",))
+    grown(search, ["wear", "tilt", "sensor-gain"])
+    assert list(search.named) == ["wear", "sensor-gain"]
+    assert [r.model[2:] for r in search.ladder] == [(), ("wear",), ("wear", "sensor-gain")]
+    assert search.gone == {"tilt"}
+    assert len(search.rounds) == 3  # what the second round tried besides is not tried again
+
+
+def test_an_effect_that_foretells_less_once_it_has_settled_is_not_kept(search):
+    search.table |= {(): {"wear": 20.0}}
+    search.worse.append(("wear",))
+    grown(search, ["wear"])
+    assert not search.named
+    assert not search.base.tags
 
 
 def test_a_model_without_an_effect_has_none_of_its_parameters():

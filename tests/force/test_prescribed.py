@@ -11,6 +11,7 @@ from stickslip.data.prescribed import prescribed, with_motion
 from stickslip.data.segment import segment
 from stickslip.data.trace import Trace
 from stickslip.errors import InputError
+from stickslip.inference.diagnose.confirm import confirm
 from stickslip.inference.diagnose.engine import Round, _end
 from stickslip.inference.diagnose.prepare import Prepared
 from stickslip.inference.force.backbone import backbone
@@ -115,6 +116,45 @@ def test_a_count_that_is_wider_than_the_stiffest_elements_yield_does_not_make_th
     np.testing.assert_allclose(curve.force[far], true[far], atol=0.05 * caps.sum())
 
 
+def test_a_contact_that_never_slides_as_a_whole_is_measured_with_what_stays_stuck():
+    """A swing that decays, as of a bolted joint: its stiff part holds a hundred times what slides."""
+    beside, zero = 4e4, 0.3  # N/m, N
+    caps, yields = np.full(20, 0.01), np.linspace(5e-6, 5e-5, 20)
+    runs, t = [], np.arange(0.0, 8.0, 1.0 / RATE)
+    for seed, size in enumerate((6e-5, 4.5e-5, 3e-5)):
+        x = size * np.exp(-0.03 * t) * np.sin(2.0 * np.pi * t)
+        force = jenkins(x, caps=caps, yields=yields) + beside * x + zero
+        noise = np.random.default_rng(seed).normal(0.0, NOISE, t.size)
+        # the record begins within a swing, where elements are loaded by what was before
+        later = t > 1.1
+        trace = Trace.from_arrays(f"{size}", time=t[later] - t[later][0], drive_position=x[later],
+                                  spring_force=(force + noise)[later], noise=NOISE)  # fmt: skip
+        runs.append(thinned(with_motion(trace)))
+    found = fit(*begin(Rig(), runs))
+    assert found.values["rig.parallel_stiffness"] == pytest.approx(beside, rel=0.02)
+    assert np.sqrt(np.mean(found.marginal**2)) < 0.03 * caps.sum()
+    curve = backbone(found)
+    true = beside * curve.displacement + [np.minimum(caps, caps / yields * u).sum() for u in curve.displacement]
+    slid = curve.displacement < 5e-5
+    np.testing.assert_allclose(curve.force[slid], true[slid], rtol=0.005)
+
+
+def test_nothing_stays_stuck_beside_a_contact_that_slides(plain):
+    assert plain.values["rig.parallel_stiffness"] * STROKE < 5e-3 * CAPS.sum()
+
+
+def test_what_a_part_of_a_stroke_has_not_made_slide_is_not_compared():
+    t, x = stage(3)
+    force = jenkins(x)
+    later = t > 0.75 * STROKE / SPEED
+    cut = Trace.from_arrays("cut", time=t[later], drive_position=x[later], spring_force=force[later], noise=NOISE)
+    run = thinned(with_motion(cut))
+    back = 2.0 * STROKE / SPEED + REST  # the end of the first whole stroke
+    assert run.at.min() > back - 0.05
+    whole = fit(*begin(Rig(), [run]))
+    assert np.sqrt(np.mean(whole.marginal**2)) < 2e-3 * CAPS.sum()
+
+
 def test_an_uneven_fixture_is_found_with_its_size():
     runs = [thinned(with_motion(record(seed, BEND))) for seed in (1, 2, 3)]
     base = fit(*begin(Rig(), runs))
@@ -175,6 +215,14 @@ def test_an_effect_is_tried_where_the_record_shows_what_it_needs(plain):
     one_way = Prepared(*begin(Rig(), runs), (), (), Scales(1.0, 0.0, 1.0), (), True)
     assert not one_way.shows(uneven)
     assert one_way.shows(loaded)
+
+
+def test_nothing_is_run_freely_and_the_report_says_so_in_words(plain):
+    loops = Prepared(plain.problem, plain.point, (), (), Scales(1.0, 0.0, 1.0), (), prescribed=True)
+    found = confirm({("static", "inertia"): plain}, ("static", "inertia"), loops)
+    assert not found.models
+    assert found.notes[0].startswith("no model is run freely: the motion is prescribed")
+    assert "Error" not in found.notes[0]
 
 
 def test_one_step_of_the_velocity_is_fitted_but_not_diagnosed():

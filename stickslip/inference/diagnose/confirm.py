@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ..features.measurement import Measurement
 from ..force.fit import Fit
 from ..force.heldout import folds, halves, points
@@ -25,6 +26,10 @@ from .prepare import Prepared
 from .trials import Tell
 
 Parts = tuple[str, ...]  # tags of what is in a model
+FOLLOWED = (
+    "no model is run freely: the motion is prescribed, no slip is the block's own, and the error on unseen runs is "
+    "that of the force"
+)
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,8 @@ def confirm(
     Returns:
         What was found. A simulation that fails is a note and raises nothing.
     """
+    if prepared.prescribed:
+        return Confirmation(notes=(FOLLOWED,))
     names = [k.name for k in prepared.runs]
     found: dict[Parts, Freely] = {}
     unit, notes = None, []
@@ -160,7 +167,8 @@ def _named(parts: Parts) -> str:
 
 
 def _line(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}".split("\n")[0][:300]
+    said = error.what if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+    return said.split("\n")[0][:300]
 
 
 def _key(kind: str, parts: Parts, fit: Fit) -> str:

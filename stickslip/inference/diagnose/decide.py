@@ -7,7 +7,8 @@
    deviation: at one of them the law would have to be stronger than such laws are, and stands for another. And the error
    of unseen runs with all events alike does not rise by more than its standard error: a law may describe the forces
    within events better, and leave what is foretold of an event worse.
-2. *Named*: the seen effect that predicts unseen runs best.
+2. *Named*: the seen effect that predicts unseen runs best. It is kept if the model that it leads to, settled and
+   without what it has made superfluous, still predicts them better than the one before, and its error does not rise.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
@@ -71,10 +72,14 @@ class Compared:
         return standard_error(self.unseen)
 
     @property
+    def no_farther(self) -> bool:
+        """Whether the error of unseen runs does not rise by more than its standard error."""
+        return float(self.nearer.sum()) >= -float(np.sqrt(self.nearer.size) * np.std(self.nearer))
+
+    @property
     def seen(self) -> bool:
         """Rule 1."""
-        spread = float(np.sqrt(self.nearer.size) * np.std(self.nearer))
-        return self.chance < CHANCE and self.better > ERRORS * self.error and float(self.nearer.sum()) >= -spread
+        return self.chance < CHANCE and self.better > ERRORS * self.error and self.no_farther
 
 
 @dataclass(frozen=True)

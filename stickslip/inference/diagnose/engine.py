@@ -257,6 +257,8 @@ class Search:
         gone: effects that were taken out again; they are not tried any more, so that the search ends.
     """
 
+    _left: Round | None = None  # of a round whose effect was not kept, what else it tried
+
     def __init__(
         self, base: Fit, ladder: list[Rung], jobs: int, tell: Tell, in_time: Callable[[], bool], store: Store | None
     ) -> None:
@@ -268,24 +270,38 @@ class Search:
 
     def round(self, tags: Sequence[str]) -> Round:
         """Every effect of these on top of the model."""
+        if self._left is not None:
+            done, self._left = self._left, None
+            self.rounds[-1] = done
+            return done
         name = f"round {len(self.rounds) + 1}"
         done = self._tried(self.base, tags, name)
         self.rounds.append(done)
         return done
 
     def add(self, done: Round) -> None:
-        """Take up what a round named, and try again each effect named before."""
+        """Take up what a round named, and try again each effect named before.
+
+        All that is undone where unseen runs lose by it: an effect is named on top of another one, and may foretell less
+        once it has displaced that one.
+        """
         tag, key = done.close[0].tag, f"round{len(self.rounds)}"
+        before = self.base, self.ladder[:], dict(self.named), set(self.gone)
         self._tell(f"round {len(self.rounds)}: the model with {tag}", 1.0)
         self._take(settled(done.base, done.close[0].candidate, self._store, key), tag, None)
         self.named[tag] = done
         for earlier in list(self.named)[:-1]:
             if self._in_time():
-                self._again(earlier)
+                self._again(earlier, tag)
+        if not foretells(before[0], self.base):
+            self.base, self.ladder[:], self.named, gone = before
+            self.gone = {*gone, tag}
+            judged = tuple(j for j in done.judged if j.tag != tag)
+            self._left = Round(done.base, judged, done.candidates, tuple(named(judged)), done.rival)
 
-    def _again(self, tag: str) -> None:
+    def _again(self, tag: str, added: str) -> None:
         """An effect tried once more, beside the best of its own round, with all others in the model."""
-        name = f"again {tag} in round {len(self.rounds)}"
+        name = f"again {tag} with {added} in round {len(self.rounds)}"
         key = name.replace(" ", "-")
         problem, _ = _taken_out(self.base, tag)
         apart = kept(self._store, f"{key}-without", problem, lambda: without(self.base, tag))
@@ -311,6 +327,12 @@ class Search:
         self.gone |= {removed} if removed else set()
         model = [t for t in self.ladder[-1].model if t != removed]
         self.ladder.append(Rung.of((*model, *([added] if added else [])), added, base, removed))
+
+
+def foretells(before: Fit, after: Fit) -> bool:
+    """Whether a model predicts unseen runs better than another, and their error does not rise beyond its error."""
+    found = Judge(before, 1).beside(after, 1, own=bool(after.problem.composition.phases))
+    return found.better > 0.0 and found.no_farther
 
 
 def without(base: Fit, tag: str) -> Fit:

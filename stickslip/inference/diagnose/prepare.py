@@ -19,14 +19,13 @@ from ...system.units import shown
 from ..features.measurement import Measurement, doubts, measure
 from ..fit.start import FALLBACK_PERIOD, ringing, shared_rig
 from ..force.knots import Knots, knots
-from ..force.prescribed import SAID, thinned
+from ..force.prescribed import SAID, both_ways, thinned
 from ..force.prescribed import begin as begin_prescribed
 from ..force.problem import PULL, Point, Problem
 from ..force.rig import SPRING
 from ..force.scales import Scales, of_run, scales, too_coarse
 from ..force.starting_values import begin
 
-BOTH = 0.1  # of the force one way, which it takes the other way at least
 FEWEST = 2  # slips of a run that takes part
 MOST_EVENTS = 200  # that a fit sees: its memory and time grow with them
 MOST_CYCLES = 40  # of a run, that are run freely
@@ -76,8 +75,7 @@ class Prepared:
             (k.stiffness or stated) * (k.drive - k.x) + k.force + more
             for k, more in zip(self.problem.runs, begun, strict=True)
         ]
-        low, high = min(float(p.min()) for p in pulls), max(float(p.max()) for p in pulls)
-        return min(high, -low) > BOTH * max(high, -low)
+        return both_ways(np.concatenate(pulls))
 
     @cached_property
     def measurement(self) -> Measurement:

@@ -10,6 +10,7 @@ from scipy.optimize import least_squares
 from ...physics.contact import power_law_bank
 from .fit import Fit
 from .linearised import Array
+from .problem import BESIDE
 
 LEAST = 2e-3  # of the strength: what no law of a rough contact describes better
 BINS = 96
@@ -64,13 +65,17 @@ def backbone(found: Fit) -> Backbone:
     """The measured backbone with its band."""
     composition = found.problem.composition
     u = composition.reach
-    basis = np.minimum(u[:, None] / u, 1.0)
     first = len(composition.shared) + found.point.phases.size
-    k = found.point.weights.size
-    part = found.covariance[first : first + k, first : first + k]
-    covariance = basis @ part @ basis.T
+    own, basis, force = [*range(first, first + u.size)], np.minimum(u[:, None] / u, 1.0), found.point.weights
+    names = [f.name for f in composition.shared]
+    if BESIDE in names:
+        own.append(names.index(BESIDE))
+        free = composition.shared[own[-1]]
+        basis = np.column_stack([basis, u * free.slope(1.0)])
+        force = np.append(force, found.point.z[own[-1]])
+    covariance = basis @ found.covariance[np.ix_(own, own)] @ basis.T
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return Backbone(u, basis @ found.point.weights, std, covariance)
+    return Backbone(u, basis @ force, std, covariance)
 
 
 def power_law(curve: Backbone, contacts: int) -> PowerLaw:

@@ -8,7 +8,7 @@ the model has no elongation, so that no law of the spring's force can take the m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from ...data.trace import Drive, Trace
 from ...physics.effects import catalogue
 from ..fit.parameters import Free, vector
 from .knots import CREEP, Knots, bow, load_at
-from .problem import OWN, Composition, Point, Problem
+from .problem import BESIDE, OWN, PULL, Composition, Point, Problem
 from .reading import Reading
 from .smoothing import onward
 from .starting_values import ELEMENTS, REACH, known, with_weights
@@ -31,6 +31,7 @@ AFTER, EVEN = 24, 24  # windows of a stretch: spaced as the logarithm of the tim
 FASTER = 1.5  # times the speed: another stretch, where the motion has few speeds
 STILL = 0.05  # of the usual speed: the motion rests
 SETTLED = 0.75  # of a stretch's way, after which all elements are taken to slide and the next event begins
+BOTH = 0.1  # of the force one way, which it takes the other way at least
 SOFT = 1e-6  # stiffness of a spring that does nothing, over that of the contact
 PLACED_APART = 3.0  # of two stretches of an event in the coordinate along which misfits are alike
 ROLES = {"Drive", "Spring", "Inertia"}  # of effects that need a driving spring
@@ -108,7 +109,7 @@ def thinned(trace: Trace) -> Knots:
     made_of = csr_array(back - back @ bowed)
     knots_x = made_of @ (means @ x)
     knots_force = (eye - bowed) @ (means @ force)
-    begins = _begins(parts, t, x)
+    begins = _begins(parts, t, x, trace.virgin)
     event = np.searchsorted(begins[1:], at, side="right")
     rate, bend = _rates(at, knots_x, piece)
     unread = max(noise, count or 0.0)
@@ -146,14 +147,23 @@ def _means(starts: Index, sizes: Index, samples: int) -> csr_array:
     return coo_array((np.repeat(1.0 / sizes, sizes), (rows, columns)), shape=(sizes.size, samples)).tocsr()
 
 
-def _begins(parts: Sequence[Stretch], t: Array, x: Array) -> Array:
-    """Times (s) at which events begin: the start, and wherever most of a stretch lies behind that others follow."""
-    far = 0.1 * max((abs(s.way) for s in parts if s.moving), default=0.0)
+def _begins(parts: Sequence[Stretch], t: Array, x: Array, virgin: bool) -> Array:
+    """Times (s) at which events begin: the start, and wherever most of a stretch lies behind that others follow.
+
+    Where the motion turns back and the contact is not virgin the first of these ends a stretch of the usual length:
+    what a part of a stroke has not made slide is still loaded by the motion before the record.
+    """
+    ways = np.array([s.way for s in parts if s.moving])
+    far = 0.1 * np.abs(ways).max(initial=0.0)
+    strokes = ways[np.abs(ways) > far]
+    back = not virgin and bool((strokes > 0.0).any() and (strokes < 0.0).any())
+    whole = SETTLED * float(np.median(np.abs(strokes))) if back else 0.0
     out = [float(t[0])]
     for s in parts[:-1]:
-        if s.moving and abs(s.way) > far:
+        first = len(out) == 1
+        if s.moving and abs(s.way) > far and (abs(s.way) >= whole or not first):
             done = np.abs(x[s.first : s.last] - x[s.first]) >= SETTLED * abs(s.way)
-            out.append(float(t[s.first + int(np.argmax(done))]))
+            out.append(float(t[s.last if first and back else s.first + int(np.argmax(done))]))
     return np.array(out)
 
 
@@ -179,10 +189,21 @@ def steepest(x: Array, force: Array, piece: Index, noise: float) -> float:
     return max(max(slopes), 1e-300)
 
 
+def both_ways(forces: Array) -> bool:
+    """Whether a force takes both signs, each beyond a tenth of the other."""
+    low, high = float(forces.min()), float(forces.max())
+    return min(high, -low) > BOTH * max(high, -low)
+
+
 def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Problem, Point]:
-    """The base model of runs of prescribed motion, and where its fit begins."""
-    levels = np.abs(np.concatenate([k.force for k in runs]))
-    strength = float(np.quantile(levels, 0.95))
+    """The base model of runs of prescribed motion, and where its fit begins.
+
+    Where the force takes both signs a spring stands beside the bank: the part of a contact that never slides (K_inf of
+    Iwan's model as Segalman, J. Appl. Mech. 72 (2005) 752, has it), with what it holds where a run begins. One way an
+    element that has not slid yet says as much.
+    """
+    forces = np.concatenate([k.force for k in runs])
+    strength = float(np.quantile(np.abs(forces), 0.95))
     softest = min(k.stiffness for k in runs if k.stiffness is not None)
     reach = strength / (softest / SOFT)
     moving = np.concatenate([np.abs(k.v) for k in runs])
@@ -201,16 +222,35 @@ def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Pr
             "time over which strength returns"),
         log("rig.damping", "N s/m", 1e-3 * critical, 1.5, 1e-7 * critical, 10.0 * critical, "viscous damping"),
     ]  # fmt: skip
+    expected = 0.1
+    if both_ways(forces):
+        way, expected = max(float(np.ptp(k.x)) for k in runs), np.inf  # how much of the force slides is not known
+        free += [
+            Free(BESIDE, "N/m", strength / way, 0.0, 0.0, np.inf, 0.0, 1e3 * strength / way,
+                 "stiffness beside the contact, which never slides"),
+            Free(PULL, "N", strength, 0.0, 0.0, np.inf, -1e3 * strength, 1e3 * strength,
+                 "force at the start of what does not slide"),
+        ]  # fmt: skip
     composition = Composition(
         mass, reach * np.geomspace(*REACH, elements), tuple(free), {"rig.spring_stiffness": softest}, (),
-        (strength, 0.1),
+        (strength, expected),
     )  # fmt: skip
+    found = _started(composition, runs, strength)
+    if BESIDE in found[0].values(found[1]) and found[0].values(found[1])[BESIDE] > 0.0:
+        # elements that no stroke makes slide are not told from it
+        most = min(REACH[1], max(0.5 * float(np.ptp(k.x)) for k in runs) / reach)
+        yields = reach * np.geomspace(REACH[0], max(most, 2.0 * REACH[0]), elements)
+        found = _started(replace(composition, reach=yields), runs, strength)
+    return found
+
+
+def _started(composition: Composition, runs: Sequence[Knots], strength: float) -> tuple[Problem, Point]:
+    """The problem, and the point with weights that fit best before anything weakens."""
     problem = Problem(composition, runs)
-    flat = np.full(elements, strength / elements)
     point = Point(
         vector(composition.shared),
-        np.zeros((0, len(runs))),
-        flat,
+        np.zeros((len(composition.phases), len(runs))),
+        np.full(composition.reach.size, strength / composition.reach.size),
         np.zeros((problem.events, OWN)),
         np.zeros(problem.readings.shape[1]),
     )

@@ -31,6 +31,7 @@ from .knots import PHASES, Knots
 Array = NDArray[np.float64]
 PHASE = "phase"
 DAMPING = "rig.damping"
+BESIDE = "rig.parallel_stiffness"  # of a spring beside the contact, which never slides (N/m)
 PULL = "start.pull"  # of the spring at the start of a record, where the contact is not virgin (N)
 PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
 CREEPING = PHASES.index("creep")
@@ -301,8 +302,9 @@ class Problem:
     def _evaluated(self, point: Point, whole: bool) -> tuple[Forces, Array]:
         c = self.composition
         shared, phases = c.shared, c.phases
-        # a damper is in proportion to the rate that is measured, and needs no model along the motion
-        bent = [i for i, f in enumerate(shared) if f.name != DAMPING]
+        # a damper and a spring beside the contact go with what is measured, and need no model along the motion
+        straight = {f.name: i for i, f in enumerate(shared) if f.name in {DAMPING, BESIDE}}
+        bent = [i for i in range(len(shared)) if i not in straight.values()]
         scales = np.array([0.0 if shared[i].scale == "log" else float(shared[i].scale) for i in bent])
         program = _program(
             tuple(shared[i].name for i in bent), tuple(f.name for f in phases), jax.tree.structure(c.effects), whole
@@ -310,7 +312,7 @@ class Problem:
         phase_scale = np.array([float(f.scale) for f in phases])
         leaves = tuple(jax.tree.leaves(c.effects))
         values = self.values(point)
-        damping = values[DAMPING]
+        damping, beside = values[DAMPING], values.get(BESIDE, 0.0)
         fixed = {n: np.float64(v) for n, v in {**c.fixed, "rig.mass": c.mass, DAMPING: damping}.items()}
         weights = np.maximum(point.weights, EMPTY)
         a, b, k, runs = len(shared), len(phases), point.weights.size, len(self.runs)
@@ -337,33 +339,37 @@ class Problem:
             q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent, *state = parts
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
+            way = mean @ (run.x - run.x[0])
             if sensed:
                 rate, acceleration = rate + first @ shift[:n], acceleration + second @ shift[:n]
+                way = way + mean @ shift[:n]
             spring = starts["rig.spring_stiffness"] if run.stiffness is None else run.stiffness
             steep = mean @ slope[:n] / (mean @ np.ones(n))
             read = not run.prescribed  # else a reading is told by itself, and the likelihood is that of the force
             counts = gain * np.where(slow[s], steep / spring, mass / c.mass) if read else np.ones(run.at.size)
             share[s] = 1.0 / counts
-            residual[s] = share[s] * (mean @ q[:n] - mass * acceleration - damping * rate)
+            residual[s] = share[s] * (mean @ q[:n] - mass * acceleration - damping * rate - beside * way)
             moved = mean @ dq[:, :n].T - acceleration[:, None] * dmass
             if sensed:
                 moved = moved - mass * (second @ dshift[:, :n].T) - damping * (first @ dshift[:, :n].T)
+                moved = moved - beside * (mean @ dshift[:, :n].T)
             grown = np.where(slow[s, None], (mean @ dslope[:, :n].T) / (mean @ slope[:n])[:, None], dmass / mass)
             moved = share[s, None] * moved - read * residual[s, None] * (grown + dgain / gain)
             local[s] = moved[:, -OWN:]
             if whole:
                 slopes[s, bent] = moved[:, : len(bent)]
-                slopes[s, [i for i in range(a) if i not in bent]] = -share[s, None] * (damping * rate)[:, None]
+                for name, i in straight.items():
+                    slopes[s, i] = -share[s] * (damping * rate if name == DAMPING else shared[i].slope(1.0) * way)
                 for j in range(b):
                     slopes[s, a + j * runs + r] = moved[:, len(bent) + j]
             held_by = mean @ elements[:n]
             slopes[s, a + b * runs : a + b * runs + k] = -share[s, None] * held_by
-            held[s] = held_by @ weights
+            held[s] = held_by @ weights + beside * way
             springs[s] = share[s] * (mean @ slope[:n])
-            tangents[s] = share[s] * (mean @ tangent[:n])
+            tangents[s] = share[s] * (mean @ tangent[:n] + beside)
             shares = np.interp(run.t, run.at, share[s])
             slides, sliding, psi = (a[:n] for a in state)
-            kept.append((tangent[:n] * shares, slides, sliding * shares, psi))
+            kept.append(((tangent[:n] + beside) * shares, slides, sliding * shares, psi))
             p += run.at.size
         slopes[:, a + b * runs + k :] = self._carried(tangents)
         residual += slopes[:, a + b * runs + k :] @ point.common

@@ -16,7 +16,7 @@ from ...data.trace import Trace
 from ...errors import InputError
 from ..fit.parameters import Free, vector
 from .knots import Knots
-from .problem import OWN, PULL, Composition, Point, Problem
+from .problem import BESIDE, OWN, PULL, Composition, Point, Problem
 from .scales import Scales
 
 ELEMENTS = 64
@@ -127,7 +127,7 @@ def _creep(runs: Sequence[Knots], found: Sequence[Segmentation]) -> float:
 
 
 def with_weights(problem: Problem, point: Point, strength: float) -> Point:
-    """The point with weights by non-negative least squares."""
+    """The point with weights by non-negative least squares, and a spring beside the contact where there is one."""
     slopes = problem.evaluate(point)
     k = point.weights.size
     c = point.common.size
@@ -135,7 +135,16 @@ def with_weights(problem: Problem, point: Point, strength: float) -> Point:
     sigma = np.hypot(slopes.tangent * 3e-9, 0.01 * strength)
     measured = slopes.residual + slopes.held
     smooth = np.diff(np.eye(k), 2, axis=0) * 10.0 * k / strength / 3.0
-    weights, _ = nnls(
-        np.vstack([share / sigma[:, None], smooth]), np.concatenate([measured / sigma, np.zeros(k - 2)]), maxiter=50 * k
-    )
-    return Point(point.z, point.phases, weights, point.events, point.common)
+    names = [f.name for f in problem.composition.shared]
+    beside = [names.index(BESIDE)] if BESIDE in names else []
+    # what a run begins with takes both signs
+    pulls = -slopes.shared[:, len(names) : len(names) + point.phases.size * bool(beside)]
+    rows = np.hstack([share, -slopes.shared[:, beside], pulls, -pulls]) / sigma[:, None]
+    smooth = np.pad(smooth, ((0, 0), (0, rows.shape[1] - k)))
+    found, _ = nnls(np.vstack([rows, smooth]), np.concatenate([measured / sigma, np.zeros(k - 2)]), maxiter=50 * k)
+    if not beside:
+        return replace(point, weights=found)
+    z = point.z.copy()
+    z[beside] = found[k]
+    ahead, behind = np.split(found[k + 1 :], 2)
+    return replace(point, z=z, phases=(ahead - behind).reshape(point.phases.shape), weights=found[:k])
