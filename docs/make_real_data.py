@@ -437,17 +437,17 @@ def amplitudes(seen: dict[str, Any]) -> Any:
 
 
 def classroom(data: Path, work: Path) -> dict[str, Any]:
-    """The classroom slider: what an inspection says, what the level follows, and the forecast."""
+    """The classroom slider: what the level of a slip follows, and the forecast."""
     work = work / "classroom"
     work.mkdir()
     path = Path(shutil.copy(DOCS.parent / "scenarios" / "real" / "classroom-slider.toml", work))
     shutil.copy(data / "classroom-slider" / "Force7.txt", work)
-    seen, arrays = result(str(path), work / "inspect", "inspect")
-    save(trace_picture(arrays, 0, seen["traces"][0]), DOCS / "figures" / "real-classroom.png", dpi=90)
-    found = ss.load_campaign(path).forecast().result
-    sizes = [e["slip"] for e in seen["traces"][0]["events"]]
+    campaign = ss.load_campaign(path)
+    sizes, forecast = campaign.levels()["slip"].values, campaign.forecast()
+    save(forecast.plot.levels(), DOCS / "figures" / "real-classroom.png", dpi=80)
+    found = forecast.result
     return {
-        "slips": len(sizes), "size_s": [mean(sizes), stdev(sizes)], "says": [*seen["can"], *seen["cannot"]],
+        "slips": int(sizes.size), "size_s": [float(sizes.mean()), float(sizes.std())],
         "levels": found["levels"], "coordinate": found["coordinate"]["text"], "methods": found["methods"],
         "gains": found["gains"], "train": found["train"],
     }  # fmt: skip

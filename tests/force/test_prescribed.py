@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -137,6 +139,21 @@ def test_a_contact_that_never_slides_as_a_whole_is_measured_with_what_stays_stuc
     true = beside * curve.displacement + [np.minimum(caps, caps / yields * u).sum() for u in curve.displacement]
     slid = curve.displacement < 5e-5
     np.testing.assert_allclose(curve.force[slid], true[slid], rtol=0.005)
+
+
+def test_derivatives_in_what_never_slides_and_in_what_a_run_begins_with():
+    t, x = stage(2)
+    trace = Trace.from_arrays("run", time=t, drive_position=x, spring_force=jenkins(x) + 3e3 * x, noise=NOISE)
+    problem, point = begin(Rig(), [thinned(with_motion(trace))])
+    names = [f.name for f in problem.composition.shared]
+    slopes, step = problem.evaluate(point).shared, 1e-4
+    at = names.index("rig.parallel_stiffness")
+    z = point.z.copy()
+    z[at] += step
+    moved = problem.evaluate(replace(point, z=z)).residual - problem.evaluate(point).residual
+    np.testing.assert_allclose(moved, step * slopes[:, at], atol=1e-9)
+    other = problem.evaluate(replace(point, phases=point.phases + step)).residual
+    np.testing.assert_allclose(other - problem.evaluate(point).residual, step * slopes[:, len(names)], atol=1e-9)
 
 
 def test_nothing_stays_stuck_beside_a_contact_that_slides(plain):

@@ -22,7 +22,7 @@ from .confirm import Confirmation, confirm
 from .decide import DISPERSION
 from .engine import Diagnosis, Rung, Verdict, leading, settled, static_residual, without
 from .prepare import Prepared
-from .shape import shape_of
+from .shape import shape_of, unshaped
 from .trials import Tell
 
 Form = tuple[str, Mapping[str, str]]  # tag and variants of an effect
@@ -55,9 +55,10 @@ class Climbed:
 
     def as_diagnosis(self, confirmation: Confirmation, rig: Any) -> Diagnosis:
         """The same ladder without a search behind it, with the laws of its backbone; ``rig`` of the campaign."""
+        shape = unshaped(self.fit, rig) if self.prepared.prescribed else shape_of(self.fit, rig)
         return Diagnosis(
             Verdict("fitted", tuple(self.gains)), self.ladder, (), {}, self.prepared, deviations(self.fit),
-            shape_of(self.fit, rig), self.prepared.dropped, confirmation=confirmation,
+            shape, self.prepared.dropped, confirmation=confirmation,
         )  # fmt: skip
 
 
