@@ -19,7 +19,7 @@ from ...system.progress import breathe
 from ...system.runstore import Run, open_run, versions
 from ..places import new_place
 from .events import Simulated, Tell
-from .lines import Found, command, commands, python
+from .lines import Found, command, commands, one, python
 from .rivals import Telling, where
 from .setting import Setting, scenario
 from .sweeps import Swept
@@ -119,5 +119,4 @@ def _experiments(
 
 
 def _again(telling: Telling, tag: str, own: str, effects: str) -> str:
-    one = Simulated(telling.fits[tag], telling.setting, telling.recordings[tag])
-    return command(one, own, f"{own.replace('/', '-')}-{AGAIN}", effects)
+    return command(one(telling, tag), own, f"{own.replace('/', '-')}-{AGAIN}", effects)
