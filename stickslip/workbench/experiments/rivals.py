@@ -12,7 +12,7 @@ from ...errors import StickslipError
 from ...objects import Campaign, Fit
 from ...simulation.scenario.recording import Recording
 from .events import MEASURES, Tell, run, steady_runs
-from .setting import Setting, scenario
+from .setting import Setting, scenario, settled
 from .synthetic import COUNT
 
 EXACT = 1e-3  # scatter of an event, of its mean, below which none is believed
@@ -186,6 +186,7 @@ def tell_apart(
             tell(f"{words}, {text}", 0.5 + 0.5 * (i + 2.0 * (share - 0.5)) / len(options))
 
         try:
+            setting = settled(model, setting)
             found = compare(fits, setting, within)
         except StickslipError as error:
             out.append(Telling(words, setting, model, fits, {}, note=str(error).split("\n")[0], code=code))
