@@ -71,14 +71,13 @@ class Read:
 
     Attributes:
         form: into which it was dropped; other windows have their own.
-        name, content: of the file.
+        name: of the file.
         columns: of it, None where it cannot be read.
         said: why it cannot be.
     """
 
     form: Form
     name: str
-    content: bytes
     columns: Columns | None
     said: str = ""
 
@@ -97,6 +96,8 @@ class Form:
     def __init__(self, session: Session) -> None:
         self._session, self._work, self._reading = session, beside(session, "adding"), beside(session, "reading")
         self.dropped: tuple[str, bytes] | None = None
+        self._given = b""
+        self._found: Read | None = None
         self._columns: Columns | None = None
         fixed = {"sizing_mode": "fixed"}
         self.drop = Dropper(self._refuse, height=90, sizing_mode="stretch_width", margin=(4, 0), stylesheets=[DROP])
@@ -162,23 +163,24 @@ class Form:
         def make(tell: Tell, show: Show) -> Read:
             tell(f"reading {name}", 0.0)
             try:
-                return Read(self, name, content, look(name, content))
+                return Read(self, name, look(name, content))
             except (InputError, OSError, ValueError) as error:
-                return Read(self, name, content, None, str(error))
+                return Read(self, name, None, str(error))
 
+        self._given = content
         self._reading.do(f"reading {name}", make)
 
     def _read(self) -> None:
         """Show what was found in a file that was dropped here."""
         found: Read | None = self._reading.found
-        if found is None or found.form is not self:
+        if found is None or found.form is not self or found is self._found:
             return
-        self._reading.found = None
+        self._found = found
         self._columns, name = found.columns, found.name
         if self._columns is None:
             self.said.text = found.said
             return
-        self.dropped = (name, found.content)
+        self.dropped = (name, self._given)
         self.stored.value = name
         self.fill(guess(self._columns, self._session.campaign))
         made = self._columns

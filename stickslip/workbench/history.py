@@ -68,7 +68,7 @@ def python(session: Session) -> str:
         first = found[0] if name == RIVALS else found
         made += ["", f"# {name}{'' if first.code == code else ', of the model that these lines lead to'}"]
         made += [] if first.code == code else [first.code]
-        made += simulation_lines.python(found)
+        made += simulation_lines.python(found, 1)
     return "\n".join(made)
 
 

@@ -22,7 +22,7 @@ from ..simulation.scenario.series import scenarios_of, summary
 from ..system.progress import breathe
 from ..system.runstore import Run, open_run, versions
 from .places import new_place
-from .simulation_lines import Found, command, commands, python
+from .simulation_lines import Found, command, commands, one, python
 
 AGAIN = "again"
 KIND = "experiments"
@@ -117,5 +117,4 @@ def _experiments(
 
 
 def _again(telling: Telling, tag: str, own: str, effects: str) -> str:
-    one = Simulated(telling.fits[tag], telling.setting, telling.recordings[tag])
-    return command(one, own, f"{own.replace('/', '-')}-{AGAIN}", effects)
+    return command(one(telling, tag), own, f"{own.replace('/', '-')}-{AGAIN}", effects)

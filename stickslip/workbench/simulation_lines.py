@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from shlex import quote
 from typing import Any
 
+from ..objects import Fit
 from ..objects.experiments.events import Simulated
 from ..objects.experiments.rivals import Telling
 from ..objects.experiments.setting import Setting, changes
@@ -15,19 +16,29 @@ from ..objects.experiments.sweeps import Swept
 Found = Simulated | Swept | Sequence[Telling]
 
 
-def python(found: Found) -> list[str]:
-    """What leads from ``fit``, the model that was simulated, to the same recordings."""
+def python(found: Found, most: int | None = None) -> list[str]:
+    """What leads from ``fit``, the model that was simulated, to the same recordings.
+
+    Args:
+        found: what was simulated.
+        most: experiments that are written; all of them unless given.
+    """
     if isinstance(found, Simulated):
-        return [f"scenario = {_scenario('fit', found)}", "recording = ss.simulate(scenario)"]
+        return [f"scenario = {_scenario('fit', found.fit, found.setting)}", "recording = ss.simulate(scenario)"]
     if isinstance(found, Swept):
         each = "ss.simulate(scenario.with_changes([('drive.velocity', v)]))"
-        return [f"scenario = {_scenario('fit', found)}", f"velocities = {list(found.velocities)!r}",
+        return [f"scenario = {_scenario('fit', found.fit, found.setting)}", f"velocities = {list(found.velocities)!r}",
                 f"recordings = [{each} for v in velocities]"]  # fmt: skip
     made = [f"base = {_base(found[0])}", f"rivals = {_rivals(found[0])}"] if found else []
-    for telling in (t for t in found if t.recordings):
-        asked = _scenario("rival", telling)
-        made += [f"# {telling.words}", f"recordings = {{tag: ss.simulate({asked}) for tag, rival in rivals.items()}}"]
-    return made
+    done = [t for t in found if t.recordings]
+    for telling in done[:most]:
+        made += [f"# {telling.words}", "recordings = {"]
+        for tag in telling.recordings:
+            own = _scenario(f"rivals[{tag!r}]", telling.fits[tag], telling.setting)
+            made.append(f"    {tag!r}: ss.simulate({own}),")
+        made.append("}")
+    left = 0 if most is None else len(done) - most
+    return made if left < 1 else [*made, f"# and {left} more, which are in result.json when they are saved"]
 
 
 def command(found: Simulated | Swept, model: str, out: str, effects: str = "") -> str:
@@ -39,36 +50,32 @@ def command(found: Simulated | Swept, model: str, out: str, effects: str = "") -
         out: run folder that it writes.
         effects: options that name files with effects of one's own.
     """
-    return _command(found, found.setting, model, out, effects)
+    sets = "".join(f" --set {quote(f'{key}={_toml(value)}')}" for key, value in changes(found.fit, found.setting))
+    sweep = ""
+    if isinstance(found, Swept):
+        series = found.series
+        sweep = f" --sweep {series.key}={series.start!r}:{series.stop!r}:{series.points}"
+    run = f" --trace {quote(found.setting.run)}"
+    return f"stickslip simulate {quote(model)}{run}{sets}{sweep}{effects} --out {quote(out)}"
 
 
 def commands(found: Sequence[Telling], model: Mapping[str, str], out: str, effects: str = "") -> list[str]:
     """The same of experiments; ``model`` is the run folder of each rival's model."""
     done = [t for t in found if t.recordings]
     return [
-        _command(telling, telling.setting, model[tag], f"{out}-{number}-{tag}", effects)
+        command(one(telling, tag), model[tag], f"{out}-{number}-{tag}", effects)
         for number, telling in enumerate(done, start=1) for tag in telling.recordings
     ]  # fmt: skip
 
 
-def _command(found: Simulated | Swept | Telling, setting: Setting, model: str, out: str, effects: str) -> str:
-    sets = "".join(f" --set {quote(f'{key}={_toml(value)}')}" for key, value in changes(_fit(found), setting))
-    sweep = ""
-    if isinstance(found, Swept):
-        series = found.series
-        sweep = f" --sweep {series.key}={series.start!r}:{series.stop!r}:{series.points}"
-    run = f" --trace {quote(setting.run)}"
-    return f"stickslip simulate {quote(model)}{run}{sets}{sweep}{effects} --out {quote(out)}"
+def one(telling: Telling, tag: str) -> Simulated:
+    """What was simulated of one rival."""
+    return Simulated(telling.fits[tag], telling.setting, telling.recordings[tag])
 
 
-def _fit(found: Simulated | Swept | Telling) -> Any:
-    return next(iter(found.fits.values())) if isinstance(found, Telling) else found.fit
-
-
-def _scenario(name: str, found: Simulated | Swept | Telling) -> str:
-    setting = found.setting
+def _scenario(name: str, fit: Fit, setting: Setting) -> str:
     made = f"{name}.scenario(run={setting.run!r}, events={setting.events})"
-    changed = changes(_fit(found), setting)
+    changed = changes(fit, setting)
     return f"{made}.with_changes({changed!r})" if changed else made
 
 
@@ -77,11 +84,11 @@ def _base(telling: Telling) -> str:
 
 
 def _rivals(telling: Telling) -> str:
-    fits = [f"{tag!r}: {_one(telling, tag)}" for tag in telling.fits]
+    fits = [f"{tag!r}: {_fitted(telling, tag)}" for tag in telling.fits]
     return "{" + ", ".join(fits) + "}"
 
 
-def _one(telling: Telling, tag: str) -> str:
+def _fitted(telling: Telling, tag: str) -> str:
     fit = telling.fits[tag]
     return "fit" if fit is telling.model else f"base.add({fit.effect_forms[fit.effects.index(tag)]!r})"
 

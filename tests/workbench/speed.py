@@ -197,11 +197,17 @@ def main() -> None:
             rows += [[f"redraws in a second while such a run is {words}", f"{redraws:.0f}", "30"]]
             time.sleep(2.0)
         seen.close(), served.end()
+    busy = os.getloadavg()[1]
     most, rare, size = lateness()
     told_late = f"up to {most:.0f} ms nine times of ten, {rare:.0f} ms 99 of 100"
     rows += [
         ["the server is late while a fit goes on in its process", told_late, ""],
         ["a fit, were it sent to another process", f"{size:.0f} MB", ""],
+        [
+            f"what else ran meanwhile: load of the {os.cpu_count()} processors, this script's own in it",
+            f"{busy:.0f}",
+            "",
+        ],
     ]
     found: dict[str, Any] = {
         "version": __version__, "date": date.today().isoformat(), "command": "python -m tests.workbench.speed",

@@ -210,9 +210,9 @@ def test_a_sweep_is_kept_as_the_command_keeps_it(session, folder, monkeypatch):
 
 def test_rivals_are_kept_each_in_every_experiment(session, base, aged, folder, monkeypatch):
     fits = {"contact-ageing": aged, "nothing": base}
-    options = {"as driven": Setting("v400", "400 um/s", events=3), "wrong": Setting("v400", mass="0 kg")}
+    options = {"as driven": Setting("v400", "400 um/s", events=3, load="2"), "wrong": Setting("v400", mass="0 kg")}
     made = Rivals(session, Asked(session))
-    found = experiments.tell_apart(base, fits, options, _silent)
+    found = experiments.tell_apart(base, fits, options, _silent, code=session.code())
     beside(session, "rivals").found = found
     assert made._table.rows[0][0] == "as driven"
     folders = folders_view.Folders(session)
@@ -228,6 +228,9 @@ def test_rivals_are_kept_each_in_every_experiment(session, base, aged, folder, m
         assert inner["kind"] == "simulate" and inner["fitted_model"]["parts"] == list(fit.parts)
         its, _ = _by_command(inner, folder, monkeypatch)
         _the_same(inner, its, ("events", "facts"))
+    again = _by_python(told, folder, monkeypatch)["recordings"]
+    for tag, recording in found[0].recordings.items():
+        assert again[tag]["onset"].values == pytest.approx(recording["onset"].values, rel=1e-7), tag
     assert [k.name for k in kept.listed(folder) if k.name.startswith("experiments")][-1] == "experiments"
     own = next(k for k in kept.listed(folder) if k.name == "experiments")
     assert kept.report(own).count("<img") == 4 and "trace.png" in kept.report(own)

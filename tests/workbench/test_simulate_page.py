@@ -192,6 +192,8 @@ def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(
     assert found[0].margin > found[1].margin > 0.0 and found[0].information == pytest.approx(np.log(2.0))
     assert "mass" in found[2].note and not found[2].recordings
     assert set(found[0].recordings) == set(RIVALS)
+    drives = [r["drive_position"].values for r in found[0].recordings.values()]
+    np.testing.assert_array_equal(*drives)  # each is put to the very same
     made = Rivals(session, Asked(session))
     assert "holds of 1 s and 10 s" in made._said.text and made.effects.value == list(RIVALS)
     beside(session, "rivals").found = found

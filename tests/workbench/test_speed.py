@@ -11,10 +11,15 @@ from stickslip.workbench import model_page
 from stickslip.workbench.overview import Levels, Window
 from stickslip.workbench.session import Session
 
+from .browser import DEEP
+from .speed import GLIDE, long_campaign, opened
+from .test_browser import CHROMIUM, DRIVER
+
 HAND = 0.1  # s in which a slider is followed
 FRAME = 1.0 / 30.0  # s of a redraw
 SAMPLES = 1_000_000
 DROP = "weakening.drop"
+REDRAWS = 20.0  # a second, in the best of some tries on a machine that does other things too; the aim: 30
 
 
 def _least(work, times: int) -> float:
@@ -63,3 +68,16 @@ def test_a_part_of_a_million_samples_is_reduced_within_a_redraw(long_curve, what
             assert 100 < t.size == y.size < 20_000
 
     assert _least(answer, 8) < FRAME
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver")
+def test_five_runs_of_a_million_samples_are_panned_and_zoomed_smoothly(tmp_path):
+    served, seen, _, _ = opened(long_campaign(tmp_path / "long"))
+    try:
+        for zoom in (False, True):
+            redraws = [seen.driver.execute_async_script(DEEP + GLIDE, zoom) for _ in range(3)]
+            assert max(redraws) > REDRAWS, (zoom, redraws)
+    finally:
+        seen.close()
+        served.end()

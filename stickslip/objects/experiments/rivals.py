@@ -18,7 +18,7 @@ from ...inference.force.scales import of_run
 from ...simulation.scenario.recording import Recording
 from ..fit import Fit
 from .events import MEASURES, Tell, run
-from .setting import Setting, changed, scenario
+from .setting import Setting, changed, scenario, settled
 
 READ, CREEP, SWING = "slip as read", "creep in the hold", "swing in the hold"
 
@@ -120,6 +120,7 @@ def tell_apart(
 
 
 def _told(words: str, setting: Setting, model: Fit, fits: Mapping[str, Fit], tell: Tell, code: str) -> Telling:
+    setting = settled(model, setting)
     found, seen = {}, []
     for i, (tag, fit) in enumerate(fits.items()):
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ class Setting:
         step: velocity that the load point goes on with from a stick on, such as "1 mm/s".
         load: normal load in that of the measured run, such as "2".
         back: whether the load point goes back the way it came.
+        pieces: velocities (m/s) and durations (s) of the load point, in place of all that else moves it.
     """
 
     run: str
@@ -43,11 +44,16 @@ class Setting:
     step: str = ""
     load: str = ""
     back: bool = False
+    pieces: tuple[tuple[float, float], ...] = ()
 
     @property
     def as_measured(self) -> bool:
         """Whether the load point moves as in the measured run."""
-        return not self.back and not any(text.strip() for text in (self.velocity, self.hold, self.step))
+        return (
+            not self.back
+            and not self.pieces
+            and not any(text.strip() for text in (self.velocity, self.hold, self.step))
+        )
 
 
 def changes(fit: Fit, setting: Setting) -> list[tuple[str, Any]]:
@@ -70,6 +76,8 @@ def changes(fit: Fit, setting: Setting) -> list[tuple[str, Any]]:
         out.append(("contact.u_max", times ** (1.0 / contact.of(0, "p")) * contact.of(0, "u_max")))
     if setting.as_measured:
         return [*out, *([] if base.file.drive.velocity is None else [("drive.events", setting.events)])]
+    if setting.pieces:
+        return [*out, ("drive", {"piece": [{"velocity": v, "duration": t} for v, t in setting.pieces]})]
     own = next(run for run in fit.fitted.runs if run.name == setting.run).velocity
     velocity = to_si(setting.velocity, "m/s", key="velocity") if setting.velocity.strip() else own
     if velocity == 0.0:
@@ -103,6 +111,12 @@ def changed(fit: Fit, setting: Setting) -> Changed:
         float(file.contact.of(0, key) / base.contact.of(0, key)) for key in ("normal_force", "u_max")
     )  # fmt: skip
     return Changed(file.block.mass / base.block.mass, load, stretch)
+
+
+def settled(fit: Fit, setting: Setting) -> Setting:
+    """The same with the times of its drive as they are for a model, so that others are put to the very same."""
+    drive = dict(changes(fit, setting)).get("drive", {})
+    return replace(setting, pieces=tuple((p["velocity"], p["duration"]) for p in drive.get("piece", ())))
 
 
 def _positive(text: str, unit: str, key: str) -> float:

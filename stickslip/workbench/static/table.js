@@ -9,7 +9,7 @@ export function render({ model }) {
     const head = table.createTHead().insertRow()
     for (const name of model.columns) {
       const cell = document.createElement("th")
-      cell.textContent = name
+      cell.textContent = name.replace(" / ", "\u00a0/\u00a0").replace("± ", "±\u00a0") // units are not parted
       head.append(cell)
     }
     const body = table.createTBody()
