@@ -4,8 +4,8 @@
 
 Writes into docs/images, from the shipped campaign in a folder of its own: workbench-data.png, workbench-events.png,
 workbench-drop.png, workbench-missing.png, workbench-backbone.png, workbench-simulate.png, workbench-sweep.png,
-workbench-rivals.png, workbench-keep.png, workbench-model.png and workbench-dark.png; and beside them workbench.txt: what
-the pages say, by which a test sees whether the pictures are of this version.
+workbench-rivals.png, workbench-keep.png, workbench-model.png and workbench-dark.png; and beside them workbench.txt:
+what the pages say, by which a test sees whether the pictures are of this version.
 """
 
 from __future__ import annotations
