@@ -2,9 +2,10 @@
 
     python docs/make_workbench.py
 
-Writes workbench-data.png, -events.png, -drop.png, -missing.png, -backbone.png, -simulate.png, -sweep.png, -rivals.png,
--keep.png, -model.png and -dark.png into docs/images, from the shipped campaign in a folder of its own, and beside them
-workbench.txt: what the pages say, by which a test sees whether the pictures are of this version.
+Writes into docs/images, from the shipped campaign in a folder of its own: workbench-data.png, workbench-events.png,
+workbench-drop.png, workbench-missing.png, workbench-backbone.png, workbench-simulate.png, workbench-sweep.png,
+workbench-rivals.png, workbench-keep.png, workbench-model.png and workbench-dark.png; and beside them workbench.txt:
+what the pages say, by which a test sees whether the pictures are of this version.
 """
 
 from __future__ import annotations

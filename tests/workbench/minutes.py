@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -27,16 +28,20 @@ RESULTS = ROOT / "docs" / "results" / "workbench_minutes.json"
 AIM = 180.0  # s
 
 
+def bare() -> dict[str, str]:
+    """The surroundings without what leads to this folder or to what was compiled before."""
+    return {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "JAX_COMPILATION_CACHE_DIR")}
+
+
 class Installed(Served):
     """The server of the installed program, in an empty folder and with an empty cache."""
 
     def __init__(self, python: Path, folder: Path) -> None:
         self.began = time.monotonic()
-        known = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "JAX_COMPILATION_CACHE_DIR")}
         self.process = subprocess.Popen(
             [str(python), "-m", "stickslip", "open", "--no-browser"], stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True, cwd=folder,
-            env={**known, "HOME": str(folder), "XDG_CACHE_HOME": str(folder / "cache")},
+            env={**bare(), "HOME": str(folder), "XDG_CACHE_HOME": str(folder / "cache")},
         )  # fmt: skip
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
@@ -80,16 +85,15 @@ def main() -> None:
     """Install, measure, write."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        subprocess.run(
-            [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(folder / "wheel"), str(ROOT)],
-            check=True,
-        )
-        wheel = next((folder / "wheel").glob("*.whl"))
+        source = shutil.copytree(ROOT, folder / "source", ignore=shutil.ignore_patterns(".*", "docs", "tests", "out"))
+        wheel = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(folder / "wheel"), str(source)]
+        subprocess.run(wheel, check=True, cwd=folder)
+        made = next((folder / "wheel").glob("*.whl"))
         began = time.monotonic()
         venv.create(folder / "own", with_pip=True)
         python = folder / "own" / "bin" / "python"
-        asked = [f"{wheel}[workbench]", "-c", str(ROOT / "constraints.txt")]
-        subprocess.run([str(python), "-m", "pip", "install", "-q", *asked], check=True)
+        asked = [f"{made}[workbench]", "-c", str(ROOT / "constraints.txt")]
+        subprocess.run([str(python), "-m", "pip", "install", "-q", *asked], check=True, env=bare(), cwd=folder)
         stages = [("the installation", time.monotonic() - began)]
         (folder / "empty").mkdir()
         seen = chromium()
