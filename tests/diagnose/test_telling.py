@@ -10,7 +10,7 @@ import pytest
 import stickslip as ss
 from stickslip.blind.generator import Run, make_campaign
 from stickslip.inference.diagnose.decide import DISPERSION
-from stickslip.inference.diagnose.telling import information, margins
+from stickslip.inference.diagnose.telling import Changed, information, margins
 from stickslip.inference.force.noise import by_reading, known_of
 from stickslip.inference.force.problem import Problem
 from stickslip.inference.force.scatter import Blocks, Whitening
@@ -72,6 +72,16 @@ def test_what_the_campaign_leaves_unknown_of_the_parameters_tells_nothing(pair):
     for fit in sure:
         fit.__dict__["_judged"] = (*fit._judged[:2], 1e-12 * fit._judged[2])
     assert margins(sure, [run, run])[0, 1] > 2.0 * margins(pair, [run, run])[0, 1]
+
+
+def test_a_load_that_is_put_in_is_known_to_one_per_cent(pair):
+    """The pair differs in strength while it slides: that tells less where the load is another, known less well."""
+    run = pair[0].problem.runs[1]
+    put = margins(pair, [run, run], Changed(load=1.0 + 1e-9))[0, 1]
+    assert 0.0 < put < 0.5 * margins(pair, [run, run])[0, 1]
+    assert margins(pair, [run, run], Changed(mass=1.0 + 1e-9))[0, 1] < margins(pair, [run, run])[0, 1]
+    own = replace(run, stiffness=pair[0].values["rig.spring_stiffness"])
+    assert margins(pair, [own, own], Changed(spring=1.1))[0, 1] < margins(pair, [own, own])[0, 1]
 
 
 def test_information_of_an_experiment():

@@ -23,15 +23,20 @@ from ..force.scatter import Blocks, Whitening, WithEvents
 from .decide import DISPERSION
 
 MASS = "rig.mass"
+KNOWN = 0.01  # of a mass, a load or a spring that is put in for the experiment
 TURNS = 4  # phases of a run's own that are tried: the experiment may meet any
 
 
 @dataclass(frozen=True)
 class Changed:
-    """What an experiment changes of the rig: factors on the mass, the normal load, and on all yield displacements."""
+    """What an experiment changes of the rig: factors on mass, normal load, spring, and on all yield displacements.
+
+    What is changed is known to one per cent. The stiffness of the spring is that of the run itself.
+    """
 
     mass: float = 1.0
     load: float = 1.0
+    spring: float = 1.0
     stretch: float = 1.0
 
 
@@ -116,8 +121,15 @@ def _along(fit: Fit, run: Knots, changed: Changed, turn: float) -> _Held:
     blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
     rows, none = by_reading(problem, point, slopes), np.zeros(problem.of.size, bool)
     white = Whitening(fit.scatter.sizes, known_of(problem, slopes, rows, blocks, none))
-    unsure = slopes.shared @ _deviations(fit, problem, changed.load)
-    return _Held(slopes.residual, unsure, white.with_events(blocks(slopes.local)), blocks)
+    unsure = [slopes.shared @ _deviations(fit, problem, changed.load)]
+    first = z.size + own.size
+    if changed.load != 1.0:
+        unsure.append(slopes.shared[:, first : first + point.weights.size] @ point.weights[:, None] * KNOWN)
+    if changed.mass != 1.0:
+        unsure.append((slopes.share * problem.composition.mass * run.acceleration)[:, None] * KNOWN)
+    if changed.spring != 1.0 and run.stiffness is not None:
+        unsure.append((slopes.share * (run.mean @ (run.stiffness * (run.drive - run.x))))[:, None] * KNOWN)
+    return _Held(slopes.residual, np.hstack(unsure), white.with_events(blocks(slopes.local)), blocks)
 
 
 def _deviations(fit: Fit, problem: Problem, load: float) -> Array:

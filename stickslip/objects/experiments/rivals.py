@@ -58,8 +58,8 @@ class Telling:
         """How likely the true model is expected to become beside any other one, in words."""
         if self.margin < np.log(2.0):
             return "hardly likelier"
-        times = f"{np.exp(self.margin):.2g}" if self.margin < np.log(1e3) else "more than 1000"
-        return f"{times} times as likely"
+        power = self.margin / np.log(10.0)
+        return f"{10.0**power:.2g} times as likely" if power < 3.0 else f"10^{power:.0f} times as likely"
 
 
 def rivals(

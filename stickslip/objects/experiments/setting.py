@@ -110,7 +110,8 @@ def changed(fit: Fit, setting: Setting) -> Changed:
     load, stretch = (
         float(file.contact.of(0, key) / base.contact.of(0, key)) for key in ("normal_force", "u_max")
     )  # fmt: skip
-    return Changed(file.block.mass / base.block.mass, load, stretch)
+    spring = file.block.spring_stiffness / base.block.spring_stiffness
+    return Changed(file.block.mass / base.block.mass, load, spring, stretch)
 
 
 def settled(fit: Fit, setting: Setting) -> Setting:
