@@ -92,7 +92,11 @@ def test_the_backbone_of_the_bank_is_measured(plain):
     curve = backbone(plain)
     true = np.array([np.minimum(CAPS, CAPS / YIELDS * u).sum() for u in curve.displacement])
     inside = (curve.displacement > YIELDS[0]) & (curve.displacement < YIELDS[-1])
-    np.testing.assert_allclose(curve.force[inside], true[inside], atol=3e-3 * CAPS.sum())
+    # in strokes with short rests the force is told between what it is at rest and in sliding
+    lost = plain.values["weakening.drop"]
+    assert lost < 0.02
+    at_rest, near = curve.force[inside], 3e-3 * CAPS.sum()
+    assert ((true[inside] < at_rest + near) & (true[inside] > (1.0 - lost) * at_rest - near)).all()
 
 
 def test_what_the_bank_leaves_is_small(plain):

@@ -8,7 +8,7 @@ the model has no elongation, so that no law of the spring's force can take the m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -199,8 +199,9 @@ def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Pr
     """The base model of runs of prescribed motion, and where its fit begins.
 
     Where the force takes both signs a spring stands beside the bank: the part of a contact that never slides (K_inf of
-    Iwan's model as Segalman, J. Appl. Mech. 72 (2005) 752, has it), with what it holds where a run begins. One way an
-    element that has not slid yet says as much.
+    Iwan's model as Segalman, J. Appl. Mech. 72 (2005) 752, has it), with what it holds where a run begins. The bank
+    then ends with what a stroke makes slide: the rest is not told from that spring. One way an element that has not
+    slid yet says as much.
     """
     forces = np.concatenate([k.force for k in runs])
     strength = float(np.quantile(np.abs(forces), 0.95))
@@ -222,9 +223,10 @@ def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Pr
             "time over which strength returns"),
         log("rig.damping", "N s/m", 1e-3 * critical, 1.5, 1e-7 * critical, 10.0 * critical, "viscous damping"),
     ]  # fmt: skip
-    expected = 0.1
+    (low, high), expected = REACH, 0.1
     if both_ways(forces):
         way, expected = max(float(np.ptp(k.x)) for k in runs), np.inf  # how much of the force slides is not known
+        high = max(min(high, 0.5 * way / reach), 2.0 * low)
         free += [
             Free(BESIDE, "N/m", strength / way, 0.0, 0.0, np.inf, 0.0, 1e3 * strength / way,
                  "stiffness beside the contact, which never slides"),
@@ -232,25 +234,14 @@ def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Pr
                  "force at the start of what does not slide"),
         ]  # fmt: skip
     composition = Composition(
-        mass, reach * np.geomspace(*REACH, elements), tuple(free), {"rig.spring_stiffness": softest}, (),
+        mass, reach * np.geomspace(low, high, elements), tuple(free), {"rig.spring_stiffness": softest}, (),
         (strength, expected),
     )  # fmt: skip
-    found = _started(composition, runs, strength)
-    if BESIDE in found[0].values(found[1]) and found[0].values(found[1])[BESIDE] > 0.0:
-        # elements that no stroke makes slide are not told from it
-        most = min(REACH[1], max(0.5 * float(np.ptp(k.x)) for k in runs) / reach)
-        yields = reach * np.geomspace(REACH[0], max(most, 2.0 * REACH[0]), elements)
-        found = _started(replace(composition, reach=yields), runs, strength)
-    return found
-
-
-def _started(composition: Composition, runs: Sequence[Knots], strength: float) -> tuple[Problem, Point]:
-    """The problem, and the point with weights that fit best before anything weakens."""
     problem = Problem(composition, runs)
     point = Point(
         vector(composition.shared),
         np.zeros((len(composition.phases), len(runs))),
-        np.full(composition.reach.size, strength / composition.reach.size),
+        np.full(elements, strength / elements),
         np.zeros((problem.events, OWN)),
         np.zeros(problem.readings.shape[1]),
     )
