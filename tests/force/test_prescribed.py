@@ -33,13 +33,13 @@ NOISE = 2e-4  # N
 BEND = 8e-7  # m/N^2
 
 
-def stage(cycles: int) -> tuple[np.ndarray, np.ndarray]:
+def stage(cycles: int, rate: float = RATE) -> tuple[np.ndarray, np.ndarray]:
     """A triangle with a rest at either end (s, m)."""
     one_way = STROKE / SPEED
     knots = np.cumsum(np.tile([0.0, one_way, REST, one_way, REST], cycles)[1:])
     knots = np.concatenate([[0.0], np.unique(knots)])
     ends = np.concatenate([[0.0], np.tile([1.0, 1.0, 0.0, 0.0], cycles)]) * STROKE
-    t = np.arange(0.0, knots[-1], 1.0 / RATE)
+    t = np.arange(0.0, knots[-1], 1.0 / rate)
     return t, np.interp(t, knots, ends)
 
 
@@ -55,8 +55,8 @@ def jenkins(
     return out
 
 
-def record(seed: int, bend: float = 0.0) -> Trace:
-    t, x = stage(4)
+def record(seed: int, bend: float = 0.0, rate: float = RATE) -> Trace:
+    t, x = stage(4, rate)
     force = jenkins(x)
     noise = np.random.default_rng(seed).normal(0.0, NOISE, t.size)
     return Trace.from_arrays(
@@ -88,13 +88,21 @@ def test_every_stroke_and_every_rest_is_a_stretch_of_its_own():
     assert sum(not s.moving for s in found) >= 5
 
 
-def test_the_backbone_of_the_bank_is_measured(plain):
+def test_the_backbone_of_the_bank_is_measured():
+    runs = [thinned(with_motion(record(seed, rate=8.0 * RATE))) for seed in (1, 2, 3)]
+    curve = backbone(fit(*begin(Rig(), runs)))
+    true = np.array([np.minimum(CAPS, CAPS / YIELDS * u).sum() for u in curve.displacement])
+    inside = (curve.displacement > YIELDS[0]) & (curve.displacement < YIELDS[-1])
+    np.testing.assert_allclose(curve.force[inside], true[inside], atol=1.5e-3 * CAPS.sum())
+
+
+def test_where_the_stiffest_elements_yield_within_two_samples_a_slow_healing_takes_what_the_windows_lose(plain):
+    """Sampled an eighth as often the true curve lies between what the contact holds at rest and in sliding."""
     curve = backbone(plain)
     true = np.array([np.minimum(CAPS, CAPS / YIELDS * u).sum() for u in curve.displacement])
     inside = (curve.displacement > YIELDS[0]) & (curve.displacement < YIELDS[-1])
-    # in strokes with short rests the force is told between what it is at rest and in sliding
     lost = plain.values["weakening.drop"]
-    assert lost < 0.02
+    assert lost < 0.01
     at_rest, near = curve.force[inside], 3e-3 * CAPS.sum()
     assert ((true[inside] < at_rest + near) & (true[inside] > (1.0 - lost) * at_rest - near)).all()
 
