@@ -181,6 +181,7 @@ class Window:
         if self._thread.is_alive():
             self._loop.add_callback(self._loop.stop)
             self._thread.join()
+            self._loop.close(all_fds=True)  # else windows that are open would wait for an answer
         atexit.unregister(self.close)
 
     def __enter__(self) -> Window:
