@@ -211,7 +211,7 @@ def diagnose(
             for finding in reversed(stopping(rig)):  # with the sign wrong in every run there are no slips to fit
                 error = error.with_hint(finding.sentence, first=True)
             raise error.at(file=campaign.description.path) from None
-        return _made(campaign, done, able, began, progress or silent)
+        return _made(campaign, done, able, began, time_limit, progress or silent)
 
     if out is None:
         return found(None, 0)
@@ -236,9 +236,13 @@ def diagnose(
     return made
 
 
-def _made(campaign: Campaign, done: Found, able: Any, began: float, tell: Tell) -> Diagnosis:
+def _made(campaign: Campaign, done: Found, able: Any, began: float, limit: float | None, tell: Tell) -> Diagnosis:
     sections, variables = summary(done, campaign.rig)
-    proposed = next_experiment(campaign, done, sections["next_experiment"], tell)
+
+    def in_time() -> bool:
+        return limit is None or time.perf_counter() - began < limit
+
+    proposed = next_experiment(campaign, done, sections["next_experiment"], tell, in_time)
     traces, segmentations = campaign.displaced[0], campaign.scaled[0]
     described, pictured = trace_sections(traces, segmentations)
     follows = wander(campaign)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +18,8 @@ from .run import Tell
 
 
 def next_experiment(
-    campaign: Campaign, found: Found, known: dict[str, Any] | None, tell: Tell
+    campaign: Campaign, found: Found, known: dict[str, Any] | None, tell: Tell,
+    in_time: Callable[[], bool] = lambda: True,
 ) -> dict[str, Any] | None:  # fmt: skip
     """What the catalogue knows to separate the effects of each set, with the experiments that are easily made.
 
@@ -26,22 +28,27 @@ def next_experiment(
         found: where the search ended.
         known: of :func:`stickslip.inference.diagnose.summary.next_experiment`.
         tell: told the progress.
+        in_time: whether there is time for another experiment.
     """
-    if known is None or found.prepared.prescribed or not found.in_time:
+    if known is None or found.prepared.prescribed:
         return known
     rounds = {tuple(j.tag for j in done.close): done for done in found.named.values() if len(done.close) > 1}
     every = [{key: value for key, value in known.items() if key != "others"}, *known.get("others", ())]
-    made = [_with(campaign, found, one, rounds.get(tuple(one["separates"])), tell) for one in every]
+    made = [_with(campaign, found, one, rounds.get(tuple(one["separates"])), tell, in_time) for one in every]
     return {**made[0], "others": made[1:]} if len(made) > 1 else made[0]
 
 
 def _with(
-    campaign: Campaign, found: Found, known: dict[str, Any], done: Round | None, tell: Tell
+    campaign: Campaign, found: Found, known: dict[str, Any], done: Round | None, tell: Tell,
+    in_time: Callable[[], bool],
 ) -> dict[str, Any]:  # fmt: skip
-    if done is None:  # laws of the backbone have no model of their own along the motion
+    if done is None or not in_time():  # laws of the backbone have no model of their own along the motion
         return known
     fits = {j.tag: _fit(campaign, found, done, j.tag, j.candidate.fit) for j in done.close}
-    options = tell_apart(next(iter(fits.values())), fits, _options(next(iter(fits.values()))), tell)
+    first = next(iter(fits.values()))
+    options = tell_apart(first, fits, _options(first), tell, until=in_time)
+    if not options:
+        return known
     rows = [
         {
             "experiment": t.words, "information": t.information, "margin": t.margin, "tells": t.tells, "note": t.note,

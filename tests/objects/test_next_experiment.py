@@ -15,7 +15,9 @@ from stickslip.blind.generator.forms import EFFECTS
 from stickslip.inference.diagnose.engine import Round
 from stickslip.objects import Diagnosis
 from stickslip.objects import next_experiment as module
+from stickslip.objects.experiments import Setting, rivals
 from stickslip.objects.next_experiment import next_experiment
+from stickslip.system.progress import Cancelled
 
 SET = ("contact-ageing", "viscous-drag")
 FORM = "logarithm"
@@ -36,7 +38,7 @@ def undecided(tmp_path_factory):
     )
     ladder, prepared = base.climbed.ladder, base.climbed.prepared
     named = {SET[0]: Round(base.force_fit, (), (), close)}
-    return campaign, SimpleNamespace(prepared=prepared, ladder=ladder, named=named, in_time=True)
+    return campaign, SimpleNamespace(prepared=prepared, ladder=ladder, named=named)
 
 
 def test_every_experiment_is_simulated_and_the_best_is_proposed(undecided, monkeypatch):
@@ -63,11 +65,25 @@ def test_every_experiment_is_simulated_and_the_best_is_proposed(undecided, monke
 
 def test_without_models_or_time_the_words_of_the_catalogue_stand(undecided):
     campaign, found = undecided
-    late = SimpleNamespace(**{**vars(found), "in_time": False})
     of_geometry = SimpleNamespace(**{**vars(found), "named": {}})
-    for other in (late, of_geometry):
-        assert next_experiment(campaign, other, KNOWN, lambda text, share: None) == KNOWN
+    assert next_experiment(campaign, of_geometry, KNOWN, lambda text, share: None) == KNOWN
+    assert next_experiment(campaign, found, KNOWN, lambda text, share: None, lambda: False) == KNOWN
+    once = iter([True, False])
+    assert next_experiment(campaign, found, KNOWN, lambda text, share: None, lambda: next(once)) == KNOWN
     assert next_experiment(campaign, found, None, lambda text, share: None) is None
     sets = {**KNOWN, "others": [{"text": "weigh it", "separates": ["curvature", "roll-off"]}]}
     made = next_experiment(campaign, of_geometry, sets, lambda text, share: None)
     assert made == sets
+
+
+def test_a_law_that_fails_is_a_note_and_a_cancel_ends_it(monkeypatch):
+    def failing(words, *rest):
+        if words == "cancelled":
+            raise Cancelled("")
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr(rivals, "_told", failing)
+    found = rivals.tell_apart(None, {}, {"one": Setting("v100"), "two": Setting("v100")}, lambda text, share: None)
+    assert [t.note for t in found] == ["ZeroDivisionError: by zero"] * 2 and not found[0].recordings
+    with pytest.raises(Cancelled):
+        rivals.tell_apart(None, {}, {"cancelled": Setting("v100")}, lambda text, share: None)

@@ -15,7 +15,10 @@ from ...inference.diagnose.prepare import Prepared
 from ...inference.diagnose.telling import information, margins
 from ...inference.force.knots import Knots, knots
 from ...inference.force.scales import of_run
+from ...simulation.conformance import blamed
+from ...simulation.conformance.trial import first_line
 from ...simulation.scenario.recording import Recording
+from ...system.progress import Cancelled
 from ..fit import Fit
 from .events import MEASURES, Tell, run
 from .setting import Setting, changed, scenario, settled
@@ -93,6 +96,7 @@ def formed(tag: str, forms: Mapping[str, Mapping[str, Any]]) -> str:
 def tell_apart(
     model: Fit, fits: Mapping[str, Fit], options: Mapping[str, Setting], tell: Tell,
     show: Callable[[Sequence[Telling]], None] = lambda found: None, code: str = "",
+    until: Callable[[], bool] = lambda: True,
 ) -> list[Telling]:  # fmt: skip
     """Every experiment simulated for every model; the one first of which most information is expected.
 
@@ -102,17 +106,23 @@ def tell_apart(
         options: the experiments.
         tell, show: told the progress, and what there is so far.
         code: the lines of Python that lead to the model.
+        until: whether there is time for more; what is not simulated then is missing.
     """
     out: list[Telling] = []
     for i, (words, setting) in enumerate(options.items()):
+        if not until():
+            break
 
         def within(text: str, share: float, i: int = i, words: str = words) -> None:
             tell(f"{words}, {text}", (i + share) / len(options))
 
         try:
             out.append(_told(words, setting, model, fits, within, code))
-        except StickslipError as error:
-            note = str(error).split("\n")[0]
+        except Cancelled:
+            raise
+        except Exception as error:  # an effect of one's own may fail in any way
+            said = error if isinstance(error, StickslipError) else blamed(error)
+            note = str(said or first_line(error)).split("\n")[0]
             out.append(Telling(words, setting, model, fits, {}, note=note, code=code))
         out.sort(key=lambda t: (bool(t.note), -round(t.information, 3), -t.margin))
         show(list(out))
