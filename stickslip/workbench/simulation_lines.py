@@ -9,9 +9,9 @@ from typing import Any
 
 from ..objects import Fit
 from ..objects.experiments.events import Simulated
-from ..objects.experiments.rivals import Telling
 from ..objects.experiments.setting import Setting, changes
 from ..objects.experiments.sweeps import Swept
+from ..objects.experiments.telling import Telling
 
 Found = Simulated | Swept | Sequence[Telling]
 

@@ -11,8 +11,8 @@ import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.objects import Diagnosis, experiments
 from stickslip.objects.experiments import Setting
-from stickslip.objects.experiments.rivals import CREEP as HELD
-from stickslip.objects.experiments.rivals import farthest, signs
+from stickslip.objects.experiments.telling import CREEP as HELD
+from stickslip.objects.experiments.telling import farthest, signs
 from stickslip.simulation.scenario import make_scenario
 from stickslip.system.progress import Cancelled, cancellable
 from stickslip.system.units import to_si

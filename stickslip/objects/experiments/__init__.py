@@ -2,9 +2,9 @@
 
 from .events import MEASURES, Simulated, measured, run, simulated, spread, steady_runs
 from .practicable import practicable
-from .rivals import Telling, rivals, tell_apart, where
 from .setting import Setting, changes, scenario
 from .sweeps import Swept, sweep
+from .telling import Telling, rivals, tell_apart, where
 
 __all__ = [
     "MEASURES",
