@@ -18,12 +18,13 @@ from ..force.fit import Fit
 from ..force.knots import Knots
 from ..force.linearised import Array
 from ..force.noise import by_reading, known_of
-from ..force.problem import PULL, Point, Problem
+from ..force.problem import LOCAL, PULL, Point, Problem
 from ..force.scatter import Blocks, Whitening, WithEvents
 from .decide import DISPERSION
 
 MASS = "rig.mass"
-KNOWN = 0.01  # of a mass, a load or a spring that is put in for the experiment
+KNOWN = 0.01  # of a mass, a load or a spring that is put in for the experiment, and of what a load does to the contact
+STRETCH = LOCAL.index("stretch")
 TURNS = 4  # phases of a run's own that are tried: the experiment may meet any
 
 
@@ -31,7 +32,8 @@ TURNS = 4  # phases of a run's own that are tried: the experiment may meet any
 class Changed:
     """What an experiment changes of the rig: factors on mass, normal load, spring, and on all yield displacements.
 
-    What is changed is known to one per cent. The stiffness of the spring is that of the run itself.
+    What is changed is known to one per cent, and so is by how much a load stretches the contact. The stiffness of the
+    spring is that of the run itself.
     """
 
     mass: float = 1.0
@@ -125,6 +127,7 @@ def _along(fit: Fit, run: Knots, changed: Changed, turn: float) -> _Held:
     first = z.size + own.size
     if changed.load != 1.0:
         unsure.append(slopes.shared[:, first : first + point.weights.size] @ point.weights[:, None] * KNOWN)
+        unsure.append(slopes.local[:, [STRETCH]] * KNOWN)
     if changed.mass != 1.0:
         unsure.append((slopes.share * problem.composition.mass * run.acceleration)[:, None] * KNOWN)
     if changed.spring != 1.0 and run.stiffness is not None:
