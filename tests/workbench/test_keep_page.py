@@ -50,7 +50,7 @@ def test_saving_writes_what_fit_save_writes(saved, base, folder, tmp_path):
     assert {p.name for p in saved.iterdir()} == {p.name for p in (tmp_path / "same").iterdir()}
 
 
-def test_the_command_writes_the_samenumbers(saved, folder, tmp_path):
+def test_the_command_writes_the_same_numbers(saved, folder, tmp_path):
     out = tmp_path / "by the command"
     assert run(["fit", str(folder / "campaign.toml"), "--model", "inertial", "--out", str(out)]) == 0
     mine, its = numbers(_plain(saved)), numbers(_plain(out))
