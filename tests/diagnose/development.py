@@ -108,7 +108,7 @@ def margin(result: dict[str, Any], tag: str) -> float | None:
     Each at its best parameters; in units in which chance spreads as it should (the cost over its dispersion). None
     where the hidden effect was not tried.
     """
-    gains = {row["effect"]: float(row["gain"] or 0.0) for row in reversed(result.get("ranking") or ())}
+    gains = {row["effect"]: float(row.get("gain") or 0.0) for row in reversed(result.get("ranking") or ())}
     if tag not in gains:
         return None
     containing = {t for t, cls in catalogue.all().items() if tag in cls.generalises}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -45,10 +46,13 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def one_round(base: Any, tags: Sequence[str], *_: Any) -> engine.Round:
         found = [judged(t, each) for t, each in table[base.tags].items() if t in tags]
-        return engine.Round(base, tuple(found), (), tuple(engine.named(found)))
+        return engine.Round(base, tuple(found), tuple(j.candidate for j in found), tuple(engine.named(found)))
+
+    def replace(made: Any, **changes: Any) -> Any:
+        return dataclasses.replace(made, **changes) if isinstance(made, Candidate) else made
 
     monkeypatch.setattr(engine, "one_round", one_round)
-    monkeypatch.setattr(engine, "replace", lambda point, **_: point)
+    monkeypatch.setattr(engine, "replace", replace)
     monkeypatch.setattr(engine, "fit", lambda problem, *_, **__: problem)
     worse: list[tuple[str, ...]] = []
     monkeypatch.setattr(engine, "foretells", lambda before, after: after.tags not in worse)
@@ -119,6 +123,7 @@ def test_an_effect_that_foretells_less_once_it_has_settled_is_not_kept(search):
     grown(search, ["wear"])
     assert not search.named
     assert not search.base.tags
+    assert {c.tag: c.note for c in search.rounds[-1].candidates} == {"wear": engine.TAKEN_OUT}
 
 
 def test_a_model_without_an_effect_has_none_of_its_parameters():

@@ -47,7 +47,8 @@ class Compared:
         gain: fall of the cost.
         chance: of such a fall by chance, corrected for all that was tried.
         unseen: fall of the predictive cost of every event left out, shape (E,).
-        nearer: fall of the squares of its error with all events alike, in units of their expected ones, shape (E,).
+        nearer: fall of the squares of its error with all events alike, over what noise and the scatter of the model
+            without give, shape (E,).
     """
 
     fit: Fit
@@ -175,13 +176,15 @@ class Judge:
         gain = max(self.base.cost - fit.cost, 0.0)
         chance = min(1.0, float(chdtrc(number, max(gain - price, 0.0) / DISPERSION)) * members * self.tried)
         without, predicted = self._unseen[own], unseen(fit, self._halves if own else self._runs)
-        nearer = self._squares(without) - self._squares(predicted)
+        # undoing a sensor makes the measured force noisier, which is no error of the model; events differ by the same
+        floor = deviations(fit, self.base.scatter.sizes)
+        nearer = self._squares(without, self._floor) - self._squares(predicted, floor)
         return Compared(fit, gain, chance, without.cost - predicted.cost, nearer)
 
-    def _squares(self, predicted: Unseen) -> Array:
-        """Of the error of every event left out over the floor of the model without, shape (E,)."""
+    def _squares(self, predicted: Unseen, floor: Array) -> Array:
+        """Of the error of every event left out over a floor of every point (N), shape (E,)."""
         base = self.base
-        over = predicted.residual / np.hypot(self._floor, predicted.spread)
+        over = predicted.residual / np.hypot(floor, predicted.spread)
         return np.asarray(np.bincount(base.problem.of, over**2 * ~base.dropped, base.problem.events), float)
 
 

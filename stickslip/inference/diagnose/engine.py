@@ -36,6 +36,7 @@ from .trials import Tell, trials
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
 LEFT = 0.5  # of what named effects explain, from which what is left is no matter of a law's form any more
+TAKEN_OUT = "seen, and taken out again: the model that came of it predicts unseen runs no better"
 BEST = 10  # effects of a round that are tried again beside the one that was named
 STRUCTURED = 1e-6  # chance of the residual force being a function of some variable, below which something is missing
 MEMBERS = 2  # of a set that are run freely besides the first
@@ -297,7 +298,8 @@ class Search:
             self.base, self.ladder[:], self.named, gone = before
             self.gone = {*gone, tag}
             judged = tuple(j for j in done.judged if j.tag != tag)
-            self._left = Round(done.base, judged, done.candidates, tuple(named(judged)), done.rival)
+            tried = tuple(replace(c, note=TAKEN_OUT) if c.tag == tag else c for c in done.candidates)
+            self._left = Round(done.base, judged, tried, tuple(named(judged)), done.rival)
 
     def _again(self, tag: str, added: str) -> None:
         """An effect tried once more, beside the best of its own round, with all others in the model."""
