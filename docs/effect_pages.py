@@ -72,7 +72,9 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         *_numbers(numbers),
         "In a scenario file:",
         "```toml\n" + _entry(cls) + "\n```",
-        f"The same in a fit: `stickslip fit campaign.toml --add {cls.tag}`.",
+        "What a measurement says of it is [told by a diagnosis and by a forecast](../forecast.md)."
+        if cls.drawn
+        else f"The same in a fit: `stickslip fit campaign.toml --add {cls.tag}`.",
         "## In a measurement",
         f"{prose(cls.signature[:1].upper() + cls.signature[1:])}.",
         "| may be taken for | the experiment that separates the two |\n|---|---|\n"
@@ -145,7 +147,7 @@ def _parameters(cls: type[Effect]) -> Iterator[str]:
     grids = {name: spec for name, spec in specs(cls).items() if spec.grid}
     if cls.periodic is not None:
         grids.pop("phase", None)
-    if grids:
+    if grids and not cls.drawn:
         starts = "; ".join(f"`{name}` {', '.join(number(v) for v in spec.grid)}" for name, spec in grids.items())
         instead = "" if cls.periodic is None else ", or from the periods that the onsets hint at"
         yield f"A search starts from up to six combinations of {starts}{instead}."

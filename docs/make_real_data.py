@@ -576,13 +576,13 @@ def main() -> None:
         parts = {f.__name__: f(data, work) for f in made if only is None or f.__name__ in only}
         single = {n: diagnosed(n, data / f, work / n) for n, f in PRESCRIBED.items() if only and n in only}
     head = {"version": __version__, "date": date.today().isoformat(), "command": "python docs/make_real_data.py"}
-    for name in parts.keys() & {"prescribed", "topographies", "classroom"}:
+    for name in parts:
         parts[name] |= head
     path = DOCS / "results" / "real_data.json"
     known = json.loads(path.read_text(encoding="utf-8")) if asked.only is not None else {}
     for name, record in single.items():
-        known["prescribed"]["records"][name] = record
-    text = json.dumps({**head, **known, **parts}, indent=1, ensure_ascii=False)
+        known["prescribed"]["records"][name] = {**record, **head}
+    text = json.dumps({**known, **head, **parts}, indent=1, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")
 
 
