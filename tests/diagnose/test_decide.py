@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.inference.diagnose import decide
 from stickslip.inference.diagnose.decide import (
     CHANCE,
     DISPERSION,
@@ -22,7 +21,6 @@ from stickslip.inference.diagnose.decide import (
 )
 from stickslip.inference.fit.parameters import effect_parameters
 from stickslip.inference.force.candidates import Candidate
-from stickslip.inference.force.heldout import Unseen
 from stickslip.physics.effects import catalogue
 
 EVENTS = 40
@@ -56,31 +54,6 @@ def test_the_error_of_unseen_runs_may_not_rise_beyond_its_standard_error():
     error = 1.0 / np.sqrt(EVENTS)
     assert judged("wear", 300.0, 4.0, nearer=-0.9 * error).seen
     assert not judged("wear", 300.0, 4.0, nearer=-1.1 * error).seen
-
-
-def test_noise_that_undoing_a_sensor_brings_is_no_error_of_a_model(monkeypatch):
-    """Five times the residual is no error where the measured force is five times as noisy, and one where it is not."""
-    events, points = 8, 200
-    rng = np.random.default_rng(7)
-    problem: Any = SimpleNamespace(of=np.arange(events * points) % events, events=events)
-
-    def model(error: float, noise: float) -> Any:
-        return SimpleNamespace(
-            problem=problem, dropped=np.zeros(events * points, bool), cost=0.0, noise=np.full(events * points, noise),
-            residual=error * rng.standard_normal(events * points), scatter=SimpleNamespace(sizes=None),
-        )  # fmt: skip
-
-    monkeypatch.setattr(decide, "folds", lambda fit: None)
-    monkeypatch.setattr(decide, "halves", lambda fit: None)
-    monkeypatch.setattr(decide, "deviations", lambda fit, sizes=None: fit.noise)
-    monkeypatch.setattr(
-        decide, "unseen", lambda fit, _: Unseen(np.zeros(events), fit.residual, np.zeros(events * points))
-    )
-    judge = decide.Judge(model(1.0, 1.0), 1)
-    assert not judge.beside(model(5.0, 1.0), 1).no_farther
-    noisier = judge.beside(model(5.0, 5.0), 1)
-    assert noisier.no_farther
-    assert abs(float(noisier.nearer.sum())) < 4.0 * np.sqrt(4.0 * events * points)
 
 
 def test_so_many_standard_errors_over_the_events():

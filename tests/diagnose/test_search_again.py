@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from stickslip.inference.diagnose import engine
-from stickslip.inference.diagnose.decide import Judged
+from stickslip.inference.diagnose.decide import Compared, Judged
 from stickslip.inference.force.candidates import Candidate
 from stickslip.inference.force.problem import Composition
 
@@ -124,6 +124,14 @@ def test_an_effect_that_foretells_less_once_it_has_settled_is_not_kept(search):
     assert not search.named
     assert not search.base.tags
     assert {c.tag: c.note for c in search.rounds[-1].candidates} == {"wear": engine.TAKEN_OUT}
+
+
+@pytest.mark.parametrize("each", [0.5, -0.5])
+def test_a_model_is_kept_by_the_likelihood_of_unseen_runs_alone(each, monkeypatch):
+    """Where a sensor is undone the measured forces are others, and a larger residual may be less of an error."""
+    found = Compared(None, 1.0, 1e-9, np.full(EVENTS, each), -np.ones(EVENTS))  # type: ignore[arg-type]
+    monkeypatch.setattr(engine, "Judge", lambda base, tried: SimpleNamespace(beside=lambda *_, **__: found))
+    assert engine.foretells(Model(()), Model(("sensor-low-pass",))) is (each > 0.0)  # type: ignore[arg-type]
 
 
 def test_a_model_without_an_effect_has_none_of_its_parameters():

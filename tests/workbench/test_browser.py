@@ -237,7 +237,7 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         browser.tab("missing")
         browser.js("seen('.effect-row[data-tag=\"contact-ageing\"]')[0].click()")
         browser.wait(lambda: browser.js("return seen('.effect-row.chosen').length"))
-        browser.wait(lambda: browser.js(CHOOSE, "place"))
+        browser.wait(lambda: browser.js(CHOOSE, "displacement"))
 
         browser.open(served.url)  # a reload
         browser.idle()
@@ -339,7 +339,8 @@ def test_a_server_that_is_killed_in_the_midst_of_long_work_comes_back_with_what_
         served = Served(path)
         browser.open(served.url, "Model")
         browser.wait(lambda: browser.text(".errors") == errors, 60)
-        assert "2 of 2: by hand" in browser.text(".model") and not browser.text(".bar")
+        assert "2 of 2: by hand" in browser.text(".model")
+        assert not any(work in browser.text(".bar") for work in ("Diagnose:", "fitting"))
         browser.wait(lambda: browser.text(".line") == cycle)
         if what == "fit":
             browser.press("button", "Fit")
@@ -370,7 +371,7 @@ WRITTEN = "return seen('input').filter((e) => e.placeholder === 'such as 10 s').
 
 def _as_it_was(browser: Browser) -> None:
     """The page, the variable of the residual, the chosen effect and a field of Simulate."""
-    browser.wait(lambda: "place" in browser.js(CHOSEN), 60)
+    browser.wait(lambda: "displacement" in browser.js(CHOSEN), 60)
     browser.wait(
         lambda: browser.js("return seen('.effect-row.chosen').map((e) => e.dataset.tag)") == ["contact-ageing"]
     )

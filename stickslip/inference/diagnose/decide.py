@@ -8,7 +8,7 @@
    of unseen runs with all events alike does not rise by more than its standard error: a law may describe the forces
    within events better, and leave what is foretold of an event worse.
 2. *Named*: the seen effect that predicts unseen runs best. It is kept if the model that it leads to, settled and
-   without what it has made superfluous, still predicts them better than the one before, and its error does not rise.
+   without what it has made superfluous, still predicts them better than the one before.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
@@ -47,8 +47,7 @@ class Compared:
         gain: fall of the cost.
         chance: of such a fall by chance, corrected for all that was tried.
         unseen: fall of the predictive cost of every event left out, shape (E,).
-        nearer: fall of the squares of its error with all events alike, over what noise and the scatter of the model
-            without give, shape (E,).
+        nearer: fall of the squares of its error with all events alike, in units of their expected ones, shape (E,).
     """
 
     fit: Fit
@@ -176,15 +175,13 @@ class Judge:
         gain = max(self.base.cost - fit.cost, 0.0)
         chance = min(1.0, float(chdtrc(number, max(gain - price, 0.0) / DISPERSION)) * members * self.tried)
         without, predicted = self._unseen[own], unseen(fit, self._halves if own else self._runs)
-        # undoing a sensor makes the measured force noisier, which is no error of the model; events differ by the same
-        floor = deviations(fit, self.base.scatter.sizes)
-        nearer = self._squares(without, self._floor) - self._squares(predicted, floor)
+        nearer = self._squares(without) - self._squares(predicted)
         return Compared(fit, gain, chance, without.cost - predicted.cost, nearer)
 
-    def _squares(self, predicted: Unseen, floor: Array) -> Array:
-        """Of the error of every event left out over a floor of every point (N), shape (E,)."""
+    def _squares(self, predicted: Unseen) -> Array:
+        """Of the error of every event left out over the floor of the model without, shape (E,)."""
         base = self.base
-        over = predicted.residual / np.hypot(floor, predicted.spread)
+        over = predicted.residual / np.hypot(self._floor, predicted.spread)
         return np.asarray(np.bincount(base.problem.of, over**2 * ~base.dropped, base.problem.events), float)
 
 

@@ -289,14 +289,9 @@ def _found(
     )  # fmt: skip
 
 
-def deviations(found: Fit, sizes: Array | None = None) -> Array:
-    """Standard deviation of the residual at every point: noise and scatter (N), shape (p,).
-
-    Args:
-        found: the model.
-        sizes: of what is random; default those of the model.
-    """
-    sizes, known = found.scatter.sizes if sizes is None else sizes, found.known
+def deviations(found: Fit) -> Array:
+    """Standard deviation of the residual at every point: noise and scatter (N), shape (p,)."""
+    sizes, known = found.scatter.sizes, found.known
     before, after = (v[:, None] for v in grown(known.spread(sizes), known.first))
     (first, second), (_, whole) = np.moveaxis(known.nodes, 2, 0), covariance(sizes, known)
     walked = first * (first + 2.0 * second) * before + second**2 * after  # the later node goes on from the earlier
