@@ -235,21 +235,23 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         browser.tab("Simulate")
         browser.wait(lambda: browser.js(WRITE, "such as 10 s", "3 s"))
         browser.tab("missing")
+        browser.wait(lambda: browser.js("return seen('.effect-row[data-tag=\"contact-ageing\"]').length"))
         browser.js("seen('.effect-row[data-tag=\"contact-ageing\"]')[0].click()")
         browser.wait(lambda: browser.js("return seen('.effect-row.chosen').length"))
         browser.wait(lambda: browser.js(CHOOSE, "displacement"))
+        time.sleep(1.0)  # what was done is kept when nothing else is to be done
 
         browser.open(served.url)  # a reload
         browser.idle()
         _as_it_was(browser)
         found = browser.unseen_error()
-        assert found < CAUGHT and "2 of 2" in browser.text(".model")
+        assert found < CAUGHT and "2 of 3" in browser.text(".model")
         time.sleep(1.0)  # what was done is kept when nothing else is to be done
         served.kill()
         served = Served(path)
         began = time.monotonic()
         browser.open(served.url)
-        browser.wait(lambda: "2 of 2" in browser.text(".model"), 60)
+        browser.wait(lambda: "2 of 3" in browser.text(".model"), 60)
         print(f"back after {served.started + time.monotonic() - began:.1f} s")
         browser.idle()
         assert browser.unseen_error() == pytest.approx(found, abs=2e-3)
