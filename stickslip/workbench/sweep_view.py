@@ -123,7 +123,7 @@ class SweepView:
             self.figures[key].xaxis.ticker = FixedTicker(ticks=ticks(velocities * k))
             if key == "recurrence":
                 self.figures[key].yaxis.ticker = FixedTicker(ticks=ticks(np.concatenate([own, theirs]) * f))
-        if found is not None:  # before the data: a legend is not painted again after a change of its texts alone
+        self._model.data, self._measured.data = model, measured
+        if found is not None:
             for item in self._names:
                 item.label = value(named(found.fit, self._session.fit))
-        self._model.data, self._measured.data = model, measured
