@@ -129,9 +129,11 @@ def test_an_effect_that_foretells_less_once_it_has_settled_is_not_kept(search):
 @pytest.mark.parametrize("each", [0.5, -0.5])
 def test_a_model_is_kept_by_the_likelihood_of_unseen_runs_alone(each, monkeypatch):
     """Where a sensor is undone the measured forces are others, and a larger residual may be less of an error."""
-    found = Compared(None, 1.0, 1e-9, np.full(EVENTS, each), -np.ones(EVENTS))  # type: ignore[arg-type]
+    before: Any = Model(())
+    after: Any = Model(("sensor-low-pass",))
+    found = Compared(after, 1.0, 1e-9, np.full(EVENTS, each), -np.ones(EVENTS))
     monkeypatch.setattr(engine, "Judge", lambda base, tried: SimpleNamespace(beside=lambda *_, **__: found))
-    assert engine.foretells(Model(()), Model(("sensor-low-pass",))) is (each > 0.0)  # type: ignore[arg-type]
+    assert engine.foretells(before, after) is (each > 0.0)
 
 
 def test_a_model_without_an_effect_has_none_of_its_parameters():
