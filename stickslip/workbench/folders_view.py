@@ -89,7 +89,7 @@ class Folders:
         if campaign is None:
             return
         if found is None:
-            self._work.said = f"{what} {'are' if what.endswith('s') else 'is'} not there yet"
+            self._work.said = f"not there yet: {what}"
             return
 
         def make(tell: Tell, show: Show) -> Any:

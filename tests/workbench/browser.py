@@ -126,11 +126,15 @@ class Browser:
         raise AssertionError(f"not within {seconds} s; the page shows: {self.text('.frame')}")
 
     def idle(self, seconds: float = 120.0) -> None:
-        """Until no fit is going on and there is a model."""
+        """Until no fit is going on and there is a model, and none begins within half a second."""
+        since = time.monotonic()
 
         def still() -> bool:
+            nonlocal since
             errors = self.text(".errors")
-            return bool(errors) and "..." not in errors and bool(self.js("return seen('.bar').length == 0"))
+            if not errors or "..." in errors or not self.js("return seen('.bar').length == 0"):
+                since = time.monotonic()
+            return time.monotonic() - since > 0.5
 
         self.wait(still, seconds)
 

@@ -101,6 +101,7 @@ def test_the_arrows_scroll_where_they_select_nothing(browser):
 
 def test_the_model_is_saved_listed_and_its_report_shown(browser, home):
     browser.tab("Keep")
+    browser.idle(200)  # until then there is no model to save, which the page says
     browser.wait(lambda: browser.js("return seen('button').some((e) => e.textContent.trim() === 'Save')"))
     _write(browser, "first", "../elsewhere")
     browser.press("button", "Save")
