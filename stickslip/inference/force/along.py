@@ -7,6 +7,7 @@ against the block along that motion.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -17,9 +18,10 @@ from numpy.typing import NDArray
 
 from ...physics.contact import Bank
 from ...physics.effects.base import Contact, Drive, Memory, Motion, Sensor
+from ...physics.effects.lag import slope
 from ...physics.model import Model, State
 
-PASSES = 4  # of undoing the sensor
+PASSES = 4  # of undoing a sensor by what it shows
 
 
 class Way(NamedTuple):
@@ -134,8 +136,9 @@ def turning(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float6
 def undone(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Way:
     """The motion of the block from that of the reading: the chain of sensor effects undone.
 
-    By van Cittert's iteration ``x <- x + (reading - sensor(x))``, which needs nothing but the sensor itself; it ends
-    for every filter that loses or delays less than it shows, after few passes where it changes little.
+    One after the other, the last one first: by the inverse that a sensor has of its own, or by van Cittert's iteration
+    ``x <- x + (reading - sensor(x))``, which needs nothing but the sensor itself; it ends for all that shows most of
+    what moves, after few passes where it changes little.
 
     Args:
         model: with effects on the sensor.
@@ -143,18 +146,34 @@ def undone(model: Model, way: Way, force: Array, knots: Array | int | None = Non
         force: that the contact holds at the knots (N), for sensors that see it, shape (n,).
         knots: number of those that count.
     """
-    if not any(isinstance(e, Sensor) for e in model.effects):
-        return way
-    seen = way.x
-    for _ in range(PASSES):
-        shift = way.x + (seen - read(model, way, force, knots)) - seen
-        way = way._replace(x=seen + shift, v=way.v + _slope(shift, way.t) - _slope(way.x - seen, way.t))
+    for sensor in reversed(chain(model)):
+        shown = way
+        before = sensor.undo(way.t, way.x, way.v)
+        if before is not None:
+            way = _moved(way, before - way.x)
+            continue
+        for _ in range(PASSES):
+            way = _moved(way, shown.x - read(model, way, force, knots, (sensor,)))
     return way
 
 
-def read(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Array:
-    """What the sensors show of a motion (m), shape (n,); arguments as of :func:`undone`, ``way`` that of the block."""
-    sensors: list[Any] = sorted((e for e in model.effects if isinstance(e, Sensor)), key=lambda e: e.place)
+def _moved(way: Way, further: Array) -> Way:
+    return way._replace(x=way.x + further, v=way.v + slope(further, way.t))
+
+
+def chain(model: Model) -> list[Any]:
+    """The effects on the sensor, in the order in which they act."""
+    return sorted((e for e in model.effects if isinstance(e, Sensor)), key=lambda e: e.place)
+
+
+def read(
+    model: Model, way: Way, force: Array, knots: Array | int | None = None, sensors: Sequence[Any] | None = None
+) -> Array:
+    """What sensors show of a motion (m), by default all of the model's, shape (n,).
+
+    Arguments as of :func:`undone`, ``way`` that of the block.
+    """
+    sensors = chain(model) if sensors is None else sensors
     bank = model.shaped()
     memory = tuple(e.start(bank) if isinstance(e, Memory) else () for e in sensors)
     zero, mass = jnp.zeros_like(bank.stiffness), model.mass()
@@ -176,11 +195,3 @@ def read(model: Model, way: Way, force: Array, knots: Array | int | None = None)
 
     last = way.t.size if knots is None else knots
     return jax.lax.fori_loop(1, last, step, (memory, way.x))[1]
-
-
-def _slope(y: Array, t: Array) -> Array:
-    """Rate of change at the knots by parabolas through three of them."""
-    dt, dy = jnp.diff(t), jnp.diff(y)
-    rate = dy / dt
-    inner = (rate[:-1] * dt[1:] + rate[1:] * dt[:-1]) / (dt[:-1] + dt[1:])
-    return jnp.concatenate([rate[:1], inner, rate[-1:]])

@@ -24,6 +24,11 @@ def kernels(half: float, rate: float) -> tuple[Array, Array, Array]:
     return phi, first / scale, second / scale**2
 
 
+def band(second: Array, rate: float) -> float:
+    """Angular frequency of what the second derivative of the test function leaves of white noise (rad/s)."""
+    return float(rate * np.sqrt((np.diff(second, prepend=0.0, append=0.0) ** 2).sum() / (second**2).sum()))
+
+
 def _matched(shape: Array, phi: Array, u: Array, order: int) -> Array:
     """A derivative of ``phi`` by its shape, with polynomials times ``phi`` added that make its moments those of it."""
     powers = [k for k in range(5) if k % 2 == order % 2]

@@ -17,7 +17,7 @@ from scipy.sparse import coo_array, csr_array
 
 from ...data.segment import Event, Segmentation
 from ...data.trace import Trace
-from .kernels import kernels
+from .kernels import band, kernels
 from .mains import hum
 from .reading import Reading
 from .sampling import even
@@ -64,6 +64,7 @@ class Knots:
         force: measured force at the knots where the motion is prescribed, else zero (N).
         load: measured normal load at the knots (N), NaN where there is none.
         force_noise: variance of the force at the points where that is measured by itself, else zero (N^2).
+        band: angular frequency of what the test function's second derivative leaves of white noise (rad/s).
         hum: what sine and cosine of the sensor's hum, each as large as is expected, add to the samples of each group
             (m), shape (g, 2).
     """
@@ -92,6 +93,7 @@ class Knots:
     force: Array
     load: Array
     force_noise: Array
+    band: float
     hum: Array
 
     @property
@@ -141,13 +143,13 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
         if end <= begin:
             continue
         onset = min(max(event.i_onset, begin), end)
-        pieces.windows(hasty(begin, onset, steady, noise, rate, h), e, t, x, d, compared=False)
+        pieces.windows(hasty(begin, onset, steady, noise, rate, h), e, t, x, d, speed)
         pieces.samples(thin(onset, end, event, times, rate, h), t, followed, speed, d, events, e)
         pieces.compare(begin + h, end - h, h, t, x, event, e, times, (phi, first, second), noise)
         edge = end
     if n - edge > 4 * h:
         last = len(events)
-        pieces.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, compared=False)
+        pieces.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, speed)
     return pieces.made(trace, t, x, (phi, first, second), events, noise, times, smoother)
 
 
@@ -181,17 +183,22 @@ class _Pieces:
         """Where the record begins."""
         self._add(t[:1], x[:1], np.zeros(1), d[:1], np.zeros(1, int), True, np.ones(1))
 
-    def windows(self, edges: Index, e: int, t: Array, x: Array, d: Array, compared: bool = True) -> None:
-        """Means over the windows between ``edges``."""
+    def windows(self, edges: Index, e: int, t: Array, x: Array, d: Array, speed: Array | None = None) -> None:
+        """Means over the windows between ``edges``; with the ``speed`` of every sample those that are not compared.
+
+        Where it creeps, the velocity is what the means beside one another say. Windows of a nucleation are so short
+        that the smoothed record knows it better.
+        """
         count = np.diff(edges)
         if count.size == 0 or edges[-1] <= edges[0]:
             return
         mean = [np.add.reduceat(y[: edges[-1]], edges[:-1]) / count for y in (t, x, d)]
-        index = self._add(
-            mean[0], mean[1], np.full(count.size, np.nan), mean[2], np.full(count.size, e), True, count.astype(float)
-        )
+        v = np.full(count.size, np.nan)
+        if speed is not None:
+            v = np.add.reduceat(speed[: edges[-1]], edges[:-1]) / count
+        index = self._add(mean[0], mean[1], v, mean[2], np.full(count.size, e), True, count.astype(float))
         self.window.append((index, edges))
-        if compared:
+        if speed is None:
             self.points.append(
                 {
                     "knot": index.astype(float), "at": mean[0], "count": count.astype(float),
@@ -245,7 +252,7 @@ class _Pieces:
         x = made_of @ seen
         v, slow = np.concatenate(self.v), np.concatenate(self.slow)
         slopes = np.gradient(x, knot_t)
-        v = np.where(slow, slopes, v)
+        v = np.where(np.isnan(v), slopes, v)
         inner = np.arange(2, v.size - 2)
         bends = np.zeros(v.size)
         bends[inner] = (v[inner + 2] - v[inner - 2]) / (knot_t[inner + 2] - knot_t[inner - 2])
@@ -314,7 +321,7 @@ class _Pieces:
             made["at"], phase, of, made["rate"], made["acceleration"], told,
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, begun), np.diff(begun),
             noise, trace.spring_stiffness, trace.virgin, np.zeros(knot_t.size), load_at(trace, knot_t),
-            np.zeros(of.size), told.sums(times.hum.at(t)),
+            np.zeros(of.size), band(second, rate), told.sums(times.hum.at(t)),
         )  # fmt: skip
         return selected(knots_made, keep)
 

@@ -135,7 +135,7 @@ def thinned(trace: Trace) -> Knots:
         rate[compared], bend[compared], reading,
         np.log1p(since / least) / np.log(4.0) + PLACED_APART * piece[compared], at[compared] - begins[of],
         np.diff(np.append(begins, t[-1])), noise, SOFT * stiffest, trace.virgin, knots_force,
-        load_at(trace, at) if trace.normal_load is None else means @ trace.normal_load, force_noise,
+        load_at(trace, at) if trace.normal_load is None else means @ trace.normal_load, force_noise, 0.0,
         np.zeros((reading.count.size, 2)),
     )  # fmt: skip
 

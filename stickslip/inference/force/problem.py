@@ -150,7 +150,8 @@ class Forces:
     an error of the motion does to them smaller too, and must not gain by it. Residuals, derivatives and stiffnesses are
     therefore taken over what a reading counts for in the model, times what it counts for as the rig is stated: the
     mass that moves where the block is fast, the stiffness of the spring where it creeps (what the contact holds there
-    grows as the spring's force does), and everywhere the displacement over what the sensor shows of it.
+    grows as the spring's force does), and everywhere the displacement over what the sensor shows of it: less where the
+    block is fast and the sensor late.
 
     Attributes:
         residual: measured force less the model's (N), shape (p,).
@@ -285,10 +286,11 @@ class Problem:
         return [Own(events[index, columns], (index >= 0).astype(float)) for index in self._events]
 
     def run_arguments(self, point: Point) -> list[tuple[Any, ...]]:
-        """Of every run: its own spring (N/m), way, number of knots, and what differs from event to event."""
+        """Of every run: its own spring (N/m), way, number of knots, band, and what differs from event to event."""
         springs = [np.float64(np.nan if k.stiffness is None else k.stiffness) for k in self.runs]
         knots = [np.int64(k.t.size) for k in self.runs]
-        return list(zip(springs, self.ways, knots, self.own(point), strict=True))
+        bands = [np.float64(k.band) for k in self.runs]
+        return list(zip(springs, self.ways, knots, bands, self.own(point), strict=True))
 
     def evaluate(self, point: Point) -> Slopes:
         """Residuals and derivatives."""
@@ -336,7 +338,8 @@ class Problem:
         p, kept = 0, []
         for r, (run, parts) in enumerate(zip(self.runs, found, strict=True)):
             n, s = run.t.size, slice(p, p + run.at.size)
-            q, shift, mass, slope, gain, dq, dshift, dmass, dslope, dgain, elements, tangent, *state = parts
+            q, shift, mass, slope, gain, late, *parts = parts
+            dq, dshift, dmass, dslope, dgain, dlate, elements, tangent, *state = parts
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             way = mean @ (run.x - run.x[0])
@@ -346,14 +349,15 @@ class Problem:
             spring = starts["rig.spring_stiffness"] if run.stiffness is None else run.stiffness
             steep = mean @ slope[:n] / (mean @ np.ones(n))
             read = not run.prescribed  # else a reading is told by itself, and the likelihood is that of the force
-            counts = gain * np.where(slow[s], steep / spring, mass / c.mass) if read else np.ones(run.at.size)
+            counts = gain * np.where(slow[s], steep / spring, late * mass / c.mass) if read else np.ones(run.at.size)
             share[s] = 1.0 / counts
             residual[s] = share[s] * (mean @ q[:n] - mass * acceleration - damping * rate - beside * way)
             moved = mean @ dq[:, :n].T - acceleration[:, None] * dmass
             if sensed:
                 moved = moved - mass * (second @ dshift[:, :n].T) - damping * (first @ dshift[:, :n].T)
                 moved = moved - beside * (mean @ dshift[:, :n].T)
-            grown = np.where(slow[s, None], (mean @ dslope[:, :n].T) / (mean @ slope[:n])[:, None], dmass / mass)
+            faster = dmass / mass + dlate / late
+            grown = np.where(slow[s, None], (mean @ dslope[:, :n].T) / (mean @ slope[:n])[:, None], faster)
             moved = share[s, None] * moved - read * residual[s, None] * (grown + dgain / gain)
             local[s] = moved[:, -OWN:]
             if whole:
@@ -440,7 +444,7 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
 
     def forces(
         z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, spring: Any,
-        way: Way, knots: Any,
+        way: Way, knots: Any, band: Any,
     ) -> Any:  # fmt: skip
         si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
         values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
@@ -448,11 +452,17 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
             stiffness = jnp.where(jnp.isnan(spring), values["rig.spring_stiffness"], spring)
             way = way._replace(drive=way.drive + values[PULL] / stiffness)
         model = model_of(values, effects, Bank(weights / reach, weights), spring)
-        seen = way
+        seen, late = way, jnp.ones(())
         if any(isinstance(e, Sensor) for e in effects):
             # the measured force, near enough for a sensor that sees it
             force = model.block.spring_stiffness * (way.drive - way.x) + way.force
-            seen = undone(model, way, force, knots)
+
+            def before(rate: Any) -> Way:
+                return undone(model, way._replace(v=rate), force, knots)
+
+            # what a reading that is late is taken ahead by is its rate's, and the faster the larger
+            seen, ahead = jax.jvp(before, (way.v,), (jnp.ones_like(way.v),))
+            late = jnp.sqrt(1.0 + (band * jnp.sum(ahead.x) / way.x.size) ** 2)
         shift = seen.x - way.x
         held = along(model, of_events(seen, event), knots)
         steep = jax.vmap(jax.grad(model.pull))(lead(model, way.t, way.drive) - seen.x)
@@ -460,19 +470,19 @@ def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
         steps = jnp.diff(way.x)
         gain = 1.0 + jnp.sum(steps * jnp.diff(shift)) / jnp.sum(steps**2)
         return (
-            (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, gain),
+            (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, gain, late),
             (held.elements, held.tangent, held.slides, held.sliding, held.psi),
         )
 
     def derived(
         z: Any, turn: Any, scales: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any, spring: Any,
-        way: Way, knots: Any, own: Own,
+        way: Way, knots: Any, band: Any, own: Own,
     ) -> Any:  # fmt: skip
         effects = jax.tree.unflatten(structure, leaves)
 
         def moved(row: Any) -> Any:
             def f(z: Any, turn: Any, event: Any) -> Any:
-                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots)
+                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots, band)
 
             # all events are moved at once: each acts on its own points only
             step = own.moves * row[a + b :]

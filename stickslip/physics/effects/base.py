@@ -233,6 +233,18 @@ class Sensor(Effect):
     def read(self, state: Any, reading: Array, motion: Motion, contact_force: Array) -> Array:
         """Reading (m) made of the ``reading`` of the sensors before it (m) and the contact's force (N)."""
 
+    def undo(self, t: Array, shown: Array, rate: Array) -> Array | None:
+        """What is read (m) before this sensor, shape (n,), or None for what a few passes of :meth:`read` tell of it.
+
+        To be overridden by a filter that loses or delays much of what it is to show.
+
+        Args:
+            t: time at the knots (s), shape (n,), which may lie close together.
+            shown: what is read after it (m).
+            rate: of that (m/s), smoothed.
+        """
+        return None
+
     def rising(self, state: Any, rate: Array) -> Array:
         """A number of the sign of the reading's rate, made of that of the sensors before it (at first the velocity).
 

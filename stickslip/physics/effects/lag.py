@@ -1,4 +1,4 @@
-"""First-order filters over an increment, exact for a displacement that is a parabola in time."""
+"""First-order filters, exact over an increment for a displacement that is a parabola in time, and rates at knots."""
 
 from __future__ import annotations
 
@@ -42,6 +42,13 @@ def trail(value: Array, time_constant: Array, motion: Motion) -> Array:
     ahead = time_constant * (start - time_constant * acceleration)
     behind = time_constant * (motion.v - time_constant * acceleration)
     return behind + (value - ahead) * fade
+
+
+def slope(y: Array, t: Array) -> Array:
+    """Rate of change at the knots, by chords from each one's neighbours: noise counts little where knots lie close."""
+    behind, ahead = jnp.minimum(jnp.arange(y.size), 1), jnp.minimum(jnp.arange(y.size)[::-1], 1)
+    i = jnp.arange(y.size)
+    return (y[i + ahead] - y[i - behind]) / (t[i + ahead] - t[i - behind])
 
 
 def _phi(z: Array) -> tuple[Array, Array, Array]:

@@ -53,3 +53,6 @@ class SensorLowPass(Memory, Sensor):
 
     def read(self, state: Array, reading: Array, motion: Motion, contact_force: Array) -> Array:
         return reading - state
+
+    def undo(self, t: Array, shown: Array, rate: Array) -> Array:
+        return shown + self.time_constant * rate
