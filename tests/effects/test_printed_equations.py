@@ -54,7 +54,7 @@ TOLD: dict[tuple[str, ...], tuple[str, ...]] = {
     ("position-dependent-friction", "trend"): ("μ e^(ε x/λ)", "¬sin"),
     ("rate-and-state", "ageing"): ("a ln(V/v^*) + b ln(v^* θ/L)", "V = |x'| + v^*", "θ' = 1 - V θ/L"),
     ("rate-and-state", "slip"): ("a ln(V/v^*) + b ln(v^* θ/L)", "V = |x'| + v^*", "θ' = -(V θ/L) ln(V θ/L)"),
-    ("residual-load",): ("f_i' + f_i ln(1-ε) max(-q', 0)", "q' = |x'| (1-q)/l - q/τ_a"),
+    ("residual-load",): ("f_i' + f_i ln(1-ε) max(-q', 0)", "q' = |x'| (1-q)/l - s q/τ_a"),
     ("roll-off",): ("(1-ε) u_i - ε F_s/k ln Q_i",),
     ("sensor-drift",): ("y → y + ε t",),
     ("sensor-gain",): ("y → (1 + γ) y",),

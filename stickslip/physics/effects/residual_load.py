@@ -22,19 +22,19 @@ class Mobility(NamedTuple):
 
 @register
 class ResidualLoad(Memory, Flow):
-    """A fast slip sets the contacts in motion (over a slip length); as they settle they shed load.
+    """A slip sets the contacts in motion (over a slip length); as they stick again they settle and shed load.
 
-    The forces fall by exp(-lambda) per unit of mobility lost, with exp(-lambda) = 1 - eps: after a slip much faster
-    than length/time all elements keep the share 1 - eps. Creep and steady sliding shed nothing.
+    The forces fall by exp(-lambda) per unit of mobility lost, with exp(-lambda) = 1 - eps: after a slip much longer
+    than the length all elements keep the share 1 - eps. Creep to a slip and sliding shed nothing.
     """
 
     tag = "residual-load"
     summary = "contacts keep only part of their tangential load when a slip comes to rest"
     equation = (
         r"\dot f_i \to \dot f_i + f_i\,\ln(1-\varepsilon)\,\max(-\dot q, 0),"
-        r"\quad \dot q = |\dot x|\,(1-q)/\ell - q/\tau_a,\quad q(0) = 0"
+        r"\quad \dot q = |\dot x|\,(1-q)/\ell - s\,q/\tau_a,\quad q(0) = 0"
     )
-    symbols = {"q": "mobility of the contacts, 0 at rest and 1 in a fast slip"}
+    symbols = {"q": "mobility of the contacts, 0 at rest and 1 in a slip", "s": "share of the strength that sticks"}
     signature = "creep of all events after the first grows towards that of a virgin contact; rebound and ringing change"
     confused_with = {
         "sensor-low-pass": "lift the block off before an event: the virgin creep is known then",
@@ -59,7 +59,7 @@ class ResidualLoad(Memory, Flow):
         1e-6, unit="m", lower=1e-8, upper=1e-4, log=True, symbol=r"\ell", doc="slip that sets the contacts in motion"
     )
     settling_time: Array = parameter(
-        1e-3, unit="s", lower=1e-4, upper=0.1, log=True, symbol=r"\tau_a", doc="time in which they come to rest"
+        1e-3, unit="s", lower=1e-5, upper=0.1, log=True, symbol=r"\tau_a", doc="time in which they come to rest"
     )
 
     def start(self, bank: Bank) -> Mobility:
@@ -67,7 +67,9 @@ class ResidualLoad(Memory, Flow):
 
     def advance(self, state: Mobility, motion: Motion, contact: Contact) -> Mobility:
         # the part at rest, 1 - q, is what relaxes with slip and grows with time
-        rate = 1.0 / self.settling_time
+        trial = jnp.abs(contact.force + contact.stiffness * motion.dx)
+        sticks = trial <= contact.cap * (1.0 + 1e-12)
+        rate = jnp.sum(jnp.where(sticks, contact.strength, 0.0)) / jnp.sum(contact.strength) / self.settling_time
         moving = 1.0 - motion.relax(1.0 - state.moving, rate, rate, 1.0 / self.slip_length)
         return Mobility(moving, jnp.maximum(state.moving - moving, 0.0))
 
