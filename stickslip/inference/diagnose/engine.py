@@ -342,7 +342,7 @@ def foretells(before: Fit, after: Fit) -> bool:
 def without(base: Fit, tag: str) -> Fit:
     """The model without one of its effects, fitted anew with what is random."""
     problem, point = _taken_out(base, tag)
-    return fit(problem, point, Scatter(base.scatter.sizes), dropped=base.dropped, first=True)
+    return fit(problem, point, Scatter(base.scatter.sizes), first=True)
 
 
 def _taken_out(base: Fit, tag: str) -> tuple[Problem, Point]:
@@ -390,15 +390,18 @@ def one_round(
 
 
 def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: str = "round") -> Fit:
-    """The model with an effect, what is random estimated anew, and the deviations of its effects' amplitudes."""
+    """The model with an effect, fitted as the base was, and the deviations of its effects' amplitudes.
+
+    What lies far off is found anew too: outliers of a model that lacks an effect are others than those of one that has
+    it, and a few that are left in hold all parameters where they are least far off.
+    """
     found = candidate.fit
     assert found is not None
     key = f"{name}-settled-{name_of(candidate.tag, candidate.form)}"
     amplitudes = [f.name for f in found.free if f.amplitude]
 
     def made() -> Fit:
-        sizes = found.scatter.within(base.scatter)
-        again = fit(found.problem, found.point, sizes, dropped=base.dropped, first=True)
+        again = fit(found.problem, found.point, Scatter.wide().within(base.scatter))
         return widened(again, amplitudes, DISPERSION)
 
     return kept(store, key, found.problem, made)

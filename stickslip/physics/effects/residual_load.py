@@ -59,7 +59,15 @@ class ResidualLoad(Memory, Flow):
         1e-6, unit="m", lower=1e-8, upper=1e-4, log=True, symbol=r"\ell", doc="slip that sets the contacts in motion"
     )
     settling_time: Array = parameter(
-        1e-3, unit="s", lower=1e-5, upper=0.1, log=True, symbol=r"\tau_a", doc="time in which they come to rest"
+        1e-3,
+        unit="s",
+        lower=1e-5,
+        upper=0.1,
+        log=True,
+        grid=(2e-5, 2e-4, 2e-3),
+        symbol=r"\tau_a",
+        doc="time in which they come to rest",
+        ends=(1e-5,),
     )
 
     def start(self, bank: Bank) -> Mobility:
