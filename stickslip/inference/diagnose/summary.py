@@ -342,11 +342,12 @@ def parameters(fit: Fit, found: Fitted) -> dict[str, dict[str, Any]]:
             continue
         low, high = f.bounds
         note = ""
-        if np.isfinite([low, high]).all() and min(z - low, high - z) < 1e-3 * (high - low):
+        left, unsure = min(z - low, high - z), std[f.name] / abs(f.slope(float(z)))
+        if np.isfinite([low, high]).all() and left < 1e-3 * (high - low) and left <= unsure:
             note = "at its bound"
         elif f.name.startswith("contact.") and f.name != "contact.strength":
             note = "of the law fitted to the measured backbone"
-        elif np.isfinite(f.width) and std[f.name] > 0.8 * f.width * abs(f.slope(float(z))):
+        elif np.isfinite(f.width) and unsure > 0.8 * f.width:
             note = "not determined by the data: this is its prior"
         note = "; ".join(filter(None, [note, f.unusual(values[f.name], std[f.name])]))
         out[f.name] = {"value": values[f.name], "std": std[f.name], "unit": f.unit, "doc": f.doc, "note": note}
