@@ -18,7 +18,7 @@ SAME = (
 )
 
 
-def told(compared: Sequence[Compared], back: bool) -> dict[str, Any]:
+def told(compared: Sequence[Compared], back: bool, each: str = "slip") -> dict[str, Any]:
     """What the levels follow.
 
     Laws are weighed by Akaike's weights (Burnham & Anderson 2002). A coordinate is named if laws that have it hold 95 %
@@ -27,6 +27,7 @@ def told(compared: Sequence[Compared], back: bool) -> dict[str, Any]:
     Args:
         compared: laws with the best first.
         back: whether the block goes back over the same track.
+        each: what has a level.
 
     Returns:
         ``coordinate`` (names joined by " and ", "nothing" for scatter alone, or "" where it cannot be told),
@@ -49,8 +50,8 @@ def told(compared: Sequence[Compared], back: bool) -> dict[str, Any]:
         errors[c] = standard_error(difference) if difference.size > 1 else float("nan")
     named = [c for c in names if weights[c] >= SURE and not gains[c] < 0.0]
     numbers = "; ".join(
-        f"{c}: weight {weights[c]:.2f}, the later slips predicted {abs(gains[c]):.3f} (+-{errors[c]:.3f}) nats a slip "
-        f"{'better' if gains[c] >= 0 else 'worse'} than without it"
+        f"{c}: weight {weights[c]:.2f}, the later {each}s predicted {abs(gains[c]):.3f} (+-{errors[c]:.3f}) nats a "
+        f"{each} {'better' if gains[c] >= 0 else 'worse'} than without it"
         for c in sorted(names, key=lambda c: -weights[c])
     )
     if nothing >= SURE:
