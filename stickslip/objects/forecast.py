@@ -13,6 +13,7 @@ from ..errors import InputError, nearest
 from ..inference.forecast.levels import levels, wandering
 from ..inference.forecast.predict import METHODS, Compared, Forecaster, compare, goes_back, training_slips
 from ..inference.forecast.rolling import SHARES, Rolled, choose, prepare, roll
+from ..inference.forecast.scoring import quantiles
 from ..inference.forecast.strokes import Strokes
 from ..inference.forecast.telling import told
 from ..inference.forecast.wander import Wander
@@ -92,7 +93,7 @@ class Forecast(Shown):
             "moment": ("forecast", past.trace.time[rolled.sample], {"units": "s"}),
             "truth": ("forecast", rolled.truth, {"units": "s"}),
             "next_slip": ("forecast", rolled.slip + 1, {"units": "1"}),
-            "quantile_times": (("forecast", "share"), np.quantile(own, QUANTILES, axis=1).T, {"units": "s"}),
+            "quantile_times": (("forecast", "share"), quantiles(np.array(own), QUANTILES).T, {"units": "s"}),
             "pit": (("forecaster", "forecast"), np.array(pit), {"units": "1"}),
             "coordinates": {
                 "slip_number": np.arange(1, len(past.events) + 1),
@@ -306,7 +307,7 @@ def _next(past: Past, law: Wander, rise: bool) -> dict[str, float] | None:
     found = Forecaster(past, law, rise).at(past.trace.time.size - 1)
     if found is None:
         return None
-    return {f"{q:g}": float(v) for q, v in zip(QUANTILES, np.quantile(found[METHODS[0]], QUANTILES), strict=True)}
+    return {f"{q:g}": float(v) for q, v in zip(QUANTILES, quantiles(found[METHODS[0]], QUANTILES), strict=True)}
 
 
 def _notes(past: Past, at: float | None, law: Wander, rise: bool) -> list[str]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import stickslip as ss
 from stickslip.data.segment import segment
-from stickslip.effects import make
+from stickslip.effects import Motion, make
 from stickslip.errors import InputError
 from stickslip.inference.force.candidates import every_form
 from stickslip.inference.forecast.levels import level_arrays
@@ -17,7 +18,7 @@ from stickslip.inference.forecast.wander import Component, covariance, fit
 from stickslip.simulation.scenario import load_scenario
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-SIZE, LENGTH = 0.1, 300e-6
+SIZE, LENGTH, TIME = 0.1, 300e-6, 7.0  # 1, m, s
 
 
 def test_a_course_has_the_covariance_of_the_process():
@@ -45,11 +46,39 @@ def test_its_course_is_no_law_to_fit():
         ss.load_campaign(SCENARIOS / "hidden-effect" / "campaign.toml").fit(["wandering-friction"])
 
 
-def test_what_is_simulated_is_found_in_the_levels_of_the_slips(tmp_path):
+def test_every_form_goes_with_its_own():
+    """There, a rest, and back over the same places: what place, way and time have become, and what the level is."""
+    step = 20e-6
+    steps = np.concatenate([np.full(30, step), np.zeros(20), np.full(30, -step)])
+    x, t = np.cumsum(steps), 0.5 * np.arange(1, steps.size + 1)
+    where = {"place": x / LENGTH, "slip": np.cumsum(np.abs(steps)) / LENGTH, "time": t / TIME}
+    zero = jnp.zeros(())
+    found = {}
+    for along, s in where.items():
+        effect = make("wandering-friction", size=SIZE, length=LENGTH, time=TIME, draw=2, along=along)
+        assert effect.along == along
+        state, levels = effect.start(None), []
+        for dx, at, when in zip(steps, x, t, strict=True):
+            motion = Motion(jnp.asarray(when), jnp.asarray(0.5), jnp.asarray(at), zero, zero, jnp.asarray(dx), zero)
+            state = effect.advance(state, motion, None)
+            levels.append(float(effect.strength(state, motion, None)))
+        np.testing.assert_allclose(levels, np.exp(SIZE * np.asarray(effect.course(s))), rtol=1e-9)
+        found[along] = np.array(levels)
+    there, back = slice(0, 29), slice(50, 79)
+    np.testing.assert_allclose(found["place"][there], found["place"][back][::-1], rtol=1e-9)
+    assert np.abs(found["slip"][there] - found["slip"][back][::-1]).max() > 0.05
+    for form in ("place", "slip"):  # nothing changes at rest
+        assert np.ptp(found[form][30:50]) == 0.0
+    assert np.ptp(found["time"][30:50]) > 0.01
+
+
+@pytest.mark.parametrize(("along", "coordinate"), [("place", "place"), ("slip", "slip path"), ("time", "time")])
+def test_what_is_simulated_is_found_in_the_levels_of_the_slips(tmp_path, along, coordinate):
     """Size and length of the wander from the forces at onset and arrest, by the forecast's law."""
     text = (SCENARIOS / "paper_slider.toml").read_text(encoding="utf-8")
     before, after = text.index("[[effect]]"), text.index("[sensor]")
-    own = f'[[effect]]\ntype = "wandering-friction"\nsize = {SIZE}\nlength = "300 um"\ndraw = 3\n\n'
+    own = f'[[effect]]\ntype = "wandering-friction"\nalong = "{along}"\nsize = {SIZE}\nlength = "300 um"\n'
+    own += f'time = "{TIME} s"\ndraw = 3\n\n'
     path = tmp_path / "wander.toml"
     path.write_text((text[:before] + own + text[after:]).replace('"40 s"', '"250 s"'), encoding="utf-8")
     data = ss.simulate(load_scenario(path))
@@ -59,11 +88,15 @@ def test_what_is_simulated_is_found_in_the_levels_of_the_slips(tmp_path):
     found = segment(trace)
     levels = level_arrays(found.events, 168.0, lambda t: 42e-6 * t)
     assert levels["onset"].std() > 0.05 * levels["onset"].mean()
-    law = fit(levels, (Component("matern-3/2", "place"),))
+    law = fit(levels, (Component("matern-3/2", coordinate),))
     (wander,) = law.components
     std = dict(zip(("size", "ratio", "length"), law.std, strict=False))
     strength = 0.32 * 0.301  # N
+    true = TIME if along == "time" else LENGTH
     assert abs(np.log(wander.size[0] / (SIZE * strength))) < 3.0 * std["size"] < 0.6
-    assert abs(np.log(wander.length / LENGTH)) < 3.0 * std["length"] < 0.9
+    assert abs(np.log(wander.length / true)) < 3.0 * std["length"] < 0.9
     assert wander.size[0] > 5.0 * law.scatter[0]  # nothing else makes slips differ
     assert fit(levels, ()).aic - law.aic > 50.0
+    # a block that never goes back does not tell place from slip path; time it does
+    other = "slip path" if along == "time" else "time"
+    assert fit(levels, (Component("matern-3/2", other),)).aic - law.aic > 50.0

@@ -22,6 +22,7 @@ import pandas
 import stickslip as ss
 from stickslip.inference.forecast.predict import METHODS, Forecaster
 from stickslip.inference.forecast.rolling import prepare, roll
+from stickslip.inference.forecast.scoring import quantiles
 from stickslip.inference.forecast.wander import Wander
 from stickslip.objects import Forecast
 from stickslip.show.plots import save
@@ -136,8 +137,8 @@ def picture(slider: Forecast, fault: Forecast) -> Any:
     for i in shown.tolist():
         begun = np.searchsorted(onsets, t[i]) != np.sum(past.known <= t[i])
         told = None if begun else forecaster.at(i)
-        quantiles = np.full(3, np.nan) if told is None else np.quantile(told[METHODS[0]], [0.05, 0.5, 0.95])
-        rows.append([t[i] - past.split, onsets[np.searchsorted(onsets, t[i])] - t[i], *quantiles])
+        band = np.full(3, np.nan) if told is None else quantiles(told[METHODS[0]], [0.05, 0.5, 0.95])
+        rows.append([t[i] - past.split, onsets[np.searchsorted(onsets, t[i])] - t[i], *band])
     r = np.array(rows)
     beside.fill_between(r[:, 0], r[:, 2], r[:, 4], color=LIGHT, alpha=0.6, lw=0, label="90 % interval")
     beside.plot(r[:, 0], r[:, 3], color=MIDDLE, lw=1.4, label="median")

@@ -15,7 +15,7 @@ from stickslip.errors import InputError
 from stickslip.inference.forecast.past import Past
 from stickslip.inference.forecast.predict import MEMBERS, Forecaster, times, waiting
 from stickslip.inference.forecast.rolling import choose, moments, prepare, roll
-from stickslip.inference.forecast.scoring import crps, score, standard_error
+from stickslip.inference.forecast.scoring import crps, quantiles, score, standard_error
 from stickslip.system.runstore import read_result
 
 from .synthetic import LAW, SPEED, STIFFNESS, record
@@ -40,6 +40,14 @@ def test_the_score_of_many_members_is_the_normal_laws():
     for z in (-1.5, 0.0, 0.7):
         closed = z * (2 * norm.cdf(z) - 1) + 2 * norm.pdf(z) - 1 / np.sqrt(np.pi)
         assert crps(middle, z) == pytest.approx(closed, abs=1e-3)
+
+
+def test_quantiles_of_an_ensemble_are_those_of_the_distribution_it_stands_for():
+    for m in (20, 100):
+        members = norm.ppf((np.arange(m) + 0.5) / m)
+        found = quantiles(members, [0.05, 0.25, 0.5, 0.75, 0.95])
+        # the interval that is called one of 90 % holds 90 %
+        np.testing.assert_allclose(norm.cdf(found), [0.05, 0.25, 0.5, 0.75, 0.95], atol=2e-3)
 
 
 def test_coverage_errors_and_standard_errors():

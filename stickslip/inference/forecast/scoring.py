@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,18 @@ def crps(members: Array, truth: float) -> float:
     return float(np.mean(np.abs(x - truth)) - np.dot(rank, x) / m**2)
 
 
+def quantiles(members: Array, shares: Sequence[float]) -> Array:
+    """Quantiles of an ensemble whose m members stand for equal parts of a distribution, each for its middle (Hazen).
+
+    Args:
+        members: equally likely values along the last axis. shares: of the distribution, shape (q,).
+
+    Returns:
+        Shape (q, ...).
+    """
+    return np.asarray(np.quantile(members, shares, axis=-1, method="hazen"))
+
+
 def score(forecasts: list[Array], truths: Array, groups: NDArray[np.intp] | None = None) -> dict[str, float]:
     """Scores of a method over many moments.
 
@@ -40,7 +52,7 @@ def score(forecasts: list[Array], truths: Array, groups: NDArray[np.intp] | None
         all truths).
     """
     each = np.array([crps(m, t) for m, t in zip(forecasts, truths, strict=True)])
-    edges = np.array([np.quantile(m, [0.05, 0.25, 0.5, 0.75, 0.95]) for m in forecasts])
+    edges = np.array([quantiles(m, [0.05, 0.25, 0.5, 0.75, 0.95]) for m in forecasts])
     means = np.array([m.mean() for m in forecasts])
     rest = float(np.sum((truths - truths.mean()) ** 2))
     return {

@@ -1,0 +1,103 @@
+"""Forecasts of simulated slips whose friction wanders by the catalogue's law: are their intervals right?
+
+    python -m tests.forecast.simulated
+
+Writes docs/results/calibration.json and docs/figures/forecast-calibration.png, for docs/forecast.md.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import stickslip as ss
+from stickslip.data.trace import Trace
+from stickslip.inference.forecast.predict import METHODS
+from stickslip.inference.forecast.rolling import Rolled, choose, prepare, roll
+from stickslip.inference.forecast.scoring import quantiles
+from stickslip.inference.forecast.wander import Wander
+from stickslip.show.plots import save
+from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, styled
+from stickslip.simulation.scenario import load_scenario
+
+ROOT = Path(__file__).parents[2]
+FORMS = {"place": 'length = "300 um"', "slip": 'length = "300 um"', "time": 'time = "30 s"'}
+SECONDS, TRAIN, SIZE, DRAW = 5000, 0.3, 0.1, 3
+SHARES = np.arange(0.1, 0.95, 0.1)
+
+
+def record(along: str, seconds: float = SECONDS, draw: float = DRAW) -> Trace:
+    """The paper slider of the scenarios without ripple of its drive, its friction wandering; as a sensor reads it."""
+    text = (ROOT / "scenarios" / "paper_slider.toml").read_text(encoding="utf-8")
+    before, after = text.index("[[effect]]"), text.index("[sensor]")
+    effect = (
+        f'[[effect]]\ntype = "wandering-friction"\nalong = "{along}"\nsize = {SIZE}\n{FORMS[along]}\ndraw = {draw}\n\n'
+    )
+    text = text[:before] + effect + text[after:]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "wander.toml"
+        path.write_text(text.replace('"40 s"', f'"{seconds:g} s"').replace('"2 kHz"', '"500 Hz"'), encoding="utf-8")
+        data = ss.simulate(load_scenario(path))
+    return Trace.from_arrays(
+        along, time=data.time.values, displacement=data.reading.values, drive_velocity="42 um/s",
+        spring_stiffness=168.0,
+    )  # fmt: skip
+
+
+def forecasts(trace: Trace) -> tuple[Wander, Rolled]:
+    """As the command makes them: law and use of the rise of late from the first part, forecasts all along the rest."""
+    past, laws = prepare(trace, TRAIN)
+    law, rise = choose(past, laws)
+    return law, roll(past, law, rise=rise)
+
+
+def held(found: Rolled) -> list[float]:
+    """Share of what came within central intervals of :data:`SHARES`."""
+    edges = quantiles(np.array(found.members[METHODS[0]]), [*(0.5 - 0.5 * SHARES), *(0.5 + 0.5 * SHARES)])
+    low, high = edges[: SHARES.size], edges[SHARES.size :]
+    return [float(v) for v in np.mean((found.truth >= low) & (found.truth <= high), axis=1)]
+
+
+@styled
+def picture(rows: dict[str, dict[str, Any]]) -> Any:
+    """Share of what came within intervals, less the share that they are called by."""
+    made, axes = figure(1, 1, width=6.0, height=3.6)
+    ax = axes[0, 0]
+    ax.axhspan(-3.0, 3.0, color=LIGHT, alpha=0.3, lw=0, label="aim")
+    ax.axhline(0.0, color=DARK, lw=0.8)
+    for (along, row), mark, color in zip(rows.items(), "os^", (DARK, MIDDLE, LIGHT), strict=True):
+        off = 100.0 * (np.array(row["held"]) - SHARES)
+        error = 100.0 * np.sqrt(SHARES * (1.0 - SHARES) / row["slips"])
+        ax.errorbar(100.0 * SHARES, off, error, marker=mark, ms=4, lw=1.0, color=color, label=f"wanders along {along}")
+    ax.set(xlabel="central interval / %", ylabel="what came within it, less that / %", ylim=(-8.0, 8.0))
+    ax.legend(fontsize="x-small", ncols=2)
+    return made
+
+
+def main() -> None:
+    rows: dict[str, dict[str, Any]] = {}
+    for along in FORMS:
+        law, found = forecasts(record(along))
+        scores = found.score()
+        rows[along] = {
+            "slips": int(np.unique(found.slip).size), "forecasts": int(found.truth.size), "law": str(law),
+            "held": held(found), **scores[METHODS[0]], "crps_mean_recurrence": scores["mean recurrence"]["crps"],
+        }  # fmt: skip
+        print(along, rows[along], flush=True)
+    head = {
+        "version": ss.__version__,
+        "date": date.today().isoformat(),
+        "command": "python -m tests.forecast.simulated",
+    }
+    text = json.dumps({**head, "size": SIZE, "seconds": SECONDS, "train": TRAIN, "records": rows}, indent=1)
+    (ROOT / "docs" / "results" / "calibration.json").write_text(text + "\n", encoding="utf-8")
+    save(picture(rows), ROOT / "docs" / "figures" / "forecast-calibration.png", dpi=90)
+
+
+if __name__ == "__main__":
+    main()
