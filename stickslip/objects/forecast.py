@@ -216,7 +216,7 @@ def wander(campaign: Campaign) -> dict[str, Any] | None:
 
 def _of_strokes(campaign: Campaign) -> dict[str, Any] | None:
     """The same of a run whose motion is prescribed."""
-    given = [with_motion(t) for t, s in zip(campaign.traces, campaign.events, strict=True) if prescribed(t, s)]
+    given = [with_motion(t) for t, s in zip(campaign.displaced[0], campaign.events, strict=True) if prescribed(t, s)]
     every = [(t.name, found) for t in given if (found := Strokes.of(t)) is not None]
     name, found = max(every, key=lambda one: one[1].time.size, default=("", None))
     if found is None or found.time.size < MANY:

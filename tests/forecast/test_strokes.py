@@ -87,3 +87,19 @@ def test_strokes_that_share_no_place_have_no_level():
     stuck = loops(40, lambda *_: 100.0)  # never slides
     found = wander(ss.Campaign.from_traces([stuck]))
     assert found is None
+
+
+def test_a_motion_read_as_a_velocity_or_as_the_stage_serves_as_well():
+    trace = loops(60, lambda place, path, time: LEVEL * (1.0 + 1e-4 * time))
+    x = trace.displacement
+    told = wander(ss.Campaign.from_traces([trace]))
+    stage = ss.Trace.from_arrays("loops", time=trace.time, drive_position=x, spring_force=trace.spring_force)
+    speed = np.gradient(x, trace.time)
+    read = ss.Trace.from_arrays("loops", time=trace.time, velocity=speed, spring_force=trace.spring_force)
+    assert told is not None
+    for other in (stage, read):
+        found = wander(ss.Campaign.from_traces([other]))
+        assert found is not None
+        assert found["shares"]["from stroke to stroke"] == pytest.approx(
+            told["shares"]["from stroke to stroke"], abs=0.02
+        )
