@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from stickslip.data.campaign import load_campaign, load_traces
-from stickslip.data.prescribed import prescribed
+from stickslip.data.prescribed import prescribed, with_motion
 from stickslip.data.readers import read_columns
 from stickslip.data.segment import segment
 from stickslip.errors import InputError
+from stickslip.inference.forecast.strokes import Strokes
 
 CAMPAIGNS = Path(__file__).parents[2] / "scenarios" / "real"
 
@@ -118,6 +119,17 @@ def test_reciprocating_loops(load, shipped):
     assert found.events == ()
     long = [phase for phase in found.during("hold") if phase.stop - phase.start > 0.8]
     assert 98 <= len(long) <= 102
+
+
+def test_the_level_of_the_loops_changes_from_stroke_to_stroke(shipped):
+    """The strokes' friction rises by some five per cent over the record, at the same places."""
+    (trace,) = shipped("reciprocating-loops-whole", "reciprocating-loops-200Hz")
+    found = Strokes.of(with_motion(trace))
+    assert found is not None and found.time.size > 80
+    assert found.shares["from stroke to stroke"] > 0.5 > 2.0 * found.shares["by the place"]
+    assert 40e-6 < np.ptp(found.place) < 80e-6  # of a stroke of 240 um, less twice 56 um and the contact's loading
+    early, late = found.level[:30].mean(), found.level[-30:].mean()
+    assert late / early == pytest.approx(1.04, abs=0.02)
 
 
 def test_robot_ramps(shipped):
