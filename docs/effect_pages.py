@@ -72,7 +72,9 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         *_numbers(numbers),
         "In a scenario file:",
         "```toml\n" + _entry(cls) + "\n```",
-        "What a measurement says of it is [told by a diagnosis and by a forecast](../forecast.md)."
+        f"No fit takes it up (`stickslip fit --add {cls.tag}` says so): its course is a draw at random, and another "
+        "draw is another course. What a measurement says of it, how large it is and what it follows, is "
+        "[told by a diagnosis and by a forecast](../forecast.md)."
         if cls.drawn
         else f"The same in a fit: `stickslip fit campaign.toml --add {cls.tag}`.",
         "## In a measurement",

@@ -74,7 +74,7 @@ def picture(rows: dict[str, dict[str, Any]]) -> Any:
         off = 100.0 * (np.array(row["held"]) - SHARES)
         error = 100.0 * np.sqrt(SHARES * (1.0 - SHARES) / row["slips"])
         ax.errorbar(100.0 * SHARES, off, error, marker=mark, ms=4, lw=1.0, color=color, label=f"wanders along {along}")
-    ax.set(xlabel="central interval / %", ylabel="what came within it, less that / %", ylim=(-8.0, 8.0))
+    ax.set(xlabel="central interval / %", ylabel="what came within it, less that / %", ylim=(-10.0, 10.0))
     ax.legend(fontsize="x-small", ncols=2)
     return made
 
