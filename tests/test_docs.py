@@ -91,6 +91,7 @@ def test_every_effect_has_its_page(pages: ModuleType, written: Path, tag: str) -
     assert f"({tag}.png)" in text and (written / f"{tag}.png").exists()
     assert "**Acts on** the" in text or "**Acts on** what" in text
     assert "## Source" in text
+    assert (f"`stickslip fit --add {tag}` says so" in text) == cls.drawn
     assert f"({tag}.md)" in (written / "index.md").read_text(encoding="utf-8")
 
 
@@ -222,7 +223,8 @@ def test_the_table_of_rates_has_the_parts_that_are_measured(tables: ModuleType) 
 
 
 def test_every_picture_has_a_script() -> None:
-    files = [*DOCS.glob("*.py"), *ROOT.glob("tests/*/real.py")]
+    own = [ROOT / "tests" / "forecast" / f"{name}.py" for name in ("real", "simulated")]
+    files = [*DOCS.glob("*.py"), *DOCS.glob("*/*.py"), *own]
     scripts = "\n".join(path.read_text(encoding="utf-8") for path in files)
     pictures = [p for folder in ("images", "paper", "figures", "verification") for p in (DOCS / folder).glob("*.png")]
     assert pictures
