@@ -19,7 +19,8 @@ from ..system.units import to_si
 from . import show
 
 if TYPE_CHECKING:
-    from ..objects import Fit, StaticFit
+    from ..objects.fit import Fit
+    from ..objects.static_fit import StaticFit
 
 _BETWEEN = re.compile(r"(?<=\.) (?=[A-Z])")  # sentences
 
@@ -74,7 +75,7 @@ def fit(
     force:
         Replace an existing run folder.
     """
-    from ..objects import load_campaign
+    from ..objects.campaign import load_campaign
     from ..objects.fit import fit as fit_dynamic
     from ..objects.static_fit import fit_static
 

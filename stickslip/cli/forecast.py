@@ -43,7 +43,7 @@ def forecast(
     force:
         Replace an existing run folder.
     """
-    from ..objects import load_campaign
+    from ..objects.campaign import load_campaign
 
     if out is not None:
         refuse_existing(out, force)

@@ -31,7 +31,7 @@ def inspect(
     force:
         Replace an existing run folder.
     """
-    from ..objects import load_campaign
+    from ..objects.campaign import load_campaign
 
     if out is not None:
         refuse_existing(out, force)

@@ -14,8 +14,6 @@ from ..data.readers.repair import from_load_point
 from ..data.segment import Segmentation, segment
 from ..data.trace import Trace
 from ..errors import InputError, nearest
-from ..show.report.describe import left_out
-from ..simulation.conformance import load_effects
 from .shown import Shown, facts, table
 
 if TYPE_CHECKING:
@@ -67,7 +65,7 @@ class Campaign(Shown):
         """
         if not traces:
             raise InputError("a campaign needs at least one trace")
-        load_effects(effects)
+        _load_effects(effects)
         described = files.described([t.name for t in traces], rig or {}, title)
         own = [_with_spring(t, described) for t in traces]
         return cls(described, [from_load_point(t) for t in own], effects)
@@ -130,6 +128,8 @@ class Campaign(Shown):
     @cached_property
     def lost(self) -> tuple[str, ...]:
         """What was left out of the data, in words."""
+        from ..show.report.describe import left_out
+
         return tuple(left_out(self.traces, self.scaled[0]))
 
     def prepare(self, holdout: Sequence[str] = ()) -> Prepared:
@@ -281,6 +281,14 @@ def _with_spring(trace: Trace, described: files.Campaign) -> Trace:
     return trace
 
 
+def _load_effects(paths: Sequence[str | Path]) -> None:
+    """Put effects of one's own into the catalogue, which is loaded for them only."""
+    if paths:
+        from ..simulation.conformance import load_effects
+
+        load_effects(paths)
+
+
 def load_campaign(path: str | Path, effects: Sequence[str | Path] = (), progress: Tell | None = None) -> Campaign:
     """Read a campaign file and the runs it names.
 
@@ -292,7 +300,7 @@ def load_campaign(path: str | Path, effects: Sequence[str | Path] = (), progress
     Raises:
         InputError: the file, a trace, a unit or an effect's file cannot be used.
     """
-    load_effects(effects)
+    _load_effects(effects)
     description = files.load_campaign(path)
     traces = []
     for i, entry in enumerate(description.entries):

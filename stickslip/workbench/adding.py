@@ -14,7 +14,7 @@ import numpy as np
 from ..data import campaign as files
 from ..data.readers import Columns, read_columns
 from ..errors import InputError
-from ..objects import Campaign, load_campaign
+from ..objects.campaign import Campaign, load_campaign
 from ..system.runstore import alone, write_aside
 from ..system.units import factor_to_si, to_si
 from .places import new_place

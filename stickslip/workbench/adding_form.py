@@ -11,7 +11,7 @@ import panel as pn
 
 from ..data.readers import Columns
 from ..errors import InputError
-from ..objects import Campaign
+from ..objects.campaign import Campaign
 from ..system.units import to_si
 from .adding import CHANNELS, FOLDER, NONE, VELOCITY, Choice, add, create, entry_text, guess, look
 from .beside import Show, Tell, beside

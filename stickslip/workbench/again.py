@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..errors import StickslipError
-from ..objects.fitted_run import FittedRun
-from .journal import Journal
 from .steps import HAND, Step, complete
 
 if TYPE_CHECKING:
+    from ..objects.fitted_run import FittedRun
+    from .journal import Journal
     from .session import Session
 
 SAME = 0.01  # standard deviations by which a parameter that was fitted anew may be off

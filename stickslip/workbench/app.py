@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import logging
 from functools import partial
 from types import ModuleType
@@ -23,7 +22,11 @@ from .session import Note, Session, watch
 from .shipped import copied
 from .watching import Place, placed
 
-PAGES = ("data_page", "model_page", "missing_page", "simulate_page", "keep_page")
+TITLES = {
+    "data_page": "Data", "model_page": "Model against measurement", "missing_page": "What is missing",
+    "simulate_page": "Simulate", "keep_page": "Keep",
+}  # fmt: skip
+PAGES = tuple(TITLES)
 KEYED = ("data_page", "model_page")  # where the arrows go through cycles and runs
 DRAWN = "This page is being drawn."  # in place of a page until it is there
 STYLE = """
@@ -71,10 +74,9 @@ def ready() -> None:
     pn.config.param.update(design=Plain, notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
 
 
-def modules() -> list[ModuleType]:
-    """The pages there are."""
-    found = (f"{__package__}.{name}" for name in PAGES)
-    return [importlib.import_module(name) for name in found if importlib.util.find_spec(name) is not None]
+def module(name: str) -> ModuleType:
+    """That of a page, loaded when it is first looked at: models and what fits them take seconds."""
+    return importlib.import_module(f"{__package__}.{name}")
 
 
 def view(session: Session) -> Any:
@@ -126,12 +128,11 @@ def _opened(session: Session, number: int, event: Any) -> None:
 
 def tabs(session: Session) -> pn.Tabs:
     """The pages, each made when it is first looked at."""
-    every = modules()
     wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
-    places = [pn.Column(Words(text=DRAWN, margin=(24, 0), **wide), min_height=500, **wide) for _ in every]
+    places = [pn.Column(Words(text=DRAWN, margin=(24, 0), **wide), min_height=500, **wide) for _ in PAGES]
     made_at: set[int] = set()
     made = pn.Tabs(
-        *((module.TITLE, place) for module, place in zip(every, places, strict=True)),
+        *zip(TITLES.values(), places, strict=True),
         sizing_mode="stretch_width", stylesheets=[TABS],
     )  # fmt: skip
     asked = pn.state.location is not None and "page=" in str(pn.state.location.search)
@@ -145,7 +146,7 @@ def tabs(session: Session) -> pn.Tabs:
     if pn.state.location is not None:
         pn.state.location.sync(made, {"active": "page"})
 
-    seen = [Place() for _ in every]
+    seen = [Place() for _ in PAGES]
 
     def show(*events: Any) -> None:
         for i, place in enumerate(seen):
@@ -155,7 +156,7 @@ def tabs(session: Session) -> pn.Tabs:
         if made.active not in made_at:
             made_at.add(made.active)
             with placed(seen[made.active]):
-                places[made.active][:] = [_made(every[made.active], session)]
+                places[made.active][:] = [_made(PAGES[made.active], session)]
 
     show()
     made.param.watch(show, "active")
@@ -164,9 +165,9 @@ def tabs(session: Session) -> pn.Tabs:
     return made
 
 
-def _made(module: ModuleType, session: Session) -> Any:
+def _made(name: str, session: Session) -> Any:
     try:
-        return module.page(session)
+        return module(name).page(session)
     except Exception as error:  # a page that fails leaves the others alive
         logging.getLogger(__name__).exception("a page")
         return pn.pane.Str(f"this page cannot be shown: {type(error).__name__}: {error}")

@@ -8,8 +8,8 @@ from typing import Any
 import panel as pn
 
 from ..errors import InputError
-from ..objects import Fit
 from ..objects.experiments import Setting
+from ..objects.fit import Fit
 from ..system.units import shown
 from .controls import BUTTON
 from .parts import head

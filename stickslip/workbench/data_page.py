@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import panel as pn
 
 from ..data.segment import Segmentation
-from ..objects import Campaign, Inspection
+from ..objects.campaign import Campaign
 from ..system.units import shown
 from .adding_form import adding
 from .beside import Beside, Show, Tell, beside
@@ -22,7 +22,9 @@ from .picked import chosen, select
 from .session import Session, watch
 from .signals import Signals
 
-TITLE = "Data"
+if TYPE_CHECKING:
+    from ..objects.inspection import Inspection
+
 MEASURES = {
     "t_onset": "onset", "recurrence": "recurrence", "hold_time": "hold", "slip": "slip",
     "peak_velocity": "peak velocity", "rise_time": "rise", "overshoot": "overshoot", "ring_frequency": "ringing",
@@ -83,13 +85,12 @@ def run_rows(campaign: Campaign) -> tuple[list[str], list[list[str]]]:
     """Columns and rows of the table of runs."""
     columns = ["run", "slips", "drive", "length", "sampling", "signal", "contact at the start"]
     rows = []
-    for name, row in campaign.summary.iterrows():
-        drive, virgin = row["drive (m/s)"], bool(row["virgin"])
-        known = drive is not None and np.isfinite(float(drive))
+    for trace, found in zip(campaign.traces, campaign.events, strict=True):
+        drive = trace.drive_velocity
         rows.append([
-            str(name), str(row["slips"]), shown(float(drive), "m/s", 3) if known else "not known",
-            shown(row["length (s)"], "s", 3), shown(row["sampling (Hz)"], "Hz", 3),
-            str(row["signal"]).replace("_", " "), "virgin" if virgin else "used",
+            trace.name, str(len(found.events)), "not known" if drive is None else shown(drive, "m/s", 3),
+            shown(trace.duration, "s", 3), shown(trace.sampling_rate, "Hz", 3), trace.leading.replace("_", " "),
+            "virgin" if trace.virgin else "used",
         ])  # fmt: skip
     return columns, rows
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..objects import Campaign
+from ..objects.campaign import Campaign
 from .event_parts import PARTS, Curve, part
 from .figures import figure, label, look, source, unit_of
 from .overview import events_of, record

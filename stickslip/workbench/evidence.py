@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..inference.force.first_order import Promise
-from ..objects import Diagnosis, Fit
+from ..objects.diagnosis import Diagnosis
+from ..objects.fit import Fit
 from ..objects.picture import AGAINST
 from ..physics.effects import catalogue
 from ..physics.params import specs

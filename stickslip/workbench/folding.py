@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from ..errors import InputError
-from ..objects import Fit
+from ..objects.fit import Fit
 from ..physics.effects import catalogue
 from ..system.units import to_si
 

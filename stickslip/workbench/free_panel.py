@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..objects import Fit
+from ..objects.fit import Fit
 from ..system.units import shown
 from .controls import Words
 from .figures import FEW, figure, label, legend, look, source, unit_of

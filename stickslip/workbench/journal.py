@@ -12,14 +12,18 @@ import json
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..inference.force.fit import Fit as ForceFit
-from ..objects import Campaign, Diagnosis, Fit
-from ..objects.stored import Arrays, packed, unpacked
+from ..objects.campaign import Campaign
 from ..system.runstore import json_text, read_result, write_aside
+
+if TYPE_CHECKING:
+    from ..inference.force.fit import Fit as ForceFit
+    from ..objects.diagnosis import Diagnosis
+    from ..objects.fit import Fit
+    from ..objects.stored import Arrays
 
 FOLDER = ".stickslip-workbench"
 SCHEMA = 1
@@ -62,6 +66,8 @@ class Journal:
         Raises:
             OSError, KeyError, ValueError, TypeError, StickslipError: it is damaged, or its effects are gone.
         """
+        from ..objects.stored import unpacked
+
         if not self.file.is_file():
             return [], [], {}
         kept = json.loads(self.file.read_text(encoding="utf-8"))
@@ -76,6 +82,8 @@ class Journal:
 
     def diagnosed(self) -> Diagnosis | None:
         """What the last diagnosis of the same data found, if it was finished."""
+        from ..objects.diagnosis import Diagnosis
+
         if not (self.diagnosis / "result.json").is_file():
             return None
         result = read_result(self.diagnosis)
@@ -83,6 +91,8 @@ class Journal:
         return Diagnosis(self.campaign, None, dict(result), {}, self.diagnosis) if same else None
 
     def _of(self, fit: Fit) -> dict[str, Any]:
+        from ..objects.stored import packed
+
         if id(fit) not in self._packed:
             self._packed[id(fit)] = (fit, packed(fit, self._keep))
         return self._packed[id(fit)][1]

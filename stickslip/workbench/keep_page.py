@@ -13,7 +13,6 @@ from .folders_view import Folders
 from .parts import Copy, Table, head, row_of
 from .session import Session, watch
 
-TITLE = "Keep"
 WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
 
 
@@ -55,6 +54,3 @@ def _lines(session: Session) -> list[Any]:
         watch(beside(session, name), ["doing"], update)
     update()
     return [head("The same in Python, in the campaign's folder"), python, head("and as commands"), shell]
-
-
-__all__ = ["TITLE", "page"]

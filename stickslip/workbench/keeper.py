@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from ..errors import RunFolderError
-from ..objects import Campaign
+from ..objects.campaign import Campaign
 from ..system.runstore import alone
 from .journal import Journal
 

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, RunFolderError
-from ..objects import Campaign, Diagnosis, Fit
+from ..objects.campaign import Campaign
+from ..objects.diagnosis import Diagnosis
+from ..objects.fit import Fit
 from ..show.report.html import REPORT
 from ..system.runstore import RESULT, read_result
 from ..system.units import shown_with

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..inference.fit.parameters import Free
-from ..objects import Fit
-from ..objects.fit import MEANINGS, STRENGTH
+from ..objects.fit import MEANINGS, STRENGTH, Fit
 from ..system.units import shown, shown_with
 
 DEVIATIONS = 12.0  # of a parameter that a slider reaches to either side

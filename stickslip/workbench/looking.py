@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import param
 
-from ..inference.force.first_order import Promise
-from ..objects import Diagnosis, Fit
-from . import searches
-from .work import Search
-
 if TYPE_CHECKING:
+    from ..inference.force.first_order import Promise
+    from ..objects.diagnosis import Diagnosis
+    from ..objects.fit import Fit
     from .session import Session
+    from .work import Search
 
 KEPT = 8  # models whose promises are kept
 
@@ -35,6 +34,8 @@ class Looking:
 
     def promises(self) -> None:
         """Look at every effect on top of the model as it stands, unless that goes on or is known already."""
+        from . import searches
+
         session, fit, loaded = self._session, self._session.fitted, self._session.loaded
         if fit is None or (session.listed < 1.0 and self._at == (fit, loaded)):
             return
@@ -67,6 +68,8 @@ class Looking:
 
     def diagnose(self, out: Path | None) -> None:
         """The whole search, with ``out`` for its run folder; finished pieces are kept and used again."""
+        from . import searches
+
         session = self._session
         if session.searching or session.campaign is None:
             return

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..data.trace import Trace
-from ..objects import Fit, experiments
+from ..objects import experiments
 from ..objects.experiments import MEASURES, Simulated
+from ..objects.fit import Fit
 from ..system.units import shown, shown_with
 from .asked import named
 from .overview import reduced

@@ -12,8 +12,6 @@ from .ladder_view import Ladder
 from .residual_view import Residual
 from .session import Session
 
-TITLE = "What is missing"
-
 
 def page(session: Session) -> Any:
     """The page of a session."""
@@ -30,6 +28,3 @@ def page(session: Session) -> Any:
     )  # fmt: skip
     right = pn.Column(listed.head, listed.part, listed.verdict, sizing_mode="stretch_width", margin=(8, 0, 0, 0))
     return pn.Row(left, right, sizing_mode="stretch_width")
-
-
-__all__ = ["TITLE", "page"]

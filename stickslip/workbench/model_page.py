@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import panel as pn
 
-from ..objects import Fit
+from ..objects.fit import Fit
 from ..objects.picture import balanced
 from .controls import BUTTON, Knobs, Message, Words
 from .figures import FEW, crosshair, figure, label, legend, look, source, unit_of
@@ -18,8 +18,6 @@ from .heat_view import Heat
 from .knobs import Knob, given, knobs, rows
 from .selection import choose, cycles, selected
 from .session import Session, watch
-
-TITLE = "Model against measurement"
 
 
 def page(session: Session) -> Any:
@@ -216,6 +214,3 @@ class _Cycle:
         }  # fmt: skip
         self.creep.xaxis.axis_label = label("time before the onset", "s")
         self.creep.yaxis.axis_label = label("creep", unit)
-
-
-__all__ = ["TITLE", "page"]

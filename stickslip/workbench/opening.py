@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..inference.fit.serialised import KEY
-from ..objects import Diagnosis, load_campaign
-from ..objects.fitted_run import load_run
+from ..objects.campaign import load_campaign
 from ..system.runstore import RESULT, read_result
 from .session import Session
 from .shipped import example
@@ -31,6 +29,10 @@ def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
         return Session(campaign=load_campaign(path, own), effects=own)
     if (path / CAMPAIGN).is_file():
         return Session(campaign=load_campaign(path / CAMPAIGN, own), effects=own)
+    from ..inference.fit.serialised import KEY
+    from ..objects.diagnosis import Diagnosis
+    from ..objects.fitted_run import load_run
+
     result = read_result(path)
     campaign = load_campaign(campaign_of(path, result), own)
     session = Session(campaign=campaign, effects=own)

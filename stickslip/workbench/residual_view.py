@@ -10,7 +10,7 @@ from bokeh.models import BasicTicker, FixedTicker
 from bokeh.models.annotations import Span
 
 from ..errors import InputError
-from ..objects import Fit
+from ..objects.fit import Fit
 from ..objects.picture import AGAINST, PARTS, WIDEST
 from ..system.units import shown
 from . import folding

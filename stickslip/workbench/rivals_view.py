@@ -8,7 +8,8 @@ import numpy as np
 import panel as pn
 
 from ..inference.force.candidates import every_form
-from ..objects import Diagnosis, experiments
+from ..objects import experiments
+from ..objects.diagnosis import Diagnosis
 from ..objects.experiments import MEASURES, Telling
 from ..physics.effects import catalogue
 from ..system.units import to_si

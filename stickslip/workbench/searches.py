@@ -12,7 +12,9 @@ from ..inference.force.candidates import every_form
 from ..inference.force.first_order import Promise, promise
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.signatures import Explained
-from ..objects import Campaign, Diagnosis, Fit, load_campaign
+from ..objects.campaign import Campaign, load_campaign
+from ..objects.diagnosis import Diagnosis
+from ..objects.fit import Fit
 from ..physics.effects import catalogue
 from ..simulation.conformance import blamed
 from .work import Search, Tell

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..objects import Fit
 from .picked import chosen, select
 from .session import Session
+
+if TYPE_CHECKING:
+    from ..objects.fit import Fit
 
 
 def follow(session: Session, key: str) -> None:

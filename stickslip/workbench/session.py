@@ -10,15 +10,12 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import param
 
 from ..errors import RunFolderError, StickslipError
-from ..objects import Campaign, Fit, load_campaign
-from ..objects.fitted_run import FittedRun
-from ..physics.effects import catalogue
-from ..simulation.conformance import load_effects
+from ..objects.campaign import Campaign, load_campaign
 from . import again
 from .keeper import Keeper
 from .looking import Looking
@@ -27,6 +24,9 @@ from .steps import Step, complete, fewer, first, moved
 from .telling import Long, Note
 from .watching import watch
 from .work import Worker, at_once
+
+if TYPE_CHECKING:
+    from ..objects.fit import Fit
 
 __all__ = ["LOOKING", "Note", "Session", "watch"]
 
@@ -63,7 +63,7 @@ class Session(param.Parameterized):
     steps = param.Parameter(())
     at = param.Integer(-1)
     diagnosis = param.Parameter(None)
-    saved = param.ClassSelector(class_=FittedRun)
+    saved = param.Parameter(None)
     run = param.String("")
     event = param.Integer(0)
     busy = param.String("")
@@ -363,6 +363,8 @@ class Session(param.Parameterized):
 
     def reload(self, path: Path) -> None:
         """A file with effects was saved: load it anew, and fit the model anew if it has one of them."""
+        from ..physics.effects import catalogue
+        from ..simulation.conformance import load_effects
 
         def job() -> None:
             with Long(self):

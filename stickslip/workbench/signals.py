@@ -10,7 +10,7 @@ from bokeh.events import Tap
 from bokeh.models import Range1d, RangeTool
 
 from ..data.segment import Segmentation
-from ..objects import Campaign
+from ..objects.campaign import Campaign
 from ..system.units import shown
 from .figures import crosshair, figure, label, look, source, unit_of
 from .overview import DISPLACEMENT, FORCE, GAP, Levels, Record, Window, record

@@ -15,8 +15,6 @@ from .session import Session, watch
 from .simulated_view import SimulatedView
 from .sweep_view import SweepView
 
-TITLE = "Simulate"
-
 
 def page(session: Session) -> Any:
     """The page of a session."""
@@ -61,6 +59,3 @@ class _Synthetic:
     def update(self) -> None:
         """Whether it can be pressed."""
         self._button.disabled = bool(self._work.doing)
-
-
-__all__ = ["TITLE", "page"]

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from shlex import quote
 from typing import Any
 
-from ..objects import Fit
 from ..objects.experiments.events import Simulated
 from ..objects.experiments.setting import Setting, changes
 from ..objects.experiments.sweeps import Swept
 from ..objects.experiments.telling import Telling
+from ..objects.fit import Fit
 
 Found = Simulated | Swept | Sequence[Telling]
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from typing import TYPE_CHECKING
 
-from ..objects import Fit
+if TYPE_CHECKING:
+    from ..objects.fit import Fit
 
 BASE = "the base model"
 HAND = "by hand"

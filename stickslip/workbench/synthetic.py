@@ -6,9 +6,10 @@ import shutil
 from pathlib import Path
 
 from ..errors import InputError
-from ..objects import Campaign, Fit
+from ..objects.campaign import Campaign
 from ..objects.experiments.events import Tell, run
 from ..objects.experiments.setting import Setting, scenario
+from ..objects.fit import Fit
 from ..simulation.scenario.writers import write_campaign
 from .places import new_place
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import param
 
 from ..errors import StickslipError
-from ..simulation.conformance import blamed
 from ..system.progress import Cancelled, showing
 
 if TYPE_CHECKING:
@@ -45,6 +44,8 @@ class Long:
             self._session.said = str(error)
             return True
         if isinstance(error, Exception):
+            from ..simulation.conformance import blamed
+
             if (found := blamed(error)) is not None:
                 self._session.said = f"{found}; the model is as it was"
                 return True

@@ -24,7 +24,7 @@ from stickslip.inference.forecast.predict import METHODS, Forecaster
 from stickslip.inference.forecast.rolling import prepare, roll
 from stickslip.inference.forecast.scoring import quantiles
 from stickslip.inference.forecast.wander import Wander
-from stickslip.objects import Forecast
+from stickslip.objects.forecast import Forecast
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, styled
 

@@ -13,8 +13,8 @@ from stickslip.blind.detection import detection
 from stickslip.blind.generator import Run, make_campaign
 from stickslip.blind.generator.forms import EFFECTS
 from stickslip.inference.diagnose.engine import Round
-from stickslip.objects import Diagnosis
 from stickslip.objects import next_experiment as module
+from stickslip.objects.diagnosis import Diagnosis
 from stickslip.objects.experiments import Setting, telling
 from stickslip.objects.next_experiment import next_experiment
 from stickslip.system.progress import Cancelled

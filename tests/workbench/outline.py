@@ -27,9 +27,11 @@ def outline(session: Session) -> str:
     """Of the pages of a session with a model, and of their colours and style sheets."""
     session.list_promises = lambda: None  # nothing is begun beside
     lines = []
-    for module in app.modules():
-        lines.append(f"[{module.TITLE}]")
-        lines += [re.sub(r"\d[\d.]*", "#", text) for part in module.page(session).select() for text in _said(part)]
+    for name, title in app.TITLES.items():
+        lines.append(f"[{title}]")
+        lines += [
+            re.sub(r"\d[\d.]*", "#", text) for part in app.module(name).page(session).select() for text in _said(part)
+        ]
     lines += ["[looks]", *(f"{name}: {colour}" for name, colour in asdict(figures.LIGHT).items())]
     lines += [f"{p.name}: {hashlib.sha256(p.read_bytes()).hexdigest()[:12]}" for p in sorted(STYLES.glob("*.css"))]
     return "\n".join(lines) + "\n"

@@ -14,7 +14,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.objects import Campaign
+from stickslip.objects.campaign import Campaign
 from stickslip.workbench import adding_form, data_page
 from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, guess, look
 from stickslip.workbench.adding_form import FirstRun, Form

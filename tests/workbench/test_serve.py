@@ -223,7 +223,7 @@ def test_a_run_folder_opens_the_campaign_it_was_made_from(folder, tmp_path):
 
 
 def test_a_saved_model_stands_again(folder, base, aged, tmp_path, monkeypatch):
-    from stickslip.objects import Campaign
+    from stickslip.objects.campaign import Campaign
 
     name = "contact-ageing.rate"
     moved = aged.with_values({name: 1.1 * aged.values[name]})
@@ -240,7 +240,7 @@ def test_a_saved_model_stands_again(folder, base, aged, tmp_path, monkeypatch):
 
 
 def test_a_saved_model_stands_again_without_the_runs_it_had_not_seen(folder, base, aged, tmp_path, monkeypatch):
-    from stickslip.objects import Campaign
+    from stickslip.objects.campaign import Campaign
 
     inputs = [{"file": str(folder / "campaign.toml"), "sha256": ""}]
     result = {"kind": "fit", "inputs": inputs, KEY: record(base.fitted), "kept_aside": ["v400"]}
@@ -267,7 +267,7 @@ def test_what_lies_in_a_folder_is_offered(folder, tmp_path):
 
 
 def test_the_shipped_example_is_worked_on_in_a_copy(tmp_path, monkeypatch, base):
-    from stickslip.objects import Campaign
+    from stickslip.objects.campaign import Campaign
 
     of_package = example()
     before = sorted(p.name for p in of_package.parent.iterdir())
@@ -284,7 +284,7 @@ def test_the_shipped_example_is_worked_on_in_a_copy(tmp_path, monkeypatch, base)
 
 
 def test_one_of_what_is_offered_is_opened_and_nothing_else(folder, monkeypatch, base):
-    from stickslip.objects import Campaign
+    from stickslip.objects.campaign import Campaign
 
     monkeypatch.setattr(Campaign, "fit", lambda self: base)
     with closing(Session(offers=(folder / "campaign.toml",))) as session:

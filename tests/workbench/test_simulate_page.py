@@ -9,7 +9,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.objects import Diagnosis, experiments
+from stickslip.objects import experiments
+from stickslip.objects.diagnosis import Diagnosis
 from stickslip.objects.experiments import Setting
 from stickslip.objects.experiments.telling import CREEP as HELD
 from stickslip.objects.experiments.telling import farthest, signs

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -30,6 +32,19 @@ def _least(work, times: int) -> float:
         work(i)
         taken.append(time.thread_time() - began)
     return min(taken)
+
+
+def test_the_first_page_is_made_before_models_and_what_fits_them_are_loaded(folder):
+    code = (
+        "import sys; from pathlib import Path; from stickslip.workbench.opening import opened\n"
+        "from stickslip.workbench import app, data_page, serve, session\n"
+        f"made = opened(Path({str(folder / 'campaign.toml')!r})); made.busy = session.LOOKING\n"
+        "from bokeh.document import Document; app.view(made).server_doc(Document()).to_json()\n"
+        "heavy = {'jax', 'equinox', 'diffrax', 'scipy', 'pandas', 'xarray', 'matplotlib', 'joblib', 'arviz'}\n"
+        "sys.exit(', '.join(sorted(heavy & set(sys.modules))) or 0)"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert found.returncode == 0, found.stderr
 
 
 def test_a_move_of_a_slider_is_worked_out_within_a_tenth_of_a_second(campaign, base, monkeypatch):

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from ..segment import Event, Segmentation, block_motion
 from ..trace import Drive, Trace
@@ -129,6 +128,8 @@ def _slope(drive: Drive, t: Array, x: Array, noise: float) -> tuple[float, float
     Where the drive turns, the spring pulls the other way and its length counts with the slip's direction. One slip far
     off the others (a jump of the sensor) is not used.
     """
+    from scipy.special import stdtrit  # a tenth of a second that reading a campaign does not need
+
     middle, way = x.mean(axis=1), drive.position(t).mean(axis=1)
     turn = np.sign(x[:, 1] - x[:, 0])
     use = np.ones(middle.size, bool)
