@@ -262,9 +262,7 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         command = ["fit", str(path), "--model", "inertial", "--add", "contact-ageing", "--out", str(tmp_path / "its")]
         assert run(command) == 0
         mine, its = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("mine", "its"))
-        assert [rung["model"] for rung in mine["ladder"]] == [rung["model"] for rung in its["ladder"]]
-        for part in ("parameters", "ladder"):  # to rounding: threads add up in another order
-            assert numbers(mine[part]) == pytest.approx(numbers(its[part]), rel=1e-9, abs=1e-15, nan_ok=True)
+        assert mine["parameters"] == its["parameters"] and mine["ladder"] == its["ladder"]
         assert not browser.complaints()
         assert not browser.elsewhere()
     finally:
