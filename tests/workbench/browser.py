@@ -27,6 +27,16 @@ const named = (name) => Bokeh.documents.map((d) => d.get_model_by_name(name)).fi
 """
 
 
+def command(*arguments: object) -> int:
+    """The exit code of a command in a process of its own, as a user gives it.
+
+    In a process that has JAX already, checked errors inside compiled code may stand otherwise (see
+    :func:`stickslip.system.cache.enable`), and last digits with them.
+    """
+    whole = [sys.executable, "-m", "stickslip", *map(str, arguments)]
+    return subprocess.run(whole, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.DEVNULL).returncode
+
+
 class Served:
     """A server of its own process: of a campaign, or of what there is to choose from in a folder."""
 

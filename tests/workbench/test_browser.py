@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip.cli import run
-
-from .browser import DEEP, Browser, Served
+from .browser import DEEP, Browser, Served, command
 from .conftest import SCENARIO, numbers
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -259,8 +257,7 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         browser.tab("Model")
         browser.press("button", "Base")
         browser.wait(lambda: abs(browser.unseen_error() - base) < 2e-3)
-        command = ["fit", str(path), "--model", "inertial", "--add", "contact-ageing", "--out", str(tmp_path / "its")]
-        assert run(command) == 0
+        assert command("fit", path, "--model", "inertial", "--add", "contact-ageing", "--out", tmp_path / "its") == 0
         mine, its = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("mine", "its"))
         assert mine["parameters"] == its["parameters"] and mine["ladder"] == its["ladder"]
         assert not browser.complaints()
@@ -298,7 +295,7 @@ def test_a_diagnosis_goes_on_beside_and_can_be_cancelled(tmp_path):
         time.sleep(PAUSE)
         browser.press("button", "Save")
         browser.wait(lambda: (tmp_path / "found" / "result.json").is_file(), 60)
-        assert run(["diagnose", str(tmp_path / "campaign.toml"), "--out", str(tmp_path / "its")]) == 0
+        assert command("diagnose", tmp_path / "campaign.toml", "--out", tmp_path / "its") == 0
         mine, its = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("found", "its"))
         assert mine["verdict"]["kind"] == its["verdict"]["kind"] == "missing"
         for result in (mine, its):
