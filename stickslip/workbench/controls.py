@@ -60,6 +60,33 @@ class Words(JSComponent):
     _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
 
 
+class Signs(JSComponent):
+    """What the signs of several figures stand for, once for all of them.
+
+    Attributes:
+        rows: tables with ``sign`` (a character), ``colour`` and ``text``.
+    """
+
+    rows = param.List([])
+
+    _esm = """
+    export function render({ model }) {
+      const line = document.createElement("div")
+      line.className = "line"
+      const update = () => line.replaceChildren(...model.rows.flatMap((row) => {
+        const sign = document.createElement("span")
+        sign.style.color = row.colour
+        sign.textContent = row.sign
+        return [sign, ` ${row.text}\u2003`]
+      }))
+      model.on("rows", update)
+      update()
+      return line
+    }
+    """
+    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+
+
 class Frame(Spoken):
     """The head of the window: title, model, errors, what is going on, what must be read; and the keyboard.
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import panel as pn
-from bokeh.core.properties import value
 from bokeh.models import FixedTicker
 
 from ..objects import experiments
@@ -15,7 +14,8 @@ from ..objects.experiments import Swept
 from ..system.units import shown
 from .asked import FIXED, WIDE, Asked, named, needed, press
 from .beside import Show, Tell, beside
-from .figures import figure, label, legend, look, source, unit_of
+from .controls import Signs
+from .figures import figure, label, look, source, unit_of
 from .parts import head, progress
 from .remembering import Remembered
 from .session import Session, watch
@@ -55,16 +55,18 @@ class SweepView:
             scales = {"x_axis_type": "log", "y_axis_type": "log" if key == "recurrence" else "linear"}
             made = figure(height=280, output_backend="canvas", **scales)
             made.line("v", key, source=self._model, color=theme.model, line_width=2, line_dash="dashed")
-            made.scatter("v", key, source=self._model, color=theme.model, size=7, marker="square", legend_label="model")
+            made.scatter(
+                "v", key, source=self._model, color=theme.model, fill_alpha=0.0, line_width=2, size=13, marker="square"
+            )
             made.multi_line("xs", "ys", source=self._bars[key], color=theme.measured, line_width=1.5)
-            made.scatter("v", key, source=self._measured, color=theme.measured, size=9, legend_label="measured")
-            legend(made)
+            made.scatter("v", key, source=self._measured, color=theme.measured, size=9)
             self.figures[key] = made
-        self._names = [made.legend[0].items[0] for made in self.figures.values()]
+        self.signs = Signs(**WIDE)
         self.view = pn.Column(
             head("A sweep of the velocity: means over the slips after the first, with their scatter"),
             pn.FlexBox(self.low, self.high, self.points, self._button, gap="6px 0"),
             progress(self._work),
+            self.signs,
             pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in self.figures.values()), **WIDE),
             **WIDE,
         )
@@ -124,6 +126,8 @@ class SweepView:
             if key == "recurrence":
                 self.figures[key].yaxis.ticker = FixedTicker(ticks=ticks(np.concatenate([own, theirs]) * f))
         self._model.data, self._measured.data = model, measured
+        theme = look()
+        signs = [{"sign": "●", "colour": theme.measured, "text": "measured"}]
         if found is not None:
-            for item in self._names:
-                item.label = value(named(found.fit, self._session.fit))
+            signs.append({"sign": "□", "colour": theme.model, "text": named(found.fit, self._session.fit)})
+        self.signs.rows = signs

@@ -15,7 +15,7 @@ from typing import Any
 import panel as pn
 
 from stickslip.workbench import app, figures
-from stickslip.workbench.controls import Knobs, Words
+from stickslip.workbench.controls import Knobs, Signs, Words
 from stickslip.workbench.parts import Sentences, Table
 from stickslip.workbench.session import Session
 
@@ -55,5 +55,7 @@ def _said(part: Any) -> Iterator[str]:
         yield " | ".join(["head", *(group["head"] for group in part.groups)])
     elif isinstance(part, Knobs):
         yield " | ".join(["sliders", *(row["label"] for row in part.rows)])
+    elif isinstance(part, Signs):
+        yield " | ".join(["signs", *(row["text"] for row in part.rows)])
     elif isinstance(part, Words) and part.text:
         yield f"words | {part.text}"
