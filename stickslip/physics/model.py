@@ -98,7 +98,7 @@ class State(eqx.Module):
     Attributes:
         x, v: displacement (m) and velocity (m/s) of the block.
         force: force of every Jenkins element (N), shape (n,).
-        cap: cap of every element as it was last (N), shape (n,); for the books of energy and sliding only.
+        cap: cap of every element as it was last (N), shape (n,).
         stiffness: stiffness of every element as it was last (N/m), shape (n,); for the books of energy only.
         psi: weakening state, 1 rested ... 0 fully weakened.
         memory: one state for each effect, in their order (``()`` where it has none).
@@ -245,7 +245,8 @@ class Model(eqx.Module):
         slides = jnp.abs(state.force) >= (1.0 - 1e-9) * state.cap
         mean_cap = jnp.where(slides, 0.5 * (state.cap + cap), cap)
         trial = state.force + stiffness * motion.turn
-        force = _held_back(trial, cap)
+        # a cap that falls within the increment meets what the motion back has unloaded, not what came before it
+        force = _held_back(trial, jnp.maximum(state.cap, cap))
         slid = jnp.abs(trial - force)
         trial = force + stiffness * (motion.dx - motion.turn)
         flow = jnp.zeros(())

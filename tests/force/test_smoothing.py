@@ -60,9 +60,22 @@ def test_noise_is_less_than_half_of_that_of_a_sample():
 
 @pytest.mark.parametrize("samples", [2.0, 2.6, 3.4])
 def test_a_ringing_of_a_few_samples_is_left_as_it_is(samples):
-    """A parabola and a ringing are seven numbers, and two periods hold no more samples."""
+    """A cubic and a ringing are eight numbers, and two periods hold no more samples."""
     x, _, times = ringing(samples)
     followed, speed, smoother = smoothed(x, NOISE, RATE, times)
     assert np.array_equal(followed, x)
     assert np.isfinite(speed).all()
     assert (smoother.matrix(np.arange(x.size)) @ x == x).all()
+
+
+def test_a_block_in_nucleation_is_as_fast_as_it_is():
+    """Its velocity grows e-fold in less than half a period of the ringing: a parabola fitted to it has a third more."""
+    i = np.arange(2000)
+    growth = 7.5  # samples
+    x = 2e-9 * np.exp(np.minimum(i - 1000.0, 60.0) / growth)
+    v = x * RATE / growth
+    times = Scales(half=19.0 / RATE, ring=19.0 / RATE, slip=400.0 / RATE)
+    rng = np.random.default_rng(7)
+    speeds = [smoothed(x + NOISE * rng.standard_normal(x.size), NOISE, RATE, times)[1] for _ in range(40)]
+    begun = slice(1015, 1040)  # from 20 to 500 um/s
+    assert np.abs(np.mean(speeds, axis=0) / v - 1.0)[begun].max() < 0.1

@@ -58,17 +58,18 @@ class Smoother:
 def smoothed(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, Array, Smoother]:
     """Displacement and velocity where every sample counts, and how the former is made of the samples.
 
-    At every sample a parabola and a ringing that grows or decays, over two of its periods (where none is heard, a
-    parabola alone); on top of them what a polynomial of the fourth degree over half a period adds, shrunk by as much as
-    noise adds to it in squares. The noise of one sample, taken for motion, would be a path that weakens the contact and
-    makes it young; a ringing that is smoothed away would be a force of the contact, which is stiff.
+    At every sample a cubic and a ringing that grows or decays, over two of its periods (where none is heard, a cubic
+    alone). A parabola would give the same displacement and, in a nucleation, a velocity that is a third too large. On
+    top of them what a polynomial of the fourth degree over half a period adds, shrunk by as much as noise adds to it in
+    squares. The noise of one sample, taken for motion, would be a path that weakens the contact and makes it young; a
+    ringing that is smoothed away would be a force of the contact, which is stiff.
     """
     period = (times.ring or times.half) * rate
     long = round(2.0 * period if times.ring else period) // 2 * 2 + 1
     short = round(0.5 * period) // 2 * 2 + 1
     if long < (9 if times.ring else 5):  # too few samples for what would be fitted to them
         return x, np.gradient(x) * rate, Smoother(np.ones(1), np.zeros(1), np.zeros(x.size))
-    slow, drift = _local(long, 2, period if times.ring else None)
+    slow, drift = _local(long, 3, period if times.ring else None)
     close, run = _local(short, 4) if short >= 7 else _local(3, 2)
     pad = (long - close.size) // 2
     fast, rush = np.pad(close, pad) - slow, np.pad(run, pad) - drift
