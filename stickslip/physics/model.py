@@ -245,8 +245,8 @@ class Model(eqx.Module):
         slides = jnp.abs(state.force) >= (1.0 - 1e-9) * state.cap
         mean_cap = jnp.where(slides, 0.5 * (state.cap + cap), cap)
         trial = state.force + stiffness * motion.turn
-        # a cap that falls within the increment meets what the motion back has unloaded, not what came before it
-        force = _held_back(trial, jnp.maximum(state.cap, cap))
+        # without a turning point a cap that falls meets what the motion has unloaded, not what came before it
+        force = jnp.where(motion.turn == 0.0, trial, _held_back(trial, cap))
         slid = jnp.abs(trial - force)
         trial = force + stiffness * (motion.dx - motion.turn)
         flow = jnp.zeros(())
