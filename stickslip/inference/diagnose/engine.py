@@ -30,6 +30,7 @@ from ..force.valleys import LEVEL, widened
 from .checkpoints import Store, kept, name_of
 from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named
+from .finals import Finals, alone, finalists
 from .prepare import FEWEST, Prepared, prepare
 from .shape import Shape, shape_of, unshaped
 from .trials import Tell, trials
@@ -382,9 +383,18 @@ def one_round(
     if before is not None:
         out = {e.tag for e in before.problem.composition.effects} - {e.tag for e in base.problem.composition.effects}
         tried = [from_end(base, c, before) if c.tag in out else c for c in tried]
-    judge = Judge(base, max(len(every_form(tags)), 1))
+    number = max(len(every_form(tags)), 1)
+    judge = Judge(base, number)
     judged = tuple(j for j in map(judge, tried) if j is not None)
     freed = spring_freed(base)
+    best = [j.candidate for j in finalists(judged)]
+    if len(best) > 1 and in_time():
+        tell("the best once more", 1.0)
+        finals = Finals.of(base, best, store, name)
+        judge = Judge(finals.base, number)
+        tags = {c.tag for c in finals.ends}
+        judged = (*(j for j in map(judge, finals.ends) if j is not None), *(j for j in judged if j.tag not in tags))
+        freed = None if freed is None else finals.on_the_same(freed)
     rival = None if freed is None else judge.beside(freed, 1)
     return Round(base, judged, tuple(tried), tuple(named(judged)), rival)
 
@@ -393,18 +403,16 @@ def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: s
     """The model with an effect, fitted as the base was, and the deviations of its effects' amplitudes.
 
     What lies far off is found anew too: outliers of a model that lacks an effect are others than those of one that has
-    it, and a few that are left in hold all parameters where they are least far off.
+    it.
     """
     found = candidate.fit
     assert found is not None
     key = f"{name}-settled-{name_of(candidate.tag, candidate.form)}"
     amplitudes = [f.name for f in found.free if f.amplitude]
-
-    def made() -> Fit:
-        again = fit(found.problem, found.point, Scatter.wide().within(base.scatter))
-        return widened(again, amplitudes, DISPERSION)
-
-    return kept(store, key, found.problem, made)
+    return kept(
+        store, key, found.problem,
+        lambda: widened(alone(base, candidate, store, name), amplitudes, DISPERSION),
+    )  # fmt: skip
 
 
 def _end(named: Mapping[str, Round], last: Round) -> Verdict:
