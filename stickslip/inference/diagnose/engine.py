@@ -392,8 +392,8 @@ def one_round(
         tell("the best once more", 1.0)
         finals = Finals.of(base, best, store, name)
         judge = Judge(finals.base, number)
-        tags = {c.tag for c in finals.ends}
-        judged = (*(j for j in map(judge, finals.ends) if j is not None), *(j for j in judged if j.tag not in tags))
+        again = {c.tag for c in finals.ends}
+        judged = (*(j for j in map(judge, finals.ends) if j is not None), *(j for j in judged if j.tag not in again))
         freed = None if freed is None else finals.on_the_same(freed)
     rival = None if freed is None else judge.beside(freed, 1)
     return Round(base, judged, tuple(tried), tuple(named(judged)), rival)
