@@ -139,7 +139,7 @@ def tabs(session: Session) -> pn.Tabs:
 
     def restore() -> None:
         page = session.view.get("page")
-        if not asked and page in PAGES:
+        if not asked and not made.active and page in PAGES:  # who has turned to a page meanwhile stays there
             made.active = PAGES.index(page)
 
     restore()

@@ -48,7 +48,7 @@ class Asked:
             margin=(0, 10, 0, 0),
             **FIXED,
         )
-        self.load = text(name="normal load, in its own", placeholder="such as 0.5 or 2")
+        self.load = text(name="normal load, times", placeholder="such as 0.5 or 2")
         self.back: Any = pn.widgets.Checkbox(
             name="and back over the same track", value=False, width=210, margin=(24, 10, 0, 0), **FIXED
         )

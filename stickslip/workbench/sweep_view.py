@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import panel as pn
-from bokeh.models import FixedTicker
+from bokeh.models import FixedTicker, Range1d
 
 from ..objects import experiments
 from ..objects.experiments import Swept
@@ -27,9 +27,30 @@ def ticks(values: np.ndarray) -> list[float]:
     if not known.size:
         return []
     low, high = float(known.min()), float(known.max())
-    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    decades = range(int(np.floor(np.log10(low))) - 1, int(np.ceil(np.log10(high))) + 2)
     every = [float(f"{m}e{d}") for d in decades for m in (1, 2, 5)]
-    return [v for v in every if 0.4 * low <= v <= 2.5 * high]
+    return [v for v in every if 0.39 * low <= v <= 2.6 * high]
+
+
+def reach(values: np.ndarray) -> tuple[float, float]:
+    """Ends of a logarithmic axis around some values, so that it has two ticks at least, however close they are."""
+    known = values[np.isfinite(values) & (values > 0)]
+    if not known.size:
+        return 1.0, 10.0
+    low, high = float(known.min()), float(known.max())
+    every = ticks(known)
+    first, last = max(v for v in every if v <= low), min(v for v in every if v >= high)
+    if first == last:
+        first, last = max(v for v in every if v < low), min(v for v in every if v > high)
+    return 0.9 * first, 1.1 * last
+
+
+def _scale(axis: Any, shown: Any, values: np.ndarray) -> None:
+    """Ticks and ends of a logarithmic axis; what a hand has zoomed into stays until the values change."""
+    axis.ticker = FixedTicker(ticks=ticks(values))
+    low, high = reach(values)
+    if (shown.reset_start, shown.reset_end) != (low, high):
+        shown.update(start=low, end=high, reset_start=low, reset_end=high)
 
 
 class SweepView:
@@ -54,6 +75,9 @@ class SweepView:
         for key in ("recurrence", "slip"):
             scales = {"x_axis_type": "log", "y_axis_type": "log" if key == "recurrence" else "linear"}
             made = figure(height=280, output_backend="canvas", **scales)
+            made.x_range = Range1d()
+            if key == "recurrence":
+                made.y_range = Range1d()
             made.line("v", key, source=self._model, color=theme.model, line_width=2, line_dash="dashed")
             made.scatter(
                 "v", key, source=self._model, color=theme.model, fill_alpha=0.0, line_width=2, size=13, marker="square"
@@ -116,15 +140,14 @@ class SweepView:
             theirs = np.array([]) if found is None else found.mean(key)
             f, written = unit_of(np.concatenate([own, theirs]), si)
             model[key], measured[key] = theirs * f, own * f
-            self._bars[key].data = {
-                "xs": [[v * k, v * k] for v in every],
-                "ys": [[max(m - s, 1e-3 * m) * f, (m + s) * f] for m, s in zip(own, std, strict=True)],
-            }
+            bars = [[max(m - s, 1e-3 * m) * f, (m + s) * f] for m, s in zip(own, std, strict=True)]
+            self._bars[key].data = {"xs": [[v * k, v * k] for v in every], "ys": bars}
             self.figures[key].yaxis.axis_label = label(key, written)
             self.figures[key].xaxis.axis_label = label("velocity of the drive", unit)
-            self.figures[key].xaxis.ticker = FixedTicker(ticks=ticks(velocities * k))
+            _scale(self.figures[key].xaxis, self.figures[key].x_range, velocities * k)
             if key == "recurrence":
-                self.figures[key].yaxis.ticker = FixedTicker(ticks=ticks(np.concatenate([own, theirs]) * f))
+                whole = np.concatenate([np.ravel(bars), theirs * f])
+                _scale(self.figures[key].yaxis, self.figures[key].y_range, whole)
         self._model.data, self._measured.data = model, measured
         theme = look()
         signs = [{"sign": "●", "colour": theme.measured, "text": "measured"}]

@@ -89,6 +89,21 @@ def test_nothing_lies_over_anything_else_or_beyond_the_edge(browser, page):
         assert count > 5 and not over, (width, over[:5])
 
 
+def test_a_slider_stays_under_the_hand_that_moves_it(browser):
+    """What the head says more of a model that was moved by hand takes no second line."""
+    browser.driver.set_window_size(WIDTHS[0], 1100)
+    browser.tab("Model")
+    browser.wait(lambda: browser.js("return seen('.knob').length"), 60)
+    browser.idle()
+    place = "return all('.knob[data-name=\"weakening.drop\"]')[0].getBoundingClientRect().top"
+    before = browser.js(place)
+    browser.redraw("weakening.drop", 0.6)
+    browser.wait(lambda: "by hand" in browser.text(".errors"))
+    time.sleep(SETTLED)
+    assert browser.js(place) == before
+    browser.press("button", "Base")
+
+
 def test_what_lies_over_something_is_found(browser):
     """The test itself: a button that is moved over another, and a table that is wider than the window."""
     browser.tab("Model")

@@ -75,6 +75,16 @@ def test_fields_page_zoom_and_the_chosen_effect_come_back(campaign, session):
         assert again.view == session.view
 
 
+def test_who_turns_to_a_page_before_the_history_is_read_stays_there(campaign, session):
+    app.tabs(session).active = 2
+    session.keep()
+    with closing(Session(campaign=campaign)) as again:
+        first, turned = app.tabs(again), app.tabs(again)
+        turned.active = 3
+        again.begin()
+        assert (first.active, turned.active) == (2, 3)
+
+
 def test_what_nobody_filled_in_is_not_kept(session):
     Shown(session)
     session.run, session.event = "v400", 2

@@ -23,7 +23,7 @@ from stickslip.workbench.beside import beside
 from stickslip.workbench.rivals_view import Rivals, _undecided
 from stickslip.workbench.session import Session
 from stickslip.workbench.simulated_view import SimulatedView
-from stickslip.workbench.sweep_view import SweepView, ticks
+from stickslip.workbench.sweep_view import SweepView, reach, ticks
 
 CREEP = "creep before slip"
 RIVALS = ("contact-ageing", "viscous-drag")
@@ -297,6 +297,22 @@ def test_an_effect_that_is_in_the_model_stays_and_the_other_takes_its_place():
 def test_the_ticks_of_a_logarithmic_axis_are_plain_numbers():
     assert ticks(np.array([25.0, 800.0, np.nan])) == [10, 20, 50, 100, 200, 500, 1000, 2000]
     assert ticks(np.array([])) == []
+
+
+@pytest.mark.parametrize("values", [[359.5, 360.1], [200.0], [1000.0], [0.116, 2.72], [np.nan, 4.999], [9.9e-3]])
+def test_a_logarithmic_axis_has_two_numbers_and_all_values_however_close_these_are(values):
+    low, high = reach(np.array(values))
+    assert low < np.nanmin(values) and np.nanmax(values) < high
+    assert sum(low < v < high for v in ticks(np.array(values))) >= 2
+    assert reach(np.array([])) == (1.0, 10.0)
+
+
+def test_the_sweep_beside_one_run_has_numbers_on_its_axes(session, monkeypatch):
+    one = {"v200": experiments.steady_runs(session.campaign)["v200"]}
+    monkeypatch.setattr(experiments, "steady_runs", lambda campaign: one)
+    made = SweepView(session, Asked(session)).figures["recurrence"]
+    for axis, shown in ((made.xaxis, made.x_range), (made.yaxis, made.y_range)):
+        assert sum(shown.start <= v <= shown.end for v in axis.ticker.ticks) >= 2
 
 
 def test_nothing_is_proposed_where_nothing_is_undecided(session, campaign):

@@ -39,8 +39,10 @@ export function render({ model }) {
   dismiss.addEventListener("click", () => model.send_msg({ kind: "dismiss" }))
 
   const update = () => {
-    title.textContent = model.title
-    shown.textContent = model.model
+    for (const [line, text] of [[title, model.title], [shown, model.model]]) {
+      line.textContent = text
+      line.title = text // where it has no room it is cut: a second line would move the sliders from under a hand
+    }
     errors.textContent = model.errors
     theme.textContent = model.dark ? "light" : "dark"
     theme.title = "change the theme"
