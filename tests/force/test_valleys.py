@@ -9,8 +9,6 @@ from stickslip.inference.force.descent import SETTLED
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.valleys import LEVEL, _variance, held, widened
 
-ROUNDED = 1.0  # fall of the cost in a round, below which a fit ends
-
 
 @pytest.fixture(scope="module")
 def virgin(small):
@@ -46,16 +44,27 @@ def test_a_flat_profile_is_as_wide_as_one_looked():
     assert np.sqrt(_variance(offset, np.array([0.2, 0.0, 0.0, 0.3, 0.1]))) == pytest.approx(30.0)
 
 
+def _rise(found, f, k, times: float) -> float:
+    """Of the cost so many deviations from the optimum: the mean of both sides, for what is odd is no curvature."""
+    sd, best = float(np.sqrt(found.covariance[k, k])), float(found.point.z[k])
+    least = held(found, f.name, best)[1]  # by the same search
+    assert least == pytest.approx(found.cost, abs=2.0 * SETTLED)
+    return float(np.mean([held(found, f.name, best + side * times * sd)[1] for side in (-1.0, 1.0)])) - least
+
+
 def test_held_parameters_cost_what_the_covariance_says_where_all_is_seen(virgin):
     for k, f in enumerate(virgin.free):
-        sd, best = float(np.sqrt(virgin.covariance[k, k])), float(virgin.point.z[k])
-        least = held(virgin, f.name, best)[1]  # by the same search
-        assert least == pytest.approx(virgin.cost, abs=2.0 * SETTLED)
-        # the mean of both sides: what is odd is no curvature
-        near, far = (np.mean([held(virgin, f.name, best + side * t * sd)[1] for side in (-1, 1)]) for t in (3.0, 6.0))
+        near, far = (_rise(virgin, f, k, times) for times in (3.0, 6.0))
+        assert far == pytest.approx(6.0**2, abs=0.03 * 36.0), f.name
         assert far - near == pytest.approx(6.0**2 - 3.0**2, rel=0.03), f.name
-        # the optimum lies in a dent, no deeper than the rounds of a fit go on for
-        assert -SETTLED < near - least - 3.0**2 < ROUNDED, f.name
+
+
+@pytest.mark.xfail(
+    strict=True, reason="the optimum of this campaign lies in a dent of 0.6, where elements begin to slide"
+)
+def test_near_by_they_cost_it_to_the_end_of_a_search(virgin):
+    for k, f in enumerate(virgin.free):
+        assert _rise(virgin, f, k, 3.0) == pytest.approx(3.0**2, abs=SETTLED), f.name
 
 
 def test_where_all_is_seen_nothing_becomes_wider_than_the_dispersion(virgin):

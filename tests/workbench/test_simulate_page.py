@@ -170,9 +170,13 @@ def test_a_synthetic_record_can_be_opened(campaign, base, folder):
     again = experiments.run(experiments.scenario(base, Setting("v400", "400 um/s", events=4)))
     seen = experiments.simulated(again, campaign["v400"])
     for key, (mean, _, count) in experiments.measured(read.traces[0], read.events[0]).items():
-        # the way of the block in a sample, as fast as it is at its onset
-        late = read.events[0].settings.threshold / 10e3 if key == "creep_before_slip" else 0.0
-        assert seen[key][0] == pytest.approx(mean, rel=3e-3, abs=late) and seen[key][2] == count, key  # a sample
+        assert seen[key][2] == count, key
+        if key != "creep_before_slip":  # its end is told to a sample, in which the block moves by some twenty counts
+            assert seen[key][0] == pytest.approx(mean, rel=3e-3), key
+    trace = read.traces[0]
+    own = trace.time <= again["time"].values[-1]
+    counted = trace.displacement[own] - np.interp(trace.time[own], again["time"].values, again["displacement"].values)
+    assert np.abs(counted).max() < 1.01 * trace.resolution
     for name in ("synthetic run", "../elsewhere", "a/b", ".hidden", ""):
         with pytest.raises(InputError):
             synthetic.write(base, Setting("v400"), campaign, name, _silent)
