@@ -59,9 +59,6 @@ def test_held_parameters_cost_what_the_covariance_says_where_all_is_seen(virgin)
         assert far - near == pytest.approx(6.0**2 - 3.0**2, rel=0.03), f.name
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the optimum of this campaign lies in a dent of 0.6, where elements begin to slide"
-)
 def test_near_by_they_cost_it_to_the_end_of_a_search(virgin):
     for k, f in enumerate(virgin.free):
         assert _rise(virgin, f, k, 3.0) == pytest.approx(3.0**2, abs=SETTLED), f.name
