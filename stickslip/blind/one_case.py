@@ -18,7 +18,6 @@ WAIT = 60.0  # s for a process that was given up, but still holds the case, to f
 
 REFUSED = "refused"  # state of a case that the disk stands in the way of: neither done nor failed
 LIVES = 3  # processes that a case may take down with it in one run
-AMPLE = 2 * 2**30  # bytes a process may hold between two cases; each leaves programs compiled for its own sizes behind
 
 
 class ProcessDiedError(StickslipError):
@@ -79,21 +78,7 @@ def do_case(campaign: str, runs: str, case: str, diagnosis: Diagnosis, session: 
             raise
         return _told(case, REFUSED, str(error), began)
     finally:
-        forget_programs(AMPLE)
-
-
-def forget_programs(ample: int) -> bool:
-    """Let go of what JAX has compiled in this process, if the process holds more than ``ample`` bytes.
-
-    The next case has other numbers of cycles and would compile most of it anew in any case. Returns whether so.
-    """
-    import jax
-    import psutil
-
-    much = bool(psutil.Process().memory_info().rss > ample)
-    if much:
-        jax.clear_caches()
-    return much
+        cache.forget_programs()
 
 
 def _attempt(

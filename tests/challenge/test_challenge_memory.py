@@ -1,11 +1,11 @@
-"""What a worker of a long run gives back between two cases."""
+"""What a process of a long run gives back between two pieces of its work."""
 
 from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
 
-from stickslip.blind.one_case import forget_programs
+from stickslip.system.cache import forget_programs
 
 
 def test_compiled_programs_go_where_a_process_holds_much_and_only_there():

@@ -16,6 +16,7 @@ from joblib import Parallel, delayed
 from ...physics.contact import Bank
 from ...physics.effects import catalogue
 from ...physics.effects.base import Memory
+from ...system.cache import forget_programs
 from ..force.candidates import Candidate, every_form, try_effect
 from ..force.fit import Fit
 from ..force.signatures import Explained
@@ -75,6 +76,7 @@ def _made(base: Fit, work: Sequence[Job], jobs: int) -> Iterator[list[Candidate]
         explained = Explained(base)
         for tag, forms in work:
             yield try_effect(base, explained, tag, forms)
+            forget_programs()
         return
     files = tuple(str(m.__file__) for m in catalogue.user_modules())
     job = dumps(base)
@@ -117,4 +119,6 @@ def _in_worker(job: bytes, tag: str, forms: list[dict[str, str]], files: tuple[s
         _kept.clear()
         base = loads(job)
         _kept[key] = (base, Explained(base))
-    return dumps(try_effect(*_kept[key], tag, forms))
+    made = dumps(try_effect(*_kept[key], tag, forms))
+    forget_programs()
+    return made
