@@ -15,7 +15,7 @@ from ..inference.forecast.predict import METHODS, Compared, Forecaster, compare,
 from ..inference.forecast.rolling import SHARES, Rolled, choose, prepare, roll
 from ..inference.forecast.scoring import quantiles
 from ..inference.forecast.strokes import Strokes
-from ..inference.forecast.telling import told
+from ..inference.forecast.telling import steps, told
 from ..inference.forecast.wander import Wander
 from ..system.units import shown
 from .run import Tell, dataset, head, save
@@ -174,7 +174,7 @@ def forecast(
         "levels": _ties(campaign, number),
         "laws": [_law(c) for c in laws],
         "chosen": {"law": str(law), "rise": rise},
-        "coordinate": told(laws, goes_back(past.arrays["direction"][: training_slips(past)])),
+        "coordinate": told(laws, goes_back(past.arrays["direction"][: training_slips(past)]), steps(past.arrays)),
         "score": {**counts, **own, **others},
         "methods": scores,
         "gains": gained,
@@ -233,7 +233,7 @@ def _followed(arrays: dict[str, np.ndarray], mean: float, each: str = "slip") ->
     laws = compare(arrays, int(LEARNED * arrays["onset"].size))
     best = laws[0].law
     return {
-        **told(laws, goes_back(arrays["direction"]) or each == "stroke", each),
+        **told(laws, goes_back(arrays["direction"]) or each == "stroke", steps(arrays), each),
         "law": [
             {"kernel": c.kernel, "coordinate": c.coordinate, "size": abs(c.size[0]) / mean, "length": c.length,
              "unit": "s" if c.coordinate == "time" else "m"}

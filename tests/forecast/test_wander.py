@@ -7,7 +7,7 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.inference.forecast.predict import Compared, compare, coordinates, predictor, take
-from stickslip.inference.forecast.telling import told
+from stickslip.inference.forecast.telling import steps, told
 from stickslip.inference.forecast.wander import (
     ARREST,
     ONSET,
@@ -22,7 +22,7 @@ from stickslip.inference.forecast.wander import (
     packed,
 )
 
-from .synthetic import series
+from .synthetic import series, wander
 
 OU, MATERN = "ornstein-uhlenbeck", "matern-3/2"
 LAWS = {
@@ -145,7 +145,7 @@ def test_the_coordinate_is_named(coordinate):
     """Time and slip path part where the recurrence changes at the same slip: here it is 1 s and 2 s in turn."""
     law = Wander((Component(MATERN, coordinate, (1.0, 1.0), {"time": 4.0, "slip path": 3e-4}[coordinate]),), (0.1, 0.1))
     arrays = series(400, law, 7, (10.0, 3.0))
-    found = told(compare(arrays, 200), back=False)
+    found = told(compare(arrays, 200), False, steps(arrays))
     assert found["coordinate"] == coordinate and f"wander along {coordinate}" in found["text"]
     assert "a way back over the same track parts them" in found["text"]
 
@@ -161,15 +161,29 @@ def test_a_way_back_decides_between_place_and_slip_path():
     for end in ("onset", "arrest"):
         arrays[f"place_{end}"] = arrays[f"place_{end}"][fold]
     arrays["direction"] = np.repeat([1.0, -1.0, 1.0, -1.0], 60)
-    found = told(compare(arrays, 180), back=True)
+    found = told(compare(arrays, 180), True, steps(arrays))
     assert found["coordinate"] == "place" and "parts them" not in found["text"]
 
 
 @pytest.mark.parametrize("seed", [9, 20])
 def test_scatter_alone_names_no_coordinate(seed):
-    found = told(compare(series(200, LAWS["none"], seed, (10.0, 3.0)), 150), back=False)
+    arrays = series(200, LAWS["none"], seed, (10.0, 3.0))
+    found = told(compare(arrays, 150), False, steps(arrays))
     assert found["coordinate"] in ("", "nothing")
     assert "only scatter" in found["text"] or "no wander is seen" in found["text"]
+
+
+def test_what_ends_within_a_slip_is_no_wander():
+    """Levels at the two ends of a slip go together as its size lets them, and no further slip knows of them."""
+    arrays, length = series(400, LAWS["none"], 7, (10.0, 3.0)), 2e-5
+    size = np.tile([2e-6, 8e-5, 1e-5], 134)[:400]
+    arrays["path_arrest"] = arrays["path_onset"] + size
+    at = np.stack([arrays["path_onset"], arrays["path_arrest"]], axis=1).ravel()
+    w = wander(OU, at, length, np.random.default_rng(3))
+    arrays["onset"], arrays["arrest"] = 10.0 + w[0::2], 3.0 + w[1::2]
+    found = told(compare(arrays, 300), False, steps(arrays))
+    assert found["weights"]["slip path"] > 0.95
+    assert found["coordinate"] == "" and "ends before the next slip" in found["text"]
 
 
 def test_what_cannot_be_fitted_is_refused():
