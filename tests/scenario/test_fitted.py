@@ -28,6 +28,7 @@ VALUES = {
     "contact.p": ("1", 3.3),
     "contact.spread": ("1", 0.15),
 }
+DRIVE = ss.LoadPoint(*map(jax.numpy.array, ([0.0, 1.0], [0.0, 3e-4])))
 
 
 def found(**changes):
@@ -68,9 +69,7 @@ def leaves(tree):
 
 def test_the_model_comes_back_as_it_was(folder):
     original, back = found(), ss.load_run(folder)
-    velocity = 3e-4
-    wanted = original.model(ss.LoadPoint(*map(jax.numpy.array, ([0.0, 1.0], [0.0, velocity]))))
-    got = back.model_at(velocity)
+    wanted, got = original.model(DRIVE), back.fitted.model(DRIVE)
     assert jax.tree.structure(got) == jax.tree.structure(wanted)
     for a, b in zip(leaves(got), leaves(wanted), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12)
@@ -87,7 +86,7 @@ def test_the_model_comes_back_as_it_was(folder):
 def test_the_scenario_is_the_same_model(folder):
     back = ss.load_run(folder)
     scenario = back.scenario(["drive.velocity=300um/s"])
-    got, wanted = build(scenario).model, back.model_at(3e-4)
+    got, wanted = build(scenario).model, back.fitted.model(DRIVE)
     assert [e.tag for e in got.effects] == [e.tag for e in wanted.effects]
     for part in ("block", "bank", "weakening", "effects"):
         for a, b in zip(leaves(getattr(got, part)), leaves(getattr(wanted, part)), strict=True):
