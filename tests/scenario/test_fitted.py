@@ -17,23 +17,14 @@ from stickslip.inference.fit.serialised import KEY, Driven, Fitted, record
 from stickslip.physics.effects import catalogue
 from stickslip.simulation.scenario import build
 from stickslip.system.runstore import json_text
+from tests.fit.synthetic import TRUTH
 
-VALUES = {
-    "contact.strength": ("N", 0.26),
-    "weakening.drop": ("1", 0.18),
-    "weakening.slip_distance": ("m", 1.2e-6),
-    "weakening.healing_time": ("s", 0.01),
-    "rig.damping": ("N s/m", 10.0),
-    "contact.u_max": ("m", 0.95e-6),
-    "contact.p": ("1", 3.3),
-    "contact.spread": ("1", 0.15),
-}
 DRIVE = ss.LoadPoint(*map(jax.numpy.array, ([0.0, 1.0], [0.0, 3e-4])))
 
 
 def found(**changes):
     """A fitted model with two effects, one of which has a form, and a free start of the second run."""
-    free = [Free(name, unit, "log", v, v, 1.0, v / 20, 20 * v, name) for name, (unit, v) in VALUES.items()]
+    free = [Free(name, unit, "log", v, v, 1.0, v / 20, 20 * v, name) for name, (unit, v) in TRUTH.items()]
     free.append(Free("start.1", "m", 1e-6, 2e-6, 0.0, 3.0, -1e-5, 1e-5, "start of run v200"))
     ageing = catalogue.make("contact-ageing", rate=0.013, onset_time=0.02)
     drag = catalogue.make("viscous-drag", drag=0.001, exponent=0.7)
@@ -78,7 +69,7 @@ def test_the_model_comes_back_as_it_was(folder):
     np.testing.assert_allclose(back.fitted.covariance, original.covariance)
     assert back.parameters["contact.u_max"]["value"] == pytest.approx(0.95e-6)
     # the standard deviation of a logarithm times the value
-    k = list(VALUES).index("contact.u_max")
+    k = list(TRUTH).index("contact.u_max")
     assert back.parameters["contact.u_max"]["std"] == pytest.approx(0.95e-6 * np.sqrt(original.covariance[k, k]))
     assert "start.1" not in back.parameters
 
