@@ -27,15 +27,15 @@ from .checkpoints import Pieces, code_digest
 from .fit import Fit
 from .forecast import wander, wander_sentence
 from .next_experiment import next_experiment
-from .run import Tell, dataset, head, save, silent
-from .shown import Shown, facts, table
+from .run import Savable, Tell, dataset, head, silent
+from .shown import facts, table
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
 
-class Diagnosis(Shown):
+class Diagnosis(Savable):
     """The outcome of :meth:`Campaign.diagnose`.
 
     Attributes:
@@ -121,17 +121,6 @@ class Diagnosis(Shown):
     def arrays(self) -> xarray.Dataset:
         """As in ``arrays.nc``."""
         return dataset(self.variables, self.campaign.title)
-
-    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
-
-        Args:
-            folder: where. force: replace an existing run folder. more: entries for ``result.json`` besides.
-
-        Raises:
-            RunFolderError: the folder exists or cannot be written.
-        """
-        return save(self, folder, force, **more)
 
     def _parts(self) -> list[Any]:
         told = self.verdict

@@ -31,8 +31,8 @@ from .fit_tables import STRENGTH, error_table, ladder_table, parameter_table
 from .free_cycles import free_run_errors, freely
 from .parameters_by_hand import moved, profile, refitted
 from .picture import FitPlots
-from .run import Tell, dataset, save, silent
-from .shown import Shown, facts
+from .run import Savable, Tell, dataset, silent
+from .shown import facts
 
 if TYPE_CHECKING:
     import arviz
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from .campaign import Campaign
 
 
-class Fit(Shown):
+class Fit(Savable):
     """The dynamic model along the measured motion, with the effects that were added.
 
     It does not change: whatever changes the model returns another.
@@ -368,17 +368,6 @@ class Fit(Shown):
     def arrays(self) -> xarray.Dataset:
         """As in ``arrays.nc``: measured and model force, the backbone, the runs thinned for pictures."""
         return dataset(self._sections[1], self.campaign.title)
-
-    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
-
-        Args:
-            folder: where. force: replace an existing run folder. more: entries for ``result.json`` besides.
-
-        Raises:
-            RunFolderError: the folder exists or cannot be written.
-        """
-        return save(self, folder, force, **more)
 
     @property
     def force_fit(self) -> ForceFit:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,8 +17,8 @@ from ..inference.forecast.strokes import Strokes
 from ..inference.forecast.telling import told
 from ..inference.forecast.wander import Wander
 from ..system.units import shown
-from .run import Tell, dataset, head, save
-from .shown import Shown, facts, table
+from .run import Savable, Tell, dataset, head
+from .shown import facts, table
 
 if TYPE_CHECKING:
     import pandas
@@ -34,7 +33,7 @@ LEARNED = 0.7  # of them, from which that is learned
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
-class Forecast(Shown):
+class Forecast(Savable):
     """The outcome of :meth:`Campaign.forecast`.
 
     Attributes:
@@ -107,17 +106,6 @@ class Forecast(Shown):
     def plot(self) -> ForecastPlots:
         """Pictures: ``plot.levels()`` and ``plot.calibration()``."""
         return ForecastPlots(self)
-
-    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
-
-        Args:
-            folder: where. force: replace an existing run folder. more: entries for ``result.json`` besides.
-
-        Raises:
-            RunFolderError: the folder exists or cannot be written.
-        """
-        return save(self, folder, force, **more)
 
     def _parts(self) -> list[Any]:
         r = self.result
