@@ -25,10 +25,10 @@ from ..system.runstore import json_text, open_run, refuse_existing, versions
 from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .fit import Fit
-from .forecast import wander, wander_sentence
 from .next_experiment import next_experiment
 from .run import Savable, Tell, dataset, head, silent
 from .shown import facts, table
+from .wander import wander, wander_sentence
 
 if TYPE_CHECKING:
     import pandas
