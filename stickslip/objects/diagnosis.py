@@ -198,7 +198,7 @@ def diagnose(
             )
         except InputError as error:
             for finding in reversed(stopping(rig)):  # with the sign wrong in every run there are no slips to fit
-                error = error.with_hint(finding.sentence, first=True)
+                error = error.with_hint(finding.sentence)
             raise error.at(file=campaign.description.path) from None
         return _made(campaign, done, able, began, time_limit, progress or silent)
 
