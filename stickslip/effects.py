@@ -5,7 +5,7 @@
 The laws themselves are in :mod:`stickslip.physics.effects`.
 """
 
-from .physics.effects import (
+from .physics.effects.base import (
     BodyForce,
     Contact,
     Drive,
@@ -19,14 +19,8 @@ from .physics.effects import (
     Spring,
     Stiffness,
     Threshold,
-    forms,
-    get,
-    load_file,
-    make,
-    register,
-    roles,
-    tags,
 )
+from .physics.effects.catalogue import forms, get, load_file, make, register, roles, tags
 from .physics.params import parameter, variant
 from .simulation.conformance import check_effect
 

@@ -53,9 +53,9 @@ class InputError(StickslipError):
             hint=self.hint,
         )
 
-    def with_hint(self, more: str, *, first: bool = False) -> InputError:
-        """The same error with a further line on how to mend it, at the end or in the first place."""
-        hint = "\n  ".join(line for line in ((more, self.hint) if first else (self.hint, more)) if line)
+    def with_hint(self, first: str) -> InputError:
+        """The same error with a further line on how to mend it, before the others."""
+        hint = "\n  ".join(line for line in (first, self.hint) if line)
         return type(self)(self.what, file=self.file, key=self.key, value=self.value, allowed=self.allowed, hint=hint)
 
     def __str__(self) -> str:

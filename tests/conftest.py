@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -18,3 +20,13 @@ def _bounded_memory():
     yield
     if "jax" in sys.modules:
         sys.modules["jax"].clear_caches()
+
+
+@pytest.fixture
+def real_data():
+    """Folder of measured data, or a skip that says where it was looked for."""
+    default = Path(__file__).resolve().parents[2] / "shared" / "data" / "real"
+    folder = Path(os.environ.get("STICKSLIP_REAL_DATA", default))
+    if not folder.is_dir():
+        pytest.skip(f"measured data are not there ({folder}); set STICKSLIP_REAL_DATA to their folder")
+    return folder

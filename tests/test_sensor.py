@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from stickslip.effects import Motion, make
 from stickslip.errors import InputError
 from stickslip.physics.contact import power_law_bank
-from stickslip.physics.effects import Motion, make
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
 from stickslip.physics.sensor import Vibrometer, flicker_noise, measure, random_walk, white_noise
 from stickslip.physics.sensor.chain import FRINGE, low_pass

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.inference.force.heldout import halves
-from stickslip.objects import Diagnosis
+from stickslip.objects.diagnosis import Diagnosis
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
 
 from .campaigns import DOCS, keep, rms, shipped

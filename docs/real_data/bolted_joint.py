@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.io import loadmat
 
+from stickslip.inference.force.composition import BESIDE
 from stickslip.inference.force.heldout import unseen
-from stickslip.inference.force.problem import BESIDE
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, styled
 
 from .along_the_motion import along_runs, least, strength, told

@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip.data.prescribed import with_motion
 from stickslip.inference.forecast.strokes import Strokes
-from stickslip.objects.forecast import wander, wander_sentence
+from stickslip.objects.wander import wander, wander_sentence
 from stickslip.show.plots.style import DARK, MIDDLE, figure, styled
 
 from .along_the_motion import diagnosed

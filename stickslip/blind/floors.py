@@ -1,8 +1,6 @@
 """What the data can tell of a feature: noise, scatter of the contact, and what a bank of few parameters gets wrong.
 
-Three levels, because they hide different things. What is wrong *alone* in every event averages out over events; what is
-wrong alike in all events of a run does not, and what is wrong alike in all runs hides nothing that depends on velocity,
-place or time.
+Stated for a single event that is predicted from others, and for events around the mean of their run.
 """
 
 from __future__ import annotations
@@ -11,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inference.features.layout import LEVELS
 from ..inference.features.measurement import Measurement
 
 
@@ -27,7 +24,6 @@ class Scatter:
     recurrence_periods: float = 0.1  # in periods of the contact resonance: its phase decides the onset
     size: float = 0.0015
     times: float = 0.0015
-    early: float = 1.0  # factor on times before half the slip
     overshoot: float = 0.05
     ring: float = 0.05
     ring_loudest: float = 0.02  # of the loudest window
@@ -49,31 +45,15 @@ ALONE = Scatter(
     frequency=0.015, creep=0.002, creep_largest=0.0012, creep_clock=1e-5, hold=0.01, resolution=0.15e-9,
     overshoot_resolution=1e-9, first=30.0,
 )  # fmt: skip
-# ... what new lines at every event add, ...
+# ... and what new lines at every event add.
 LINES = Scatter(
     recurrence=0.0015, recurrence_periods=0.1, size=0.0026, times=3e-4, overshoot=0.03, ring=0.02, ring_loudest=0.01,
     frequency=0.045, creep=0.006, creep_largest=0.004, creep_clock=5e-5, hold=0.01, resolution=0.2e-9,
     overshoot_resolution=1e-9, first=3.0,
 )  # fmt: skip
-# ... what all events of a run have alike, ...
-RUN = Scatter(
-    recurrence=4e-4, recurrence_periods=0.04, size=8e-4, times=4e-4, overshoot=0.02, ring=0.015, ring_loudest=0.008,
-    frequency=0.01, creep=0.002, creep_largest=0.0015, creep_clock=1e-5, hold=0.01, resolution=0.15e-9,
-    overshoot_resolution=0.5e-9, first=0.0,
-)  # fmt: skip
-# ... and what all events have.
-ALL = Scatter(
-    recurrence=1e-4, recurrence_periods=0.01, size=2e-4, times=1e-3, early=3.0, overshoot=0.07, ring=0.07,
-    ring_loudest=0.02,
-    frequency=0.08, creep=0.002, creep_largest=0.0015, creep_clock=1e-5, hold=0.01, resolution=0.15e-9,
-    overshoot_resolution=1e-9, first=0.0,
-)  # fmt: skip
-
 NEW_SIZE, NEW_CREEP = 0.002, 0.012  # scatter of slip size and creep (share of the largest) where the lines are new
 CREEP_NOISE = 0.003  # of that of the creep, from the sensor
 MOST_VARIED = 1.5
-EVENT_WIDTHS = (0.12, 0.08)  # prior s.d. of ln(u_max) and ln(p) from event to event where lines are new every time
-LEAST_WIDTH = 0.02  # share of these where the lines are the same
 CONTACTS = 4  # of the rigs that all these numbers are of: what rough lines do to the mean of n goes as 1/sqrt(n)
 FEWEST = 4  # events of a run that tell scatter
 CREEP_MIDDLE = slice(3, 9)  # points of the creep that scatter most with the lines
@@ -93,28 +73,9 @@ def floors_alone(measurement: Measurement, *, factor: float = 1.0) -> np.ndarray
     return _root_sum(measurement.sensor, factor * _level(measurement, Scatter()))
 
 
-def common(measurement: Measurement) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations of what all events of a run, and of what all events, have alike (SI, shape (R, n, F) each).
-
-    Zero in the first cycle of a run, which is not like others.
-    """
-    share = lines_share(measurement)
-    return share * _level(measurement, RUN), share * _level(measurement, ALL)
-
-
 def lines_share(measurement: Measurement) -> float:
     """How much more (or less) rough lines do to the mean of this rig's contacts than to that of four."""
     return float(np.sqrt(CONTACTS / measurement.contacts)) if measurement.contacts else 1.0
-
-
-def event_widths(measurement: Measurement) -> np.ndarray:
-    """Prior s.d. of ln(u_max) and ln(p) of every event, shape (R, n, 2).
-
-    As the events scatter; that of a virgin cycle, which sees the whole shape of the lines, as if they were new.
-    """
-    share = np.full(measurement.valid.shape[:2], max(min(scatter_factor(measurement), 1.0), LEAST_WIDTH))
-    share[:, 0][np.asarray(measurement.cycles.virgin, bool)] = 1.0
-    return lines_share(measurement) * share[..., None] * np.array(EVENT_WIDTHS)
 
 
 def _level(measurement: Measurement, k: Scatter) -> np.ndarray:
@@ -125,8 +86,7 @@ def _level(measurement: Measurement, k: Scatter) -> np.ndarray:
     real[..., s["recurrence"]] = np.hypot(k.recurrence * v[..., s["recurrence"]], k.recurrence_periods * period)
     real[..., s["size"]] = k.size * v[..., s["size"]]
     times = v[..., s["times"]]
-    share = np.where(np.array(LEVELS) < 0.5, k.early, 1.0) * k.times
-    real[..., s["times"]] = share * (times[..., -1] - times[..., 0])[..., None]
+    real[..., s["times"]] = k.times * (times[..., -1] - times[..., 0])[..., None]
     real[..., s["overshoot"]] = np.hypot(k.overshoot * v[..., s["overshoot"]], k.overshoot_resolution)
     loudest = np.max(np.abs(v[..., s["ring"]]), axis=-1, keepdims=True)
     real[..., s["ring"]] = np.hypot(k.ring * v[..., s["ring"]], k.ring_loudest * loudest)
@@ -180,15 +140,3 @@ def _scatter(values: np.ndarray) -> float:
     t = np.arange(len(values))
     lines = np.polynomial.polynomial.polyval(t, np.polynomial.polynomial.polyfit(t, values, 1)).T
     return float(np.sqrt(np.median(np.sum((values - lines) ** 2, axis=0) / (len(values) - 2))))
-
-
-def uncertain(measurement: Measurement) -> np.ndarray:
-    """Standard deviation of every feature that tells of a parameter (SI, shape (R, n, F)).
-
-    What no model of few parameters describes is the same realisation in all cycles where the lines are the same at
-    every event; their average knows no more of it than one of them. With new lines each cycle has its own.
-    """
-    same = float(np.clip(1.0 - scatter_factor(measurement), 0.0, 1.0))
-    cycles = 1.0 + (float(np.sum(np.asarray(measurement.cycles.used))) - 1.0) * same
-    real = (2.0 - same) * lines_share(measurement) * _level(measurement, Scatter())
-    return _root_sum(measurement.sensor, np.sqrt(cycles) * real)

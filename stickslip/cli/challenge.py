@@ -5,11 +5,12 @@ from __future__ import annotations
 import shutil
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
 from ..system.progress import working
+from .parameters import Candidates, Flag, Jobs, MaxEffects, names
 
 if TYPE_CHECKING:
     from ..blind.run import Progress
@@ -24,10 +25,7 @@ challenge = App(
 
 
 @challenge.command
-def make(
-    folder: Path, *, cases: int = 100, seed: int = 0, grouped: Annotated[bool, Parameter(negative="")] = False,
-    jobs: int | None = None,
-) -> int:  # fmt: skip
+def make(folder: Path, *, cases: int = 100, seed: int = 0, grouped: Flag = False, jobs: Jobs = None) -> int:
     """Make campaigns with hidden effects; the truth is sealed in a file apart.
 
     Parameters
@@ -41,8 +39,6 @@ def make(
     grouped:
         Join springs of about the same threshold, instead of moving every one of them: ten times faster, not quite the
         same slips.
-    jobs:
-        Parallel processes; default one a core.
     """
     from ..blind.make import make_challenge
 
@@ -58,10 +54,10 @@ def run(
     *,
     scheduler: str | None = None,
     workers: int | None = None,
-    candidates: str | None = None,
-    max_effects: int = 4,
+    candidates: Candidates = None,
+    max_effects: MaxEffects = 4,
     only: str | None = None,
-    retry: Annotated[bool, Parameter(negative="")] = False,
+    retry: Flag = False,
 ) -> int:
     """Diagnose every case; what is finished is not done again, and a case cut off goes on from its pieces.
 
@@ -73,10 +69,6 @@ def run(
         Address of a running dask.distributed scheduler: tcp://host:8786. Default: a cluster on this machine.
     workers:
         Processes of the cluster on this machine; default one a core.
-    candidates:
-        Try these effects only: contact-ageing,drive-ripple.
-    max_effects:
-        Add at most so many, one after the other.
     only:
         Diagnose these cases only, in this order, and leave the others open: case-003,case-001.
     retry:
@@ -84,13 +76,13 @@ def run(
     """
     from ..blind.run import run_challenge
 
-    chosen, some = _names(candidates), _names(only)
+    some = names(only)
     try:
         found = run_challenge(
             folder,
             scheduler=scheduler,
             workers=workers,
-            candidates=chosen,
+            candidates=names(candidates),
             max_effects=max_effects,
             only=some,
             retry=retry,
@@ -104,10 +96,6 @@ def run(
         print(f"failures are described in {folder / 'runs'}; try again with --retry")
     left_open = found["open"] and some is None
     return UNRESOLVED if left_open or found["failed"] else 0
-
-
-def _names(text: str | None) -> list[str] | None:
-    return None if text is None else [n.strip() for n in text.split(",") if n.strip()]
 
 
 def _tell(p: Progress) -> None:
@@ -143,10 +131,7 @@ def seal(folder: Path) -> int:
 
 
 @challenge.command
-def score(
-    folder: Path, *, seal: str | None = None, json: Annotated[bool, Parameter(negative="")] = False,
-    force: Annotated[bool, Parameter(negative="")] = False,
-) -> int:  # fmt: skip
+def score(folder: Path, *, seal: str | None = None, json: Flag = False, force: Flag = False) -> int:
     """Compare the answers with the truth; refuses a folder whose seal does not match.
 
     Writes score.json, score.txt, confusion.png, confusion-by-amplitude.png and amplitude.png into FOLDER/score.

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
-
-from cyclopts import Parameter
+from typing import Any
 
 from ..system.runstore import file_record, json_text, open_run, refuse_existing, versions
 from . import show
+from .parameters import Force, Json
 
 
 def compare(
@@ -16,8 +15,8 @@ def compare(
     second: Path,
     *,
     out: Path | None = None,
-    json: Annotated[bool, Parameter(negative="")] = False,
-    force: Annotated[bool, Parameter(negative="")] = False,
+    json: Json = False,
+    force: Force = False,
 ) -> int:
     """Two runs side by side: models, verdicts, errors by phase, parameters and how far apart they are.
 
@@ -29,10 +28,6 @@ def compare(
         The other one.
     out:
         Folder for result.json and the picture compare.png.
-    json:
-        Print the result as JSON.
-    force:
-        Replace an existing run folder.
     """
     if out is not None:
         refuse_existing(out, force)

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from cyclopts import Parameter
+from typing import Any, Literal
 
 from ..errors import InputError
 from ..system.runstore import open_run, refuse_existing, versions
 from . import show
+from .parameters import Changes, Force, MoreChanges
 
 
 def creep(
     scenario: str,
-    *more: str,
+    *more: MoreChanges,
     out: Path | None = None,
-    set: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
+    set: Changes = (),
     points: int = 400,
     average: Literal["displacement", "force"] = "displacement",
     time: Literal["exact", "paper"] = "exact",
-    force: Annotated[bool, Parameter(negative="")] = False,
+    force: Force = False,
 ) -> int:
     """The static creep curve of a scenario's contacts, without inertia.
 
@@ -31,20 +30,14 @@ def creep(
     ----------
     scenario:
         TOML file that describes the rig and its drive.
-    more:
-        Further changes such as contact.H=0.5.
     out:
         Folder for creep.csv, creep.png and result.json instead.
-    set:
-        Change a key of the scenario: --set contact.H=0.5. May be given several times.
     points:
         Loads from zero to full friction.
     average:
         Mean over rough lines of the displacement at the same load, or of the force at the same displacement.
     time:
         Virtual time with the block's own motion (exact) or without it (paper).
-    force:
-        Replace an existing run folder.
     """
     from ..show.simulated import input_records
     from .simulate import outside, scenario_arguments

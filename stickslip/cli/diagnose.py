@@ -6,12 +6,11 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
-
-from cyclopts import Parameter
+from typing import Any
 
 from ..system.progress import EVERY, Stage
 from ..system.runstore import json_text
+from .parameters import Candidates, Files, Flag, Force, Jobs, MaxEffects, Several, names
 
 UNRESOLVED = 3
 
@@ -20,14 +19,14 @@ def diagnose(
     campaign: str,
     *,
     out: Path | None = None,
-    candidates: str | None = None,
-    max_effects: int = 4,
-    holdout: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
-    effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
-    jobs: int | None = None,
+    candidates: Candidates = None,
+    max_effects: MaxEffects = 4,
+    holdout: Several = (),
+    effect: Files = (),
+    jobs: Jobs = None,
     time_limit: float | None = None,
-    json: Annotated[bool, Parameter(negative="")] = False,
-    force: Annotated[bool, Parameter(negative="")] = False,
+    json: Flag = False,
+    force: Force = False,
 ) -> int:
     """Find the physical effect that the model lacks, add it, and see the error on unseen runs fall.
 
@@ -38,32 +37,23 @@ def diagnose(
     out:
         Folder for report.html, result.json and the finished pieces; an interrupted diagnosis goes on from them.
         Default: NAME-diagnosis in this folder, after the campaign's file or, where that is campaign.toml, its folder.
-    candidates:
-        Try these effects only: contact-ageing,drive-ripple.
-    max_effects:
-        Add at most so many, one after the other.
     holdout:
         A run to keep aside; may be given several times. Default: runs whose role in the campaign is "held-out". Every
         other run is predicted from the others in turn.
     effect:
         A Python file with an effect of your own, which is run and then tried with the others.
-    jobs:
-        Parallel processes; default one a core.
     time_limit:
         Seconds after which the best answer so far is given; it says so.
     json:
         Print result.json.
-    force:
-        Replace an existing run folder.
     """
     from ..objects.diagnosis import diagnose_campaign
 
-    chosen = None if candidates is None else [c.strip() for c in candidates.split(",") if c.strip()]
     out = _named_after(Path(campaign)) if out is None else out
     result = diagnose_campaign(
         campaign,
         out,
-        candidates=chosen,
+        candidates=names(candidates),
         max_effects=max_effects,
         holdout=holdout,
         effect_files=effect,

@@ -6,12 +6,11 @@ import sys
 import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from ..errors import InputError, RunFolderError, StickslipError
 from . import show
+from .parameters import Flag, OwnEffects
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,10 +23,10 @@ def effects(
     tag: str | None = None,
     *,
     model: str | None = None,
-    latex: Annotated[bool, Parameter(negative="")] = False,
-    effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
+    latex: Flag = False,
+    effect: OwnEffects = (),
     picture: Path | None = None,
-    force: Annotated[bool, Parameter(negative="")] = False,
+    force: Flag = False,
 ) -> int:
     """List the catalogue of effects, explain one, or print a model's equations.
 
@@ -40,8 +39,6 @@ def effects(
         the defaults go behind the tag: rate-and-state:law=slip:evolution=0.01, drive-ripple:pitch=2mm.
     latex:
         Print the equations as LaTeX.
-    effect:
-        A Python file with an effect of your own. Its code is run.
     picture:
         Write a picture of the trace with and without the effect to this PNG file.
     force:

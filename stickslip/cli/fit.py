@@ -8,15 +8,14 @@ import textwrap
 import time as clock
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING, Annotated, Any, Literal
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import InputError
 from ..system.progress import working
 from ..system.runstore import json_text, refuse_existing
 from ..system.units import to_si
 from . import show
+from .parameters import CampaignFile, Files, Force, Json, OutFolder, Several
 
 if TYPE_CHECKING:
     from ..objects.fit import Fit
@@ -26,31 +25,27 @@ _BETWEEN = re.compile(r"(?<=\.) (?=[A-Z])")  # sentences
 
 
 def fit(
-    campaign: Path,
+    campaign: CampaignFile,
     *,
     model: Literal["static", "inertial"] = "inertial",
-    out: Path | None = None,
-    add: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
-    effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
-    profile: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
-    holdout: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
+    out: OutFolder = None,
+    add: Several = (),
+    effect: Files = (),
+    profile: Several = (),
+    holdout: Several = (),
     align: Literal["consistent", "paper"] = "consistent",
     time: Literal["exact", "paper"] = "exact",
     v_lim: str = "1 um/s",
     sampling: Literal["log", "uniform"] = "log",
-    json: Annotated[bool, Parameter(negative="")] = False,
-    force: Annotated[bool, Parameter(negative="")] = False,
+    json: Json = False,
+    force: Force = False,
 ) -> int:
     """Fit the static or the dynamic model to a campaign, and say where it fails.
 
     Parameters
     ----------
-    campaign:
-        TOML file that names the measurements.
     model:
         static (creep without inertia, one process after the other) or inertial (all runs together).
-    out:
-        Folder for result.json, arrays.nc and report.html.
     add:
         Put an effect into the dynamic model: --add contact-ageing. Another form of its law than the usual one:
         --add machine-compliance:where=series. May be given several times. --add inertia fits how much mass moves with
@@ -70,10 +65,6 @@ def fit(
         Static: speed of the block at which a creep process ends.
     sampling:
         Static: windows even in the logarithm of the time left, or even in time as in the paper.
-    json:
-        Print the result as JSON.
-    force:
-        Replace an existing run folder.
     """
     from ..objects.campaign import load_campaign
     from ..objects.fit import fit as fit_dynamic
@@ -178,9 +169,5 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
     lines += ["", *(f"left out: {text}" for text in lost[:8])]
     if len(lost) > 8:
         lines.append(f"... and {len(lost) - 8} more: --json, or the report of --out")
-    lines.append(f"{result['seconds']:.1f} s")
-    if out is not None:
-        lines.append(f"written to {out}: report.html, result.json, arrays.nc")
-    else:
-        lines.append("nothing was written: --out FOLDER keeps it, with a report of pictures")
+    lines += [f"{result['seconds']:.1f} s", show.kept(out)]
     return "\n".join(lines)

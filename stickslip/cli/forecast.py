@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
-
-from cyclopts import Parameter
+from typing import Any
 
 from ..system.progress import working
 from ..system.runstore import json_text, refuse_existing
 from . import show
+from .parameters import CampaignFile, Force, Json, OutFolder
 
 
 def forecast(
-    campaign: Path,
+    campaign: CampaignFile,
     *,
     run: str | None = None,
     train: float = 0.5,
     at: float | None = None,
-    out: Path | None = None,
-    json: Annotated[bool, Parameter(negative="")] = False,
-    force: Annotated[bool, Parameter(negative="")] = False,
+    out: OutFolder = None,
+    json: Json = False,
+    force: Force = False,
 ) -> int:
     """Forecast the next slip from how strength wanders and load rises, and score it on unseen slips.
 
     Parameters
     ----------
-    campaign:
-        TOML file that names the measurements.
     run:
         The run to be forecast. Default: the one with the most slips.
     train:
@@ -36,12 +33,6 @@ def forecast(
     at:
         Forecast once in each stick, so many mean recurrences after the arrest (0.5: half of one). Default: moments
         all along, ten in a mean recurrence.
-    out:
-        Folder for result.json, arrays.nc and report.html.
-    json:
-        Print the result as JSON.
-    force:
-        Replace an existing run folder.
     """
     from ..objects.campaign import load_campaign
 
@@ -85,9 +76,5 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
             f"{q['0.25']} to {q['0.75']}, nine tenths from {q['0.05']} to {q['0.95']})"
         )
     lines += [f"left out: {text}" for text in result["dropped"]]
-    lines.append(f"{result['seconds']:.1f} s")
-    if out is None:
-        lines.append("nothing was written: --out FOLDER keeps it, with a report of pictures")
-    else:
-        lines.append(f"written to {out}: report.html, result.json, arrays.nc")
+    lines += [f"{result['seconds']:.1f} s", show.kept(out)]
     return "\n".join(lines)

@@ -4,32 +4,26 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from ..system.runstore import json_text, refuse_existing
+from .parameters import CampaignFile, Flag, Force
 
 
 def inspect(
-    campaign: Path,
+    campaign: CampaignFile,
     *,
     out: Path | None = None,
-    json: Annotated[bool, Parameter(negative="")] = False,
-    force: Annotated[bool, Parameter(negative="")] = False,
+    json: Flag = False,
+    force: Force = False,
 ) -> int:
     """Traces of a campaign, their events, what was mended or left out, and what they can tell.
 
     Parameters
     ----------
-    campaign:
-        TOML file that names the measurements.
     out:
         Folder for result.json, arrays.nc, a picture of every trace and report.html.
     json:
         Print everything as JSON, with the events of every trace, instead of a table.
-    force:
-        Replace an existing run folder.
     """
     from ..objects.campaign import load_campaign
 

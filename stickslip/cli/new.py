@@ -8,13 +8,14 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from ..errors import RunFolderError
+from .parameters import Flag
 
 
 def new(
     what: Literal["scenario", "campaign"],
     file: Annotated[Path | None, Parameter(allow_leading_hyphen=True)] = None,
     *,
-    force: Annotated[bool, Parameter(negative="")] = False,
+    force: Flag = False,
 ) -> int:
     """Write a commented scenario or campaign file to start from.
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import importlib.util
 import ipaddress
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from ..errors import InputError
+from .parameters import Files
 
 NEEDED = ("panel", "bokeh", "tsdownsample", "watchfiles")
 LOOPBACK = "127.0.0.1"
@@ -20,7 +18,7 @@ def open(
     *,
     port: int = 0,
     browser: bool = True,
-    effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
+    effect: Files = (),
     address: str = LOOPBACK,
 ) -> int:
     """Open the workbench in the browser: compare, see where the model fails, add an effect, watch the error fall.

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from ..system.units import shown
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ..simulation.scenario import Progress
 
 PATIENCE = 1.0  # s before a progress bar appears
@@ -75,6 +77,13 @@ def told(result: Mapping[str, Any]) -> list[str]:
         for t in result.get("traces", ())
         for text in t[key]
     ]
+
+
+def kept(out: Path | None) -> str:
+    """Where the result lies."""
+    if out is None:
+        return "nothing was written: --out FOLDER keeps it, with a report of pictures"
+    return f"written to {out}: report.html, result.json, arrays.nc"
 
 
 def warn(text: str) -> None:

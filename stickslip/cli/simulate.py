@@ -6,13 +6,12 @@ import sys
 import time
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..system.runstore import Run, json_text, open_run, refuse_existing
 from . import show
+from .parameters import Changes, Flag, Force, MoreChanges, OwnEffects
 
 if TYPE_CHECKING:
     import xarray
@@ -23,14 +22,14 @@ if TYPE_CHECKING:
 
 def simulate(
     scenario: str,
-    *more: str,
+    *more: MoreChanges,
     out: Path | None = None,
-    set: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
+    set: Changes = (),
     sweep: str | None = None,
-    json: Annotated[bool, Parameter(negative="")] = False,
+    json: Flag = False,
     trace: str | None = None,
-    effect: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = (),
-    force: Annotated[bool, Parameter(negative="")] = False,
+    effect: OwnEffects = (),
+    force: Force = False,
 ) -> int:
     """Simulate a scenario, or the model that a fit or a diagnosis found: trace, slip events, pictures.
 
@@ -39,22 +38,14 @@ def simulate(
     scenario:
         TOML file that describes the rig and its drive; or the run folder of a fit or a diagnosis, whose model is then
         driven at the velocity of its first run.
-    more:
-        Further changes such as contact.H=0.5.
     out:
         Folder for result.json, arrays.nc, the pictures and the synthetic measurement.
-    set:
-        Change a key of the scenario: --set contact.H=0.5. May be given several times.
     sweep:
         Run a series: --sweep drive.velocity=20um/s:1mm/s:8 (start, stop, number), or values with commas.
     json:
         Print the result as JSON instead of a table.
     trace:
         Of a run folder: drive as this measured run was driven, with its holds.
-    effect:
-        A Python file with an effect of your own. Its code is run.
-    force:
-        Replace an existing run folder.
     """
     path, changes = scenario_arguments(scenario, more, set)
     if out is not None:

@@ -25,17 +25,17 @@ from ..system.runstore import json_text, open_run, refuse_existing, versions
 from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .fit import Fit
-from .forecast import wander, wander_sentence
 from .next_experiment import next_experiment
-from .run import Tell, dataset, head, save, silent
-from .shown import Shown, facts, table
+from .run import Savable, Tell, dataset, head, silent
+from .shown import facts, table
+from .wander import wander, wander_sentence
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
 
-class Diagnosis(Shown):
+class Diagnosis(Savable):
     """The outcome of :meth:`Campaign.diagnose`.
 
     Attributes:
@@ -122,17 +122,6 @@ class Diagnosis(Shown):
         """As in ``arrays.nc``."""
         return dataset(self.variables, self.campaign.title)
 
-    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
-
-        Args:
-            folder: where. force: replace an existing run folder. more: entries for ``result.json`` besides.
-
-        Raises:
-            RunFolderError: the folder exists or cannot be written.
-        """
-        return save(self, folder, force, **more)
-
     def _parts(self) -> list[Any]:
         told = self.verdict
         proposed = self.next_experiment
@@ -209,7 +198,7 @@ def diagnose(
             )
         except InputError as error:
             for finding in reversed(stopping(rig)):  # with the sign wrong in every run there are no slips to fit
-                error = error.with_hint(finding.sentence, first=True)
+                error = error.with_hint(finding.sentence)
             raise error.at(file=campaign.description.path) from None
         return _made(campaign, done, able, began, time_limit, progress or silent)
 

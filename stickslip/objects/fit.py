@@ -11,31 +11,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, nearest
-from ..inference.diagnose.climb import Climbed, chosen, climb, extended, profiled, replaced, shortened
+from ..inference.diagnose.climb import Climbed, chosen, climb, extended, replaced, shortened
 from ..inference.diagnose.confirm import Confirmation
 from ..inference.diagnose.fitted import fitted_model
-from ..inference.diagnose.summary import fitted_sections
 from ..inference.fit.parameters import Free, effect_parameters
 from ..inference.fit.serialised import Fitted
 from ..inference.force.backbone import backbone, power_law
-from ..inference.force.errors import deviation, error, of_all, sums
+from ..inference.force.errors import Sums, deviation, error, sums
 from ..inference.force.fit import Fit as ForceFit
-from ..inference.force.fit import at, deviations
-from ..inference.force.fit import fit as fit_force
+from ..inference.force.fit import deviations
 from ..inference.force.heldout import apart
-from ..inference.force.knots import PHASES
-from ..inference.force.residual import VARIABLES, WAYS, coordinates
-from ..inference.force.valleys import pinned
+from ..inference.force.residual import coordinates
 from ..physics.effects import catalogue
 from ..physics.effects.named import with_form
-from ..show.report.diagnosis_result import trace_sections
-from ..show.report.identifiability import identifiability
 from ..simulation.conformance import try_laws
-from ..system.units import shown, to_si
-from .error_tables import by_phase
+from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rough_lines
+from .fit_result import fit_result
+from .fit_tables import STRENGTH, error_table, ladder_table, parameter_table
+from .free_cycles import free_run_errors, freely
+from .parameters_by_hand import moved, profile, refitted
 from .picture import FitPlots
-from .run import Tell, dataset, head, save, silent
-from .shown import Shown, facts, table
+from .run import Savable, Tell, dataset, silent
+from .shown import facts
 
 if TYPE_CHECKING:
     import arviz
@@ -44,16 +41,8 @@ if TYPE_CHECKING:
 
     from .campaign import Campaign
 
-STRENGTH = "contact.strength"
-MEANINGS = {
-    STRENGTH: "friction force of all contacts at full strength",
-    "rig.mass": "mass of the block",
-    "rig.spring_stiffness": "stiffness of the driving spring",
-}
-COORDINATES = ("displacement", "velocity", "spring force", "time in contact", *WAYS)
 
-
-class Fit(Shown):
+class Fit(Savable):
     """The dynamic model along the measured motion, with the effects that were added.
 
     It does not change: whatever changes the model returns another.
@@ -130,31 +119,12 @@ class Fit(Shown):
     @cached_property
     def parameters(self) -> pandas.DataFrame:
         """Value and standard deviation (SI), unit, prior and meaning of every parameter that all runs share."""
-        free = {f.name: f for f in self.free}
-        rows: dict[str, dict[str, Any]] = {}
-        for name, value in self.values.items():
-            f = free.get(name)
-            unit = "N" if name == STRENGTH else f.unit if f is not None else _unit_of(name)
-            rows[name] = {
-                "value": value,
-                "std": self.std.get(name, 0.0),
-                "unit": unit,
-                "prior": "measured" if name == STRENGTH else "given" if f is None else f.known,
-                "meaning": f.doc if f is not None else MEANINGS.get(name, ""),
-            }
-        return table(rows, "parameter")
+        return parameter_table(self)
 
     @cached_property
     def covariance(self) -> xarray.DataArray:
         """Covariance (SI) of the free parameters that all runs share, shape (a, a)."""
-        import xarray
-
-        names = [f.name for f in self.free]
-        slope = np.array([f.slope(float(z)) for f, z in zip(self.free, self._fit.point.z, strict=True)])
-        part = self._fit.covariance[: len(names), : len(names)] * slope[:, None] * slope
-        return xarray.DataArray(
-            part, dims=("parameter", "other"), coords={"parameter": names, "other": names}, name="covariance"
-        )
+        return parameter_covariance(self)
 
     # how far it is from the measurement
 
@@ -165,30 +135,7 @@ class Fit(Shown):
         ``residual`` is measured less model with all events alike, ``floor`` the standard deviation that noise and the
         scatter of events make.
         """
-        import xarray
-
-        found, problem = self._fit, self._fit.problem
-        where = self._where
-        names = np.array([k.name for k in problem.runs])
-        coords: dict[str, Any] = {
-            "run": ("point", names[problem.run]),
-            "event": ("point", problem.of - problem.first[problem.run]),
-            "phase": ("point", np.array(PHASES)[problem.phase]),
-            "time": ("point", problem.at, {"units": "s"}),
-        }
-        for name in COORDINATES:
-            unit = (VARIABLES | WAYS)[name]
-            coords[name.replace(" ", "_")] = ("point", where[name], {"units": unit, "long_name": name})
-        data = {
-            "measured": found.forces.measured, "model": found.forces.held, "residual": found.marginal,
-            "floor": self._floor, "stiffness": found.forces.tangent,
-        }  # fmt: skip
-        units = {"stiffness": "N/m"}
-        made = {k: ("point", v, {"units": units.get(k, "N")}) for k, v in data.items()}
-        made["left_out"] = ("point", found.dropped, {"long_name": "beyond what is random: a jump of the sensor"})
-        return xarray.Dataset(
-            made, coords=coords, attrs={"title": self.campaign.title, "model": " + ".join(self.parts)}
-        )
+        return contact_force(self, self._where, self._floor)
 
     @property
     def residuals(self) -> xarray.DataArray:
@@ -199,22 +146,22 @@ class Fit(Shown):
     @cached_property
     def errors(self) -> pandas.DataFrame:
         """Root mean square of the residual force over its floor: a row for each phase of the cycle, a column a run."""
-        return self._table(self._fit.marginal, error)
+        return self._errors(self._fit.marginal, error)
 
     @cached_property
     def unseen_errors(self) -> pandas.DataFrame:
         """The same on runs that are left out of the fit, each in turn."""
-        return self._table(self._unseen, error)
+        return self._errors(self._unseen, error)
 
     @cached_property
     def error_deviations(self) -> pandas.DataFrame:
         """Standard deviations of :attr:`errors`, by how much events differ, for residuals within one go together."""
-        return self._table(self._fit.marginal, deviation)
+        return self._errors(self._fit.marginal, deviation)
 
     @cached_property
     def unseen_error_deviations(self) -> pandas.DataFrame:
         """The same of :attr:`unseen_errors`."""
-        return self._table(self._unseen, deviation)
+        return self._errors(self._unseen, deviation)
 
     @property
     def error(self) -> float:
@@ -242,17 +189,7 @@ class Fit(Shown):
 
         ``error std`` and ``unseen std`` are their standard deviations, by how much events differ.
         """
-        rows: dict[Any, dict[str, Any]] = {}
-        for rung in self.climbed.ladder:
-            what = f"without {rung.removed}" if rung.removed else rung.added or "static"
-            rows[len(rows)] = {
-                "model": " + ".join(rung.model),
-                "step": what if rung.removed or rung.added is None else f"+ {what}",
-                **self._of_all(rung.residual, "error", "error std"),
-                **self._of_all(rung.unseen, "unseen error", "unseen std"),
-                "gain": self.climbed.gains.get(rung.added or "", np.nan),
-            }
-        return table(rows, "rung")
+        return ladder_table(self, self._summed)
 
     @cached_property
     def backbone(self) -> xarray.Dataset:
@@ -260,22 +197,8 @@ class Fit(Shown):
 
         Attributes ``u_max`` (m), ``p`` and their standard deviations, ``spread`` and ``misfit`` are of the law.
         """
-        import xarray
-
         curve = backbone(self._fit)
-        law = power_law(curve, self._contacts)
-        return xarray.Dataset(
-            {
-                "force": ("displacement", curve.force, {"units": "N"}),
-                "std": ("displacement", curve.std, {"units": "N"}),
-                "law": ("displacement", law.force, {"units": "N", "long_name": "1 - (1 - u/u_max)^p"}),
-            },
-            coords={"displacement": ("displacement", curve.displacement, {"units": "m"})},
-            attrs={
-                "u_max": law.u_max, "u_max_std": law.u_max_std, "p": law.p, "p_std": law.p_std, "spread": law.spread,
-                "misfit": law.misfit,
-            },
-        )  # fmt: skip
+        return backbone_curve(curve, power_law(curve, self._contacts))
 
     @cached_property
     def rough_line(self) -> xarray.Dataset | None:
@@ -285,23 +208,7 @@ class Fit(Shown):
             ``force`` (N) over ``displacement`` (m); ``later`` and ``sooner``, one deviation to either side, by which
             other contacts of the same surface differ. Attributes ``H``, ``h_rms`` (m) and their deviations, ``misfit``.
         """
-        import xarray
-
-        from ..inference.diagnose.shape import shape_of
-
-        shape = shape_of(self._fit, self.campaign.rig, [])
-        line = shape.line
-        if line is None:
-            return None
-        curves = {"force": line.force, "later": line.scatter[0], "sooner": line.scatter[1]}
-        return xarray.Dataset(
-            {name: ("displacement", values, {"units": "N"}) for name, values in curves.items()},
-            coords={"displacement": ("displacement", shape.curve.displacement, {"units": "m"})},
-            attrs={
-                "H": line.hurst, "H_std": line.hurst_std, "h_rms": line.h_rms, "h_rms_std": line.h_rms_std,
-                "misfit": line.misfit,
-            },
-        )  # fmt: skip
+        return rough_lines(self)
 
     # what can be changed
 
@@ -314,24 +221,7 @@ class Fit(Shown):
         Raises:
             InputError: no free parameter of that name, or a value beyond its bounds.
         """
-        known = {f.name: i for i, f in enumerate(self.free)}
-        z, weights = self._fit.point.z.copy(), self._fit.point.weights
-        for name, value in values.items():
-            if name == STRENGTH:
-                strength = to_si(value, "N", key=name)
-                if not strength > 0.0:
-                    raise InputError("out of range", key=name, value=value, allowed="more than 0 N")
-                weights = weights * (strength / self._fit.strength)
-                continue
-            f = self.free[self._index(name, known)]
-            number = to_si(value, f.unit, key=name)
-            if not f.lower <= number <= f.upper:
-                allowed = f"{shown(f.lower, f.unit)} to {shown(f.upper, f.unit)}"
-                raise InputError("out of range", key=name, value=value, allowed=allowed)
-            z[known[name]] = f.inward(number)
-        found = self._fit
-        moved = at(found.problem, replace(found.point, z=z, weights=weights), found.scatter, found)
-        made = Fit(self.campaign, self._climbed, moved)
+        made = Fit(self.campaign, self._climbed, moved(self, values))
         if "rig.spring_stiffness" not in values:
             made.__dict__["_where"] = self._where
         return made
@@ -345,17 +235,7 @@ class Fit(Shown):
         Raises:
             InputError: no free parameter of that name.
         """
-        known = {f.name: i for i, f in enumerate(self.free)}
-        found = self._fit
-        held = {name: float(found.point.z[self._index(name, known)]) for name in locked}
-        problem = pinned(found, held, 1e-6) if held else found.problem
-        again = fit_force(problem, found.point, found.scatter, dropped=found.dropped, first=True)
-        if held:
-            free = again.problem.with_composition(
-                replace(again.problem.composition, free=found.problem.composition.free)
-            )
-            again = at(free, again.point, again.scatter, again)
-        return Fit(self.campaign, replaced(self.climbed, again))
+        return Fit(self.campaign, replaced(self.climbed, refitted(self, locked)))
 
     def add(self, effect: str) -> Fit:
         """The model with an effect more, fitted: ``fit.add("contact-ageing")``.
@@ -393,22 +273,7 @@ class Fit(Shown):
         Returns:
             A row for each run: relative errors (1) of recurrence, slip and creep before the onset; slips missed.
         """
-        from ..inference.diagnose.free_errors import errors
-
-        c = self.confirm(progress)
-        free = c.models.get(self.parts)
-        if free is None:
-            raise InputError("the model could not be run freely", hint="; ".join(c.notes))
-        found = errors(c, free)
-        rows = {"all": found, **found["by_run"]}
-        measures = ("recurrence", "slip", "creep")
-        return table(
-            {
-                name: {**{m: row[m]["relative"] for m in measures}, "missed": row["missed"], "events": row["events"]}
-                for name, row in rows.items()
-            },
-            "run",
-        )
+        return free_run_errors(self.confirm(progress), self.parts)
 
     def freely(self, run: str) -> xarray.Dataset:
         """The model as it stands, run freely through a measured run, each cycle from the measured arrest before it.
@@ -422,8 +287,6 @@ class Fit(Shown):
         Raises:
             InputError: no run of that name whose cycles can be run.
         """
-        from .free_cycles import freely
-
         return freely(self._climbed.prepared, self._fit, run)
 
     @cached_property
@@ -461,19 +324,7 @@ class Fit(Shown):
         Raises:
             InputError: no free parameter of that name.
         """
-        known = {f.name: i for i, f in enumerate(self.free)}
-        f = self.free[self._index(name, known)]
-        found = profiled(self._fit, name, progress or silent)
-        low, high = (f.outward(v) if np.isfinite(v) else None for v in found.interval)
-        low_text, high_text = ("-" if v is None else shown(v, f.unit, 3) for v in (low, high))
-        return {
-            "name": name,
-            "unit": f.unit,
-            "value": [f.outward(float(v)) for v in found.z],
-            "rise": found.rise,
-            "interval": [low, high],
-            "text": f"{found.text}; 95 % interval {low_text} to {high_text}",
-        }
+        return profile(self, name, progress or silent)
 
     def sample(self, draws: int = 200, tune: int = 100, chains: int = 2, seed: int = 0) -> arviz.InferenceData:
         """Draw from the posterior by the No-U-Turn sampler (Hoffman & Gelman, JMLR 15 (2014) 1593; by nutpie).
@@ -506,31 +357,7 @@ class Fit(Shown):
 
     @cached_property
     def _sections(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        found = self.climbed.as_diagnosis(self.confirm(), self.campaign.rig)
-        sections, variables, fitted = fitted_sections(found, self.campaign.rig)
-        traces, segmentations = self.campaign.displaced[0], self.campaign.scaled[0]
-        described, pictured = trace_sections(traces, segmentations)
-        result = {
-            **head(self.campaign, "fit"),
-            "model": "inertial",
-            "model_parts": list(self.parts),
-            **sections,
-            "gains": dict(self.climbed.gains),
-            "profiles": [],
-            "identifiability": identifiability(fitted, self.campaign.rig, sections["backbone"]["rough_line"]),
-            **described,
-            "fit": {
-                "cost": self._fit.cost,
-                "evaluations": self._fit.evaluations,
-                "covariance": fitted.covariance,
-                "ring_period": self.climbed.prepared.scales.ring,
-                "cycles": self._fit.problem.events,
-            },
-            "rig": [finding.plain() for finding in self.campaign.findings],
-            "notes": [*self.campaign.scaled[1], *self.campaign.displaced[1]],
-            "dropped": [*self.campaign.lost, *sections["dropped"]],
-        }
-        return result, variables | pictured
+        return fit_result(self, self.confirm())
 
     @property
     def result(self) -> dict[str, Any]:
@@ -541,17 +368,6 @@ class Fit(Shown):
     def arrays(self) -> xarray.Dataset:
         """As in ``arrays.nc``: measured and model force, the backbone, the runs thinned for pictures."""
         return dataset(self._sections[1], self.campaign.title)
-
-    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
-
-        Args:
-            folder: where. force: replace an existing run folder. more: entries for ``result.json`` besides.
-
-        Raises:
-            RunFolderError: the folder exists or cannot be written.
-        """
-        return save(self, folder, force, **more)
 
     @property
     def force_fit(self) -> ForceFit:
@@ -583,18 +399,11 @@ class Fit(Shown):
     def _floor(self) -> np.ndarray:
         return deviations(self._fit)
 
-    def _index(self, name: str, known: Mapping[str, int]) -> int:
-        if name not in known:
-            raise InputError("no free parameter of that name", key=name, hint=nearest(name, list(known)))
-        return known[name]
+    def _summed(self, residual: np.ndarray) -> Sums:
+        return sums(self._fit, residual, self._floor)
 
-    def _of_all(self, residual: np.ndarray | None, *names: str) -> dict[str, float]:
-        """Error of all points together and its deviation, by these names."""
-        values = (np.nan, np.nan) if residual is None else of_all(sums(self._fit, residual, self._floor))
-        return dict(zip(names, values, strict=True))
-
-    def _table(self, residual: np.ndarray, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:
-        return by_phase(self._fit, sums(self._fit, residual, self._floor), measure)
+    def _errors(self, residual: np.ndarray, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:
+        return error_table(self._fit, self._summed(residual), measure)
 
     def _parts(self) -> list[Any]:
         what = {
@@ -630,7 +439,3 @@ def fit(
         if name not in known:
             raise InputError("no free parameter of that name", key="--profile", value=name, hint=nearest(name, known))
     return Fit(campaign, climb(prepared, forms, progress or silent))
-
-
-def _unit_of(name: str) -> str:
-    return {"rig.mass": "kg", "rig.spring_stiffness": "N/m"}.get(name, "1")

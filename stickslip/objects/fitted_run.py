@@ -73,10 +73,6 @@ class FittedRun:
         """The model, driven as the first measured run was."""
         return self.model_of(self._first())
 
-    def model_at(self, velocity: float) -> Model:
-        """The model under a drive of one velocity (m/s), with the rig's spring."""
-        return self.fitted.model(constant_drive(velocity), self._spring())
-
     def model_of(self, trace: str | Driven) -> Model:
         """The model, driven as a measured run was (from time zero).
 

@@ -1,22 +1,44 @@
-"""A fitted model run freely through the cycles of one measured run, beside what was measured."""
+"""A fitted model run freely through measured cycles: beside what was measured in one run, and its errors in all."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, nearest
+from ..inference.diagnose.confirm import Confirmation
+from ..inference.diagnose.free_errors import errors
 from ..inference.diagnose.free_measures import simulated
 from ..inference.diagnose.prepare import Prepared
 from ..inference.force.fit import Fit
+from .shown import table
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 Array = NDArray[np.float64]
 WIDER = 1.5  # duration of a slip before its arrest within which it is measured, over that between onset and arrest
+
+
+def free_run_errors(confirmation: Confirmation, parts: Sequence[str]) -> pandas.DataFrame:
+    """See :meth:`stickslip.Fit.predict`; of the model with these parts."""
+    free = confirmation.models.get(tuple(parts))
+    if free is None:
+        raise InputError("the model could not be run freely", hint="; ".join(confirmation.notes))
+    found = errors(confirmation, free)
+    rows = {"all": found, **found["by_run"]}
+    measures = ("recurrence", "slip", "creep")
+    return table(
+        {
+            name: {**{m: row[m]["relative"] for m in measures}, "missed": row["missed"], "events": row["events"]}
+            for name, row in rows.items()
+        },
+        "run",
+    )
 
 
 def freely(prepared: Prepared, fit: Fit, run: str) -> xarray.Dataset:

@@ -68,14 +68,7 @@ class Inspection(Shown):
         return dataset(self.variables | more, self.result["title"])
 
     def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder, with a picture of every trace.
-
-        Args:
-            folder: where. force: replace an existing run folder. more: entries for ``result.json`` besides.
-
-        Raises:
-            RunFolderError: the folder exists or cannot be written.
-        """
+        """Keep it as a run folder, with a picture of every trace; as :meth:`Fit.save`."""
         from ..show.plots import save
         from ..show.report import write_report
         from ..show.report.figures import trace_picture

@@ -9,13 +9,13 @@ import numpy as np
 from ..errors import InputError
 from ..inference.fit.parameters import to_si
 from ..inference.force.posterior import Walked, walked
+from .fit_tables import STRENGTH
 
 if TYPE_CHECKING:
     import arviz
 
     from .fit import Fit
 
-STRENGTH = "contact.strength"
 ALIKE = 1.05  # R-hat from which the chains do not agree
 FEW = 100  # effective draws below which a 95 % interval is rough
 

@@ -1,4 +1,4 @@
-"""What every result of a campaign has: its head, and how it is kept as a run folder."""
+"""What every result of a campaign has: its head, and how it is shown and kept."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..system.runstore import open_run, versions
+from .shown import Shown
 
 if TYPE_CHECKING:
     import xarray
@@ -51,23 +52,25 @@ class Result(Protocol):
         """As in ``arrays.nc``."""
 
 
-def save(found: Result, folder: str | Path, force: bool = False, **more: Any) -> Path:
-    """Keep a result as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
+class Savable(Shown):
+    """What a campaign gave, which can be kept as a run folder."""
 
-    Args:
-        found: what to keep.
-        folder: where; it appears when all of it is written.
-        force: replace an existing run folder.
-        more: entries for ``result.json`` besides.
+    def save(self: Result, folder: str | Path, force: bool = False, **more: Any) -> Path:
+        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
 
-    Raises:
-        RunFolderError: the folder exists or cannot be written.
-    """
-    from ..show.report import write_report
+        Args:
+            folder: where; it appears when all of it is written.
+            force: replace an existing run folder.
+            more: entries for ``result.json`` besides.
 
-    result, arrays = {**found.result, **more}, found.arrays
-    with open_run(folder, force=force) as run:
-        run.arrays(arrays)
-        run.json(result)
-        write_report(run.folder)
-    return Path(folder)
+        Raises:
+            RunFolderError: the folder exists or cannot be written.
+        """
+        from ..show.report import write_report
+
+        result, arrays = {**self.result, **more}, self.arrays
+        with open_run(folder, force=force) as run:
+            run.arrays(arrays)
+            run.json(result)
+            write_report(run.folder)
+        return Path(folder)

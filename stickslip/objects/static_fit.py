@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import InputError
 from ..system.units import to_si
-from .run import Tell, dataset, head, save, silent
-from .shown import Shown, facts
+from .run import Savable, Tell, dataset, head, silent
+from .shown import facts
 
 if TYPE_CHECKING:
     from .campaign import Campaign
 
 
-class StaticFit(Shown):
+class StaticFit(Savable):
     """The paper's static model, every creep process fitted by itself.
 
     Attributes:
@@ -26,10 +25,6 @@ class StaticFit(Shown):
     def __init__(self, campaign: Campaign, result: dict[str, Any], variables: dict[str, Any]) -> None:
         self.campaign, self.result = campaign, result
         self.arrays = dataset(variables, campaign.title)
-
-    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder; as :meth:`Fit.save`."""
-        return save(self, folder, force, **more)
 
     def _parts(self) -> list[Any]:
         said = [self.result[key]["text"] for key in ("static", "ramps") if self.result.get(key)]

@@ -100,6 +100,14 @@ def phase(doc: str) -> Any:
     return parameter(0.0, unit="rad", lower=-turn, upper=turn, grid=(0.0, turn / 4), symbol=r"\varphi", doc=doc)
 
 
+def first_age(default: float) -> Any:
+    """For effects whose state is an age, which no record tells of its start."""
+    return parameter(
+        default, unit="s", lower=1e-3, upper=1e7, log=True, grid=(1.0, 100.0), symbol=r"\theta_1",
+        doc="age of the contact at the start of the record",
+    )  # fmt: skip
+
+
 def variant(default: str, choices: tuple[str, ...], doc: str = "") -> Any:
     """A field that chooses between several forms of a law found in the literature (static: another compilation)."""
     return eqx.field(default=default, static=True, metadata={"choices": choices, "doc": doc})

@@ -9,7 +9,6 @@ from typing import Any
 import param
 from panel.custom import JSComponent
 
-_HERE = Path(__file__).parent / "static"
 BUTTON = """
 :host(.solid) .bk-btn.bk-btn-default, .bk-btn.bk-btn-default {
   border: 1px solid var(--wb-accent); border-radius: 4px; background: var(--wb-surface); color: var(--wb-accent);
@@ -20,6 +19,14 @@ BUTTON = """
 :host(.solid) .bk-btn-group .bk-btn.bk-btn-default.bk-active { background: var(--wb-accent); color: var(--wb-surface); }
 """
 Message = dict[str, Any]
+
+
+def static(*names: str) -> str:
+    """The text of files of the pages, one after the other."""
+    return "\n".join((Path(__file__).parent / "static" / name).read_text(encoding="utf-8") for name in names)
+
+
+_STYLE = [static("parts.css")]
 
 
 class Spoken(JSComponent):
@@ -57,7 +64,7 @@ class Words(JSComponent):
       return line
     }
     """
-    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+    _stylesheets = _STYLE
 
 
 class Signs(JSComponent):
@@ -84,7 +91,7 @@ class Signs(JSComponent):
       return line
     }
     """
-    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+    _stylesheets = _STYLE
 
 
 class Frame(Spoken):
@@ -108,8 +115,8 @@ class Frame(Spoken):
     dark = param.Boolean(False)
     colours = param.Dict({})
 
-    _esm = (_HERE / "frame.js").read_text(encoding="utf-8")
-    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+    _esm = static("part.js", "frame.js")
+    _stylesheets = _STYLE
 
 
 class Knobs(Spoken):
@@ -126,8 +133,8 @@ class Knobs(Spoken):
     given = param.List([])
     closed = param.Boolean(False)
 
-    _esm = (_HERE / "knobs.js").read_text(encoding="utf-8")
-    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+    _esm = static("part.js", "knobs.js")
+    _stylesheets = _STYLE
 
 
 class Catalogue(Spoken):
@@ -142,5 +149,5 @@ class Catalogue(Spoken):
     rows = param.List([])
     closed = param.Boolean(False)
 
-    _esm = (_HERE / "catalogue.js").read_text(encoding="utf-8")
-    _stylesheets = [(_HERE / "parts.css").read_text(encoding="utf-8")]
+    _esm = static("part.js", "catalogue.js")
+    _stylesheets = _STYLE

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..inference.fit.parameters import Free
-from ..objects.fit import MEANINGS, STRENGTH, Fit
+from ..objects.fit import Fit
+from ..objects.fit_tables import MEANINGS, STRENGTH
 from ..system.units import shown, shown_with
 
 DEVIATIONS = 12.0  # of a parameter that a slider reaches to either side

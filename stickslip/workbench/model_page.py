@@ -132,13 +132,7 @@ class _Cycle:
         self._creep = source(t=[], measured=[], model=[])
 
         self.force = figure(y="force of the contact", height=270, output_backend=FEW)
-        self.force.line(
-            "t", "measured", source=self._data, color=theme.measured, line_width=2.5, legend_label="measured"
-        )
-        self.force.line(
-            "t", "model", source=self._data, color=theme.model, line_width=2, line_dash="dashed",
-            legend_label="model",
-        )  # fmt: skip
+        _compare(self.force, self._data, "model")
         self.force.xaxis.major_label_text_font_size = "0px"
         self.residual = figure(y="measured - model", height=190, x_range=self.force.x_range, output_backend=FEW)
         self.residual.varea(
@@ -148,13 +142,7 @@ class _Cycle:
         self.residual.line("t", "residual", source=self._data, color=theme.model, line_width=1.5)
         self.residual.scatter("t", "residual", source=self._data, color=theme.model, size=3)
         self.creep = figure("creep before the onset", height=300, output_backend=FEW)
-        self.creep.line(
-            "t", "measured", source=self._creep, color=theme.measured, line_width=2.5, legend_label="measured"
-        )
-        self.creep.line(
-            "t", "model", source=self._creep, color=theme.model, line_width=2, line_dash="dashed",
-            legend_label="model in balance",
-        )  # fmt: skip
+        _compare(self.creep, self._creep, "model in balance")
         for made in (self.force, self.residual, self.creep):
             legend(made)
         self.force.min_border_left = self.residual.min_border_left = 72
@@ -214,3 +202,10 @@ class _Cycle:
         }  # fmt: skip
         self.creep.xaxis.axis_label = label("time before the onset", "s")
         self.creep.yaxis.axis_label = label("creep", unit)
+
+
+def _compare(made: Any, data: Any, name: str) -> None:
+    """What was measured, and the model's beside it."""
+    theme = look()
+    made.line("t", "measured", source=data, color=theme.measured, line_width=2.5, legend_label="measured")
+    made.line("t", "model", source=data, color=theme.model, line_width=2, line_dash="dashed", legend_label=name)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import param
 from panel.custom import JSComponent
 
 from .beside import Beside
-from .controls import Message, Spoken
+from .controls import Message, Spoken, static
 from .watching import watch
 
-_HERE = Path(__file__).parent / "static"
-_STYLE = [(_HERE / "table.css").read_text(encoding="utf-8")]
+_STYLE = [static("table.css")]
 
 
 class Table(Spoken):
@@ -31,7 +28,7 @@ class Table(Spoken):
     choosing = param.Boolean(True)
     tall = param.Integer(0)
 
-    _esm = (_HERE / "table.js").read_text(encoding="utf-8")
+    _esm = static("table.js")
     _stylesheets = _STYLE
 
 
@@ -46,7 +43,7 @@ class Sentences(JSComponent):
     groups = param.List([])
     tall = param.Integer(0)
 
-    _esm = (_HERE / "list.js").read_text(encoding="utf-8")
+    _esm = static("list.js")
     _stylesheets = _STYLE
 
 
@@ -65,7 +62,7 @@ class Progress(Spoken):
     said = param.String("")
     stopping = param.Boolean(True)
 
-    _esm = (_HERE / "work.js").read_text(encoding="utf-8")
+    _esm = static("work.js")
     _stylesheets = _STYLE
 
 
@@ -74,7 +71,7 @@ class Copy(JSComponent):
 
     text = param.String("")
 
-    _esm = (_HERE / "copy.js").read_text(encoding="utf-8")
+    _esm = static("copy.js")
     _stylesheets = _STYLE
 
 

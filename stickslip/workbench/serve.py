@@ -65,7 +65,7 @@ class Door(Router):
 
 def serve(
     session: Session, *, port: int = 0, address: str = LOOPBACK, browser: bool = True,
-    tell: Callable[[str], None] = print, token: str | None = None, keep: bool = True, origins: Sequence[str] = (),
+    tell: Callable[[str], None] = print, keep: bool = True, origins: Sequence[str] = (),
 ) -> None:  # fmt: skip
     """Serve a session until interrupted.
 
@@ -75,7 +75,6 @@ def serve(
         address: of this machine, under which the server is reached.
         browser: open it.
         tell: told the address.
-        token: in the address; random unless given.
         keep: the history beside the campaign's file.
         origins: hosts whose pages may talk to it; default: its own, or any where ``address`` is not this machine's.
 
@@ -89,7 +88,7 @@ def serve(
     for name in ("bokeh", "panel", "tornado"):
         logging.getLogger(name).setLevel(logging.ERROR)
     ready()
-    token = token or secrets.token_urlsafe(16)
+    token = secrets.token_urlsafe(16)
     port = _free(address, port)
     session.worker, session.aside = workers = Worker(), Worker()
     origins = list(origins) or (["*"] if address not in NAMES else [f"{name}:{port}" for name in NAMES])

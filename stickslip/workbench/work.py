@@ -130,11 +130,6 @@ class Search:
         with suppress(OSError, ValueError):
             self._process.terminate()
 
-    @property
-    def alive(self) -> bool:
-        """Whether it is still at work."""
-        return not self._cancelled and self._process.is_alive()
-
     def _listen(
         self, here: Connection, tell: Tell, done: Callable[[Any], None], failed: Callable[[str], None]
     ) -> None:  # fmt: skip

@@ -11,15 +11,18 @@ from stickslip.blind.generator.lines import (
     Surface,
     gaps,
     group,
-    grouping_error,
     indentation_depth,
     press,
     rough_line,
-    slide_curve,
 )
 from stickslip.errors import InputError
 
 LOAD, MU = 0.31, 0.21
+
+
+def slide_curve(normal: np.ndarray, stiffness: np.ndarray, friction: float, u: np.ndarray) -> np.ndarray:
+    """Virgin tangential force at displacements ``u``: sum of min(k u, friction f_n) (Grzemba 2014 eqs. 2-3), N."""
+    return np.array([np.minimum(stiffness * step, friction * normal).sum() for step in np.atleast_1d(u)])
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +85,7 @@ def test_smooth_parabola_gives_cattaneo_mindlin() -> None:
     assert 4 / 3 * e_star * np.sqrt(radius) * depth**1.5 == pytest.approx(0.02, rel=1e-4)
 
 
-def test_grouping_keeps_the_sums_and_states_its_error(surface: Surface, heights: np.ndarray) -> None:
+def test_grouping_keeps_the_sums_and_hardly_moves_the_curve(surface: Surface, heights: np.ndarray) -> None:
     normal, c_t = press(surface, heights, LOAD), surface.tangential_spring
     errors = []
     for groups in (32, 64, 128, 256):
@@ -90,11 +93,9 @@ def test_grouping_keeps_the_sums_and_states_its_error(surface: Surface, heights:
         assert joined.size <= groups + 1
         assert joined.sum() == pytest.approx(LOAD, rel=1e-12)
         assert stiffness.sum() == pytest.approx(c_t * normal.size, rel=1e-12)
-        u = np.linspace(0, 1.05 * MU * normal[-1] / c_t, 400)
+        u = MU * np.unique(np.concatenate([joined / stiffness, normal / c_t]))  # the error is largest at a threshold
         full = slide_curve(normal, np.full(normal.size, c_t), MU, u)
-        seen = np.abs(slide_curve(joined, stiffness, MU, u) - full).max() / (MU * LOAD)
-        errors.append(grouping_error(normal, c_t, groups, MU))
-        assert 0.5 * errors[-1] < seen <= errors[-1] * (1 + 1e-9)
+        errors.append(np.abs(slide_curve(joined, stiffness, MU, u) - full).max() / (MU * LOAD))
     assert errors[2] < 2e-4
     assert errors[0] / errors[2] > 8  # second order in the number of groups
 

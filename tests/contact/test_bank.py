@@ -10,19 +10,18 @@ from stickslip.physics.contact import (
     bank_from_backbone,
     bank_from_contact,
     binning_error,
-    concatenate,
     default_edges,
     equal_bodies,
     mixture,
     normal_scores,
     power_law_backbone,
     power_law_bank,
-    return_map,
     rough_bank,
     rough_table,
-    spring_bank,
     static_contact,
 )
+
+from .springs import spring_bank
 
 F_S, U_MAX, P = 0.2604, 1e-6, 3.2
 
@@ -83,23 +82,6 @@ def test_no_element_is_negative_or_nan_on_a_straight_backbone():
     assert np.isfinite(bank.threshold).all()
     assert np.allclose(bank.stiffness[:-1], 0, atol=1e6 * 1e-12)
     assert float(bank.total_strength) == pytest.approx(0.2, rel=1e-10)
-
-
-def test_return_map():
-    force = return_map(
-        jnp.array([0.0, 0.9, -0.9, 0.5]), jnp.full(4, 2.0), jnp.full(4, 1.0), jnp.array([0.1, 1.0, -1.0, -3.0])
-    )
-    assert np.allclose(force, [0.2, 1.0, -1.0, -1.0])
-
-
-def test_return_map_does_not_care_how_a_motion_in_one_direction_is_cut():
-    bank = power_law_bank(F_S, U_MAX, P)
-    held = return_map(0.0, bank.stiffness, bank.strength, 7e-7)
-    once = return_map(held, bank.stiffness, bank.strength, -9e-7)
-    steps = held
-    for _ in range(9):
-        steps = return_map(steps, bank.stiffness, bank.strength, -1e-7)
-    assert np.allclose(once, steps, atol=1e-15)
 
 
 def test_power_law_is_safe_at_and_beyond_its_end():
@@ -163,15 +145,6 @@ def test_effect_of_the_spread_is_of_second_order():
     """It enters through exp(spread z) with z symmetric, so its derivative is zero at zero and not merely undefined."""
     at_zero = jax.jacfwd(lambda s: power_law_bank(F_S, U_MAX, P, s).stiffness)(0.0)
     assert np.abs(np.asarray(at_zero)).max() < 1e-9 * P * F_S / U_MAX
-
-
-def test_concatenated_contacts_carry_together():
-    banks = [power_law_bank(F_S / 4, u, P, n=32) for u in (0.8e-6, 1e-6, 1.3e-6)]
-    together, u = concatenate(banks), np.linspace(0, 2e-6, 20)
-    assert together.stiffness.shape == (96,)
-    assert np.allclose(together.backbone(u), sum(bank.backbone(u) for bank in banks), rtol=1e-14)
-    with pytest.raises(InputError):
-        concatenate([])
 
 
 def test_rough_bank_follows_every_spring():

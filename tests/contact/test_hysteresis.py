@@ -1,20 +1,18 @@
-"""Masing, return-point memory and loop area: the turning points against thousands of springs."""
+"""Masing and return-point memory: the turning points against thousands of springs."""
 
 import numpy as np
 import pytest
 
 from stickslip.physics.contact import (
     Hysteresis,
-    damping_ratio,
-    loop_area,
-    microslip_ring_down,
     power_law_backbone,
     power_law_bank,
-    power_law_damping_ratio,
     rough_table,
-    spring_bank,
     static_contact,
 )
+from tests.solve.ringing import microslip_ring_down
+
+from .springs import spring_bank
 
 F_S, U_MAX, P = 0.2604, 1e-6, 3.2
 
@@ -106,31 +104,6 @@ def test_inner_loops_between_the_same_limits_are_congruent(rough):
         return np.array([springs.move_to(u) - start for u in (2.5e-7, 3e-7, 2.5e-7, 2e-7)])
 
     assert np.allclose(loop([6e-7, 2e-7, 3e-7]), loop([-6e-7, 3e-7]), rtol=0, atol=1e-12 * F_S)
-
-
-@pytest.mark.parametrize("amplitude", [0.1e-6, 0.5e-6, 0.9e-6])
-def test_loop_area_is_the_work_of_the_sliders(amplitude):
-    bank = power_law_bank(F_S, U_MAX, P, n=4000)
-    sliders = float((4 * bank.strength * np.maximum(amplitude - bank.threshold, 0)).sum())
-    area = loop_area(lambda u: power_law_backbone(u, U_MAX, F_S, P), amplitude)
-    assert area == pytest.approx(sliders, rel=1e-4)
-
-
-def test_loop_area_of_the_power_law_in_closed_form():
-    w = 0.7
-    integral = F_S * U_MAX * (w - (1 - (1 - w) ** (P + 1)) / (P + 1))
-    exact = 8 * integral - 4 * w * U_MAX * float(power_law_backbone(w * U_MAX, U_MAX, F_S, P))
-    assert loop_area(lambda u: power_law_backbone(u, U_MAX, F_S, P), w * U_MAX) == pytest.approx(exact, rel=1e-12)
-
-
-def test_damping_ratio_of_small_cycles():
-    stiffness = P * F_S / U_MAX
-    errors = []
-    for amplitude in (2e-8, 1e-8):
-        area = loop_area(lambda u: power_law_backbone(u, U_MAX, F_S, P), amplitude)
-        errors.append(damping_ratio(area, stiffness, amplitude) / power_law_damping_ratio(amplitude, U_MAX, P) - 1)
-    assert abs(errors[1]) < 0.02
-    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
 
 
 @pytest.mark.parametrize("amplitude", [20e-9, 50e-9, 100e-9])

@@ -7,12 +7,10 @@ from stickslip.errors import InputError
 from stickslip.physics.contact import (
     add_curvature,
     cone,
-    exponential_gaps,
     flat_punch,
     from_heights,
     heights_from_scan,
     power_law,
-    profile_from_heights,
     rough_lines,
     sphere,
 )
@@ -25,11 +23,6 @@ def test_analytic_gaps():
     assert np.allclose(power_law(1.0, 10, 3.0, 2.0).gaps, 2 * np.abs(x) ** 3)
     assert np.array_equal(flat_punch(1.0, 10).gaps, np.zeros(10))
     assert sphere(1.0, 10, 4.0).dx == pytest.approx(0.2)
-
-
-def test_exponential_gaps_count_exponentially():
-    gaps = np.asarray(exponential_gaps(2e-7, 1000, 1e-8).gaps)
-    assert [(gaps <= 2e-7 * np.log(n) * (1 + 1e-12)).sum() for n in (1, 10, 500)] == [1, 10, 500]
 
 
 def test_gaps_of_a_line_start_at_its_top():
@@ -60,7 +53,7 @@ def test_scan_is_resampled_and_detrended():
 
 def test_scan_of_heights_alone():
     z = np.cos(np.linspace(0, 20, 200))
-    profile = profile_from_heights(None, z, spacing=1e-7)
+    profile = from_heights(*heights_from_scan(None, z, spacing=1e-7))
     assert profile.dx == pytest.approx(1e-7)
     assert profile.gaps.shape == (200,)
 

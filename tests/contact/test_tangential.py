@@ -9,7 +9,6 @@ from stickslip.physics.contact import (
     add_curvature,
     cone,
     equal_bodies,
-    exponential_gaps,
     flat_punch,
     from_heights,
     indentation,
@@ -19,6 +18,8 @@ from stickslip.physics.contact import (
     sphere,
     static_contact,
 )
+
+from .springs import exponential_gaps
 
 STEEL = equal_bodies()
 L = 20e-6

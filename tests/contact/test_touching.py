@@ -10,7 +10,6 @@ from stickslip.physics.contact import (
     creep_curve,
     default_loads,
     equal_bodies,
-    exponential_gaps,
     flat_punch,
     from_heights,
     indentation,
@@ -19,6 +18,8 @@ from stickslip.physics.contact import (
     static_contact,
     touching,
 )
+
+from .springs import exponential_gaps
 
 STEEL = equal_bodies()
 L = 20e-6

@@ -1,8 +1,6 @@
 """Traces whose onsets and arrests are known in closed form."""
 
-import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -97,13 +95,3 @@ def campaign(tmp_path):
         return path
 
     return write
-
-
-@pytest.fixture
-def real_data():
-    """Folder of measured data, or a skip that says where it was looked for."""
-    default = Path(__file__).resolve().parents[3] / "shared" / "data" / "real"
-    folder = Path(os.environ.get("STICKSLIP_REAL_DATA", default))
-    if not folder.is_dir():
-        pytest.skip(f"measured data are not there ({folder}); set STICKSLIP_REAL_DATA to their folder")
-    return folder

@@ -15,7 +15,7 @@ from stickslip.objects.diagnosis import diagnose_campaign
 from stickslip.physics.effects import catalogue
 from stickslip.system.runstore import open_run
 
-OWN = """from stickslip.physics.effects import Threshold
+OWN = """from stickslip.effects import Threshold
 from stickslip.effects import parameter
 
 class Mine(Threshold):

@@ -13,7 +13,7 @@ import pytest
 from stickslip.inference.diagnose import engine
 from stickslip.inference.diagnose.decide import Compared, Judged
 from stickslip.inference.force.candidates import Candidate
-from stickslip.inference.force.problem import Composition
+from stickslip.inference.force.composition import Composition
 
 EVENTS = 30
 

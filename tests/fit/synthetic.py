@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import jax.numpy as jnp
 import numpy as np
 
 from stickslip.data.segment import segment
 from stickslip.data.trace import Drive, Trace
 from stickslip.inference.features.measurement import Measurement, measure
-from stickslip.inference.fit.composition import START, Composition
+from stickslip.inference.fit.composition import Composition
 from stickslip.inference.fit.parameters import Free
 from stickslip.physics.effects.base import Effect
 from stickslip.simulation.solve import Tolerance, integrate
@@ -59,23 +57,6 @@ def traces(
         drive = Drive.constant(v, 0.0, stop)
         out.append(Trace(name=f"v{v * 1e6:.0f}", time=t, displacement=run.at(t).reading, drive=drive, virgin=True))
     return out
-
-
-def begun_later(trace: Trace, since: float, zero: float = 0.0) -> Trace:
-    """The record as one begun when the drive had come so far (m), the spring stretched; its clock from zero, its
-    reading from ``zero`` (m)."""
-    assert trace.displacement is not None
-    assert trace.drive is not None
-    speed = float(np.diff(trace.drive.positions)[0] / np.diff(trace.drive.times)[0])
-    i = int(np.searchsorted(trace.time, since / speed))
-    t, y = trace.time[i:] - trace.time[i], trace.displacement[i:] - trace.displacement[i] + zero
-    return Trace(name=trace.name, time=t, displacement=y, drive=Drive.constant(speed, 0.0, float(t[-1])))
-
-
-def with_starts(family: Composition, runs: int, full: float = 0.26 / 1000.0) -> Composition:
-    """The family for records that do not begin virgin: where each run begins is free."""
-    starts = tuple(Free(f"{START}{r}", "m", 0.01 * full, 0.0, 0.0, 15.0, -full, full) for r in range(runs))
-    return replace(family, free=(*family.free, *starts))
 
 
 def measured(found: list[Trace]) -> Measurement:

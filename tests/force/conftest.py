@@ -15,7 +15,8 @@ from stickslip.data.segment import Segmentation, segment
 from stickslip.data.trace import Trace
 from stickslip.inference.fit.resonance import ringing
 from stickslip.inference.force.knots import Knots, knots
-from stickslip.inference.force.problem import Point, Problem
+from stickslip.inference.force.point import Point
+from stickslip.inference.force.problem import Problem
 from stickslip.inference.force.scales import Scales, scales
 from stickslip.inference.force.starting_values import begin
 

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from stickslip.inference.fit.parameters import Free, effect_parameters
+from stickslip.inference.force.composition import is_own
 from stickslip.inference.force.knots import PHASES
 from stickslip.inference.force.noise import by_reading, carrier
-from stickslip.inference.force.problem import LOCAL, Point, Problem, is_own
+from stickslip.inference.force.point import LOCAL, Point
+from stickslip.inference.force.problem import Problem
 from stickslip.physics.effects import catalogue
 
 LADDER = 10.0 ** np.arange(-3.0, -7.5, -0.5)  # of each direction's own unit

@@ -13,6 +13,7 @@ from scipy.optimize import nnls
 
 from stickslip.blind.generator.lines import Surface, press, rough_line
 from stickslip.data.campaign import Rig
+from stickslip.effects import make
 from stickslip.errors import InputError
 from stickslip.inference.diagnose.engine import Verdict, with_shape
 from stickslip.inference.diagnose.shape import Shape, judged, section, shape_of
@@ -22,7 +23,6 @@ from stickslip.inference.force.backbone import Backbone, power_law
 from stickslip.inference.force.geometry import Laws, geometry_laws, in_logarithms
 from stickslip.inference.force.rough_contacts import RoughContacts, rough_contacts
 from stickslip.physics.contact import Bank, rough_bank, rough_table, static_contact
-from stickslip.physics.effects import make
 
 HURST, HEIGHT, LOAD, FRICTION, CONTACTS = 0.3, 2.46e-6, 0.31, 0.21, 4
 KNOWN = {"contacts": CONTACTS, "normal_force": LOAD, "friction_coefficient": FRICTION, "line_length": 20e-6}

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.inference.force.problem import _program
+from stickslip.inference.force.problem import compiled
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Effect
 from stickslip.system import threads, traced
@@ -169,7 +169,7 @@ def test_traces_of_effects_from_elsewhere_are_not_kept():
         tag = "elsewhere"
 
     def name(*effects, names=("weakening.drop",), whole=True):
-        return _program(names, (), jax.tree.structure(effects), whole).name
+        return compiled(names, (), jax.tree.structure(effects), whole).name
 
     wear, other = catalogue.get("wear")(), catalogue.get("wear")(course="saturating")
     assert name(wear, Elsewhere()) is None
@@ -180,7 +180,7 @@ def test_traces_of_effects_from_elsewhere_are_not_kept():
 
 def test_a_force_is_the_same_from_a_kept_trace(folder, small):
     def evaluated():
-        _program.cache_clear()
+        compiled.cache_clear()
         return small.problem.evaluate(small.point)
 
     first, again = evaluated(), evaluated()

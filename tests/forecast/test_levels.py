@@ -8,7 +8,7 @@ from stickslip.data.segment import segment
 from stickslip.data.trace import Trace
 from stickslip.errors import InputError
 from stickslip.inference.forecast.levels import levels, wandering
-from stickslip.objects.forecast import wander, wander_sentence
+from stickslip.objects.wander import wander, wander_sentence
 
 from .synthetic import LAW, MEANS, SPEED, STIFFNESS, record
 

@@ -6,7 +6,7 @@ import pytest
 import stickslip as ss
 from stickslip.data.prescribed import with_motion
 from stickslip.inference.forecast.strokes import KNEE, Strokes
-from stickslip.objects.forecast import wander, wander_sentence
+from stickslip.objects.wander import wander, wander_sentence
 
 LEVEL, STIFFNESS, STROKE = 2.0, 4e4, 3e-4  # N, N/m, m
 

@@ -1,7 +1,6 @@
 """Measured records of others: what is known of them is found and said. Skipped where the data are not there."""
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -32,16 +31,6 @@ spring_force = {{ column = 2, unit = "N", file = "{torque}" }}
 minimum_slip = "{smallest} mm"
 stop = "{stop:.3f} s"
 """
-
-
-@pytest.fixture
-def real_data():
-    """Folder of measured data, or a skip that says where it was looked for."""
-    default = Path(__file__).resolve().parents[3] / "shared" / "data" / "real"
-    folder = Path(os.environ.get("STICKSLIP_REAL_DATA", default))
-    if not folder.is_dir():
-        pytest.skip(f"measured data are not there ({folder}); set STICKSLIP_REAL_DATA to their folder")
-    return folder
 
 
 @pytest.fixture

@@ -17,22 +17,14 @@ from stickslip.inference.fit.serialised import KEY, Driven, Fitted, record
 from stickslip.physics.effects import catalogue
 from stickslip.simulation.scenario import build
 from stickslip.system.runstore import json_text
+from tests.fit.synthetic import TRUTH
 
-VALUES = {
-    "contact.strength": ("N", 0.26),
-    "weakening.drop": ("1", 0.18),
-    "weakening.slip_distance": ("m", 1.2e-6),
-    "weakening.healing_time": ("s", 0.01),
-    "rig.damping": ("N s/m", 10.0),
-    "contact.u_max": ("m", 0.95e-6),
-    "contact.p": ("1", 3.3),
-    "contact.spread": ("1", 0.15),
-}
+DRIVE = ss.LoadPoint(*map(jax.numpy.array, ([0.0, 1.0], [0.0, 3e-4])))
 
 
 def found(**changes):
     """A fitted model with two effects, one of which has a form, and a free start of the second run."""
-    free = [Free(name, unit, "log", v, v, 1.0, v / 20, 20 * v, name) for name, (unit, v) in VALUES.items()]
+    free = [Free(name, unit, "log", v, v, 1.0, v / 20, 20 * v, name) for name, (unit, v) in TRUTH.items()]
     free.append(Free("start.1", "m", 1e-6, 2e-6, 0.0, 3.0, -1e-5, 1e-5, "start of run v200"))
     ageing = catalogue.make("contact-ageing", rate=0.013, onset_time=0.02)
     drag = catalogue.make("viscous-drag", drag=0.001, exponent=0.7)
@@ -68,9 +60,7 @@ def leaves(tree):
 
 def test_the_model_comes_back_as_it_was(folder):
     original, back = found(), ss.load_run(folder)
-    velocity = 3e-4
-    wanted = original.model(ss.LoadPoint(*map(jax.numpy.array, ([0.0, 1.0], [0.0, velocity]))))
-    got = back.model_at(velocity)
+    wanted, got = original.model(DRIVE), back.fitted.model(DRIVE)
     assert jax.tree.structure(got) == jax.tree.structure(wanted)
     for a, b in zip(leaves(got), leaves(wanted), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12)
@@ -79,7 +69,7 @@ def test_the_model_comes_back_as_it_was(folder):
     np.testing.assert_allclose(back.fitted.covariance, original.covariance)
     assert back.parameters["contact.u_max"]["value"] == pytest.approx(0.95e-6)
     # the standard deviation of a logarithm times the value
-    k = list(VALUES).index("contact.u_max")
+    k = list(TRUTH).index("contact.u_max")
     assert back.parameters["contact.u_max"]["std"] == pytest.approx(0.95e-6 * np.sqrt(original.covariance[k, k]))
     assert "start.1" not in back.parameters
 
@@ -87,7 +77,7 @@ def test_the_model_comes_back_as_it_was(folder):
 def test_the_scenario_is_the_same_model(folder):
     back = ss.load_run(folder)
     scenario = back.scenario(["drive.velocity=300um/s"])
-    got, wanted = build(scenario).model, back.model_at(3e-4)
+    got, wanted = build(scenario).model, back.fitted.model(DRIVE)
     assert [e.tag for e in got.effects] == [e.tag for e in wanted.effects]
     for part in ("block", "bank", "weakening", "effects"):
         for a, b in zip(leaves(getattr(got, part)), leaves(getattr(wanted, part)), strict=True):

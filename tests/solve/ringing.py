@@ -7,13 +7,20 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from stickslip.physics.contact import microslip_ring_down
 from stickslip.physics.model import Model
 from stickslip.simulation.solve import Tolerance, integrate
 
 from .rig import FAR, MASS, STRENGTH, U_MAX, P, drive, fine_start_bank, rig, tighter
 
 TANGENT = P * STRENGTH / U_MAX  # N/m, stiffness of the virgin contact
+
+
+def microslip_ring_down(t: np.ndarray, start: float, angular_frequency: float, u_max: float, p: float) -> np.ndarray:
+    """Amplitude (m) at time ``t`` (s) of ringing that only microslip damps, while it is small against ``u_max``.
+
+    A small cycle loses as much as a damper of the ratio (p - 1) A/(3 pi u_max).
+    """
+    return start / (1.0 + (p - 1.0) * start / (3.0 * np.pi * u_max) * angular_frequency * t)
 
 
 class Ringing(NamedTuple):

@@ -13,14 +13,18 @@ import stickslip as ss
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "hidden-effect"
 
 
+def campaign_in(folder: Path) -> Path:
+    """The shipped campaign's file in a folder, with all that it names."""
+    for path in SCENARIO.iterdir():
+        if path.is_file():
+            shutil.copy(path, folder)
+    return folder / "campaign.toml"
+
+
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory) -> Path:
     """A copy of the shipped campaign, in which histories may be written."""
-    made = tmp_path_factory.mktemp("campaign")
-    for path in SCENARIO.iterdir():
-        if path.is_file():
-            shutil.copy(path, made)
-    return made
+    return campaign_in(tmp_path_factory.mktemp("campaign")).parent
 
 
 @pytest.fixture(scope="session")
@@ -31,6 +35,16 @@ def campaign(folder):
 @pytest.fixture(scope="session")
 def base(campaign):
     return campaign.fit()
+
+
+@pytest.fixture
+def session(campaign, base):
+    """A session with the base model."""
+    from stickslip.workbench.session import Session
+
+    made = Session(campaign=campaign)
+    made.first(base)
+    return made
 
 
 @pytest.fixture(scope="session")

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from pathlib import Path
 
 import pytest
 
 from .browser import DEEP, Browser, Served, command
-from .conftest import SCENARIO, numbers
+from .conftest import campaign_in, numbers
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -18,13 +17,6 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="ther
 CAUGHT = 1.0  # floors: the error on unseen runs with the hidden effect in the model
 QUICK = 300.0  # ms in which the quickest of some moves is drawn on a machine that does other things too; the aim: 100
 PAUSE = 0.3  # s between two moves
-
-
-def campaign_in(folder: Path) -> Path:
-    for path in SCENARIO.iterdir():
-        if path.is_file():
-            shutil.copy(path, folder)
-    return folder / "campaign.toml"
 
 
 @pytest.fixture(scope="module")

@@ -17,20 +17,12 @@ from stickslip.workbench import folders_view, history, keep_page, kept, kept_sim
 from stickslip.workbench.asked import Asked
 from stickslip.workbench.beside import beside
 from stickslip.workbench.rivals_view import Rivals
-from stickslip.workbench.session import Session
 from stickslip.workbench.simulated_view import SimulatedView
 from stickslip.workbench.sweep_view import SweepView
 
 from .conftest import numbers
 
 SCRIPT = "<script>alert(1)</script>"
-
-
-@pytest.fixture
-def session(campaign, base):
-    made = Session(campaign=campaign)
-    made.first(base)
-    return made
 
 
 @pytest.fixture(scope="module")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 
 import pytest
 
 from .browser import Browser, Served
-from .conftest import SCENARIO
+from .conftest import campaign_in
 from .test_browser import CHROMIUM, DRIVER
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver")
@@ -60,11 +59,7 @@ return [parts.length, found]
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("layout")
-    for path in SCENARIO.iterdir():
-        if path.is_file():
-            shutil.copy(path, folder)
-    served = Served(folder / "campaign.toml")
+    served = Served(campaign_in(tmp_path_factory.mktemp("layout")))
     made = Browser(str(CHROMIUM), str(DRIVER))
     made.open(served.url, "Data")
     made.idle()

@@ -12,7 +12,8 @@ import stickslip as ss
 from stickslip.workbench.session import Session
 
 from .browser import Browser, Served
-from .test_browser import CHROMIUM, DRIVER, campaign_in
+from .conftest import campaign_in
+from .test_browser import CHROMIUM, DRIVER
 from .test_serve import EFFECT
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver")

@@ -8,7 +8,7 @@ import shutil
 import pytest
 
 from .browser import Browser, Served
-from .conftest import SCENARIO
+from .conftest import SCENARIO, campaign_in
 from .test_browser import CHROMIUM, DRIVER
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver")
@@ -19,11 +19,7 @@ RUNS = "return seen('tbody tr').map((e) => e.cells[0].textContent)"
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory):
-    made = tmp_path_factory.mktemp("pages")
-    for path in SCENARIO.iterdir():
-        if path.is_file():
-            shutil.copy(path, made)
-    return made
+    return campaign_in(tmp_path_factory.mktemp("pages")).parent
 
 
 @pytest.fixture(scope="module")

@@ -20,13 +20,6 @@ from stickslip.workbench.steps import complete, fewer, moved
 DROP = "weakening.drop"
 
 
-@pytest.fixture
-def session(campaign, base):
-    made = Session(campaign=campaign)
-    made.first(base)
-    return made
-
-
 def test_a_drag_is_one_step_and_undo_goes_before_it(session, base):
     value = base.values[DROP]
     session.by_hand({DROP: value * 1.01})

@@ -33,13 +33,6 @@ def _silent(text, share):
     assert 0.0 <= share <= 1.0
 
 
-@pytest.fixture
-def session(campaign, base):
-    made = Session(campaign=campaign)
-    made.first(base)
-    return made
-
-
 @pytest.fixture(scope="module")
 def undecided(campaign):
     proposed = {"text": "holds of 1 s and 10 s", "separates": list(RIVALS)}

@@ -4,16 +4,14 @@ It shares no law, no contact and no solver with the package's model, so that a d
 """
 
 from .bank import Bank, make_bank
-from .campaigns import DEFAULT_RUNS, Run, make_campaign
+from .campaigns import Run, make_campaign
 from .dynamics import Drive, Result, Rig, simulate
 from .forms import CATALOGUED, EFFECTS, OUTSIDE, Setup, hide
 from .lines import Surface
 from .rigs import draw_setup
-from .sensor import Sensor
 
 __all__ = [
     "CATALOGUED",
-    "DEFAULT_RUNS",
     "EFFECTS",
     "OUTSIDE",
     "Bank",
@@ -21,7 +19,6 @@ __all__ = [
     "Result",
     "Rig",
     "Run",
-    "Sensor",
     "Setup",
     "Surface",
     "draw_setup",

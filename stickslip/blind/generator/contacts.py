@@ -42,7 +42,7 @@ def needs_rich(eff):
 
 
 @jit
-def fresh_lines(f, normal_old, normal, k, count_old, count, start):
+def fresh_lines(f, normal_old, normal, count_old, count, start):
     """Move the forces to new lines by rank: every spring keeps its share of the cap, every contact its force."""
     out = np.zeros_like(f)
     for j in range(start.size - 1):

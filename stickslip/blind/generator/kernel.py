@@ -256,7 +256,7 @@ def run(
                 changed = False
                 if renew:
                     nxt = n_events % normal_pool.shape[0]
-                    f = fresh_lines(f, normal, normal_pool[nxt], k_pool[nxt], count_pool[row], count_pool[nxt], start)
+                    f = fresh_lines(f, normal, normal_pool[nxt], count_pool[row], count_pool[nxt], start)
                     row = nxt
                     normal = normal_pool[row]
                     k = k_pool[row]

@@ -146,17 +146,11 @@ def _soft_depth(gap: Array, c_n: float, load: float, limit: float, form: str) ->
     return float(brentq(miss, 0.5 * low, high, xtol=1e-18, rtol=1e-14))
 
 
-def slide_curve(normal: Array, stiffness: Array, friction: float, u: Array) -> Array:
-    """Virgin tangential force at displacements ``u``: sum of min(k u, friction f_n) (Grzemba 2014 eqs. 2-3), N."""
-    return np.array([np.minimum(stiffness * step, friction * normal).sum() for step in np.atleast_1d(u)])
-
-
 def group(normal: Array, spring: float, groups: int) -> tuple[Array, Array]:
     """Join neighbouring thresholds of equal springs into at most ``groups`` elements.
 
     Half of the edges hold equal counts, half equal thresholds, so that the last springs to slide stay single. Sum of
-    stiffness and sum of caps are kept exactly; the curve is off only between the thresholds of one group
-    (``grouping_error`` gives by how much).
+    stiffness and sum of caps are kept exactly; the curve is off only between the thresholds of one group.
 
     Args:
         normal: ascending normal forces of one contact, N.
@@ -171,11 +165,3 @@ def group(normal: Array, spring: float, groups: int) -> tuple[Array, Array]:
     edges = np.unique(np.concatenate([by_count, np.searchsorted(normal, levels)]))
     edges = np.unique(np.clip(edges, 0, n))
     return np.add.reduceat(normal, edges[:-1]), np.diff(edges) * spring
-
-
-def grouping_error(normal: Array, spring: float, groups: int, friction: float) -> float:
-    """Largest error of the grouped virgin curve over the full one, relative to the capacity."""
-    joined, stiffness = group(normal, spring, groups)
-    u = friction * np.unique(np.concatenate([joined / stiffness, normal / spring]))
-    full = slide_curve(normal, np.full(normal.size, spring), friction, u)
-    return float(np.abs(slide_curve(joined, stiffness, friction, u) - full).max() / (friction * normal.sum()))

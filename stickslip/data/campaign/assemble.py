@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -34,19 +34,13 @@ Array = NDArray[np.float64]
 _CHANNELS = (*SIGNALS, "normal_load", "drive_position")
 
 
-def load_traces(campaign: Campaign, names: Iterable[str] | None = None) -> list[Trace]:
+def load_traces(campaign: Campaign) -> list[Trace]:
     """Read the traces of a campaign, in its order.
-
-    Args:
-        names: only these (default: all).
 
     Raises:
         InputError: a file cannot be read, a column is not there, time does not increase, the block outruns the drive.
     """
-    wanted = campaign.names if names is None else list(names)
-    for name in wanted:
-        campaign.entry(name)
-    return [load_trace(campaign, entry) for entry in campaign.entries if entry.label in wanted]
+    return [load_trace(campaign, entry) for entry in campaign.entries]
 
 
 def load_trace(campaign: Campaign, entry: TraceEntry) -> Trace:
@@ -72,7 +66,7 @@ class _Assembly:
     def _placed(self, error: InputError) -> InputError:
         placed = error.at(file=self.campaign.path, key=f"{self.place} ('{self.entry.label}')")
         noticed = "first look at what was noticed before: " + "; ".join(self.warnings)
-        return placed.with_hint(noticed, first=True) if self.warnings else placed
+        return placed.with_hint(noticed) if self.warnings else placed
 
     def _trace(self) -> Trace:
         entry = self.entry

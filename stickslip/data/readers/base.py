@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -143,8 +143,3 @@ def need_columns(columns: Columns, path: Path) -> Columns:
         found = "; ".join(f"{name}: {why}" for name, why in list(columns.ignored.items())[:8]) or "nothing"
         raise InputError("the file holds no column of numbers", file=path, allowed=f"found: {found}")
     return columns
-
-
-def as_mapping(names: Iterable[str], table: NDArray[np.float64]) -> Mapping[str, NDArray[np.float64]]:
-    """Columns of a 2-d table (rows, columns) by name."""
-    return dict(zip(names, table.T, strict=True))

@@ -20,8 +20,9 @@ from ..force.candidates import Candidate, every_form, from_end
 from ..force.fit import Fit, deviations, fit
 from ..force.heldout import apart
 from ..force.linearised import Array
+from ..force.point import Point
 from ..force.prescribed import applies
-from ..force.problem import Point, Problem
+from ..force.problem import Problem
 from ..force.residual import Structure, structures
 from ..force.rig import slips_finding, spring_freed
 from ..force.scatter import Scatter

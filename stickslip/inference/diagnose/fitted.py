@@ -13,8 +13,8 @@ from ..fit.composition import Composition
 from ..fit.parameters import Free
 from ..fit.serialised import MOST_PIECES, Driven, Fitted
 from ..force.backbone import BINS, PowerLaw
+from ..force.composition import PHASE, PULL
 from ..force.fit import Fit
-from ..force.problem import PHASE, PULL
 
 
 def fitted_model(found: Fit, law: PowerLaw, traces: Sequence[Trace], contacts: int, rig: Any = None) -> Fitted:

@@ -30,7 +30,8 @@ from ..features.measurement import Measurement
 from ..force.fit import Fit
 from ..force.free_run import run_freely
 from ..force.knots import NUCLEATION
-from ..force.problem import Point, Problem
+from ..force.point import Point
+from ..force.problem import Problem
 from ..force.scatter import EVENTS
 
 Array = NDArray[np.float64]

@@ -18,10 +18,12 @@ from ...physics.effects.base import Effect
 from ...system.units import shown
 from ..features.measurement import Measurement, doubts, measure
 from ..fit.start import FALLBACK_PERIOD, ringing, shared_rig
+from ..force.composition import PULL
 from ..force.knots import Knots, knots
+from ..force.point import Point
 from ..force.prescribed import SAID, both_ways, thinned
 from ..force.prescribed import begin as begin_prescribed
-from ..force.problem import PULL, Point, Problem
+from ..force.problem import Problem
 from ..force.rig import SPRING
 from ..force.scales import Scales, of_run, scales, too_coarse
 from ..force.starting_values import begin

@@ -12,12 +12,12 @@ from ...system.units import shown
 from ..fit.composition import run_of
 from ..fit.equations import solved
 from ..fit.serialised import KEY, Fitted, record
+from ..force.composition import PULL
 from ..force.errors import of_all, sums
 from ..force.fit import Fit
 from ..force.heldout import apart
 from ..force.knots import PHASES
 from ..force.linearised import Array
-from ..force.problem import PULL
 from ..force.residual import coordinates
 from .decide import CHANCE, ERRORS, Judged, best_forms
 from .engine import Diagnosis, Round, Rung

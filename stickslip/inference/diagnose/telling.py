@@ -14,11 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from ..force.composition import PULL
 from ..force.fit import Fit
 from ..force.knots import Knots
 from ..force.linearised import Array
 from ..force.noise import by_reading, known_of
-from ..force.problem import LOCAL, PULL, Point, Problem
+from ..force.point import LOCAL, Point
+from ..force.problem import Problem
 from ..force.scatter import Blocks, Whitening, WithEvents
 from .decide import DISPERSION
 

@@ -61,7 +61,3 @@ class Layout:
         }
         ends = np.cumsum(list(sizes.values()))
         return {k: slice(int(e) - n, int(e)) for (k, n), e in zip(sizes.items(), ends, strict=True)}
-
-    def phase_index(self) -> np.ndarray:
-        """For every feature the position of its phase in PHASES, shape (size,)."""
-        return np.array([PHASES.index(p) for p in self.phases])

@@ -123,13 +123,6 @@ def fit_ramps(ramps: Sequence[Ramp], n_springs: int = 4096, lines: int = 100, se
     return tuple(_fit_one(ramp, table, n_springs) for ramp in ramps)
 
 
-def normalised_curve(hurst: float, tau: Array, n_springs: int = 4096, lines: int = 100, seed: int = 0) -> Array:
-    """u/u_max of the mean of the lines at loads ``tau``, shape (n,)."""
-    table = static_table(n_springs, lines, seed)
-    shape = table.shape(hurst, CROWDING)
-    return np.interp(tau, table.tau, shape / shape[-1])
-
-
 def _fit_one(ramp: Ramp, table: StaticTable, n_springs: int) -> RampFit:
     span = float(np.ptp(ramp.displacement))
 

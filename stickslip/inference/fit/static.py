@@ -208,11 +208,11 @@ def tied_quantities(fit: CreepFit, rig: StaticRig) -> str:
     table = static_table(rig.n_springs, rig.lines, rig.seed)
     q, step = rig.crowding(fit.h_rms), 0.05
 
-    def log_curve(height: float, crowding: float) -> Array:
-        return np.log(height * table.shape(fit.hurst, crowding)[20:])
+    def log_curve(crowding: float) -> Array:
+        return np.log(table.shape(fit.hurst, crowding)[20:])
 
     # L, F_n and E* act through q alone; h_rms through q and as the scale
-    dq = (log_curve(1.0, q * np.exp(step)) - log_curve(1.0, q * np.exp(-step))) / (2 * step)
+    dq = (log_curve(q * np.exp(step)) - log_curve(q * np.exp(-step))) / (2 * step)
     columns = np.stack([1.0 - dq, -dq, dq, -dq], axis=1)
     s = np.linalg.svd(columns, compute_uv=False)
     numbers = int(np.count_nonzero(s > 0.05 * s[0]))

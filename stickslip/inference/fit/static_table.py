@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from ...errors import InputError
-from ...physics.contact import Moduli, check_saturation, creep_displacements, default_loads, equal_bodies
+from ...physics.contact import Moduli, creep_displacements, default_loads, equal_bodies
 
 Array = NDArray[np.float64]
 HURST = (0.02, 0.98)
@@ -212,17 +212,3 @@ def virtual_curve(rig: StaticRig, velocity: float, tau: Array, u: Array, form: s
     pulled = tau * rig.friction_force / rig.spring_stiffness
     t = (pulled + u if form == "exact" else pulled) / velocity
     return VirtualCurve(t, u, np.gradient(u, t))
-
-
-def contact_share(rig: StaticRig, hurst: float, h_rms: float) -> float:
-    """Share of the springs of the fullest line that touch.
-
-    Warns:
-        SaturationWarning: above one half.
-    """
-    from ...physics.contact import rough_table, static_contact
-
-    table = rough_table(hurst, rig.length, rig.n_springs, rig.lines, rig.seed).scaled(h_rms)
-    share = np.asarray(static_contact(table, rig.normal_force, rig.friction, rig.elastic).contact_share)
-    check_saturation(np.minimum(share, 1.0 - 1e-9))
-    return float(share.max())

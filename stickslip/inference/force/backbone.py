@@ -8,9 +8,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ...physics.contact import power_law_bank
+from .composition import BESIDE
 from .fit import Fit
 from .linearised import Array
-from .problem import BESIDE
 
 LEAST = 2e-3  # of the strength: what no law of a rough contact describes better
 BINS = 96

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import nnls
 
-from .problem import Point, Problem
+from .point import Point
+from .problem import Problem
 
 Array = NDArray[np.float64]
 EVEN = 0.15  # of the elements stay spread over the whole range

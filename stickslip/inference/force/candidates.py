@@ -17,10 +17,12 @@ from ...physics.effects.base import Effect, Geometry
 from ...physics.params import Spec, specs
 from ...system.progress import breathe, portion
 from ..fit.parameters import Free, effect_parameters
+from .composition import is_own
 from .fit import Fit, adapted, refit
 from .linearised import Array
 from .periodogram import best_wave, waves
-from .problem import Point, Problem, is_own
+from .point import Point
+from .problem import Problem
 from .signatures import Explained, signatures
 
 FEW = 12  # members of a family for which no program of their own is compiled

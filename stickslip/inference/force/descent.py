@@ -7,7 +7,8 @@ import numpy as np
 from ...errors import FitError
 from ...system.progress import breathe
 from .linearised import Linearised, moved
-from .problem import Point, Problem, Slopes
+from .point import Point, Slopes
+from .problem import Problem
 from .scatter import Blocks, Known, Scatter, Whitening
 
 FAILED = 4  # steps in turn that do not lower the cost, after which the search ends

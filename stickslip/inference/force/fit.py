@@ -16,7 +16,8 @@ from .bank import placed
 from .descent import DAMPING, descend
 from .linearised import FARTHEST, Array, Linearised, moved
 from .noise import beyond, by_reading, carrier, known_of, left_out
-from .problem import Forces, Point, Problem, Slopes
+from .point import Forces, Point, Slopes
+from .problem import Problem
 from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
 from .sensor_walk import grown
 

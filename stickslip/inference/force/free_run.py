@@ -22,7 +22,10 @@ from ...simulation.shooting import MOST_STEPS, Cycles, Track, run_cycles
 from ...simulation.solve.stepper import Tolerance
 from ...system.traced import Program, of_this_package
 from .along import departures
-from .problem import EMPTY, PULL, Point, Problem, model_of
+from .compiled_force import EMPTY, model_of
+from .composition import PULL
+from .point import Point
+from .problem import Problem
 
 FINE = Tolerance(3e-4, 6e-12, 6e-9, 6e-3, 1e-7)
 

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from .bank import spacing
-from .problem import PULL, Forces, Point, Problem, Slopes
+from .composition import PULL
+from .point import Forces, Point, Slopes
+from .problem import Problem
 from .scatter import EVENTS, Blocks, Scatter, Whitening
 
 Array = NDArray[np.float64]

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, dia_array
 
-from .problem import Point, Problem, Slopes
+from .point import Point, Slopes
+from .problem import Problem
 from .scatter import Blocks, Known, Scatter, weigh
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from scipy.optimize import lsq_linear
 
 from .fit import Fit
 from .linearised import Array, moved, prior_rows, reach
-from .problem import Point
+from .point import Point
 from .scatter import WithEvents
 
 

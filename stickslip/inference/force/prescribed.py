@@ -19,8 +19,10 @@ from ...data.resolution import estimate_resolution, noise_level
 from ...data.trace import Drive, Trace
 from ...physics.effects import catalogue
 from ..fit.parameters import Free, vector
+from .composition import BESIDE, PULL, Composition
 from .knots import CREEP, Knots, bow, load_at
-from .problem import BESIDE, OWN, PULL, Composition, Point, Problem
+from .point import OWN, Point
+from .problem import Problem
 from .reading import Reading
 from .smoothing import onward
 from .starting_values import ELEMENTS, REACH, known, with_weights

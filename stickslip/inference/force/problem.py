@@ -8,36 +8,26 @@ yield displacements and the error of the position at the arrest before it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from operator import attrgetter
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from ...physics.contact import Bank
-from ...physics.effects.base import Effect, Sensor
-from ...physics.model import Block, LoadPoint, Model, Weakening
+from ...physics.effects.base import Sensor
 from ...system.threads import side_by_side
-from ...system.traced import Program, of_this_package
-from ..fit.parameters import Free, to_si
-from .along import Way, along, lead, undone
+from ..fit.parameters import to_si
+from .along import Way
+from .compiled_force import EMPTY, Own, compiled
+from .composition import BESIDE, DAMPING, Composition
 from .knots import PHASES, Knots
+from .point import OWN, Forces, Point, Slopes
 
 Array = NDArray[np.float64]
-PHASE = "phase"
-DAMPING = "rig.damping"
-BESIDE = "rig.parallel_stiffness"  # of a spring beside the contact, which never slides (N/m)
-PULL = "start.pull"  # of the spring at the start of a record, where the contact is not virgin (N)
-PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
 CREEPING = PHASES.index("creep")
 LEAST_ROOM = 1024  # knots
 LOADED = 1e-3  # of the load, which it must vary by to be told of
-EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
 NODES = (
     -8.0,
     -6.0,
@@ -51,152 +41,7 @@ NODES = (
     3.0,
     4.5,
     6.0,
-)  # of what cycles share, in units of the place
-LOCAL = ("strength", "stretch", "shape", "offset")  # of each event: two logarithms, a power, and a length (m)
-OWN = len(LOCAL)
-
-
-class Own(NamedTuple):
-    """What differs from event to event, at the knots of a run, shape (n, 4) each, in the order of :data:`LOCAL`.
-
-    Attributes:
-        value: of the event that a knot belongs to, zero where it belongs to none.
-        moves: 1 where it belongs to one, else 0.
-    """
-
-    value: Any
-    moves: Any
-
-
-class Start(NamedTuple):
-    """The effects without their numbers, which decide about a compiled program."""
-
-    effects: tuple[Effect, ...]
-
-
-@dataclass(frozen=True)
-class Composition:
-    """The base with some effects, and what of it is free.
-
-    Attributes:
-        mass: of the block (kg).
-        reach: yield displacements of the bank's elements (m), shape (k,), increasing.
-        free: free parameters of base and effects, those called "phase" for every run.
-        fixed: SI values of base parameters that are not free.
-        effects: instances; their free fields are overwritten.
-        nominal: what is known of the full strength beforehand (N), and the standard deviation of its logarithm.
-    """
-
-    mass: float
-    reach: Array
-    free: tuple[Free, ...]
-    fixed: dict[str, float] = field(default_factory=dict)
-    effects: tuple[Effect, ...] = ()
-    nominal: tuple[float, float] = (1.0, np.inf)
-
-    @property
-    def shared(self) -> tuple[Free, ...]:
-        """Free parameters with one value for all runs."""
-        return tuple(f for f in self.free if not is_own(f.name))
-
-    @property
-    def phases(self) -> tuple[Free, ...]:
-        """Free parameters with a value for every run."""
-        return tuple(f for f in self.free if is_own(f.name))
-
-    def with_effect(self, effect: Effect, free: Sequence[Free]) -> Composition:
-        """The same with one effect more."""
-        return replace(self, free=(*self.free, *free), effects=(*self.effects, effect))
-
-    def without(self, tag: str) -> Composition:
-        """The same without an effect."""
-        return replace(
-            self,
-            free=tuple(f for f in self.free if not f.name.startswith(f"{tag}.")),
-            effects=tuple(e for e in self.effects if e.tag != tag),
-        )
-
-
-def is_own(name: str) -> bool:
-    """Whether a parameter has a value for every run."""
-    return name == PULL or name.rpartition(".")[2] == PHASE
-
-
-@dataclass(frozen=True)
-class Point:
-    """Where in the space of parameters.
-
-    Attributes:
-        z: shared parameters on the search scale, shape (a,).
-        phases: shape (b, R).
-        weights: strength of every element (N), not negative, shape (k,).
-        events: :data:`LOCAL` of each event, shape (E, 4).
-        common: error of the position that all cycles share, as a function of the place in the cycle (m), and what is
-            left of the hum in each run, over what is expected of it, shape (c,).
-    """
-
-    z: Array
-    phases: Array
-    weights: Array
-    events: Array
-    common: Array
-
-
-@dataclass(frozen=True)
-class Forces:
-    """Residual force at a point.
-
-    What is measured is a motion, and the likelihood is that of the motion: a model that makes forces smaller makes what
-    an error of the motion does to them smaller too, and must not gain by it. Residuals, derivatives and stiffnesses are
-    therefore taken over what a reading counts for in the model, times what it counts for as the rig is stated: the
-    mass that moves where the block is fast, the stiffness of the spring where it creeps (what the contact holds there
-    grows as the spring's force does), and everywhere the displacement over what the sensor shows of it: less where the
-    block is fast and the sensor late.
-
-    Attributes:
-        residual: measured force less the model's (N), shape (p,).
-        local: derivatives in the event's own, shape (p, 4).
-        spring: stiffness of the spring (N/m), shape (p,).
-        tangent: stiffness of what sticks (N/m), shape (p,).
-        sticking: the same at the knots of every run, shape (n,) each.
-        slides: whether an element slides there, shape (n, k) each.
-        sliding: force of those that slide (N), shape (n,) each.
-        psi: state of the weakening, shape (n,) each.
-        held: force that the model holds (N), shape (p,).
-        share: what a reading counts for as the rig is stated, over what it counts for in the model, shape (p,).
-    """
-
-    residual: Array
-    local: Array
-    spring: Array
-    tangent: Array
-    sticking: tuple[Array, ...]
-    slides: tuple[NDArray[np.bool_], ...]
-    sliding: tuple[Array, ...]
-    psi: tuple[Array, ...]
-    held: Array
-    share: Array
-
-    @property
-    def measured(self) -> Array:
-        """Force that the motion says (N), shape (p,)."""
-        return np.asarray(self.held + self.residual / self.share)
-
-
-@dataclass(frozen=True)
-class Slopes(Forces):
-    """Residual force and all its derivatives.
-
-    Attributes:
-        shared: derivatives in z, phases of all runs, weights and errors of the position, shape (p, a + b R + k + c).
-    """
-
-    shared: Array
-
-    @property
-    def finite(self) -> bool:
-        """Whether a search can go on from here."""
-        return all(np.isfinite(a).all() for a in (self.residual, self.local, self.shared))
+)  # in units of the place, of what cycles share
 
 
 class Problem:
@@ -308,7 +153,7 @@ class Problem:
         straight = {f.name: i for i, f in enumerate(shared) if f.name in {DAMPING, BESIDE}}
         bent = [i for i in range(len(shared)) if i not in straight.values()]
         scales = np.array([0.0 if shared[i].scale == "log" else float(shared[i].scale) for i in bent])
-        program = _program(
+        program = compiled(
             tuple(shared[i].name for i in bent), tuple(f.name for f in phases), jax.tree.structure(c.effects), whole
         )
         phase_scale = np.array([float(f.scale) for f in phases])
@@ -409,94 +254,3 @@ def _events(k: Knots, n: int, first: int) -> NDArray[np.intp]:
     for column, event in enumerate((k.event, k.event, k.event, k.arrest)):
         out[: k.t.size, column] = np.where((event >= 0) & (event < k.events), event + first, -1)
     return out
-
-
-def model_of(values: dict[str, Any], effects: tuple[Effect, ...], bank: Bank, own: Any) -> Model:
-    """The model with these numbers; ``own`` is the spring of the run (N/m), nan where it has none."""
-    spring = jnp.where(jnp.isnan(own), values["rig.spring_stiffness"], own)
-    block = Block(mass=values["rig.mass"], spring_stiffness=spring, damping=values[DAMPING])
-    weakening = Weakening(
-        ratio=1.0 - values["weakening.drop"],
-        slip_distance=values["weakening.slip_distance"],
-        healing_time=values["weakening.healing_time"],
-    )
-    still = LoadPoint(jnp.array([0.0, 1.0]), jnp.array([0.0, 0.0]))
-    return Model(block, bank, weakening, still, tuple(_set(e, values) for e in effects))
-
-
-def _set(effect: Effect, values: dict[str, Any]) -> Effect:
-    for name, value in values.items():
-        tag, _, own = name.partition(".")
-        if tag == effect.tag:
-            effect = eqx.tree_at(attrgetter(own), effect, value)
-    return effect
-
-
-@lru_cache(maxsize=PROGRAMS)
-def _program(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, whole: bool) -> Program:
-    """The compiled forces at the knots of one run, shape (n,), with derivatives in shared, phases and locals.
-
-    Those in locals alone where they are not wanted as a ``whole``.
-
-    Runs and events are not in its shapes, so that all campaigns share it.
-    """
-    a, b = len(names), len(phases)
-
-    def forces(
-        z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, spring: Any,
-        way: Way, knots: Any, band: Any,
-    ) -> Any:  # fmt: skip
-        si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
-        values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
-        if PULL in values:
-            stiffness = jnp.where(jnp.isnan(spring), values["rig.spring_stiffness"], spring)
-            way = way._replace(drive=way.drive + values[PULL] / stiffness)
-        model = model_of(values, effects, Bank(weights / reach, weights), spring)
-        seen, late = way, jnp.ones(())
-        if any(isinstance(e, Sensor) for e in effects):
-            # the measured force, near enough for a sensor that sees it
-            force = model.block.spring_stiffness * (way.drive - way.x) + way.force
-
-            def before(rate: Any) -> Way:
-                return undone(model, way._replace(v=rate), force, knots)
-
-            # what a reading that is late is taken ahead by is its rate's, and the faster the larger
-            seen, ahead = jax.jvp(before, (way.v,), (jnp.ones_like(way.v),))
-            late = jnp.sqrt(1.0 + (band * jnp.sum(ahead.x) / way.x.size) ** 2)
-        shift = seen.x - way.x
-        held = along(model, of_events(seen, event), knots)
-        steep = jax.vmap(jax.grad(model.pull))(lead(model, way.t, way.drive) - seen.x)
-        # how much the displacement changes where the reading does
-        steps = jnp.diff(way.x)
-        gain = 1.0 + jnp.sum(steps * jnp.diff(shift)) / jnp.sum(steps**2)
-        return (
-            (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, gain, late),
-            (held.elements, held.tangent, held.slides, held.sliding, held.psi),
-        )
-
-    def derived(
-        z: Any, turn: Any, scales: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any, spring: Any,
-        way: Way, knots: Any, band: Any, own: Own,
-    ) -> Any:  # fmt: skip
-        effects = jax.tree.unflatten(structure, leaves)
-
-        def moved(row: Any) -> Any:
-            def f(z: Any, turn: Any, event: Any) -> Any:
-                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots, band)
-
-            # all events are moved at once: each acts on its own points only
-            step = own.moves * row[a + b :]
-            return jax.jvp(f, (z, turn, own.value), (row[:a], row[a : a + b] * turn_scale, step), has_aux=True)
-
-        out, slope, aux = jax.vmap(moved, out_axes=(None, 0, None))(jnp.eye(a + b + OWN)[0 if whole else a + b :])
-        return *out, *slope, *aux
-
-    name = f"{'along' if whole else 'forces along'} {names} {phases} {structure}"
-    return Program(derived, name if of_this_package(structure) else None)
-
-
-def of_events(way: Way, event: Any) -> Way:
-    """The way with what differs from event to event, shape (n, 4)."""
-    return way._replace(
-        x=way.x + event[:, 3], strength=jnp.exp(event[:, 0]), stretch=jnp.exp(event[:, 1]), shape=event[:, 2]
-    )

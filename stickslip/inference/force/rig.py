@@ -14,7 +14,7 @@ from ...data.checks.finding import Finding
 from ...system.units import shown
 from ..fit.parameters import Free
 from .fit import Fit, adapted, refit
-from .problem import Point
+from .point import Point
 
 SPRING = "rig.spring_stiffness"
 WIDEST = 10.0  # factor on the stated stiffness within which it is sought

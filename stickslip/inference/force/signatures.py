@@ -16,9 +16,11 @@ from ...physics.effects.base import Effect, Sensor
 from ...physics.params import specs
 from ...system.traced import Program, of_this_package
 from .along import Way, along, undone
+from .compiled_force import EMPTY, PROGRAMS, Own, model_of, of_events
+from .composition import PULL
 from .fit import Fit
 from .linearised import Array, prior_rows, reach
-from .problem import EMPTY, PROGRAMS, PULL, Own, Problem, model_of, of_events
+from .problem import Problem
 
 CHUNK = 64  # members evaluated at once
 

@@ -15,8 +15,10 @@ from ...data.segment import Segmentation
 from ...data.trace import Trace
 from ...errors import InputError
 from ..fit.parameters import Free, vector
+from .composition import BESIDE, PULL, Composition
 from .knots import Knots
-from .problem import BESIDE, OWN, PULL, Composition, Point, Problem
+from .point import OWN, Point
+from .problem import Problem
 from .scales import Scales
 
 ELEMENTS = 64

@@ -9,7 +9,8 @@ import numpy as np
 
 from .fit import Fit, again
 from .linearised import Array
-from .problem import Point, Problem
+from .point import Point
+from .problem import Problem
 from .scatter import Scatter
 
 POINT = ("z", "phases", "weights", "events", "common")

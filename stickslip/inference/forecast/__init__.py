@@ -1,25 +1,14 @@
 """Slips that are not alike: how their level wanders, and how well the next one can be foretold."""
 
-from .levels import Wandering, levels, wandering
-from .predict import METHODS, Compared, Forecaster
-from .rolling import Rolled, prepare, roll
+from .levels import levels, wandering
 from .scoring import crps
-from .wander import Component, Filter, Wander, fit, log_likelihood
+from .wander import Component, Wander, fit
 
 __all__ = [
-    "METHODS",
-    "Compared",
     "Component",
-    "Filter",
-    "Forecaster",
-    "Rolled",
     "Wander",
-    "Wandering",
     "crps",
     "fit",
     "levels",
-    "log_likelihood",
-    "prepare",
-    "roll",
     "wandering",
 ]

@@ -5,7 +5,7 @@ Also called a parallel-series Iwan model, a Maxwell-slip model or a Prandtl-Ishl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -53,14 +53,6 @@ class Bank(eqx.Module):
         """Force in N on first loading from the force-free state to displacement ``u`` (m); odd in ``u``."""
         pull = self.stiffness * jnp.asarray(u)[..., None]
         return jnp.sum(jnp.clip(pull, -self.strength, self.strength), axis=-1)
-
-
-def return_map(force: ArrayLike, stiffness: ArrayLike, strength: ArrayLike, du: ArrayLike) -> Array:
-    """Element forces (N) after the displacement increment ``du`` (m): elastic trial, cut back to the cap.
-
-    Exact for motion in one direction, whatever its size. All arguments broadcast.
-    """
-    return jnp.clip(force + stiffness * jnp.asarray(du), -jnp.asarray(strength), strength)
 
 
 def default_edges(n: int) -> np.ndarray:
@@ -111,13 +103,6 @@ def binning_error(backbone: Backbone, u_max: ArrayLike, edges: ArrayLike) -> Arr
     before = jnp.append(jnp.inf, fall[:-1])
     height = widths * jnp.where(jnp.isinf(before), fall, before * fall / jnp.maximum(before + fall, 1e-300))
     return jnp.max(height) / jnp.sum(slopes * widths)
-
-
-def concatenate(banks: Sequence[Bank]) -> Bank:
-    """All elements of several banks side by side: contacts in parallel, at the same displacement."""
-    if not banks:
-        raise InputError("no bank to concatenate", allowed="at least one")
-    return Bank(jnp.concatenate([bank.stiffness for bank in banks]), jnp.concatenate([bank.strength for bank in banks]))
 
 
 def _chords(backbone: Backbone, u_max: ArrayLike, edges: ArrayLike) -> tuple[Array, Array]:

@@ -58,34 +58,3 @@ class Hysteresis:
 
     def _virgin(self, u: float) -> float:
         return float(np.asarray(self._backbone(u)))
-
-
-def loop_area(backbone: Callable[[np.ndarray], ArrayLike], amplitude: float, points: int = 200) -> float:
-    """Work lost in a closed cycle between -amplitude and +amplitude (m), in J: 8 int(F du) - 4 A F(A).
-
-    Gauss-Legendre with ``points`` nodes: to rounding where the backbone is smooth up to the amplitude.
-    """
-    node, weight = np.polynomial.legendre.leggauss(points)
-    force = np.asarray(backbone(0.5 * amplitude * (node + 1.0)))
-    end = float(np.asarray(backbone(np.asarray([amplitude])))[0])
-    return float(4.0 * amplitude * (weight @ force - end))
-
-
-def damping_ratio(area: ArrayLike, stiffness: ArrayLike, amplitude: ArrayLike) -> ArrayLike:
-    """Damping ratio of the viscous damper that loses as much in a cycle at resonance: area/(2 pi k A^2)."""
-    return area / (2.0 * np.pi * stiffness * amplitude**2)
-
-
-def power_law_damping_ratio(amplitude: ArrayLike, u_max: ArrayLike, p: ArrayLike) -> ArrayLike:
-    """Equivalent damping ratio (p - 1) A/(3 pi u_max) of small cycles about zero on a power-law backbone."""
-    return (p - 1.0) * amplitude / (3.0 * np.pi * u_max)
-
-
-def microslip_ring_down(
-    t: ArrayLike, start: ArrayLike, angular_frequency: ArrayLike, u_max: ArrayLike, p: ArrayLike
-) -> ArrayLike:
-    """Amplitude (m) at time ``t`` (s) of ringing that only microslip damps.
-
-    Hyperbolic, A0/(1 + (p - 1) omega A0 t/(3 pi u_max)), while the amplitude is small against u_max.
-    """
-    return start / (1.0 + power_law_damping_ratio(start, u_max, p) * angular_frequency * t)

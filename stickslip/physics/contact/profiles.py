@@ -52,16 +52,6 @@ def flat_punch(half_width: float, n_springs: int) -> Profile:
     return Profile(jnp.zeros_like(x), dx)
 
 
-def exponential_gaps(decay_length: ArrayLike, n_springs: int, dx: ArrayLike) -> Profile:
-    """The number of springs within a gap g grows as exp(g/decay_length): asperities as of Greenwood and Williamson.
-
-    While contact is partial, F_n grows as exp(depth/decay_length) and F_t/(mu F_n) = 1 - exp(-u/u_c) with
-    u_c = mu (E*/G*) decay_length.
-    """
-    check_within("the decay length", decay_length, above=0.0, key="decay_length", unit="m")
-    return Profile(jnp.log(jnp.arange(1, n_springs + 1, dtype=float)) * jnp.asarray(decay_length), dx)
-
-
 def add_curvature(heights: ArrayLike, dx: ArrayLike, curvature: ArrayLike) -> Array:
     """Heights (..., N) of lines on a body of radius R = 1/curvature (1/m): lowered by x^2/R about the middle."""
     heights = jnp.asarray(heights)
@@ -114,13 +104,6 @@ def heights_from_scan(
     z = np.interp(even, x, z)
     slope, level = np.polyfit(even - even.mean(), z, 1)
     return z - level - slope * (even - even.mean()), float(even[1] - even[0])
-
-
-def profile_from_heights(
-    position: ArrayLike | None, height: ArrayLike, *, spacing: float | None = None, n_springs: int | None = None
-) -> Profile:
-    """The profile of a measured scan; arguments, errors and caution as of `heights_from_scan`."""
-    return from_heights(*heights_from_scan(position, height, spacing=spacing, n_springs=n_springs))
 
 
 def _grid(half_width: float, n_springs: int) -> tuple[Array, float]:

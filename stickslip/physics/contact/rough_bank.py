@@ -23,15 +23,6 @@ def bank_from_contact(contact: StaticContact, n: int = 128) -> Bank:
     return bank_from_backbone(backbone, jnp.max(contact.u_max), default_edges(n))
 
 
-def spring_bank(contact: StaticContact) -> Bank:
-    """Every spring of a contact as an element of its own (springs out of contact have none of either); not binned."""
-    table = contact.indentation
-    reach = contact.friction * contact.moduli.normal / contact.moduli.tangential
-    depths = jnp.maximum(jnp.asarray(contact.depth)[..., None] - table.gaps * jnp.asarray(table.height)[..., None], 0.0)
-    stiffness = jnp.where(depths > 0.0, contact.moduli.tangential * jnp.asarray(table.dx), 0.0)
-    return Bank(stiffness.ravel(), (stiffness * depths * jnp.asarray(reach)[..., None]).ravel())
-
-
 def rough_bank(
     H: ArrayLike = 0.3,
     h_rms: ArrayLike = 2.46e-6,

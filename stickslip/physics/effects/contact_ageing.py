@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from ..contact import Bank
-from ..params import parameter
+from ..params import first_age, parameter
 from .base import Contact, Memory, Motion, Threshold
 from .catalogue import register
 
@@ -64,16 +64,7 @@ class ContactAgeing(Memory, Threshold):
         symbol="D",
         doc="slip over which the age is lost",
     )
-    first_age: Array = parameter(
-        10.0,
-        unit="s",
-        lower=1e-3,
-        upper=1e7,
-        log=True,
-        grid=(1.0, 100.0),
-        symbol=r"\theta_1",
-        doc="age of the contact at the start of the record",
-    )
+    first_age: Array = first_age(10.0)
 
     def start(self, bank: Bank) -> Array:
         return self.first_age + jnp.zeros(())

@@ -7,10 +7,13 @@ every element from its own quantile function towards that of the other.
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax.numpy as jnp
 from jax import Array
 
 from ..contact import Bank
+from ..params import parameter
 from .sliding import filled
 
 
@@ -31,6 +34,11 @@ def scaled(bank: Bank, factor: Array) -> Bank:
     """
     strength = bank.strength * factor
     return Bank(bank.stiffness, strength * (bank.total_strength / jnp.sum(strength)))
+
+
+def share(doc: str) -> Any:
+    """The parameter of effects that lead a bank towards another one."""
+    return parameter(0.0, unit="1", lower=0.0, upper=1.0, null=0.0, symbol=r"\varepsilon", doc=doc, ends=(1.0,))
 
 
 def towards(bank: Bank, threshold: Array, share: Array) -> Bank:

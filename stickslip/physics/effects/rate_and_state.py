@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from ..contact import Bank
-from ..params import parameter, variant
+from ..params import first_age, parameter, variant
 from .base import Contact, Memory, Motion, Threshold
 from .catalogue import register
 
@@ -83,16 +83,7 @@ class RateAndState(Memory, Threshold):
         symbol="v^*",
         doc="velocity below which friction is static",
     )
-    first_age: Array = parameter(
-        100.0,
-        unit="s",
-        lower=1e-3,
-        upper=1e7,
-        log=True,
-        grid=(1.0, 100.0),
-        symbol=r"\theta_1",
-        doc="age of the contact at the start of the record",
-    )
+    first_age: Array = first_age(100.0)
     law: str = variant("ageing", ("ageing", "slip"), "the state grows in stationary contact too, or by slip only")
 
     def formula(self) -> str:

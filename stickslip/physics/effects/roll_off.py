@@ -6,10 +6,9 @@ import jax.numpy as jnp
 from jax import Array
 
 from ..contact import Bank
-from ..params import parameter
 from .base import Geometry
 from .catalogue import register
-from .quantiles import sticking_shares, towards
+from .quantiles import share, sticking_shares, towards
 
 
 @register
@@ -40,16 +39,7 @@ class RollOff(Geometry):
     amplitude = "share"
     family = "geometry"
 
-    share: Array = parameter(
-        0.0,
-        unit="1",
-        lower=0.0,
-        upper=1.0,
-        null=0.0,
-        symbol=r"\varepsilon",
-        doc="how far the distribution of thresholds is exponential",
-        ends=(1.0,),
-    )
+    share: Array = share("how far the distribution of thresholds is exponential")
 
     def reshape(self, bank: Bank) -> Bank:
         before, after = sticking_shares(bank)

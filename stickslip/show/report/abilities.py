@@ -26,11 +26,6 @@ class Abilities:
     can: tuple[str, ...]
     cannot: tuple[str, ...]
 
-    @property
-    def paragraph(self) -> str:
-        """All of it as running text."""
-        return " ".join([*self.can, *self.cannot])
-
 
 def abilities(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> Abilities:
     """What the traces of a campaign can and cannot tell."""

@@ -9,6 +9,13 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from ...data.campaign.fields import fault, quantity
 from ...errors import InputError
 
+FORCE = quantity("N", above=0)
+FRICTION = quantity("1", above=0, most=10)
+LENGTH = quantity("m", above=0)
+HURST = quantity("1", above=0, below=1)
+EXPONENT = quantity("1", above=1, most=100)
+SLOPE = quantity("1", above=0)
+
 
 class Table(BaseModel):
     """Base: unknown keys are errors, nothing changes after loading."""
@@ -19,8 +26,8 @@ class Table(BaseModel):
 class Each(Table):
     """One contact that differs from the others."""
 
-    normal_force: Annotated[float | None, quantity("N", above=0)] = None
-    friction_coefficient: Annotated[float | None, quantity("1", above=0, most=10)] = None
+    normal_force: Annotated[float | None, FORCE] = None
+    friction_coefficient: Annotated[float | None, FRICTION] = None
 
 
 class ContactTable(Table):
@@ -33,8 +40,8 @@ class ContactTable(Table):
 
     kind: str
     contacts: Annotated[int, Field(ge=1, le=10_000)] = 1
-    normal_force: Annotated[float, quantity("N", above=0)]
-    friction_coefficient: Annotated[float, quantity("1", above=0, most=10)]
+    normal_force: Annotated[float, FORCE]
+    friction_coefficient: Annotated[float, FRICTION]
     bins: Annotated[int, Field(ge=8, le=100_000)] = 128
     residual: Annotated[float, quantity("1", least=0, most=1)] = 0.0
 
@@ -73,8 +80,8 @@ class ElasticTable(ContactTable):
 class EachRoughLine(Each):
     """A rough line of its own."""
 
-    H: Annotated[float | None, quantity("1", above=0, below=1)] = None
-    h_rms: Annotated[float | None, quantity("m", above=0)] = None
+    H: Annotated[float | None, HURST] = None
+    h_rms: Annotated[float | None, LENGTH] = None
 
 
 class RoughLineTable(ElasticTable):
@@ -82,15 +89,15 @@ class RoughLineTable(ElasticTable):
 
     kind: Literal["rough-line"]
     bins: Annotated[int, Field(ge=8, le=100_000)] = 256
-    H: Annotated[float, quantity("1", above=0, below=1)]
-    h_rms: Annotated[float, quantity("m", above=0)]
-    line_length: Annotated[float, quantity("m", above=0)] = 20e-6
+    H: Annotated[float, HURST]
+    h_rms: Annotated[float, LENGTH]
+    line_length: Annotated[float, LENGTH] = 20e-6
     springs: Annotated[int, Field(ge=16, le=10_000_000, multiple_of=2)] = 4096
     realisation: Literal["each", "mean"] = "each"
     lines: Annotated[int, Field(ge=1, le=100_000)] = 100
     seed: Annotated[int, Field(ge=0)] = 0
-    roll_off: Annotated[float | None, quantity("m", above=0)] = None
-    cut_off: Annotated[float | None, quantity("m", above=0)] = None
+    roll_off: Annotated[float | None, LENGTH] = None
+    cut_off: Annotated[float | None, LENGTH] = None
     curvature: Annotated[float, quantity("1/m", least=0)] = 0.0
     each: list[EachRoughLine] | None = None
 
@@ -98,49 +105,52 @@ class RoughLineTable(ElasticTable):
 class EachPowerLaw(Each):
     """A power law of its own."""
 
-    u_max: Annotated[float | None, quantity("m", above=0)] = None
-    p: Annotated[float | None, quantity("1", above=1, most=100)] = None
+    u_max: Annotated[float | None, LENGTH] = None
+    p: Annotated[float | None, EXPONENT] = None
 
 
 class PowerLawTable(ContactTable):
     """The backbone 1 - (1 - u/u_max)^p; ``spread`` is the rms of ln(u_max) over equally loaded contacts."""
 
     kind: Literal["power-law"]
-    u_max: Annotated[float, quantity("m", above=0)]
-    p: Annotated[float, quantity("1", above=1, most=100)]
+    u_max: Annotated[float, LENGTH]
+    p: Annotated[float, EXPONENT]
     spread: Annotated[float, quantity("1", least=0, most=3)] = 0.0
     each: list[EachPowerLaw] | None = None
+
+
+class RoundTable(ElasticTable):
+    """Kinds that touch at a point: the springs cover ``reach`` times the contact radius of Hertz."""
+
+    springs: Annotated[int, Field(ge=16, le=10_000_000)] = 4096
+    reach: Annotated[float, quantity("1", above=1, most=1000)] = 2.5
 
 
 class EachSphere(Each):
     """A sphere of its own."""
 
-    radius: Annotated[float | None, quantity("m", above=0)] = None
+    radius: Annotated[float | None, LENGTH] = None
 
 
-class SphereTable(ElasticTable):
-    """Spheres on flats; the springs cover ``reach`` times the contact radius of Hertz."""
+class SphereTable(RoundTable):
+    """Spheres on flats."""
 
     kind: Literal["sphere"]
-    radius: Annotated[float, quantity("m", above=0)]
-    springs: Annotated[int, Field(ge=16, le=10_000_000)] = 4096
-    reach: Annotated[float, quantity("1", above=1, most=1000)] = 2.5
+    radius: Annotated[float, LENGTH]
     each: list[EachSphere] | None = None
 
 
 class EachCone(Each):
     """A cone of its own."""
 
-    slope: Annotated[float | None, quantity("1", above=0)] = None
+    slope: Annotated[float | None, SLOPE] = None
 
 
-class ConeTable(ElasticTable):
+class ConeTable(RoundTable):
     """Cones on flats; ``slope`` is the tangent of the angle between flank and flat."""
 
     kind: Literal["cone"]
-    slope: Annotated[float, quantity("1", above=0)]
-    springs: Annotated[int, Field(ge=16, le=10_000_000)] = 4096
-    reach: Annotated[float, quantity("1", above=1, most=1000)] = 2.5
+    slope: Annotated[float, SLOPE]
     each: list[EachCone] | None = None
 
 
@@ -148,7 +158,7 @@ class FlatPunchTable(ElasticTable):
     """Flat punches: no creep, all springs slide at once."""
 
     kind: Literal["flat-punch"]
-    half_width: Annotated[float, quantity("m", above=0)]
+    half_width: Annotated[float, LENGTH]
     each: list[Each] | None = None
 
 
@@ -166,7 +176,7 @@ class HeightsTable(ElasticTable):
     file: str = Field(min_length=1)
     height: HeightColumn
     position: HeightColumn | None = None
-    spacing: Annotated[float | None, quantity("m", above=0)] = None
+    spacing: Annotated[float | None, LENGTH] = None
     springs: Annotated[int, Field(ge=16, le=10_000_000)] | None = None
     scale: Annotated[float, quantity("1", above=0)] = 1.0
     each: list[Each] | None = None

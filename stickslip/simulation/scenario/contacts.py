@@ -248,7 +248,7 @@ def _profiles(table: ElasticTable, folder: Path) -> list[tuple[int, int, Profile
     return [(i, number, profile_of(table, i, folder)) for i, number in _distinct(table, *keys)]
 
 
-def profile_of(table: ElasticTable, i: int = 0, folder: Path = Path()) -> Profile:
+def profile_of(table: ElasticTable, i: int, folder: Path) -> Profile:
     """The profile of the i-th contact of a kind that is not a rough line."""
     normal = float(np.asarray(moduli(table).normal))
     load = table.of(i, "normal_force")

@@ -11,7 +11,7 @@ from typing import Any
 from ...errors import InputError
 
 
-def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
+def parse_assignment(text: str) -> tuple[str, Any]:
     """``"contact.H=0.5"`` as key and value; the value is read as TOML where it is that, else as text.
 
     Raises:
@@ -20,7 +20,9 @@ def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     key, value = key.strip(), value.strip()
     if not equals or not key or not value or not all(key.split(".")):
-        raise InputError("not an assignment", file=option, value=text, allowed="table.key=value, such as contact.H=0.5")
+        raise InputError(
+            "not an assignment", file="--set", value=text, allowed="table.key=value, such as contact.H=0.5"
+        )
     try:
         return key, tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
@@ -39,15 +41,15 @@ def with_overrides(content: dict[str, Any], changes: Sequence[tuple[str, Any]]) 
     for key, value in changes:
         parts = key.split(".")
         place: Any = content
-        for depth, part in enumerate(parts[:-1]):
-            place = _step(place, part, parts[depth + 1], key)
+        for part in parts[:-1]:
+            place = _step(place, part, key)
         if isinstance(place, list):
             raise InputError("the key names a list", file="--set", key=key, hint="name one entry: effect.1.key")
         place[parts[-1]] = value
     return content
 
 
-def _step(place: Any, part: str, following: str, key: str) -> Any:
+def _step(place: Any, part: str, key: str) -> Any:
     if isinstance(place, dict):
         inner = place.setdefault(part, [] if part == "effect" else {})
     else:

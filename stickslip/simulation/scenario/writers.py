@@ -112,7 +112,7 @@ def _entry(name: str, scenario: Scenario, run: Run) -> list[str]:
             parts += _counter(file.sensor, run)
         lines.append(f"{channel} = {{ {', '.join(parts)} }}")
     if "drive_position" not in file.output.channels:
-        lines.append(_drive(scenario, run))
+        lines.append(_drive(scenario))
     lines.append(f"virgin = {'true' if file.contact.residual == 0 else 'false'}")
     return lines
 
@@ -128,7 +128,7 @@ def _counter(sensor: Any, run: Run) -> list[str]:
     return parts
 
 
-def _drive(scenario: Scenario, run: Run) -> str:
+def _drive(scenario: Scenario) -> str:
     drive = scenario.file.drive
     if drive.velocity is not None:
         return f"drive_velocity = {_quantity(drive.velocity, 'm/s')}"

@@ -3,14 +3,6 @@ const EVIDENCE = "by how much the cost (chi-square, no unit) falls: promised by 
   "when the effect was fitted; on runs that had no part in its amplitude it must fall too"
 const SVG = "http://www.w3.org/2000/svg"
 
-function part(kind, classes, parent, text) {
-  const made = document.createElement(kind)
-  made.className = classes
-  if (text) made.textContent = text
-  parent.append(made)
-  return made
-}
-
 function curve(parent, points, classes) {
   const line = document.createElementNS(SVG, "polyline")
   line.setAttribute("points", points.map(([x, y]) => `${(110 * x + 2).toFixed(1)},${(36 * (1 - y) + 2).toFixed(1)}`).join(" "))

@@ -1,12 +1,4 @@
 // The head of the window. Everything from elsewhere is set as text, never as HTML.
-function part(kind, classes, parent, text) {
-  const made = document.createElement(kind)
-  made.className = classes
-  if (text) made.textContent = text
-  parent.append(made)
-  return made
-}
-
 export function render({ model }) {
   const root = document.createElement("div")
   root.className = "frame"

@@ -1,14 +1,6 @@
 // Sliders. A hand sends at most ten places a second, the last one always, from the first touch on.
 const EVERY = 100 // ms
 
-function part(kind, classes, parent, text) {
-  const made = document.createElement(kind)
-  made.className = classes
-  if (text) made.textContent = text
-  parent.append(made)
-  return made
-}
-
 // A text that is set anew has the whole page laid out again, which every picture then waits for.
 function put(element, key, value) {
   if (element[key] !== value) element[key] = value

@@ -1,0 +1,125 @@
+"""The forces along the motion of one run and their derivatives, compiled."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from ...physics.contact import Bank
+from ...physics.effects.base import Effect, Sensor
+from ...physics.model import Block, LoadPoint, Model, Weakening
+from ...system.traced import Program, of_this_package
+from .along import Way, along, lead, undone
+from .composition import DAMPING, PULL
+from .point import OWN
+
+PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
+EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
+
+
+class Own(NamedTuple):
+    """What differs from event to event, at the knots of a run, shape (n, 4) each, in the order of :data:`LOCAL`.
+
+    Attributes:
+        value: of the event that a knot belongs to, zero where it belongs to none.
+        moves: 1 where it belongs to one, else 0.
+    """
+
+    value: Any
+    moves: Any
+
+
+@lru_cache(maxsize=PROGRAMS)
+def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, whole: bool) -> Program:
+    """The compiled forces at the knots of one run, shape (n,), with derivatives in shared, phases and locals.
+
+    Those in locals alone where they are not wanted as a ``whole``.
+
+    Runs and events are not in its shapes, so that all campaigns share it.
+    """
+    a, b = len(names), len(phases)
+
+    def forces(
+        z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, spring: Any,
+        way: Way, knots: Any, band: Any,
+    ) -> Any:  # fmt: skip
+        si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
+        values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
+        if PULL in values:
+            stiffness = jnp.where(jnp.isnan(spring), values["rig.spring_stiffness"], spring)
+            way = way._replace(drive=way.drive + values[PULL] / stiffness)
+        model = model_of(values, effects, Bank(weights / reach, weights), spring)
+        seen, late = way, jnp.ones(())
+        if any(isinstance(e, Sensor) for e in effects):
+            # the measured force, near enough for a sensor that sees it
+            force = model.block.spring_stiffness * (way.drive - way.x) + way.force
+
+            def before(rate: Any) -> Way:
+                return undone(model, way._replace(v=rate), force, knots)
+
+            # what a reading that is late is taken ahead by is its rate's, and the faster the larger
+            seen, ahead = jax.jvp(before, (way.v,), (jnp.ones_like(way.v),))
+            late = jnp.sqrt(1.0 + (band * jnp.sum(ahead.x) / way.x.size) ** 2)
+        shift = seen.x - way.x
+        held = along(model, of_events(seen, event), knots)
+        steep = jax.vmap(jax.grad(model.pull))(lead(model, way.t, way.drive) - seen.x)
+        # how much the displacement changes where the reading does
+        steps = jnp.diff(way.x)
+        gain = 1.0 + jnp.sum(steps * jnp.diff(shift)) / jnp.sum(steps**2)
+        return (
+            (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, gain, late),
+            (held.elements, held.tangent, held.slides, held.sliding, held.psi),
+        )
+
+    def derived(
+        z: Any, turn: Any, scales: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any, spring: Any,
+        way: Way, knots: Any, band: Any, own: Own,
+    ) -> Any:  # fmt: skip
+        effects = jax.tree.unflatten(structure, leaves)
+
+        def moved(row: Any) -> Any:
+            def f(z: Any, turn: Any, event: Any) -> Any:
+                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots, band)
+
+            # all events are moved at once: each acts on its own points only
+            step = own.moves * row[a + b :]
+            return jax.jvp(f, (z, turn, own.value), (row[:a], row[a : a + b] * turn_scale, step), has_aux=True)
+
+        out, slope, aux = jax.vmap(moved, out_axes=(None, 0, None))(jnp.eye(a + b + OWN)[0 if whole else a + b :])
+        return *out, *slope, *aux
+
+    name = f"{'along' if whole else 'forces along'} {names} {phases} {structure}"
+    return Program(derived, name if of_this_package(structure) else None)
+
+
+def model_of(values: dict[str, Any], effects: tuple[Effect, ...], bank: Bank, own: Any) -> Model:
+    """The model with these numbers; ``own`` is the spring of the run (N/m), nan where it has none."""
+    spring = jnp.where(jnp.isnan(own), values["rig.spring_stiffness"], own)
+    block = Block(mass=values["rig.mass"], spring_stiffness=spring, damping=values[DAMPING])
+    weakening = Weakening(
+        ratio=1.0 - values["weakening.drop"],
+        slip_distance=values["weakening.slip_distance"],
+        healing_time=values["weakening.healing_time"],
+    )
+    still = LoadPoint(jnp.array([0.0, 1.0]), jnp.array([0.0, 0.0]))
+    return Model(block, bank, weakening, still, tuple(_set(e, values) for e in effects))
+
+
+def _set(effect: Effect, values: dict[str, Any]) -> Effect:
+    for name, value in values.items():
+        tag, _, own = name.partition(".")
+        if tag == effect.tag:
+            effect = eqx.tree_at(attrgetter(own), effect, value)
+    return effect
+
+
+def of_events(way: Way, event: Any) -> Way:
+    """The way with what differs from event to event, shape (n, 4)."""
+    return way._replace(
+        x=way.x + event[:, 3], strength=jnp.exp(event[:, 0]), stretch=jnp.exp(event[:, 1]), shape=event[:, 2]
+    )
