@@ -17,13 +17,13 @@ from scipy.sparse import coo_array, csr_array
 
 from ...data.segment import Event, Segmentation
 from ...data.trace import Trace
+from .inserted_knots import Inserted
 from .kernels import band, kernels
 from .mains import hum
 from .reading import Reading
 from .sampling import even
 from .scales import Scales
 from .smoothing import Smoother, onward, smoothed, unsteady
-from .turns import Turns
 from .windows import apart, edges_of, fast, hasty, thin
 
 Array = NDArray[np.float64]
@@ -295,14 +295,15 @@ class _Pieces:
                 into.append(piece[key])
             p += size
         # between windows the velocity is a mean, which tells no turning point
-        turns = Turns.of(knot_t, x, np.where(slow, 0.0, v), slow)
-        shape = (p, turns.size)
+        arrests = np.array([e.t_arrest for e in events])
+        inserted = Inserted.of(knot_t, x, np.where(slow, 0.0, v), slow, arrests, times.ring or times.slip)
+        shape = (p, inserted.size)
         flat = bowed[_joined(columns_window)].tocoo()
         r = np.concatenate([*rows[0], *rows_window, _joined(rows_window)[flat.coords[0]]])
-        c = turns.place[np.concatenate([*rows[1], *columns_window, flat.coords[1]])]
+        c = inserted.place[np.concatenate([*rows[1], *columns_window, flat.coords[1]])]
         ones = [np.ones(w.size) for w in rows_window]
         mean = coo_array((np.concatenate([*values[0], *ones, flat.data]), (r, c)), shape=shape).tocsr()
-        smooth = tuple(_sparse(k, rows[0], [turns.place[i] for i in rows[1]], shape) for k in values[1:])
+        smooth = tuple(_sparse(k, rows[0], [inserted.place[i] for i in rows[1]], shape) for k in values[1:])
         moving = tuple(_sparse(k, shaken[0], shaken[1], (p, t.size)) for k in shaken[2:])
         made = {k: np.concatenate(w) for k, w in out.items()}
         event = np.concatenate(self.event)
@@ -311,11 +312,10 @@ class _Pieces:
         keep = (of < len(events)) & ((of > 0) | trace.virgin)
         reading = csr_array(made_of @ self._reading(smoother, (knot_t.size, t.size)))
         begun = np.array([float(t[0]), *(e.t_arrest for e in events)])
-        knot_t, x, v, d = (
-            turns.joined(y, own) for y, own in zip((knot_t, x, v, d), turns.at(knot_t, x, d), strict=True)
-        )
-        event = event[turns.source]
-        told = Reading.of(samples, turns.rows(reading), moving[0], moving[1])
+        d, x, v = (inserted.joined(y, own) for y, own in ((d, inserted.between(d)), (x, inserted.x), (v, inserted.v)))
+        knot_t = inserted.joined(knot_t, inserted.between(knot_t))
+        event = event[inserted.source]
+        told = Reading.of(samples, inserted.rows(reading), moving[0], moving[1])
         knots_made = Knots(
             trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
             made["at"], phase, of, made["rate"], made["acceleration"], told,
