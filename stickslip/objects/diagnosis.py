@@ -217,7 +217,7 @@ def diagnose(
         try:
             made = found(pieces, pieces.ready())
         except KeyboardInterrupt:
-            text = f"{pieces.ready()} finished pieces are kept, and the same command goes on from them"
+            text = f"{pieces.ready()} finished parts are kept, and the same command resumes from them"
             raise KeyboardInterrupt(text) from None
         run.arrays(made.arrays)
         run.json(made.result)
