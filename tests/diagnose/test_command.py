@@ -203,4 +203,4 @@ def test_an_interrupted_diagnosis_says_what_is_kept_and_goes_on_from_it(tmp_path
         assert "interrupted; 2 finished parts are kept, and the same command resumes from them" in said
         assert "before anything is fitted:" in said
         assert "Slow noise of the sensor is not stated in v050" in said  # what these data cannot tell
-    assert "going on from 2 finished pieces" in said
+    assert "resuming from 2 finished parts" in said
