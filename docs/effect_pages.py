@@ -72,14 +72,14 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         *_numbers(numbers),
         "In a scenario file:",
         "```toml\n" + _entry(cls) + "\n```",
-        f"No fit takes it up (`stickslip fit --add {cls.tag}` says so): its course is a draw at random, and another "
+        f"No fit takes it up (`stickslip fit --add {cls.tag}` says so): it is a random process, and another "
         "draw is another course. What a measurement says of it, how large it is and what it follows, is "
         "[told by a diagnosis and by a forecast](../forecast.md)."
         if cls.drawn
         else f"The same in a fit: `stickslip fit campaign.toml --add {cls.tag}`.",
         "## In a measurement",
         f"{prose(cls.signature[:1].upper() + cls.signature[1:])}.",
-        "| may be taken for | the experiment that separates the two |\n|---|---|\n"
+        "| similar to | the experiment that separates the two |\n|---|---|\n"
         + "\n".join(f"| [{tag}]({tag}.md) | {cell(text)} |" for tag, text in catalogue.alike(cls.tag).items()),
         "## Source",
         f"{prose(cls.source.rstrip('.'))}.",

@@ -246,7 +246,7 @@ def fitted(
 
 
 def summary(fit: StaticFit) -> dict[str, Any]:
-    """Mean and standard deviation over the satisfying fits, as in the paper, and of all fits."""
+    """Mean and standard deviation over the satisfactory fits, as in the paper, and of all fits."""
     good, everything = fit.good, fit.fits
     interval = binomtest(len(good), len(everything)).proportion_ci()
     at_bound = sum(bool(f.at_bound) for f in everything)
@@ -409,7 +409,7 @@ def fit_command(path: Path, model: str, *more: str) -> dict[str, Any]:
 
 
 def static_part(result: dict[str, Any], rig: StaticRig) -> dict[str, Any]:
-    """Of the processes after a slip: medians, and how many fits satisfy."""
+    """Of the processes after a slip: medians, and how many fits are satisfactory."""
     later = [f for f in result["static"]["fits"] if "virgin" not in f["note"]]
     table = static_table()
     curves = [table.displacement(rig, f["hurst"], f["h_rms"]) for f in later]

@@ -1,4 +1,4 @@
-"""The errors a user can meet, each one message that says what, where and how to mend it."""
+"""The errors a user can meet, each one message that says what, where and how to fix it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class InputError(StickslipError):
         key: the key, column or line in that file (``"rig.mass"``, ``"line 12"``).
         value: the offending value.
         allowed: the range or the list of what would be accepted.
-        hint: how to mend it.
+        hint: how to fix it.
     """
 
     exit_code = 2
@@ -54,7 +54,7 @@ class InputError(StickslipError):
         )
 
     def with_hint(self, first: str) -> InputError:
-        """The same error with a further line on how to mend it, before the others."""
+        """The same error with a further line on how to fix it, before the others."""
         hint = "\n  ".join(line for line in (first, self.hint) if line)
         return type(self)(self.what, file=self.file, key=self.key, value=self.value, allowed=self.allowed, hint=hint)
 
@@ -66,7 +66,7 @@ class InputError(StickslipError):
         if self.allowed:
             text += f"\n  allowed: {self.allowed}"
         if self.hint:
-            text += f"\n  to mend: {self.hint}"
+            text += f"\n  to fix: {self.hint}"
         return text
 
 

@@ -336,7 +336,7 @@ def test_creep_into_a_folder(scenario, capsys):
 def test_creep_of_a_standing_drive_is_refused(scenario, capsys):
     changes = ["--set", "drive.events=1", "--set", "drive.velocity=0"]
     assert run(["creep", scenario, *changes]) == 2
-    assert "stands still" in capsys.readouterr().err
+    assert "without drive motion" in capsys.readouterr().err
 
 
 def test_new_files_are_not_overwritten(scenario, capsys):
@@ -490,7 +490,7 @@ def test_a_terminal_shows_both_traces_beside_the_explanation(capsys, monkeypatch
     shown = capsys.readouterr().out.splitlines()
     assert [line for line in shown if line in piped and line] == [line for line in piped if line]
     number = shown.index("without:")
-    assert shown[number - 1].startswith("the spring's force as the reading tells it, from ")
+    assert shown[number - 1].startswith("spring force derived from the reading, from ")
     without, with_it = shown[number + 1 : number + 6], shown[number + 7 : number + 12]
     assert shown[number + 6] == "with lost = 0.196:"
     assert any(line.strip() for line in without)

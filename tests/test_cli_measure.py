@@ -244,7 +244,7 @@ def test_inertial_fit_of_a_generated_campaign(capsys):
     assert base["train_error"] < 1.5 < static["train_error"]
     assert base["heldout_error"] < 1.5
     assert set(base["by_run"]) == {"v100", "v200"}
-    assert any("v400: kept aside" in line for line in found["dropped"])
+    assert any("v400: held out of all fits" in line for line in found["dropped"])
     assert found["kept_aside"] == ["v400"]
     assert base["free"] is not None
     p = found["parameters"]

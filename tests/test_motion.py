@@ -99,7 +99,7 @@ def test_a_drive_or_a_clock_wrong_by_a_thousand_is_refused(tmp_path, capsys, tim
     assert run([command[0], str(tmp_path / "c.toml"), *command[1:], "--out", str(out)]) == 2
     said = capsys.readouterr().err
     assert "drive" in said
-    assert "to mend" in said
+    assert "to fix" in said
     assert not out.exists()
 
 

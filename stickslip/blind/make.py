@@ -81,7 +81,7 @@ def _need_numba() -> None:
         import numba  # noqa: F401
     except ImportError:
         raise StickslipError(
-            "the generator of the challenge needs numba\n  to mend: pip install 'stickslip[challenge]'"
+            "the generator of the challenge needs numba\n  to fix: pip install 'stickslip[challenge]'"
         ) from None
 
 

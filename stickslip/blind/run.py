@@ -230,14 +230,14 @@ def _work(
                     continue
                 if told is None:
                     raise StickslipError(
-                        f"the cluster was lost while {case} was running; what is finished is kept"
-                        "\n  to mend: run the same command again"
+                        f"the cluster was lost while {case} was running; finished cases are kept"
+                        "\n  to fix: run the same command again"
                     )
                 if told["state"] == REFUSED:
                     raise RunFolderError(
                         f"{case} cannot be written: {told['message'].splitlines()[0]}", file=runs,
                         hint="make room, or make the folder writable, and run the same command again;"
-                        " what is finished is kept, and the case goes on from its pieces",
+                        " finished cases are kept, and this one resumes from its finished parts",
                     )  # fmt: skip
                 del at_work[case]
                 count += 1

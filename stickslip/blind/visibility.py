@@ -129,7 +129,7 @@ class Reference:
         step = {**RIG, **SURFACE}[name]
         shift = self._shift(self._setup(**{name: step}), [])
         if shift is None:
-            raise StickslipError(f"rig {self.seed} does not stand another {name}")
+            raise StickslipError(f"rig {self.seed} cannot take another {name}")
         return shift / step
 
     def _whitening(self, each: list[np.ndarray]) -> np.ndarray:

@@ -25,12 +25,12 @@ COMMANDS = {
     "simulate": "Simulate a scenario, or the model of a run folder: trace, slip events, pictures.",
     "creep": "The static creep curve of a scenario's contacts, without inertia.",
     "new": "Write a commented scenario or campaign file to start from.",
-    "inspect": "Traces of a campaign, their events, what was mended or left out, and what they can tell.",
+    "inspect": "Traces of a campaign, their events, repairs, omissions, and what the data can tell.",
     "fit": "Fit the static or the dynamic model to a campaign, and say where it fails.",
-    "diagnose": "Find the physical effect the model lacks, add it, and see the error on unseen runs fall.",
+    "diagnose": "Find the physical effect the model lacks, add it, and test it on runs left out of the fit.",
     "open": "The workbench in the browser: compare, add an effect, watch the error fall.",
     "forecast": "Forecast the next slip from how strength wanders and load rises, and score it on unseen slips.",
-    "compare": "Two runs side by side: models, errors by phase, parameters and how far apart they are.",
+    "compare": "Two runs side by side: models, errors by phase, parameters and their differences.",
     "challenge": "Test the diagnosis blindly on campaigns with a hidden effect: make, seal, run, score.",
     "effects": "List the catalogue of effects, explain one, or print a model's equations.",
 }
@@ -42,7 +42,7 @@ def make_app() -> App:
     """The command line's application; commands are imported when they are called."""
     app = App(
         name="stickslip",
-        help="Creep and stick-slip of a rough contact: simulate it, measure it, find what is missing.",
+        help="Creep and stick-slip of a rough contact: simulate it, measure it, identify the missing effect.",
         version=__version__,
         help_format="plaintext",
         suppress_keyboard_interrupt=False,
@@ -143,7 +143,7 @@ def _of_libraries(error: RuntimeError) -> StickslipError | None:
     if kind in ("TerminatedWorkerError", "BrokenProcessPool"):
         return StickslipError(
             "a worker process was ended by the system; did memory run out?"
-            "\n  to mend: the same command again goes on from the finished pieces; --jobs 1 takes the least memory"
+            "\n  to fix: repeat the command, which resumes from the finished parts; --jobs 1 takes the least memory"
         )
     return None
 

@@ -49,7 +49,7 @@ def text(result: Mapping[str, Any], variables: Mapping[str, tuple], out: Path | 
     for i, row in enumerate(rows):
         lines += ["", *_fold(_heading(row), columns), *_drawing(variables, i, columns), *_events(row, scales, columns)]
         said = [*(f"warning: {w}" for w in row["warnings"]), *(f"read: {w}" for w in row["notes"])]
-        said += [f"mended: {w}" for w in row["repairs"]]
+        said += [f"repaired: {w}" for w in row["repairs"]]
         said += [f"left out: {w}" for w in row["dropped"]]
         if row.get("ripple", {}).get("lines"):
             said.append(row["ripple"]["text"])

@@ -31,7 +31,7 @@ def make(folder: Path, *, cases: int = 100, seed: int = 0, grouped: Flag = False
     Parameters
     ----------
     folder:
-        Where to; must not exist yet. An interrupted making goes on where it was.
+        Where to; must not exist yet. Interrupted, it resumes where it stopped.
     cases:
         How many: 30 % with nothing missing, 45 % with one effect, 15 % with two, 10 % outside the catalogue.
     seed:
@@ -59,7 +59,7 @@ def run(
     only: str | None = None,
     retry: Flag = False,
 ) -> int:
-    """Diagnose every case; what is finished is not done again, and a case cut off goes on from its pieces.
+    """Diagnose every case; finished cases are not repeated, and an interrupted one resumes from its finished parts.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def run(
             note=_note,
         )
     except KeyboardInterrupt:
-        raise KeyboardInterrupt("what is finished is kept; the same command goes on") from None
+        raise KeyboardInterrupt("finished cases are kept; repeat the command to resume") from None
     print(f"{found['done']} diagnosed, {found['failed']} failed, {found['open']} open")
     if found["failed"]:
         print(f"failures are described in {folder / 'runs'}; try again with --retry")

@@ -18,7 +18,7 @@ def compare(
     json: Json = False,
     force: Force = False,
 ) -> int:
-    """Two runs side by side: models, verdicts, errors by phase, parameters and how far apart they are.
+    """Two runs side by side: models, verdicts, errors by phase, parameters and their differences.
 
     Parameters
     ----------

@@ -28,14 +28,14 @@ def diagnose(
     json: Flag = False,
     force: Force = False,
 ) -> int:
-    """Find the physical effect that the model lacks, add it, and see the error on unseen runs fall.
+    """Find the physical effect that the model lacks, add it, and test it on runs left out of the fit.
 
     Parameters
     ----------
     campaign:
         TOML file that describes the rig and its measured runs.
     out:
-        Folder for report.html, result.json and the finished pieces; an interrupted diagnosis goes on from them.
+        Folder for report.html, result.json and the finished parts; an interrupted diagnosis resumes from them.
         Default: NAME-diagnosis in this folder, after the campaign's file or, where that is campaign.toml, its folder.
     holdout:
         A run to keep aside; may be given several times. Default: runs whose role in the campaign is "held-out". Every
@@ -98,7 +98,7 @@ def _teller(clock: Callable[[], float] = time.perf_counter) -> Callable[[str, fl
 
 
 def _free_table(ladder: list[dict[str, Any]]) -> Any:
-    """Errors of the models that were run freely; None where none was."""
+    """Errors of the free simulations; None where there is none."""
     from rich.table import Table
 
     from .show import quantity
@@ -107,8 +107,8 @@ def _free_table(ladder: list[dict[str, Any]]) -> Any:
     if not rows:
         return None
     table = Table(
-        title="Run freely from arrest to arrest through unseen runs: error in % of the measured\n"
-        "(over what the events of these runs scatter by themselves)"
+        title="Free simulation from arrest to arrest through unseen runs: error in % of the measured\n"
+        "(in brackets: divided by the scatter between events)"
     )
     table.add_column("model")
     for name in ("recurrence", "slip", "creep before the onset", "slips missed"):
@@ -132,7 +132,7 @@ def _print(result: dict[str, Any], out: Path) -> None:
     from .show import quantity, told
 
     console = Console(width=None if sys.stdout.isatty() else 110)
-    table = Table(title="Ladder of models: error in units of what the data can tell (1 is as good as they allow)")
+    table = Table(title="Ladder of models: error in floors (1: as good as noise and scatter allow)")
     table.add_column("model")
     phases = list(dict.fromkeys(p for rung in result["ladder"] for p in rung["by_phase"]))
     table.add_column("cycles")
@@ -161,8 +161,8 @@ def _print(result: dict[str, Any], out: Path) -> None:
     rig = [finding["sentence"] for finding in result["rig"] if not finding["stops"]]  # the verdict says the others
     for text in [*rig, *result["notes"], *result["caution"]]:
         console.print(escape(text), highlight=False)
-    mended = told(result)
+    repaired = told(result)
     lost = [f"left out: {text}" for text in result["dropped"]]
-    for text in [*mended, *lost[:8], *([f"... and {len(lost) - 8} more"] if len(lost) > 8 else [])]:
+    for text in [*repaired, *lost[:8], *([f"... and {len(lost) - 8} more"] if len(lost) > 8 else [])]:
         console.print(escape(text), highlight=False)
     console.print(f"report in {escape(str(out / 'report.html'))}", highlight=False)

@@ -187,7 +187,7 @@ def _sketched(cls: type[Effect]) -> list[str]:
     low, top = min(float(y.min()) for _, y in curves), max(float(y.max()) for _, y in curves)
     span = f"from {show.quantity(begin, 's')} to {show.quantity(float(curves[0][0][-1]), 's')}, "
     span += f"between {show.quantity(low, 'N')} and {show.quantity(top, 'N')}"
-    lines = [f"the spring's force as the reading tells it, {span}"]
+    lines = [f"spring force derived from the reading, {span}"]
     for name, (t, y) in zip(("without", f"with {_given(cls, values)}"), curves, strict=True):
         lines += [f"{name}:", *(f"  {line}" for line in sketch(t, y, columns=72, rows=5, limits=(low, top)))]
     return lines

@@ -1,4 +1,4 @@
-"""``stickslip inspect``: the traces of a campaign, their events, what was mended, and what the data can tell."""
+"""``stickslip inspect``: the traces of a campaign, their events, repairs, and what the data can tell."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def inspect(
     json: Flag = False,
     force: Force = False,
 ) -> int:
-    """Traces of a campaign, their events, what was mended or left out, and what they can tell.
+    """Traces of a campaign, their events, repairs, omissions, and what the data can tell.
 
     Parameters
     ----------

@@ -70,10 +70,10 @@ def table(header: list[str], rows: list[list[str]]) -> str:
 
 
 def told(result: Mapping[str, Any]) -> list[str]:
-    """What was noticed, read in a certain way, and mended, trace by trace."""
+    """What was noticed, read in a certain way, and repaired, trace by trace."""
     return [
         f"{word}: {t['name']}: {text}"
-        for key, word in (("warnings", "warning"), ("notes", "read"), ("repairs", "mended"))
+        for key, word in (("warnings", "warning"), ("notes", "read"), ("repairs", "repaired"))
         for t in result.get("traces", ())
         for text in t[key]
     ]
@@ -82,7 +82,7 @@ def told(result: Mapping[str, Any]) -> list[str]:
 def kept(out: Path | None) -> str:
     """Where the result lies."""
     if out is None:
-        return "nothing was written: --out FOLDER keeps it, with a report of pictures"
+        return "not saved: use --out FOLDER, which also writes a report with pictures"
     return f"written to {out}: report.html, result.json, arrays.nc"
 
 

@@ -51,10 +51,10 @@ def relative(
     scale = np.array([1.0 if logs[i] else 1.0 / z[i] for i in kept])
     part = np.asarray(covariance, float)[np.ix_(kept, kept)] * np.outer(scale, scale)
     lost = [
-        f"{names[i]} is known to {sd[i] / abs(z[i]):.1g} times its value, so its size alone is not told from zero "
-        "(whether the effect is there is told by what it takes off the error)"
+        f"{names[i]} is known to {sd[i] / abs(z[i]):.1g} times its value, so its size alone is not "
+        "significantly different from zero (whether the effect exists is decided by its gain)"
         if abs(z[i]) > 0.1 * sd[i]
-        else f"{names[i]} is not told from zero"
+        else f"{names[i]} is not significantly different from zero"
         for i in range(len(names))
         if i not in kept
     ]

@@ -154,7 +154,7 @@ def diagnose(
         holdout: runs to keep aside, besides those whose role in the campaign is "held-out".
         jobs: processes; default one a core.
         time_limit: seconds after which the best answer so far is given; it says so.
-        out: run folder for ``result.json``, ``arrays.nc``, ``report.html`` and the finished pieces, from which an
+        out: run folder for ``result.json``, ``arrays.nc``, ``report.html`` and the finished parts, from which an
             interrupted diagnosis goes on; default none.
         force: replace an existing run folder.
         progress: told the stage and the share of it done.
@@ -178,7 +178,7 @@ def diagnose(
     def found(store: Store | None, ready: int) -> Diagnosis:
         # before minutes of fitting, in which a wrong unit may be mended
         first = [f.sentence for f in rig] + list(able.cannot)
-        first += [f"going on from {ready} finished pieces"] if ready else []
+        first += [f"resuming from {ready} finished parts"] if ready else []
         if progress is not None and first:
             progress("\n         ".join(["before anything is fitted:", *first]), 0.0)
         left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), 0.0)
@@ -217,7 +217,7 @@ def diagnose(
         try:
             made = found(pieces, pieces.ready())
         except KeyboardInterrupt:
-            text = f"{pieces.ready()} finished pieces are kept, and the same command goes on from them"
+            text = f"{pieces.ready()} finished parts are kept, and the same command resumes from them"
             raise KeyboardInterrupt(text) from None
         run.arrays(made.arrays)
         run.json(made.result)

@@ -229,7 +229,9 @@ def _notes(past: Past, at: float | None, law: Wander, rise: bool) -> list[str]:
         f"Chosen within the part for training: {how}.",
     ]
     if goes_back(past.arrays["direction"]):
-        said.append("The block goes back: that the drive turns is not foretold, and no forecast looks beyond it.")
+        said.append(
+            "The block goes back: the reversal of the drive is not predicted, and no forecast extends beyond it."
+        )
     if past.trace.drive_position is not None:
         said.append("The load point was measured, so it is taken to go on as fast as over the last mean recurrence.")
     return said

@@ -28,7 +28,7 @@ def free_run_errors(confirmation: Confirmation, parts: Sequence[str]) -> pandas.
     """See :meth:`stickslip.Fit.predict`; of the model with these parts."""
     free = confirmation.models.get(tuple(parts))
     if free is None:
-        raise InputError("the model could not be run freely", hint="; ".join(confirmation.notes))
+        raise InputError("the free simulation of the model failed", hint="; ".join(confirmation.notes))
     found = errors(confirmation, free)
     rows = {"all": found, **found["by_run"]}
     measures = ("recurrence", "slip", "creep")
@@ -47,7 +47,9 @@ def freely(prepared: Prepared, fit: Fit, run: str) -> xarray.Dataset:
 
     m, names = prepared.measurement, [k.name for k in prepared.runs]
     if run not in m.names:
-        raise InputError("no run of that name can be run freely", key="run", value=run, hint=nearest(run, m.names))
+        raise InputError(
+            "no run of that name can be simulated freely", key="run", value=run, hint=nearest(run, m.names)
+        )
     r, number = m.names.index(run), names.index(run)
     track, _, broken = simulated(m, fit.problem, fit.point, r, number)
     used = np.flatnonzero(np.asarray(m.cycles.used)[r])

@@ -1,4 +1,4 @@
-"""What the runs of a campaign hold: events, what was mended or left out, and what they can tell."""
+"""What the runs of a campaign hold: events, repairs, omissions, and what they can tell."""
 
 from __future__ import annotations
 

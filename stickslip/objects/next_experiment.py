@@ -77,5 +77,5 @@ def _options(model: Fit) -> dict[str, Setting]:
 def _text(known: str, options: list[Telling]) -> str:
     best = options[0]
     if best.note or best.margin < np.log(2.0):
-        return f"{known} (no experiment of the usual kind is expected to tell them apart)"
+        return f"{known} (no experiment of the usual kind is expected to separate them)"
     return f"{best.words}, after which the true one is expected to be {best.tells} as any other; or {known}"

@@ -23,7 +23,9 @@ FEW = 100  # effective draws below which a 95 % interval is rough
 def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int) -> arviz.InferenceData:
     """See :meth:`stickslip.Fit.sample`."""
     if min(draws, tune, chains) < 1:
-        raise InputError("out of range", key="draws, tune, chains", value=f"{draws}, {tune}, {chains}", allowed="1 up")
+        raise InputError(
+            "out of range", key="draws, tune, chains", value=f"{draws}, {tune}, {chains}", allowed="1 or more"
+        )
     try:
         import nutpie
         from nutpie.compiled_pyfunc import from_pyfunc

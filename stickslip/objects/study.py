@@ -51,7 +51,7 @@ def study(
     """
     named = dict(campaigns) if isinstance(campaigns, Mapping) else {_name(Path(p)): p for p in campaigns}
     if not named or len(named) != len(campaigns):
-        raise InputError("campaigns must be there and have names of their own", value=len(campaigns))
+        raise InputError("at least one campaign is needed, each with a unique name", value=len(campaigns))
     found: dict[str, dict[str, Any]] = {}
     with cluster(scheduler, workers) as client, client.as_current():
         from distributed import as_completed

@@ -42,7 +42,7 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         from distributed import Client, LocalCluster
     except ImportError:
         raise StickslipError(
-            "work on many campaigns needs dask.distributed\n  to mend: pip install 'stickslip[distributed]'"
+            "work on many campaigns needs dask.distributed\n  to fix: pip install 'stickslip[distributed]'"
         ) from None
     if scheduler is not None:
         if workers is not None:

@@ -29,7 +29,7 @@ def history(session: Session, journal: Journal) -> bool:
         run, event = str(more.get("run", "")), int(more.get("event", 0))
         view = dict(more.get("view", {}))
     except (StickslipError, OSError, KeyError, ValueError, TypeError, AttributeError) as error:
-        session.said = f"what was open before cannot be shown again ({error}); it begins anew"
+        session.said = f"what was open before cannot be shown again ({error}); the history begins again"
         return False
     session.param.update(steps=steps, at=at, locked=locked, run=run, event=event, view=view)
     session.restored += 1

@@ -21,7 +21,8 @@ class Listed:
         self._session, self._residual = session, residual
         self._diagnose = pn.widgets.Button(
             name="Diagnose", stylesheets=[BUTTON], width=110, sizing_mode="fixed", margin=(0, 10, 0, 0),
-            description="Fit every effect, judge each on unseen runs, add the best, repeat (minutes, beside)",
+            description="Fit every effect, judge each on unseen runs, add the best, repeat "
+            "(minutes, in the background)",
         )  # fmt: skip
         self._diagnose.on_click(lambda event: session.diagnose())
         self._words = Words(sizing_mode="stretch_width", margin=(6, 0, 0, 0))
@@ -69,7 +70,7 @@ class Listed:
         self._words.text = (
             f"looking at the effects ({100 * session.listed:.0f} %)"
             if session.listed < 1.0
-            else "by the fall of the cost (chi-square) that each promises; a click lays one over the residual"
+            else "ordered by expected fall of the cost; click to overlay an effect on the residual"
         )
         self.verdict.object = _verdict(session.diagnosis)
 

@@ -134,17 +134,17 @@ def _column(name: str, values: Sequence[Any], std: float | None, unit: str) -> t
 
 
 def groups(found: Looked | None) -> list[dict[str, Any]]:
-    """What was mended, what these data can and cannot tell, as sentences under headings."""
+    """Repairs, what these data can and cannot tell, as sentences under headings."""
     if found is None or found.inspection is None:
         return [{"head": "What these data can tell", "items": ["is being looked at"], "mark": ""}]
     i = found.inspection
-    mended = list(i.result["dropped"])
+    repaired = list(i.result["dropped"])
     notes = [f"{t['name']}: {text}" for t in i.result["traces"] for text in (*t["notes"], *t["warnings"])]
     every = (
         ("Contradicted by the motion", i.findings, "bad"),
         ("Can tell", i.can, "good"),
         ("Cannot tell", i.cannot, "bad"),
-        ("Mended or left out", mended or ["nothing"], ""),
+        ("Repaired or left out", repaired or ["nothing"], ""),
         ("Noticed", notes, ""),
     )
     return [{"head": head, "items": list(items), "mark": mark} for head, items, mark in every if items]

@@ -67,6 +67,6 @@ class EventView:
             self._others[name].data = {"t": [t for t, _ in others], "y": [x * k for _, x in others]}
             self._own[name].data = {"t": [], "y": []} if curve is None else {"t": curve[0], "y": curve[1] * k}
             self.figures[name].yaxis.axis_label = label("displacement", unit)
-            thin = f"; thin: {len(others)} others" if others else ""
+            thin = f"; {len(others)} others as thin lines" if others else ""
             what = f"{name} of event {event + 1}{thin}" if found.events else "no slip in this run"
             self.figures[name].title.text = what

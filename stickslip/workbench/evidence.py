@@ -115,7 +115,7 @@ def _row(
         **_empty(found.tag, chosen),
         "form": name_of(found),
         "share": _share(found.fall, top),
-        "gain": f"promises {found.fall:.0f}" if found.fall > LEAST else "promises nothing",
+        "gain": f"expected gain {found.fall:.0f}" if found.fall > LEAST else "no expected gain",
         "unseen": f"on unseen runs {found.unseen:.0f} ± {found.unseen_std:.0f}" if found.fall > LEAST else "",
         "amplitude": size,
         "picture": signature(fit, found.force, parts) if found.fall > LEAST else [],
@@ -131,7 +131,7 @@ def _without(fit: Fit, name: str, null: float) -> Fit:
 
 def _in_model(fit: Fit, tag: str, parts: Sequence[np.ndarray], chosen: str) -> dict[str, Any]:
     if tag not in catalogue.tags():
-        return {**_empty(tag, chosen), "on": True, "share": 1.0, "gain": "in the model, and in no file any more"}
+        return {**_empty(tag, chosen), "on": True, "share": 1.0, "gain": "in the model, but its file is gone"}
     cls = catalogue.get(tag)
     name = f"{tag}.{cls.amplitude}"
     free = {f.name: f for f in fit.free}
@@ -176,7 +176,7 @@ def _empty(tag: str, chosen: str) -> dict[str, Any]:
     others = list(catalogue.alike(tag)) if cls is not None else []
     return {
         "tag": tag, "form": tag, "words": words, "share": 0.0, "gain": "", "unseen": "", "amplitude": "",
-        "alike": f"may be taken for {', '.join(others[:3])}" if others else "", "picture": [], "on": False,
+        "alike": f"similar to {', '.join(others[:3])}" if others else "", "picture": [], "on": False,
         "chosen": tag == chosen,
     }  # fmt: skip
 

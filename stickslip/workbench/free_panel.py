@@ -29,7 +29,7 @@ class Free:
         theme = look()
         self._measured, self._model = source(t=[], x=[]), source(t=[], x=[])
         self._model.name = "free"
-        self.figure = figure("slip, run freely from the arrest before", height=300, output_backend=FEW)
+        self.figure = figure("free simulation of the slip from the arrest before", height=300, output_backend=FEW)
         self.figure.line("t", "x", source=self._measured, color=theme.measured, line_width=2.5, legend_label="measured")
         self.figure.line(
             "t", "x", source=self._model, color=theme.model, line_width=2, line_dash="dashed",
@@ -53,13 +53,13 @@ class Free:
         fit, run, found = free
         name, number = selected(self._session)
         if fit is not self._session.fit or run != name:  # not yet
-            self.words.text = "is run freely when no hand moves the model"
+            self.words.text = "simulated when the sliders are at rest"
             if len(self._model.data["t"]):
                 self._model.data = {"t": [], "x": []}
             return
         if found is None or number not in found.cycle.values:
             self._measured.data = self._model.data = {"t": [], "x": []}
-            self.words.text = "this cycle cannot be run freely"
+            self.words.text = "this cycle cannot be simulated freely"
             return
         cycle = found.sel(cycle=number)
         trace = next(t for t in fit.campaign.displaced[0] if t.name == name)

@@ -39,7 +39,7 @@ def _history(session: Session) -> list[Any]:
     watch(session, ["steps", "at"], update)
     update()
     floors = Words(text="Errors are in floors of each step's own model: 1 is as good as the data allow.", **WIDE)
-    return [head("History: a click shows the model after a step; the steps behind it can be had again"), made, floors]
+    return [head("History: a click shows the model after a step; later steps remain available"), made, floors]
 
 
 def _lines(session: Session) -> list[Any]:

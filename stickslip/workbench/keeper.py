@@ -13,7 +13,7 @@ from .journal import Journal
 if TYPE_CHECKING:
     from .session import Session
 
-TAKEN = "another workbench has this campaign open, or nothing can be written beside it: nothing done here is kept"
+TAKEN = "another workbench has this campaign open, or nothing can be written beside it: changes here will not be saved"
 
 
 class Keeper:

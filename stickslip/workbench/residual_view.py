@@ -53,11 +53,12 @@ class Residual:
         self._law, self._smooth = source(x=[], y=[]), source(x=[], y=[])
         self.figure.add_layout(Span(location=0.0, dimension="width", line_color=theme.soft, line_width=1))
         asked = self.figure.line(
-            "x", "y", source=self._smooth, color=theme.text, line_width=3.5, legend_label="what all runs ask for",
+            "x", "y", source=self._smooth, color=theme.text, line_width=3.5,
+            legend_label="smoothed median over all runs",
         )  # fmt: skip
         chosen = self.figure.line(
             "x", "y", source=self._law, color=theme.model, line_width=4, line_dash="dashed",
-            legend_label="what the chosen effect takes off",
+            legend_label="part explained by the chosen effect",
         )  # fmt: skip
         self._curves = (asked, chosen)
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST

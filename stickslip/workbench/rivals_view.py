@@ -25,8 +25,8 @@ from .session import Session, watch
 
 RIVALS = 8  # effects that are told apart at once
 FALLBACK = 1e-4  # m/s, where a run has no velocity of its own
-UNSEEN = "Choose effects; those that promise most are offered once What is missing has looked at them."
-DONE = "Each is fitted, and run freely in experiments that are easily made."
+UNSEEN = "Choose effects; those with the largest expected gain are offered once What is missing is evaluated."
+DONE = "Each is fitted and simulated in experiments that are easily made."
 
 
 def _undecided(diagnosis: Diagnosis | None) -> list[tuple[tuple[str, ...], str]]:
@@ -48,10 +48,10 @@ class Rivals:
         self._drawn: Telling | None = None
         self._offered: list[str] = []
         self.which = pn.widgets.Select(
-            name="effects that these data cannot tell apart", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
+            name="effects that these data cannot distinguish", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
         )
         self.effects: Any = pn.widgets.MultiChoice(
-            name="effects to tell apart, each in the model in place of the others", options=[], value=[],
+            name="effects to compare, each in the model in place of the others", options=[], value=[],
             max_items=RIVALS, width=420, margin=(0, 10, 0, 0), **FIXED,
         )  # fmt: skip
         self._button = press("Simulate each", self.start)
@@ -59,7 +59,7 @@ class Rivals:
         self._table = Table(heard=self._heard, columns=[], rows=[], **WIDE)
         self._place = pn.Column(**WIDE)
         self.view = pn.Column(
-            head("The experiment that would tell candidates apart"), self._said,
+            head("The experiment that would separate candidates"), self._said,
             pn.FlexBox(self.which, self.effects, self._button, gap="6px 10px"), progress(self._work), self._table,
             self._place, **WIDE,
         )  # fmt: skip
@@ -95,7 +95,7 @@ class Rivals:
             best = [p.tag for p in best_forms(self._session.promises) if p.fall > LEAST]
             with self._kept.aside():
                 self._offered = self.effects.value = [tag for tag in best if tag in self.effects.options][:2]
-        offered = "The effects that promise most are offered; others can be chosen."
+        offered = "The effects with the largest expected gain are offered; others can be chosen."
         self._said.text = f"{offered if self._session.promises else UNSEEN} {DONE}"
 
     def start(self) -> None:
@@ -116,7 +116,7 @@ class Rivals:
             block = scenario.file.block
             options = experiments.practicable(asked, abs(velocity), block.spring_stiffness, block.mass)
             if not asked.as_measured:
-                options = {"as asked for above": asked, **options}
+                options = {"as set above": asked, **options}
             fits = experiments.rivals(fit, tags, told, lambda text, share: tell(text, 0.5 * share))
             after = lambda text, share: tell(text, 0.5 + 0.5 * share)  # noqa: E731
             return experiments.tell_apart(fit, fits, options, after, show, code)

@@ -370,7 +370,7 @@ class Session(param.Parameterized):
             with Long(self):
                 classes = load_effects([path])
                 tags = [cls.tag for cls in classes]
-                self.said = Note(f"{path.name} was loaded anew: {', '.join(tags)}")
+                self.said = Note(f"{path.name} was reloaded: {', '.join(tags)}")
                 fit = self.fit
                 forms = {} if fit is None else dict(zip(fit.effects, fit.effect_forms, strict=True))
                 for tag in tags:

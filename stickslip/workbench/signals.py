@@ -161,7 +161,7 @@ class Signals:
         t, y = own.curves[first][0](begin, end, WHOLE)
         self._line.data = {"t": t, "y": y * self._factors[first]}
         axis = self.figures[first].yaxis.axis_label
-        self.whole.title.text = f"{axis} of the whole run: drag the frame or its ends, or turn the wheel below"
+        self.whole.title.text = f"{axis} of the whole run: drag or resize the frame, or scroll"
         self.whole.x_range.update(start=begin, end=end)
         onsets = np.array([e.t_onset for e in self._found.events])
         for name, marks in self._marks.items():

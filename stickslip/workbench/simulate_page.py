@@ -36,7 +36,7 @@ class _Synthetic:
         )
         self._button = press("Write a record", self.start)
         filed = session.campaign is not None and session.campaign.description.filed
-        words = "What is asked for above as a vibrometer would record it: record.csv and campaign.toml in a new folder"
+        words = "What is set above as a vibrometer would record it: record.csv and campaign.toml in a new folder"
         self.view = pn.Column(
             head(words), pn.FlexBox(self.name, self._button, gap="6px 10px"), progress(self._work), visible=filed,
             **WIDE,

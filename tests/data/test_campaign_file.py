@@ -1,4 +1,4 @@
-"""A campaign file is read into SI, and every fault in it is named with file, line or key, and how to mend it."""
+"""A campaign file is read into SI, and every fault in it is named with file, line or key, and how to fix it."""
 
 import math
 

@@ -195,7 +195,7 @@ def test_a_freshly_set_down_block_begins_where_its_load_point_is(zero):
     assert found.displacement == pytest.approx(x - np.median(x[:5]), abs=1e-16)
     assert found.drive.position(t) == pytest.approx(1e-4 * t, abs=1e-16)
     assert [r.kind for r in found.repairs] == ["zero"]
-    assert "off the load point" in found.repairs[0].reason
+    assert "from the load point" in found.repairs[0].reason
     assert from_load_point(run.replace(virgin=False)).displacement is run.displacement
     near = run.replace(displacement=zero + 1.5e-8 + x)  # within noise and counts
     seen = from_load_point(near)

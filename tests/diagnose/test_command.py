@@ -35,13 +35,13 @@ CAMPAIGN = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign
     [
         (["--candidates", "contact-aging"], "contact-ageing"),
         (["--candidates", "wer,tilt,contact-aging"], "'wear'?\n  contact-aging: did you mean 'contact-ageing'"),
-        (["--candidates", "qqq,wer,xxx"], "'xxx'\n  to mend: wer: did you mean 'wear'?\n  one of: adhesion, base-vib"),
+        (["--candidates", "qqq,wer,xxx"], "'xxx'\n  to fix: wer: did you mean 'wear'?\n  one of: adhesion, base-vib"),
         (["--candidates", " , "], "no effect is named"),
         (["--holdout", "v999.csv"], "v999"),
         (["--effect", "nowhere.py"], "nowhere.py"),
-        (["--jobs", "0"], "--jobs: out of range (got 0)\n  allowed: 1 or more\n  to mend: leave it out"),
+        (["--jobs", "0"], "--jobs: out of range (got 0)\n  allowed: 1 or more\n  to fix: leave it out"),
         (["--jobs", "-2"], "--jobs: out of range (got -2)"),
-        (["--max-effects", "0"], "--max-effects: out of range (got 0)\n  allowed: 1 or more\n  to mend: leave it out"),
+        (["--max-effects", "0"], "--max-effects: out of range (got 0)\n  allowed: 1 or more\n  to fix: leave it out"),
         (["--max-effects", "-1"], "--max-effects: out of range (got -1)"),
     ],
 )
@@ -200,7 +200,7 @@ def test_an_interrupted_diagnosis_says_what_is_kept_and_goes_on_from_it(tmp_path
     for _ in range(2):
         assert run(["diagnose", str(CAMPAIGN), "--out", str(tmp_path / "run")]) == 130
         said = capsys.readouterr().err
-        assert "interrupted; 2 finished pieces are kept, and the same command goes on from them" in said
+        assert "interrupted; 2 finished parts are kept, and the same command resumes from them" in said
         assert "before anything is fitted:" in said
         assert "Slow noise of the sensor is not stated in v050" in said  # what these data cannot tell
-    assert "going on from 2 finished pieces" in said
+    assert "resuming from 2 finished parts" in said

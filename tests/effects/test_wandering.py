@@ -42,7 +42,7 @@ def test_draws_are_independent_and_normal():
 
 def test_its_course_is_no_law_to_fit():
     assert every_form(["wandering-friction"]) == []
-    with pytest.raises(InputError, match="draw at random"):
+    with pytest.raises(InputError, match="random process"):
         ss.load_campaign(SCENARIOS / "hidden-effect" / "campaign.toml").fit(["wandering-friction"])
 
 

@@ -41,9 +41,9 @@ def test_the_usual_form_unless_another_is_named():
         (["machine-compliance:were=series"], "allowed: machine-compliance:where=read-out"),
         (["machine-compliance:"], "allowed: machine-compliance:where=read-out"),
         (["tilt:by=spring,by=contact"], "allowed: tilt:by=spring, tilt:by=contact"),
-        (["inertia:share=0.05"], "allowed: inertia, which has one form\n  to mend: a fit finds the values of"),
+        (["inertia:share=0.05"], "allowed: inertia, which has one form\n  to fix: a fit finds the values of"),
         (["viscous:by=spring"], "effects: there is no effect 'viscous'"),
-        (["tild"], "effects: there is no effect 'tild'\n  to mend: did you mean 'tilt'"),
+        (["tild"], "effects: there is no effect 'tild'\n  to fix: did you mean 'tilt'"),
         (["tilt", "wear", "tilt:by=contact"], "effects: an effect can be added once (got 'tilt')"),
     ],
 )

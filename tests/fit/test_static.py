@@ -133,7 +133,7 @@ def test_what_cannot_be_fitted_is_named():
     noisy = segment(record())
     noisy = replace(noisy, settings=replace(noisy.settings, noise=2e-5))
     (lost,) = creep_processes(record(), noisy)[1]
-    assert "cannot be seen" in lost.reason
+    assert "below the resolution" in lost.reason
     unstated = record().replace(virgin=False)
     assert "begins within this stick" in _reason(unstated)
 

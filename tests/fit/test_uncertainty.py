@@ -81,8 +81,12 @@ def test_what_is_not_sought_as_a_logarithm_is_taken_relative_to_its_value():
     kept, part, lost = relative(NAMES, [3.0, 5.0, 0.5], c, [True, False, False])
     assert kept == [0, 1]
     (text,) = lost
-    assert text.startswith("p is known to 1 times its value, so its size alone is not told from zero")
-    assert relative(NAMES, [3.0, 5.0, 0.01], c, [True, False, False])[2] == ["p is not told from zero"]
+    assert text.startswith(
+        "p is known to 1 times its value, so its size alone is not significantly different from zero"
+    )
+    assert relative(NAMES, [3.0, 5.0, 0.01], c, [True, False, False])[2] == [
+        "p is not significantly different from zero"
+    ]
     assert np.sqrt(np.diag(part)) == pytest.approx([0.01, 0.1])
     (pair,) = flat_directions(NAMES[:2], part)
     assert set(pair.names) == {"strength", "u_max"}

@@ -250,7 +250,7 @@ def test_nothing_is_run_freely_and_the_report_says_so_in_words(plain):
     loops = Prepared(plain.problem, plain.point, (), (), Scales(1.0, 0.0, 1.0), (), prescribed=True)
     found = confirm({("static", "inertia"): plain}, ("static", "inertia"), loops)
     assert not found.models
-    assert found.notes[0].startswith("no model is run freely: the motion is prescribed")
+    assert found.notes[0].startswith("no free simulation: the motion is prescribed")
     assert "Error" not in found.notes[0]
 
 
@@ -266,7 +266,7 @@ def test_one_step_of_the_velocity_is_fitted_but_not_diagnosed():
     assert found.error < 2.0
     assert np.isnan(found.unseen_error)  # nothing can be held out
     assert "one event holds none" in repr(found)
-    with pytest.raises(InputError, match="checked on what a fit has not seen"):
+    with pytest.raises(InputError, match="no part of the record can be left out to test an effect"):
         campaign.diagnose()
     still = Trace.from_arrays("steady", time=t, drive_position=SPEED * t, spring_force=jenkins(SPEED * t), noise=NOISE)
     with pytest.raises(InputError, match="never turns, stops or changes its speed"):

@@ -255,7 +255,7 @@ def test_too_few_slips_are_told(tmp_path, capsys):
     path = write(tmp_path, record(10, 7))
     assert run(["forecast", path]) == 2
     said = capsys.readouterr().err
-    assert "campaign.toml" in said and "12 or more" in said and "to mend" in said
+    assert "campaign.toml" in said and "12 or more" in said and "to fix" in said
 
 
 def test_without_a_slip_or_a_load_point_nothing_is_forecast():

@@ -147,7 +147,7 @@ def test_the_coordinate_is_named(coordinate):
     arrays = series(400, law, 7, (10.0, 3.0))
     found = told(compare(arrays, 200), False, steps(arrays))
     assert found["coordinate"] == coordinate and f"wander along {coordinate}" in found["text"]
-    assert "a way back over the same track parts them" in found["text"]
+    assert "motion back over the same track separates them" in found["text"]
 
 
 def test_a_way_back_decides_between_place_and_slip_path():
@@ -162,7 +162,7 @@ def test_a_way_back_decides_between_place_and_slip_path():
         arrays[f"place_{end}"] = arrays[f"place_{end}"][fold]
     arrays["direction"] = np.repeat([1.0, -1.0, 1.0, -1.0], 60)
     found = told(compare(arrays, 180), True, steps(arrays))
-    assert found["coordinate"] == "place" and "parts them" not in found["text"]
+    assert found["coordinate"] == "place" and "separates them" not in found["text"]
 
 
 @pytest.mark.parametrize("seed", [9, 20])
@@ -170,7 +170,7 @@ def test_scatter_alone_names_no_coordinate(seed):
     arrays = series(200, LAWS["none"], seed, (10.0, 3.0))
     found = told(compare(arrays, 150), False, steps(arrays))
     assert found["coordinate"] in ("", "nothing")
-    assert "only scatter" in found["text"] or "no wander is seen" in found["text"]
+    assert "only scatter" in found["text"] or "no correlation detected" in found["text"]
 
 
 def test_what_ends_within_a_slip_is_no_wander():

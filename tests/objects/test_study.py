@@ -32,7 +32,7 @@ def test_a_study_has_the_numbers_of_the_fits_and_says_what_failed(tmp_path):
 
 
 def test_campaigns_need_names_of_their_own():
-    with pytest.raises(InputError, match="names of their own"):
+    with pytest.raises(InputError, match="unique name"):
         ss.study([SHIPPED, SHIPPED])
     with pytest.raises(InputError):
         ss.study([])

@@ -173,7 +173,7 @@ def test_the_file_is_complete_in_itself(tmp_path):
 def test_everything_a_diagnosis_holds_is_shown(tmp_path):
     words = " ".join(Reader(write_report(folder(tmp_path)).read_text()).text.split())
     for part in (
-        "ambiguous", "cannot tell apart: tilt, nonlinear-spring", "start in reverse", "static + inertia", "39.5",
+        "ambiguous", "cannot distinguish: tilt, nonlinear-spring", "start in reverse", "static + inertia", "39.5",
         "61.5", "0.01 ± 0.0004", "920 nm", "89.4 g", "m x'' = F < 0 & more",
         "h_rms, L and F_n act only together", "143 s", "0" * 64,
     ):  # fmt: skip

@@ -53,7 +53,7 @@ BAD = {
     "no kind": (rig(contact={"normal_force": 0.3, "friction_coefficient": 0.2}), "contact", ["'kind' is missing"]),
     "two drives": (rig(drive__piece=[{"velocity": 1e-4, "duration": 1}]), "drive", ["more than once", "velocity"]),
     "no end": (rig(drive={"velocity": 1e-4}), "drive", ["neither 'duration' nor 'events'"]),
-    "standing drive": (rig(drive={"velocity": 0, "events": 2}), "drive", ["stands still"]),
+    "standing drive": (rig(drive={"velocity": 0, "events": 2}), "drive", ["no slip"]),
     "unknown effect": (rig(effect=[{"type": "contact-agein"}]), "effect.1.type", ["did you mean 'contact-ageing'"]),
     "unknown parameter": (
         rig(effect=[{"type": "contact-ageing", "rat": 0.01}]),
@@ -126,7 +126,7 @@ def test_a_missing_file_names_the_nearest_one(tmp_path):
 
 def test_a_bare_number_out_of_range_is_told_its_unit(tmp_path):
     path = write(tmp_path, rig())
-    with pytest.raises(InputError, match="at most 10 m/s\\n  to mend: a number alone is in m/s"):
+    with pytest.raises(InputError, match="at most 10 m/s\\n  to fix: a number alone is in m/s"):
         load_scenario(path, ["drive.velocity=50"])
     with pytest.raises(InputError) as told:
         load_scenario(path, ["drive.velocity=50 m/s"])

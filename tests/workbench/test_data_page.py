@@ -354,7 +354,7 @@ def test_what_the_data_tell_is_said(campaign):
     assert data_page.page(session) is not None
     found = data_page.beside(session, "inspection").found
     told = {g["head"]: g["items"] for g in data_page.groups(found)}
-    assert told["Can tell"] == campaign.inspect().can and told["Mended or left out"] == ["nothing"]
+    assert told["Can tell"] == campaign.inspect().can and told["Repaired or left out"] == ["nothing"]
     columns, rows = data_page.event_rows(found, "v100")
     ringing = next(i for i, head in enumerate(columns) if head.startswith("ringing / Hz ± "))
     assert len(rows) == 7 and float(rows[3][ringing]) > 100.0

@@ -247,7 +247,7 @@ def test_legends_name_what_is_drawn_from_the_first_look_on(session):
         assert [item.visible for item in legend.items] == [True] * len(legend.items), figure.title.text
     residual = residual_view.Residual(session)
     hidden = [item.label.value for item in residual.figure.legend[0].items if not item.visible]
-    assert hidden == ["what the chosen effect takes off"]  # for none is chosen
+    assert hidden == ["part explained by the chosen effect"]  # for none is chosen
 
 
 def test_an_error_of_five_floors_is_seen_beside_one_of_sixty():
@@ -313,7 +313,7 @@ def test_the_catalogue_has_its_rows(base, promises):
     assert made[0]["tag"] == "contact-ageing"
     assert [r["tag"] for r in made if r["chosen"]] == ["drive-ripple"]
     assert made[0]["share"] == 1.0 and all(0.0 <= r["share"] <= 1.0 for r in made)
-    assert "±" in made[0]["amplitude"] and "may be taken for" in made[0]["alike"]
+    assert "±" in made[0]["amplitude"] and "similar to" in made[0]["alike"]
     assert all(0.0 <= y <= 1.0 for curve in made[0]["picture"] for _, y in curve)
 
 

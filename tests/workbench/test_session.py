@@ -130,7 +130,7 @@ def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, monke
     monkeypatch.setattr(type(campaign), "fit", lambda self: base)
     with closing(Session(campaign=campaign)) as again:
         again.begin()
-    assert "begins anew" in again.said and again.fit is base
+    assert "begins again" in again.said and again.fit is base
 
 
 def test_a_history_of_other_data_is_left_alone(campaign, base, session, folder):

@@ -1,4 +1,4 @@
-"""From a pydantic error to one message with file, line, key and how to mend it."""
+"""From a pydantic error to one message with file, line, key and how to fix it."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def _instead(path: Path, kind: str) -> str:
 
 
 def _wanted(path: Path, kind: Kind) -> str:
-    """How to mend it where something else was named, such as a file of measurements."""
+    """How to fix it where something else was named, such as a file of measurements."""
     if kind == "scenario":
         return "name a .toml file; stickslip new scenario writes one to start from"
     return f'name the .toml file; for measurements, stickslip new campaign writes one, and  file = "{path.name}"  in it'

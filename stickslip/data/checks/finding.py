@@ -20,7 +20,7 @@ class Finding:
         run: name of the run, or None where it holds of all.
         stated, value, std: what the file says, and what the motion gives with its standard deviation, in ``unit``. A
             scale is stated as 1; its value is the factor by which to multiply the numbers of the file.
-        sentence: all of it in words, and how to mend it.
+        sentence: all of it in words, and how to fix it.
         stops: whether no physics may be named before it is mended.
         impossible: whether nothing can be made of the data as they are stated.
     """

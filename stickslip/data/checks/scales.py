@@ -100,16 +100,16 @@ def _common(agreed: Sequence[tuple[Trace, Travel]], runs: int) -> list[Finding]:
     trace, seen = agreed[0]
     pair = (
         f"{where}: from slip to slip the block moves {shown(seen.block, 'm/s', 3)}, the drive "
-        f"{shown(seen.drive, 'm/s', 3)}; no spring can be stretched for ever"
+        f"{shown(seen.drive, 'm/s', 3)}; the spring would stretch without limit"
         if len(agreed) == 1
         else f"{where}: over whole cycles the block moves {factor:.3f} (+-{std:.3f}) times as far as the drive is "
-        "stated to, and no spring can be stretched for ever"
+        "stated to, and the spring would stretch without limit"
     )
     velocities = "drive's velocity" if len(agreed) == 1 else "drive's velocities"
     sentence = (
         f"{pair}. The {velocities} or the {trace.leading}'s unit or the clock is wrong: check drive_velocity, the unit "
-        f"of {trace.leading} and sampling_rate or the unit of time; times {factor:.3f} the drive would go with the "
-        "block."
+        f"of {trace.leading} and sampling_rate or the unit of time; multiplied by {factor:.3f} the drive agrees with "
+        "the block."
     )
     what = f"{_VELOCITY} or {trace.leading} {_SCALE} or {_CLOCKED}"
     return [Finding(what, name if runs > 1 else None, 1.0, factor, std, "1", sentence)]
@@ -118,8 +118,8 @@ def _common(agreed: Sequence[tuple[Trace, Travel]], runs: int) -> list[Finding]:
 def _impossible(trace: Trace, seen: Travel) -> Finding:
     block, drive = shown(seen.block, "m/s", 3), shown(seen.drive, "m/s", 3)
     text = (
-        f"{trace.name}: from slip to slip the block moves {block}, the drive {drive}; no spring can be stretched for "
-        "ever"
+        f"{trace.name}: from slip to slip the block moves {block}, the drive {drive}; the spring would "
+        "stretch without limit"
     )
     what = f"{_VELOCITY} or {trace.leading} {_SCALE} or {_CLOCKED}"
     return Finding(what, trace.name, 1.0, seen.slope, seen.std, "1", text, impossible=True)
@@ -135,8 +135,8 @@ def _clock(trace: Trace, seen: Travel) -> Finding:
     std = _clock_std(seen)
     rate, true = trace.sampling_rate, trace.sampling_rate / seen.clock
     sentence = (
-        f"{trace.name}: slips and pieces of the drive go together if the record's time runs {seen.clock:.3f} "
-        f"(+-{std:.3f}) times as long. Check sampling_rate ({shown(rate, 'Hz', 4)} stated, the motion gives "
+        f"{trace.name}: slips and drive segments agree if the time axis is stretched by a factor of "
+        f"{seen.clock:.3f} (+-{std:.3f}). Check sampling_rate ({shown(rate, 'Hz', 4)} stated, the motion gives "
         f"{shown(true, 'Hz', 3)}) or the unit of time, and the drive's 'until' times."
     )
     return Finding(_CLOCKED, trace.name, rate, true, true * std / seen.clock, "Hz", sentence)
@@ -155,7 +155,8 @@ def _one(trace: Trace, seen: Travel, centre: float, std: float, others: Sequence
     told = {
         _VELOCITY: f"drive_velocity (the motion gives {_with_error(speed * factor, speed * error, 'm/s')}, stated "
         f"{shown(speed, 'm/s', 4)})",
-        _SCALE: f"the unit of {leading} (times {1 / factor:.3f} +-{error / factor**2:.3f} it would go with the drive)",
+        _SCALE: f"the unit of {leading} (multiplied by {1 / factor:.3f} +-{error / factor**2:.3f} it agrees with the "
+        "drive)",
         _CLOCKED: f"sampling_rate or the unit of time (the motion gives {shown(trace.sampling_rate / factor, 'Hz', 4)},"
         f" stated {shown(trace.sampling_rate, 'Hz', 4)})",
     }

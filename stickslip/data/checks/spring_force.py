@@ -71,7 +71,7 @@ def force_findings(traces: Sequence[Trace], found: Sequence[Segmentation]) -> li
         else:
             text = (
                 f"{rises}: the block creeps along at {-share:.0f} % of the drive's velocity, or {scale} Force alone "
-                "cannot tell the two apart: measure the block's position as well."
+                "cannot separate the two: measure the block's position as well."
             )
         out.append(
             Finding(

@@ -248,8 +248,8 @@ def from_load_point(trace: Trace) -> Trace:
         said.append(f"the load point begins at {shown(begins, 'm')}, from where both are counted")
     if off:
         said.append(
-            f"the displacement begins {shown(off, 'm')} off the load point, which is taken as its sensor's zero: the "
-            "spring of a freshly set down block (virgin = true) is not stretched"
+            f"the displacement starts {shown(off, 'm')} from the load point; treated as a zero offset of the sensor: "
+            "the spring of a freshly placed block (virgin = true) is not stretched"
         )
     if not said:
         return trace

@@ -67,7 +67,7 @@ def ringing(
         return none, float("nan"), "", "the sticks are too short for a ring-down"
     frequency = _common(pieces, rate, low, high)
     if frequency is None:
-        why = f"nothing between {low:.3g} and {high:.3g} Hz is louder after the slips than later in the sticks"
+        why = f"no ring-down between {low:.3g} and {high:.3g} Hz above the level of the sticks"
         return none, float("nan"), "", why
     rings = [None if p is None else _one(p[0], rate, frequency, found.settings.noise) for p in pairs]
     told = [r for r in rings if r is not None]

@@ -84,7 +84,7 @@ def event_shapes(trace: Trace, found: Segmentation) -> Shapes:
     longest, nearest = 0.9 * float(np.median(sticks)), max(NEAREST * duration, 2.0 / rate)
     before = np.geomspace(nearest, longest, CREEP_POINTS) if longest > 2 * nearest else nothing
     if not np.isfinite(before).all():
-        missing["creep"] = "sticks are too short to tell creep from slips"
+        missing["creep"] = "sticks are too short to separate creep from slips"
     shapes = []
     for event, ring in zip(found.events, rings, strict=True):
         times = _passages(time, position, event) if samples >= SLIP_SAMPLES else np.full(len(LEVELS), np.nan)
@@ -92,7 +92,7 @@ def event_shapes(trace: Trace, found: Segmentation) -> Shapes:
         creep = _creep(time, position, found, event, before)
         shapes.append(Shape(times, overshoot, ring, creep, _hold_motion(time, position, event)))
     if all(np.isnan(s.overshoot) for s in shapes):
-        missing["overshoot"] = "the block does not stop, or not for long enough to see where it settles"
+        missing["overshoot"] = "the block does not stop, or not for long enough to determine its rest position"
     return Shapes(tuple(shapes), before, frequency, decay, missing, _noise(found, shapes, duration, rate))
 
 

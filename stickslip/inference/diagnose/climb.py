@@ -166,12 +166,12 @@ def _acts(tag: str, form: Mapping[str, str]) -> None:
     """Refuse what only gives the backbone another shape, and what is drawn at random."""
     if catalogue.get(tag).drawn:
         raise InputError(
-            "the course of this effect is a draw at random, of which only size and length can be measured",
-            key="--add", value=tag, hint="stickslip forecast tells both; events may differ in any model",
+            "this effect is a random process, of which only size and length can be measured",
+            key="--add", value=tag, hint="stickslip forecast estimates both; events may differ in any model",
         )  # fmt: skip
     if shapes_backbone(catalogue.get(tag)(**form)):
         raise InputError(
-            "the effect only gives the contact's backbone another shape, which the fit measures as it is",
+            "the effect only changes the shape of the backbone, which the fit measures directly",
             key="--add",
             value=":".join([tag, *(f"{name}={value}" for name, value in form.items())]),
             hint="leave it out: its part is in the backbone already",

@@ -27,7 +27,7 @@ from .trials import Tell
 
 Parts = tuple[str, ...]  # tags of what is in a model
 FOLLOWED = (
-    "no model is run freely: the motion is prescribed, no slip is the block's own, and the error on unseen runs is "
+    "no free simulation: the motion is prescribed, no slip is the block's own, and the error on unseen runs is "
     "that of the force"
 )
 
@@ -107,7 +107,7 @@ def confirm(
     apart = any(len(folds(fit)) != len(names) for fit in fits.values())
     for done, (parts, fit) in enumerate(fits.items()):
         if not in_time():
-            notes.append(f"the time limit came before the model {_named(parts)} was run freely")
+            notes.append(f"the time limit came before the free simulation of the model {_named(parts)}")
             continue
         tell(f"free simulation of {_named(parts)}", done / len(fits))
         try:

@@ -38,7 +38,7 @@ from .trials import Tell, trials
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
 LEFT = 0.5  # of what named effects explain, from which what is left is no matter of a law's form any more
-TAKEN_OUT = "seen, and taken out again: the model that came of it predicts unseen runs no better"
+TAKEN_OUT = "detected, then removed: the resulting model predicts unseen runs no better"
 BEST = 10  # effects of a round that are tried again beside the one that was named
 STRUCTURED = 1e-6  # chance of the residual force being a function of some variable, below which something is missing
 MEMBERS = 2  # of a set that are run freely besides the first
@@ -193,8 +193,8 @@ def diagnose(
     prepared = prepare(campaign, traces, segmentations, holdout)
     if prepared.problem.events < FEWEST:
         raise InputError(
-            "the motion turns, stops or changes its speed less than twice, so no effect could be checked on what a fit "
-            "has not seen",
+            "the motion turns, stops or changes its speed less than twice, so no part of the record can be left "
+            "out to test an effect",
             file=campaign.path,
             key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in prepared.traces[:4]),
             hint="record it again: two loops, or a step up and down; stickslip fit takes it as it is",
@@ -202,7 +202,7 @@ def diagnose(
     dropped = list(prepared.dropped)
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]
     if candidates is not None:
-        dropped += [f"{t}: not tried, for its course is a draw at random" for t in tags if catalogue.get(t).drawn]
+        dropped += [f"{t}: not tried, because it is a random process" for t in tags if catalogue.get(t).drawn]
     if campaign.rig.contacts == 1 and SEVERAL in tags:
         tags.remove(SEVERAL)
         dropped.append(f"{SEVERAL}: not tried, for the rig has one contact")
@@ -390,7 +390,7 @@ def one_round(
     freed = spring_freed(base)
     best = [j.candidate for j in finalists(judged)]
     if len(best) > 1 and in_time():
-        tell("the best once more", 1.0)
+        tell("refitting the best effects", 1.0)
         finals = Finals.of(base, best, store, name)
         judge = Judge(finals.base, number)
         again = {c.tag for c in finals.ends}

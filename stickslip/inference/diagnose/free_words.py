@@ -30,7 +30,8 @@ def cautions(c: Confirmation, unseen: dict[Parts, float]) -> list[str]:
         events = 0 if c.measurement is None else int(np.sum(np.asarray(c.measurement.cycles.used)))
         if missed:
             out.append(
-                f"run freely, the model {' + '.join(parts)} does not slip in time in {missed} of {events} cycles"
+                f"in free simulation, the model {' + '.join(parts)} does not slip in time in {missed} of {events} "
+                "cycles"
             )
         if broken:
             out.append(f"{broken} of {events} cycles of the model {' + '.join(parts)} could not be integrated freely")

@@ -31,7 +31,7 @@ from ..force.starting_values import begin
 FEWEST = 2  # slips of a run that takes part
 MOST_EVENTS = 200  # that a fit sees: its memory and time grow with them
 MOST_CYCLES = 40  # of a run, that are run freely
-UNHEARD = "no ringing is heard after the slips, so the contact's stiffness is known from the creep alone"
+UNHEARD = "no ring-down is detected after the slips, so the contact's stiffness is known from the creep alone"
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def prepare(
     for trace, found in zip(traces, segmentations, strict=True):
         aside = trace.name in holdout or (not holdout and trace.role == "held-out")
         kept_aside += [trace.name] * aside
-        why = "kept aside: no fit sees it" if aside else _why_not(trace, found)
+        why = "held out of all fits" if aside else _why_not(trace, found)
         if why and not aside and prescribed(trace, found):
             given.append((trace, found))
         if why:

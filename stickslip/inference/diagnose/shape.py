@@ -141,9 +141,9 @@ def text(shape: Shape) -> str:
     if shape.close:
         parts.append(named_text(shape))
     elif shape.stated and shape.unstated is not None:
-        parts.append(f"No effect of geometry is seen on top. {_free(shape.unstated)}")
+        parts.append(f"No geometry effect is detected. {_free(shape.unstated)}")
     elif shape.laws:
-        parts.append("Nobody measured the roughness, so no effect of geometry is told from it.")
+        parts.append("The roughness is not stated, so geometry effects cannot be identified.")
     return " ".join(parts)
 
 
@@ -152,7 +152,7 @@ def named_text(shape: Shape) -> str:
     if not shape.close:
         return ""
     best, *others = shape.close
-    also = f" This curve cannot tell it from {' or '.join(o.tag for o in others)}." if others else ""
+    also = f" This curve cannot distinguish it from {' or '.join(o.tag for o in others)}." if others else ""
     free = "" if shape.unstated is None else f" {_free(shape.unstated)}"
     return (
         f"The contact's backbone is not that of rough lines as stated, but with {best.tag} on top ({best.amount}; "
@@ -208,18 +208,19 @@ def _reason(law: Law, shape: Shape) -> str:
     """Why an effect is named or not."""
     s, seen = law.shaped, law.chance < CHANCE
     if not shape.stated:
-        missing = " and ".join(name for name in ROUGHNESS if shape.line is None or name not in shape.line.stated)
+        names = [name for name in ROUGHNESS if shape.line is None or name not in shape.line.stated]
+        missing = f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} not stated"
         if seen:
-            return f"nearer than any rough line, but with {missing} measured by nobody that is no proof of a cause"
-        return f"{missing}, which nobody measured, take up what such a change of shape would do"
+            return f"closer than any rough line, but {missing}, so this is no evidence of a cause"
+        return f"{missing} and can compensate such a change of shape"
     if not seen and s.gain > law.gain:
-        return "such an amplitude lies where such values do not"
+        return "the amplitude is outside its usual range"
     if not seen:
         limit = s.visible
         if limit is None:
-            return "not seen, and no amplitude of its range would be"
-        return f"not seen; from {shown(limit, s.free.unit, 2)} on it would be"
+            return "not detectable within its range"
+        return f"not detected (detection limit {shown(limit, s.free.unit, 2)})"
     if law not in shape.close:
         return f"{shape.close[0].tag} is nearer"
     others = [o.tag for o in shape.close if o is not law]
-    return f"this curve cannot tell it from {' or '.join(others)}" if others else "named"
+    return f"this curve cannot distinguish it from {' or '.join(others)}" if others else "named"

@@ -90,7 +90,7 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
         "scatter": d.fit.scatter.named(),
         "parameters": parameters(d.fit, found),
         "backbone": section(d.shape),
-        "held_out": "every run in turn; by halves where a run has parameters of its own",
+        "held_out": "every run in turn; in halves if a run has its own parameters",
         "kept_aside": list(d.prepared.aside),
         "dropped": [*d.dropped, *left_out(d.confirmation)],
         "equations": [{"text": words.text(), "latex": words.latex()}],
@@ -202,14 +202,14 @@ def _not_ranked(tag: str, form: dict[str, str], note: str) -> dict[str, Any]:
 def failures(j: Judged, done: Round) -> list[str]:
     """Why an effect is not named, in words; nothing where it is."""
     if any(j is c for c in done.close):
-        return [] if j is done.close[0] else [f"these data cannot tell it from {done.close[0].tag}"]
+        return [] if j is done.close[0] else [f"these data cannot distinguish it from {done.close[0].tag}"]
     out = []
     if j.chance >= CHANCE:
-        out.append(f"chance gives such a gain with probability {j.chance:.2g}")
+        out.append(f"a gain of this size occurs by chance with probability {j.chance:.2g}")
     if j.better <= ERRORS * j.error:
         out.append(f"unseen runs are not predicted better by more than {ERRORS:g} standard errors")
     if out and j.odd:
-        out.append(f"{' and '.join(j.odd)} would lie where such values do not")
+        out.append(f"{' and '.join(j.odd)} would be outside {'its' if len(j.odd) == 1 else 'their'} usual range")
     if not out and done.close:
         out.append(f"{done.close[0].tag} predicts unseen runs better")
     return out
@@ -257,8 +257,8 @@ def verdict_text(d: Diagnosis) -> str:
     if d.wrong:
         found = " ".join(finding.sentence for finding in d.wrong)
         if not any(done.candidates for done in d.rounds):
-            return f"{found} Until this is mended no effect is tried, for it would be fitted to the wrong entry."
-        alike = f" These data cannot tell this from {' or '.join(v.set)}." if v.set else ""
+            return f"{found} Correct this first: no effect is tried, because it would only compensate the wrong entry."
+        alike = f" These data cannot distinguish this from {' or '.join(v.set)}." if v.set else ""
         return f"{found} No effect predicts unseen runs better than that.{alike}"
     before, after = (error(r.unseen, d) for r in (base, last) if r.unseen is not None)
     parts = []
@@ -276,7 +276,7 @@ def verdict_text(d: Diagnosis) -> str:
     if _of_shape(d):
         parts.append(named_text(d.shape))
     if v.kind == "ambiguous":
-        parts.append("These data cannot tell " + "; nor ".join(" from ".join(s) for s in _sets(d)) + ".")
+        parts.append("These data cannot distinguish " + "; nor ".join(" from ".join(s) for s in _sets(d)) + ".")
     if v.kind == "unknown" and v.structure is not None:
         parts.append(
             f"Something is missing that no effect of the catalogue explains: the residual force depends on the "
@@ -286,14 +286,14 @@ def verdict_text(d: Diagnosis) -> str:
         phase, share = v.misfit
         parts.append(
             f"Something is missing that no effect of the catalogue explains: in {phase} the model is off by "
-            f"{100.0 * share:.2g} % of the strength, and alike at neighbouring points."
+            f"{100.0 * share:.2g} % of the strength, with correlated neighbouring points."
         )
     if v.kind in ("complete", "missing"):
         seen = sorted(visible(d).items(), key=lambda item: item[0])
         some = "; ".join(f"{tag} {shown(a['amplitude'], a['unit'], 2)}" for tag, a in seen[:LISTED])
         more = f"; and {len(seen) - LISTED} more in the report" if len(seen) > LISTED else ""
         parts.append(
-            f"Nothing {'else ' if v.effects else ''}is missing above what these data show (five standard deviations: "
+            f"No {'other ' if v.effects else ''}effect above its detection limit (five standard deviations: "
             f"{some}{more})."
         )
     return " ".join(parts)

@@ -86,7 +86,7 @@ def creep_processes(
     half = half_window(noise, step, v_lim / 10.0, most)
     if velocity_noise(noise, half, step) > 0.5 * v_lim:
         hidden = f"{shown(noise, 'm', 2)} of noise at {shown(trace.sampling_rate, 'Hz', 3)}"
-        why = f"v_lim = {shown(v_lim, 'm/s', 3)} cannot be seen: {hidden} hide it"
+        why = f"v_lim = {shown(v_lim, 'm/s', 3)} is below the resolution ({hidden})"
         return [], [Dropped("creep processes", len(segmentation.events), trace.name, why, coarse=True)]
     kept, dropped = [], []
     for event in segmentation.events:

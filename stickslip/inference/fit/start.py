@@ -44,7 +44,7 @@ def shared_rig(campaign: Campaign, names: Sequence[str]) -> Rig:
     guesses = [rig.spring_stiffness for rig in rigs if isinstance(rig.spring_stiffness, Unmeasured)]
     if any(guess != guesses[0] for guess in guesses):
         raise InputError(
-            "the runs have different guesses of 'spring_stiffness', of which the dynamic model fits one",
+            "the runs have different guesses of 'spring_stiffness', but the dynamic model fits only one",
             file=campaign.path,
             key="trace.spring_stiffness",
             hint="state it where it is known, and one guess for all other runs, or fit them one by one",

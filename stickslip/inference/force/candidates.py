@@ -172,7 +172,7 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     columns = (_columns if len(members) <= FEW else signatures)(base, effect, members)
     usable = np.isfinite(columns).all(axis=1) & (np.abs(columns).max(axis=1) > 0.0)
     if not usable.any():
-        return Candidate(effect.tag, form, 0.0, None, "it does nothing along this motion")
+        return Candidate(effect.tag, form, 0.0, None, "it has no effect on this motion")
     members = [m for m, ok in zip(members, usable, strict=True) if ok]
     apart = explained.apart(columns[usable].T)
     falls, sizes, errors = explained.singly(apart)

@@ -45,7 +45,9 @@ def descend(
             try:
                 system = Linearised(problem, point, slopes, scatter, blocks, white)
             except np.linalg.LinAlgError:
-                raise FitError("the derivatives in what is an event's own are too large for a likelihood") from None
+                raise FitError(
+                    "derivatives with respect to the random effects of an event are too large for a likelihood"
+                ) from None
             cost = system.objective(point, slopes)
             first = cost if count == 0 else first
         change, events, expected = system.step(damping)

@@ -39,8 +39,8 @@ PLACED_APART = 3.0  # of two stretches of an event in the coordinate along which
 ROLES = {"Drive", "Spring", "Inertia"}  # of effects that need a driving spring
 GAIN = "sensor-gain"  # a motion that is longer than it seems is a contact that yields later
 SAID = (
-    "the motion is prescribed and the force measured, with no driving spring between: what acts on spring, drive or "
-    "mass is not tried, and nothing is simulated freely"
+    "the motion is prescribed and the force measured, with no driving spring between: effects on spring, drive or "
+    "mass are not tried, and there is no free simulation"
 )
 
 

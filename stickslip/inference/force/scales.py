@@ -65,6 +65,6 @@ def too_coarse(times: Scales, rate: float) -> str | None:
         return None
     return (
         f"sampling at {rate:.4g} Hz is too coarse for inertia: the acceleration is a mean over {2e3 * times.half:.3g} "
-        f"ms of a slip of {1e3 * times.slip:.3g} ms, so mass, damping and what acts within a slip are told badly; "
-        f"{HALF / (COARSE * times.slip):.3g} Hz would do"
+        f"ms of a slip of {1e3 * times.slip:.3g} ms, so mass, damping and effects within a slip are poorly determined; "
+        f"at least {HALF / (COARSE * times.slip):.3g} Hz needed"
     )

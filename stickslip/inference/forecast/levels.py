@@ -150,7 +150,7 @@ def wandering(data: xarray.Dataset, window: int = 31) -> Wandering:
     """
     n = data.sizes["slip_number"]
     if n < 3:
-        raise InputError(f"{n} slips tell of no correlation", allowed="three slips or more")
+        raise InputError(f"{n} slips are too few for a correlation", allowed="three slips or more")
     window = min(window, n)
 
     def less(values: Array) -> Array:

@@ -14,8 +14,8 @@ from .wander import KEYS
 SURE = 0.95  # weight by which one coordinate is named
 
 SAME = (
-    "Place and slip path are one coordinate in a record that never goes back: a way back over the same track parts "
-    "them."
+    "Place and slip path are one coordinate in a record that never goes back: motion back over the same track "
+    "separates them."
 )
 
 
@@ -65,19 +65,19 @@ def told(compared: Sequence[Compared], back: bool, step: Mapping[str, float], ea
         for c in sorted(names, key=lambda c: -weights[c])
     )
     if nothing >= SURE:
-        coordinate, text = "nothing", f"The levels scatter, and no wander is seen in them ({numbers})."
+        coordinate, text = "nothing", f"The levels scatter, no correlation detected ({numbers})."
     elif named:
         coordinate, text = " and ".join(named), f"The levels wander along {' and '.join(named)} ({numbers})."
     elif likely:
         coordinate = ""
         text = (
             f"Levels within a {each} differ along {' and '.join(likely)}, but their correlation ends before the next "
-            f"{each}: no wander from {each} to {each} is seen ({numbers})."
+            f"{each}: no correlation from {each} to {each} is detected ({numbers})."
         )
     elif nothing > 1.0 - SURE:
-        coordinate, text = "", f"Whether the levels wander or only scatter cannot be told ({numbers})."
+        coordinate, text = "", f"Whether the levels wander or only scatter cannot be determined ({numbers})."
     else:
-        coordinate, text = "", f"The levels wander, but along which coordinate cannot be told ({numbers})."
+        coordinate, text = "", f"The levels wander, but along which coordinate cannot be determined ({numbers})."
     if nothing < SURE and not back:
         text += f" {SAME}"
     return {

@@ -81,7 +81,7 @@ def changes(fit: Fit, setting: Setting) -> list[tuple[str, Any]]:
     own = next(run for run in fit.fitted.runs if run.name == setting.run).velocity
     velocity = to_si(setting.velocity, "m/s", key="velocity") if setting.velocity.strip() else own
     if velocity == 0.0:
-        raise InputError("a load point that stands still brings no slip", key="velocity", value=setting.velocity)
+        raise InputError("without drive motion there is no slip", key="velocity", value=setting.velocity)
     hold = _positive(setting.hold, "s", "hold") if setting.hold.strip() else 0.0
     if hold > LONGEST_HOLD:
         raise InputError(

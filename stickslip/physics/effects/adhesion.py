@@ -18,7 +18,7 @@ class Adhesion(Geometry):
     """
 
     tag = "adhesion"
-    summary = "attraction loads all contacting asperities alike"
+    summary = "attraction loads all contacting asperities equally"
     equation = r"c_i \to c_i + \varepsilon\,F_s\,k_i/\sum_j k_j,\quad F_s \to (1 + \varepsilon)\,F_s"
     signature = "friction at light load; nothing slides at first: stiffer, more sudden"
     confused_with = {

@@ -42,7 +42,7 @@ def effects_of(words: Sequence[str]) -> tuple[list[Effect], bool]:
             raise InputError(f"'{tag}' is named twice", key=_OPTION)
     if not inertial and any(tag != STATIC for tag in tags):
         raise InputError(
-            "the model without inertia has constant friction and no effects; whatever else acts is solved with inertia",
+            "the model without inertia has constant friction and no effects; all other models include inertia",
             key=_OPTION,
             value=",".join(tags),
             hint=f"--model {','.join([STATIC, INERTIA, *(tag for tag in tags if tag != STATIC)])}",

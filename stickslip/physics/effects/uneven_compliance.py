@@ -20,7 +20,7 @@ class UnevenCompliance(Sensor):
     """
 
     tag = "uneven-compliance"
-    summary = "the fixture gives way more one way than the other"
+    summary = "the fixture is more compliant in one direction"
     equation = r"y \to y + \beta\,\left(\sum_i f_i\right)^2"
     signature = "loops of force against displacement that are no longer the same when turned by half a turn"
     confused_with = {

@@ -43,7 +43,9 @@ class WanderingFriction(Memory, Threshold):
         r"\varphi_j": "phases of the first draw (rad)",
         r"\gamma_j": "turn of a phase from draw to draw (rad)",
     }
-    signature = "slips of irregular size: forces at onset and arrest vary together, and alike in slips near each other"
+    signature = (
+        "slips of irregular size: forces at onset and arrest vary together, and are similar in neighbouring slips"
+    )
     confused_with = {
         "position-dependent-friction": "a longer track: a wave comes back after its length",
         "wear": "a longer path: a run-in ends, a wander does not",

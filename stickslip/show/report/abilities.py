@@ -40,7 +40,9 @@ def abilities(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) ->
             "elasticity of the instrument counts as the contact's."
         )
     elif not slipping:
-        cannot.append("No trace holds a slip: nothing but creep or sliding can be looked at, no dynamic model fitted.")
+        cannot.append(
+            "No trace holds a slip: only creep or sliding can be examined; the dynamic model cannot be fitted."
+        )
     shapes = [event_shapes(t, s) for t, s in slipping]
     verdicts = [judge(pairs, slipping) for judge in (_velocities, _events, _holds, _virgin, _signals, _slow_noise)]
     verdicts += [judge(slipping, shapes) for judge in (_slip, _overshoot, _ringing)]
@@ -69,11 +71,12 @@ def _velocities(pairs: Pairs, slipping: Pairs) -> Verdict:
     if len(groups) == 1:
         return [], [
             f"One drive velocity only ({shown} µm/s): creep at one velocity identifies nothing, since roughness, "
-            "friction and weakening together imitate almost every effect. Three velocities over a factor of four do."
+            "friction and weakening together imitate almost every effect. Record three velocities over a factor of "
+            "four."
         ]
     if len(groups) == 2 or groups[-1] < 4 * groups[0]:
         return [f"{len(groups)} drive velocities ({shown} µm/s): effects that depend on velocity show."], [
-            "Fewer than three velocities over a factor of four: many effects will stay alike."
+            "Fewer than three velocities over a factor of four: many effects cannot be distinguished."
         ]
     return [f"{len(groups)} drive velocities ({shown} µm/s) separate what depends on velocity from what does not."], []
 
@@ -105,8 +108,8 @@ def _slow_noise(pairs: Pairs, slipping: Pairs) -> Verdict:
         for walk, hum in kinds
     ]
     bad = [
-        f"Slow noise of the sensor is not stated in {_some(silent)}: a reading that wanders or hums by nanometres "
-        "would be taken for creep. Record the block at rest, and give walk and hum beside the displacement's column."
+        f"Slow noise of the sensor is not stated in {_some(silent)}: drift or hum of some nanometres would be "
+        "interpreted as creep. Record the block at rest, and give walk and hum beside the displacement's column."
     ]
     return good, bad if silent else []
 
@@ -117,7 +120,7 @@ def _holds(pairs: Pairs, slipping: Pairs) -> Verdict:
         return [], []
     if sum(held):
         return [f"{_count(sum(held), 'slip')} after a hold: strengthening with time and creep at rest show."], []
-    return [], ["No hold: strengthening with time, creep at rest and drift of the sensor cannot be told apart."]
+    return [], ["No hold: strengthening with time, creep at rest and drift of the sensor cannot be separated."]
 
 
 def _virgin(pairs: Pairs, slipping: Pairs) -> Verdict:
@@ -135,7 +138,7 @@ def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
         return [], []
     bad = [
         f"Spring force only in {_some(force)}: the block's position is drive - F/c_s, so every error of the force's "
-        "scale, of the stiffness or of the drive is taken for motion."
+        "scale, of the stiffness or of the drive appears as motion."
     ]
     good: list[str] = []
     for t, s in pairs:
@@ -192,7 +195,7 @@ def _ringing(slipping: Pairs, shapes: list[Shapes]) -> Verdict:
         if len(set(clear)) == 1 and len(clear) >= 0.5 * len(found):
             good.append(f"The ring-down's {LAWS[clear[0]]}.")
         else:
-            bad.append("The law by which the ring-down decays is not clear, so kinds of damping cannot be told apart.")
+            bad.append("The law by which the ring-down decays is not clear, so kinds of damping cannot be separated.")
     quiet = [
         f"{t.name} ({shape.missing['ring']})"
         for (t, _), shape in zip(slipping, shapes, strict=True)

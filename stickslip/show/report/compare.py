@@ -1,4 +1,4 @@
-"""Two runs side by side: models, verdicts, errors by phase, parameters and how far apart they are."""
+"""Two runs side by side: models, verdicts, errors by phase, parameters and their differences."""
 
 from __future__ import annotations
 

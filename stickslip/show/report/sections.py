@@ -27,7 +27,7 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
     """(section, caption, figure) of everything this result can show."""
     if len(result.get("ladder") or []) > 1:
         unseen = any(step.get("heldout_error") is not None for step in result["ladder"])
-        runs = "on fitted and on unseen runs" if unseen else "on fitted runs; no run was kept aside"
+        runs = "on fitted and on unseen runs" if unseen else "on fitted runs; no run was held out"
         yield "ladder", f"Error of every model by phase, {runs}.", ladder_picture(result["ladder"])
     if runs_of(data):
         names = list((result.get("ladder") or [{}])[-1].get("by_run") or [])
@@ -36,15 +36,15 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
             "One cycle of every run: force that the contact held, and the model's.",
             cycle_picture(data, names),
         )
-        caption = "Residual force of the base model against what it may depend on; lines: running medians."
+        caption = "Residual force of the base model against possible variables; lines: running medians."
         yield "force", caption, residual_picture(data, names)
     if "backbone_force" in data and result.get("backbone"):
         caption = "Backbone of the contact as the motion shows it, and the laws of a rough contact."
         yield "force", caption, backbone_picture(data, result["backbone"])
     if "free_run_measured_time" in data and "free_recurrence_measured" in data:
         caption = (
-            "Models run freely from arrest to arrest through runs that their fit has not seen: the run where the base "
-            "errs most, one of its onsets, and every recurrence."
+            "Free simulations from arrest to arrest through runs left out of their fit: the run where the base errs "
+            "most, one of its onsets, and every recurrence."
         )
         yield "free", caption, free_picture(data)
     if result.get("methods") and "pit" in data:

@@ -65,7 +65,7 @@ class DriveTable(Table):
             what = "neither 'duration' nor 'events' is given" if self.events is None else "both 'duration' and 'events'"
             raise fault(InputError(what, hint='write  duration = "14 s"  or  events = 5'))
         if self.velocity == 0.0 and self.events is not None:
-            raise fault(InputError("a drive that stands still brings no events", hint="give 'duration' instead"))
+            raise fault(InputError("without drive motion there is no slip", hint="give 'duration' instead"))
         if self.piece is not None and self.duration is not None:
             raise fault(InputError("every piece has its own duration", hint="remove 'duration' of [drive]"))
         if self.file is not None and self.position is None:
