@@ -184,11 +184,6 @@ def test_the_template_is_valid(tmp_path):
     assert loaded.entry("run1").clock_error == pytest.approx(25e-6)
 
 
-def test_unknown_trace_names_are_refused(campaign, refuses):
-    loaded = load_campaign(campaign(TRACE, rows=ROWS))
-    refuses(lambda: load_traces(loaded, ["b"]), "no trace 'b'")
-
-
 def test_lines_of_keys():
     lines = key_lines('a = 1\n[b.c]\n"d e" = 2\n[[t]]\nx.y = 1\n[[t]]\n# no = 3\nz = 4\n[t.sub]\nw = 5\n')
     assert lines[("a",)] == 1
