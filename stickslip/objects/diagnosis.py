@@ -26,7 +26,7 @@ from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .fit import Fit
 from .next_experiment import next_experiment
-from .run import Savable, Tell, dataset, head, silent
+from .run import Savable, Tell, dataset, head, several, silent
 from .shown import facts, table
 from .wander import wander, wander_sentence
 
@@ -136,9 +136,9 @@ class Diagnosis(Savable):
 def diagnose(
     campaign: Campaign,
     *,
-    candidates: Sequence[str] | None = None,
+    candidates: str | Sequence[str] | None = None,
     max_effects: int = 4,
-    holdout: Sequence[str] = (),
+    holdout: str | Sequence[str] = (),
     jobs: int | None = None,
     time_limit: float | None = None,
     out: str | Path | None = None,
@@ -165,8 +165,10 @@ def diagnose(
     """
     check_counts(max_effects, jobs)
     check_time(time_limit)
+    holdout = several(holdout)
     began = time.perf_counter()
     if candidates is not None:
+        candidates = several(candidates)
         _check_candidates(candidates)
     try_laws(catalogue.get(tag) for tag in (catalogue.tags() if candidates is None else candidates))
     rig = campaign.findings

@@ -31,7 +31,7 @@ from .fit_tables import STRENGTH, error_table, ladder_table, parameter_table
 from .free_cycles import free_run_errors, freely
 from .parameters_by_hand import moved, profile, refitted
 from .picture import FitPlots
-from .run import Savable, Tell, dataset, silent
+from .run import Savable, Tell, dataset, several, silent
 from .shown import facts
 
 if TYPE_CHECKING:
@@ -226,7 +226,7 @@ class Fit(Savable):
             made.__dict__["_where"] = self._where
         return made
 
-    def refit(self, locked: Sequence[str] = ()) -> Fit:
+    def refit(self, locked: str | Sequence[str] = ()) -> Fit:
         """Fitted anew from where it stands.
 
         Args:
@@ -235,7 +235,7 @@ class Fit(Savable):
         Raises:
             InputError: no free parameter of that name.
         """
-        return Fit(self.campaign, replaced(self.climbed, refitted(self, locked)))
+        return Fit(self.campaign, replaced(self.climbed, refitted(self, several(locked))))
 
     def add(self, effect: str) -> Fit:
         """The model with an effect more, fitted: ``fit.add("contact-ageing")``.
@@ -295,7 +295,7 @@ class Fit(Savable):
         law = power_law(backbone(self._fit), self._contacts)
         return fitted_model(self._fit, law, self.climbed.prepared.traces, self._contacts, self.campaign.rig)
 
-    def scenario(self, changes: Sequence[str] = (), run: str | None = None, events: int = 5) -> Any:
+    def scenario(self, changes: str | Sequence[str] = (), run: str | None = None, events: int = 5) -> Any:
         """The model as a scenario, for :func:`stickslip.simulate`.
 
         Args:
@@ -417,8 +417,8 @@ class Fit(Savable):
 
 
 def fit(
-    campaign: Campaign, effects: Sequence[str] = (), *, holdout: Sequence[str] = (), key: str = "effects",
-    profiles: Sequence[str] = (), progress: Tell | None = None,
+    campaign: Campaign, effects: str | Sequence[str] = (), *, holdout: str | Sequence[str] = (),
+    key: str = "effects", profiles: Sequence[str] = (), progress: Tell | None = None,
 ) -> Fit:  # fmt: skip
     """Fit the dynamic model along the measured motion (see :meth:`Campaign.fit`).
 
@@ -430,7 +430,7 @@ def fit(
         profiles: parameters that will be asked for: a wrong name is an error before anything is fitted.
         progress: told the stage and the share of it done.
     """
-    forms = chosen(effects, key)
+    forms = chosen(several(effects), key)
     try_laws(catalogue.get(tag) for tag, _ in forms)
     prepared = campaign.prepare(holdout)
     own = [f.name for tag, form in forms for f in effect_parameters(catalogue.get(tag)(**form))]

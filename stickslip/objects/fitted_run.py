@@ -18,6 +18,7 @@ from ..simulation.conformance import load_effects
 from ..simulation.scenario.load import Scenario, make_scenario
 from ..simulation.scenario.overrides import parse_assignment
 from ..system.runstore import RESULT, read_result
+from .run import several
 
 EVENTS = 5  # slips that are simulated unless told otherwise
 FRICTION = 0.2  # where neither load nor friction of a contact is known; only their product acts
@@ -87,7 +88,7 @@ class FittedRun:
         """The equations that are solved, with the fitted values."""
         return solved(self.fitted)
 
-    def scenario(self, changes: Sequence[str] = (), trace: str | None = None, events: int = EVENTS) -> Scenario:
+    def scenario(self, changes: str | Sequence[str] = (), trace: str | None = None, events: int = EVENTS) -> Scenario:
         """The model as a scenario.
 
         Args:
@@ -105,7 +106,7 @@ class FittedRun:
             drive = {"piece": [{"velocity": v, "duration": dt} for v, dt in run.pieces]}
         spring = self._spring() if trace is None else run.stiffness
         content = scenario_content(self.fitted, f"{self.title}: {' + '.join(self.parts)}", drive, spring)
-        given = [(self.key(name), value) for name, value in map(parse_assignment, changes)]
+        given = [(self.key(name), value) for name, value in map(parse_assignment, several(changes))]
         made = make_scenario(content, self.folder).with_changes(given)
         return replace(made, path=self.folder / RESULT)
 
@@ -143,7 +144,7 @@ class FittedRun:
         return own[0] if own and None not in own else None
 
 
-def load_run(folder: str | Path, effects: Sequence[str | Path] = ()) -> FittedRun:
+def load_run(folder: str | Path, effects: str | Path | Sequence[str | Path] = ()) -> FittedRun:
     """Read the model that a fit or a diagnosis left in its run folder.
 
     Args:
@@ -156,7 +157,7 @@ def load_run(folder: str | Path, effects: Sequence[str | Path] = ()) -> FittedRu
     """
     folder = Path(folder)
     result = read_result(folder)
-    load_effects(effects)
+    load_effects(several(effects))
     section = result.get(KEY)
     if section is None:
         raise RunFolderError(

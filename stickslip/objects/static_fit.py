@@ -12,6 +12,10 @@ from .shown import facts
 if TYPE_CHECKING:
     from .campaign import Campaign
 
+Align = Literal["consistent", "paper"]
+Time = Literal["exact", "paper"]
+Sampling = Literal["log", "uniform"]
+
 
 class StaticFit(Savable):
     """The paper's static model, every creep process fitted by itself.
@@ -34,10 +38,10 @@ class StaticFit(Savable):
 def fit_static(
     campaign: Campaign,
     *,
-    align: Literal["consistent", "paper"] = "consistent",
-    time: Literal["exact", "paper"] = "exact",
+    align: Align = "consistent",
+    time: Time = "exact",
     v_lim: float | str = 1e-6,
-    sampling: Literal["log", "uniform"] = "log",
+    sampling: Sampling = "log",
     progress: Tell | None = None,
 ) -> StaticFit:
     """Fit the static model to every creep process (see :meth:`Campaign.fit`).

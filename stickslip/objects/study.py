@@ -13,7 +13,7 @@ from ..errors import InputError, StickslipError
 from ..system.cluster import cluster
 from ..system.lifeline import end_with
 from .campaign import load_campaign
-from .run import Tell
+from .run import Tell, several
 
 if TYPE_CHECKING:
     import xarray
@@ -22,10 +22,10 @@ WHOLE = ("error", "unseen_error", "cost", "cycles")
 
 
 def study(
-    campaigns: Mapping[str, str | Path] | Sequence[str | Path],
-    effects: Sequence[str] = (),
+    campaigns: Mapping[str, str | Path] | str | Path | Sequence[str | Path],
+    effects: str | Sequence[str] = (),
     *,
-    files: Sequence[str | Path] = (),
+    files: str | Path | Sequence[str | Path] = (),
     scheduler: str | None = None,
     workers: int | None = None,
     progress: Tell | None = None,
@@ -49,6 +49,7 @@ def study(
         InputError: no campaign, two of one name, or no scheduler at that address.
         StickslipError: dask.distributed is missing.
     """
+    campaigns = campaigns if isinstance(campaigns, Mapping) else several(campaigns)
     named = dict(campaigns) if isinstance(campaigns, Mapping) else {_name(Path(p)): p for p in campaigns}
     if not named or len(named) != len(campaigns):
         raise InputError("campaigns must be there and have names of their own", value=len(campaigns))
@@ -57,7 +58,7 @@ def study(
         from distributed import as_completed
 
         local = None if scheduler else os.getpid()
-        own = (tuple(effects), tuple(map(str, files)), local)
+        own = (several(effects), tuple(map(str, several(files))), local)
         work = {
             client.submit(_fitted, str(Path(path).resolve()), *own, pure=False): name for name, path in named.items()
         }
