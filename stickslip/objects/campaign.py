@@ -14,8 +14,8 @@ from ..data.readers.repair import from_load_point
 from ..data.segment import Segmentation, segment
 from ..data.trace import Trace
 from ..errors import InputError, nearest
+from ..system.shown import Shown, facts, table
 from .run import several
-from .shown import Shown, facts, table
 
 if TYPE_CHECKING:
     import pandas

@@ -22,12 +22,12 @@ from ..show.report import abilities, write_report
 from ..show.report.diagnosis_result import trace_sections
 from ..simulation.conformance import try_laws
 from ..system.runstore import json_text, open_run, refuse_existing, versions
+from ..system.shown import facts, table
 from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .fit import Fit
 from .next_experiment import next_experiment
 from .run import Savable, Tell, dataset, head, several, silent
-from .shown import facts, table
 from .wander import wander, wander_sentence
 
 if TYPE_CHECKING:

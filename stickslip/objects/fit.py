@@ -25,6 +25,7 @@ from ..inference.force.residual import coordinates
 from ..physics.effects import catalogue
 from ..physics.effects.named import with_form
 from ..simulation.conformance import try_laws
+from ..system.shown import facts
 from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rough_lines
 from .fit_result import fit_result
 from .fit_tables import STRENGTH, error_table, ladder_table, parameter_table
@@ -32,7 +33,6 @@ from .free_cycles import free_run_errors, freely
 from .parameters_by_hand import moved, profile, refitted
 from .picture import FitPlots
 from .run import Savable, Tell, dataset, several, silent
-from .shown import facts
 
 if TYPE_CHECKING:
     import arviz

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, RunFolderError, nearest
 from ..inference.fit.equations import solved
@@ -18,7 +18,11 @@ from ..simulation.conformance import load_effects
 from ..simulation.scenario.load import Scenario, make_scenario
 from ..simulation.scenario.overrides import parse_assignment
 from ..system.runstore import RESULT, read_result
+from ..system.shown import Shown, facts, table
 from .run import several
+
+if TYPE_CHECKING:
+    import pandas
 
 EVENTS = 5  # slips that are simulated unless told otherwise
 FRICTION = 0.2  # where neither load nor friction of a contact is known; only their product acts
@@ -28,8 +32,8 @@ _OTHERWISE = {  # parameters of a fit that a scenario has in another way -> what
 }
 
 
-@dataclass(frozen=True)
-class FittedRun:
+@dataclass(frozen=True, repr=False)
+class FittedRun(Shown):
     """A run folder of ``stickslip fit --model inertial`` or ``stickslip diagnose``.
 
     Attributes:
@@ -58,11 +62,17 @@ class FittedRun:
         return tuple(with_form(e) for e in self.fitted.composition.effects)
 
     @property
-    def parameters(self) -> dict[str, dict[str, Any]]:
-        """Name -> ``value`` and ``std`` (SI), ``unit`` and ``doc`` of every fitted parameter of the model."""
+    def parameters(self) -> pandas.DataFrame:
+        """Value and standard deviation (SI), unit, prior and meaning of every fitted parameter of the model."""
         values, std = self.fitted.values, self.fitted.std
         free = [f for f in self.fitted.composition.free if shared(f.name)]
-        return {f.name: {"value": values[f.name], "std": std[f.name], "unit": f.unit, "doc": f.doc} for f in free}
+        rows = {
+            f.name: {
+                "value": values[f.name], "std": std[f.name], "unit": f.unit, "prior": f.known, "meaning": f.doc,
+            }
+            for f in free
+        }  # fmt: skip
+        return table(rows, "parameter")
 
     @property
     def runs(self) -> tuple[Driven, ...]:
@@ -121,6 +131,11 @@ class FittedRun:
         table, _, rest = name.partition(".")
         tags = [effect.tag for effect in self.fitted.effects()]
         return f"block.{rest}" if table == "rig" else f"effect.{name}" if table in tags else name
+
+    def _parts(self) -> list[Any]:
+        verdict = self.result.get("verdict", {}).get("text")
+        what = {"folder": self.folder, "campaign": self.title, "model": " + ".join(self.parts), "verdict": verdict}
+        return [facts(what), self.parameters[["value", "std", "unit"]]]
 
     def _first(self) -> Driven:
         if not self.runs:

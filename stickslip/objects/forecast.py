@@ -14,8 +14,8 @@ from ..inference.forecast.rolling import SHARES, Rolled, choose, prepare, roll
 from ..inference.forecast.scoring import quantiles
 from ..inference.forecast.telling import steps, told
 from ..inference.forecast.wander import Wander
+from ..system.shown import facts, table
 from .run import Savable, Tell, dataset, head
-from .shown import facts, table
 from .wander import most_slips
 
 if TYPE_CHECKING:

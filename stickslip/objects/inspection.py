@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..system.runstore import open_run
+from ..system.shown import Shown, facts, table
 from .run import dataset, head
-from .shown import Shown, facts, table
 
 if TYPE_CHECKING:
     import pandas

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from ..system.runstore import open_run, versions
-from .shown import Shown
+from ..system.shown import Shown
 
 if TYPE_CHECKING:
     import xarray

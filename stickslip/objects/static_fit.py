@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import InputError
+from ..system.shown import facts
 from ..system.units import to_si
 from .run import Savable, Tell, dataset, head, silent
-from .shown import facts
 
 if TYPE_CHECKING:
     from .campaign import Campaign

@@ -142,7 +142,7 @@ def test_what_is_saved_is_what_is_shown(aged, tmp_path):
     assert kept["ladder"][-1]["train_error"] == pytest.approx(aged.error, rel=1e-9)
     assert kept["ladder"][-1]["heldout_error"] == pytest.approx(aged.unseen_error, rel=1e-9)
     again = ss.load_run(folder)
-    assert again.parameters["contact-ageing.rate"]["value"] == pytest.approx(aged.values["contact-ageing.rate"])
+    assert again.parameters.loc["contact-ageing.rate", "value"] == pytest.approx(aged.values["contact-ageing.rate"])
     free = aged.predict()
     assert kept["ladder"][-1]["free"]["recurrence"]["relative"] == pytest.approx(free.loc["all", "recurrence"])
     assert (folder / "report.html").stat().st_size > 10_000

@@ -67,11 +67,19 @@ def test_the_model_comes_back_as_it_was(folder):
     assert back.parts == ("static", "inertia", "contact-ageing", "viscous-drag")
     assert float(back.model.effects[0].rate) == pytest.approx(0.013, rel=1e-12)
     np.testing.assert_allclose(back.fitted.covariance, original.covariance)
-    assert back.parameters["contact.u_max"]["value"] == pytest.approx(0.95e-6)
+    assert back.parameters.loc["contact.u_max", "value"] == pytest.approx(0.95e-6)
     # the standard deviation of a logarithm times the value
     k = list(TRUTH).index("contact.u_max")
-    assert back.parameters["contact.u_max"]["std"] == pytest.approx(0.95e-6 * np.sqrt(original.covariance[k, k]))
-    assert "start.1" not in back.parameters
+    assert back.parameters.loc["contact.u_max", "std"] == pytest.approx(0.95e-6 * np.sqrt(original.covariance[k, k]))
+    assert "start.1" not in back.parameters.index
+
+
+def test_a_run_shows_its_model_and_not_all_that_was_kept(folder):
+    back = ss.load_run(folder)
+    text, html = repr(back), back._repr_html_()
+    assert text.startswith("<FittedRun>") and len(text) < 3000
+    assert "static + inertia + contact-ageing" in text and "contact.u_max" in text and "model_parts" not in text
+    assert html.count("<table") == 1 and "contact.u_max" in html
 
 
 def test_the_scenario_is_the_same_model(folder):
