@@ -152,11 +152,15 @@ class Campaign(Shown):
         except InputError as error:
             raise error.at(file=self._file) from None
 
-    def inspect(self) -> Inspection:
-        """Events of every run, what was mended or left out, and what these data can tell."""
+    def inspect(self, progress: Tell | None = None) -> Inspection:
+        """Events of every run, what was mended or left out, and what these data can tell.
+
+        Args:
+            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
+        """
         from .inspection import inspect
 
-        return inspect(self)
+        return inspect(self, progress)
 
     @overload
     def fit(
@@ -181,7 +185,7 @@ class Campaign(Shown):
             model: ``"inertial"``, the force along the measured motion, or ``"static"``, every creep process by itself.
             holdout: runs that no fit of the dynamic model sees.
             align, time, v_lim, sampling: of the static model; see :func:`stickslip.objects.static_fit.fit_static`.
-            progress: told the stage and the share of it done.
+            progress: told the stage and the share of it done; default a bar in a terminal or a notebook.
 
         Raises:
             InputError: no such model, an argument that belongs to the other one, no run can take part, an effect that
@@ -252,7 +256,7 @@ class Campaign(Shown):
             train: share of its length from which everything is learned.
             at: mean recurrences after an arrest at which a forecast is made, once in each stick; default moments all
                 along, ten in a mean recurrence.
-            progress: told what is done and the share of it.
+            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
 
         Raises:
             InputError: no run of that name, too few slips, no load point or force, shares out of range.

@@ -25,6 +25,7 @@ from ..inference.force.residual import coordinates
 from ..physics.effects import catalogue
 from ..physics.effects.named import with_form
 from ..simulation.conformance import try_laws
+from ..system.progress import telling
 from ..system.shown import facts
 from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rough_lines
 from .fit_result import fit_result
@@ -32,7 +33,7 @@ from .fit_tables import STRENGTH, error_table, ladder_table, parameter_table
 from .free_cycles import free_run_errors, freely
 from .parameters_by_hand import moved, profile, refitted
 from .picture import FitPlots
-from .run import Savable, Tell, dataset, several, silent
+from .run import Savable, Tell, dataset, several
 
 if TYPE_CHECKING:
     import arviz
@@ -270,6 +271,9 @@ class Fit(Savable):
     def predict(self, progress: Tell | None = None) -> pandas.DataFrame:
         """Errors of the model run freely, from arrest to arrest, through runs it was not fitted to.
 
+        Args:
+            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
+
         Returns:
             A row for each run: relative errors (1) of recurrence, slip and creep before the onset; slips missed.
         """
@@ -324,9 +328,12 @@ class Fit(Savable):
         Raises:
             InputError: no free parameter of that name.
         """
-        return profile(self, name, progress or silent)
+        with telling(f"profile of {name}", progress) as tell:
+            return profile(self, name, tell)
 
-    def sample(self, draws: int = 200, tune: int = 100, chains: int = 2, seed: int = 0) -> arviz.InferenceData:
+    def sample(
+        self, draws: int = 200, tune: int = 100, chains: int = 2, seed: int = 0, progress: Tell | None = None
+    ) -> arviz.InferenceData:
         """Draw from the posterior by the No-U-Turn sampler (Hoffman & Gelman, JMLR 15 (2014) 1593; by nutpie).
 
         The covariance of the residuals is that of the fit, every event is marginalised; gradients are exact.
@@ -335,6 +342,7 @@ class Fit(Savable):
             draws, tune: of each chain, kept and for adaptation.
             chains: side by side.
             seed: of the draws.
+            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
 
         Returns:
             ``posterior`` holds the free parameters (SI, ``attrs["units"]``) and ``contact.strength``; its
@@ -345,14 +353,16 @@ class Fit(Savable):
         """
         from .posterior import sample
 
-        return sample(self, draws, tune, chains, seed)
+        with telling("sampling", progress) as tell:
+            return sample(self, draws, tune, chains, seed, tell)
 
     # what is kept
 
     def confirm(self, progress: Tell | None = None) -> Confirmation:
         """Base and last model run freely through the measured cycles; simulated once."""
         if self._confirmation is None:
-            self._confirmation = self.climbed.confirmed(progress or silent)
+            with telling("running freely", progress) as tell:
+                self._confirmation = self.climbed.confirmed(tell)
         return self._confirmation
 
     @cached_property
@@ -438,4 +448,5 @@ def fit(
     for name in profiles:
         if name not in known:
             raise InputError("no free parameter of that name", key="--profile", value=name, hint=nearest(name, known))
-    return Fit(campaign, climb(prepared, forms, progress or silent))
+    with telling("fitting", progress) as tell:
+        return Fit(campaign, climb(prepared, forms, tell))

@@ -18,10 +18,6 @@ Tell = Callable[[str, float], None]
 Name = TypeVar("Name", bound=str | Path)
 
 
-def silent(text: str, share: float) -> None:
-    """Progress that nobody is told."""
-
-
 def several(names: Name | Sequence[Name]) -> tuple[Name, ...]:
     """Names, of which a single one may stand by itself."""
     return (names,) if isinstance(names, str | Path) else tuple(names)

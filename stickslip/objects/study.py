@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError, StickslipError
 from ..system.cluster import cluster
 from ..system.lifeline import end_with
+from ..system.progress import silent, telling
 from .campaign import load_campaign
 from .run import Tell, several
 
@@ -38,7 +39,7 @@ def study(
         files: Python files with effects of one's own; they must be there on every worker.
         scheduler: address of a running dask scheduler, ``tcp://host:8786``; default a cluster on this machine.
         workers: of the local cluster; default one a core.
-        progress: told which campaign is done and the share of all.
+        progress: told which campaign is done and the share of all; default a bar in a terminal or a notebook.
 
     Returns:
         Over ``campaign`` and ``parameter``: ``value`` and ``std`` (SI, unit in the coordinate ``unit``); over
@@ -54,7 +55,7 @@ def study(
     if not named or len(named) != len(campaigns):
         raise InputError("campaigns must be there and have names of their own", value=len(campaigns))
     found: dict[str, dict[str, Any]] = {}
-    with cluster(scheduler, workers) as client, client.as_current():
+    with telling("studying", progress) as tell, cluster(scheduler, workers) as client, client.as_current():
         from distributed import as_completed
 
         local = None if scheduler else os.getpid()
@@ -65,8 +66,7 @@ def study(
         for done in as_completed(work):
             name = work[done]
             found[name] = done.result()
-            if progress is not None:
-                progress(name, len(found) / len(named))
+            tell(name, len(found) / len(named))
     return _together({name: found[name] for name in named})
 
 
@@ -82,7 +82,7 @@ def _fitted(path: str, effects: tuple[str, ...], files: tuple[str, ...], parent:
         end_with(parent)
     cache.enable()
     try:
-        fit = load_campaign(path, files).fit(effects)
+        fit = load_campaign(path, files).fit(effects, progress=silent)
     except StickslipError as error:
         return {"note": str(error).split("\n")[0]}
     frame = fit.parameters
