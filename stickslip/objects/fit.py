@@ -40,7 +40,9 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from ..simulation.scenario.load import Scenario
     from .campaign import Campaign
+    from .fitted_run import Moves
 
 
 class Fit(Savable):
@@ -299,24 +301,30 @@ class Fit(Savable):
         law = power_law(backbone(self._fit), self._contacts)
         return fitted_model(self._fit, law, self.climbed.prepared.traces, self._contacts, self.campaign.rig)
 
-    def scenario(self, changes: str | Sequence[str] = (), run: str | None = None, events: int = 5) -> Any:
+    def scenario(
+        self, changes: str | Sequence[str] = (), run: str | None = None, events: int = 5, drive: Moves | None = None
+    ) -> Scenario:
         """The model as a scenario, for :func:`stickslip.simulate`.
 
         Args:
             changes: such as ``"drive.velocity=100um/s"``.
             run: drive as this measured run was; default at the first run's velocity, for so many ``events``.
             events: slips to simulate where the drive has one velocity.
+            drive: another one: a velocity such as ``"800 um/s"`` (a number in m/s), or until when and how fast, piece
+                by piece, as of :meth:`stickslip.Trace.from_arrays`: ``[("4 s", "100 um/s"), ("5 s", 0)]``.
         """
         from .fitted_run import FittedRun
 
         record = FittedRun(Path(), {"title": self.campaign.title}, self.fitted)
-        return record.scenario(changes, run, events)
+        return record.scenario(changes, run, events, drive)
 
-    def simulate(self, changes: Sequence[str] = (), run: str | None = None, events: int = 5) -> xarray.Dataset:
-        """Run the model freely under another drive; arguments as of :meth:`scenario`."""
+    def simulate(
+        self, changes: str | Sequence[str] = (), run: str | None = None, events: int = 5, drive: Moves | None = None
+    ) -> xarray.Dataset:
+        """Run the model freely: ``fit.simulate(drive="800 um/s")``; arguments as of :meth:`scenario`."""
         from ..simulation.scenario import simulate
 
-        return simulate(self.scenario(changes, run, events))
+        return simulate(self.scenario(changes, run, events, drive))
 
     def profile(self, name: str, progress: Tell | None = None) -> dict[str, Any]:
         """Profile likelihood of a parameter: held at values around its best one, all others fitted.

@@ -64,4 +64,5 @@ def test_a_fit_takes_a_single_name(campaign):
         fit.refit(locked="weakening.dorp")
     change = "drive.velocity=0.8 mm/s"
     one, several = (fit.scenario(changes).file.drive for changes in (change, [change]))
-    assert one == several
+    assert one == several == fit.scenario(drive="0.8 mm/s").file.drive
+    assert fit.simulate(drive="0.8 mm/s", events=1).sizes == fit.simulate(change, events=1).sizes

@@ -141,6 +141,31 @@ def test_a_run_can_be_driven_as_it_was_measured(folder):
         back.scenario(trace="v20")
 
 
+def test_a_drive_is_a_velocity_or_pieces(folder):
+    back = ss.load_run(folder)
+    assert back.scenario(drive="0.8 mm/s", events=3).file == back.scenario(["drive.velocity=0.8mm/s"], events=3).file
+    assert back.scenario(drive=8e-4).file.drive.velocity == 8e-4
+    made = build(back.scenario(trace="v200", drive=[("1.5 s", "100 um/s"), (2.0, 0), ("3 s", "-50 um/s")])).motion
+    assert made.duration == pytest.approx(3.0)
+    np.testing.assert_allclose(made.position(np.array([1.5, 2.0, 3.0])), [1.5e-4, 1.5e-4, 1e-4], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("drive", "words"),
+    [
+        ("800", "unit is missing"),
+        ("3 N", "drive: the unit"),
+        (["800 um/s"], "until when and how fast"),
+        ([], "until when and how fast"),
+        ([("2 s", "1 um/s"), ("1 s", 0)], "must be finite and increase"),
+        ({"velocity": 1.0}, "until when and how fast"),
+    ],
+)
+def test_a_drive_that_is_none_is_refused(folder, drive, words):
+    with pytest.raises(InputError, match=words):
+        ss.load_run(folder).scenario(drive=drive)
+
+
 def test_a_spring_of_its_own_belongs_to_its_run(tmp_path):
     runs = (Driven("soft", 1e-4, ((1e-4, 2.0),), 170.0), Driven("hard", 1e-4, ((1e-4, 2.0),)))
     fitted = found()
