@@ -53,10 +53,14 @@ def test_a_script_is_silent(monkeypatch):
     assert log.getvalue() == ""
 
 
-def test_a_fit_tells_its_share_as_it_goes():
+def test_a_fit_and_a_sample_tell_their_share_as_they_go():
     heard = []
-    ss.load_campaign(SHIPPED).fit(progress=lambda text, share: heard.append(share))
+    fit = ss.load_campaign(SHIPPED).fit(progress=lambda text, share: heard.append(share))
     assert len(heard) > 3 and heard == sorted(heard) and heard[-1] <= 1.0
+    pytest.importorskip("nutpie")
+    heard.clear()
+    fit.sample(draws=2, tune=3, chains=1, progress=lambda text, share: heard.append(share))
+    assert heard == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
 
 
 def test_shares_of_a_part_are_told_as_shares_of_the_whole():
