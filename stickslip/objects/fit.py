@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,7 @@ from ..inference.force.residual import coordinates
 from ..physics.effects import catalogue
 from ..physics.effects.named import with_form
 from ..simulation.conformance import try_laws
-from ..system.progress import telling
+from ..system.progress import portion, telling
 from ..system.shown import facts
 from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rough_lines
 from .fit_result import fit_result
@@ -238,7 +239,8 @@ class Fit(Savable):
         Raises:
             InputError: no free parameter of that name.
         """
-        return Fit(self.campaign, replaced(self.climbed, refitted(self, several(locked))))
+        with _told("refitting", "all parameters"):
+            return Fit(self.campaign, replaced(self.climbed, refitted(self, several(locked))))
 
     def add(self, effect: str) -> Fit:
         """The model with an effect more, fitted: ``fit.add("contact-ageing")``.
@@ -254,7 +256,8 @@ class Fit(Savable):
         if tag in self.effects:
             raise InputError("the effect is in the model already", key="effect", value=effect)
         try_laws([catalogue.get(tag)])
-        return Fit(self.campaign, extended(self.climbed, tag, form))
+        with _told("fitting", f"adding {tag}"):
+            return Fit(self.campaign, extended(self.climbed, tag, form))
 
     def remove(self, effect: str) -> Fit:
         """The model without one of its effects, fitted anew.
@@ -266,7 +269,8 @@ class Fit(Savable):
             raise InputError(
                 "the effect is not in the model", key="effect", value=effect, hint=nearest(effect, self.effects)
             )
-        return Fit(self.campaign, shortened(self.climbed, effect))
+        with _told("fitting", f"without {effect}"):
+            return Fit(self.campaign, shortened(self.climbed, effect))
 
     # what it foretells
 
@@ -432,6 +436,13 @@ class Fit(Savable):
             "parameters": "set by hand" if self.by_hand else None,
         }
         return [facts(what), self.parameters[["value", "std", "unit"]], self.errors]
+
+
+@contextmanager
+def _told(title: str, text: str) -> Iterator[None]:
+    """Shows the shares of the work within, where somebody sees them."""
+    with telling(title, None) as tell, portion(0.0, 1.0, partial(tell, text)):
+        yield
 
 
 def fit(

@@ -29,8 +29,10 @@ def test_a_terminal_shows_a_bar_by_default(monkeypatch):
     screen, campaign = terminal(monkeypatch), ss.load_campaign(SHIPPED)
     campaign.inspect()
     assert "inspecting" in screen.getvalue() and "holds" in screen.getvalue()
-    campaign.fit()
+    fit = campaign.fit()
     assert "fitting" in screen.getvalue() and "the base model" in screen.getvalue()
+    fit.add("contact-ageing")
+    assert "adding contact-ageing" in screen.getvalue()
 
 
 def test_the_callers_own_is_told_and_no_bar_is_shown(monkeypatch):
