@@ -6,7 +6,7 @@ Public names are loaded when they are first used, so that importing the package 
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
@@ -42,20 +42,60 @@ _PUBLIC = {
     "StickslipError": "errors",
     "InputError": "errors",
     "SolveError": "errors",
+    "FitError": "errors",
+    "RunFolderError": "errors",
 }
 
 __all__ = ["__version__", *_PUBLIC]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'stickslip' has no attribute '{name}'")
-    module, _, attribute = _PUBLIC[name].partition(":")
-    found = importlib.import_module(f"{__name__}.{module}")
-    value = found if name == module else getattr(found, attribute or name)
-    globals()[name] = value
-    return value
+if TYPE_CHECKING:  # the same for editors and type checkers
+    from .data.segment import segment as _segment
+    from .data.trace import Trace as Trace
+    from .errors import FitError as FitError
+    from .errors import InputError as InputError
+    from .errors import RunFolderError as RunFolderError
+    from .errors import SolveError as SolveError
+    from .errors import StickslipError as StickslipError
+    from .objects.campaign import Campaign as Campaign
+    from .objects.campaign import load_campaign as load_campaign
+    from .objects.diagnosis import Diagnosis as Diagnosis
+    from .objects.fit import Fit as Fit
+    from .objects.fitted_run import load_run as load_run
+    from .objects.study import study as study
+    from .physics.contact import creep_curve as creep_curve
+    from .physics.contact import power_law_bank as power_law_bank
+    from .physics.contact import rough_bank as rough_bank
+    from .physics.effects.catalogue import make as _make
+    from .physics.model import Block as Block
+    from .physics.model import LoadPoint as LoadPoint
+    from .physics.model import Model as Model
+    from .physics.model import Weakening as Weakening
+    from .physics.sensor import Vibrometer as Vibrometer
+    from .physics.sensor import measure as measure
+    from .simulation.scenario import build as build
+    from .simulation.scenario import load_scenario as load_scenario
+    from .simulation.scenario import make_scenario as make_scenario
+    from .simulation.scenario import simulate as simulate
+    from .simulation.scenario import static_creep as static_creep
+    from .simulation.scenario import steady_sliding as steady_sliding
+    from .simulation.solve import integrate as integrate
+    from .simulation.solve import slip_derivatives as slip_derivatives
+    from .workbench import CallableModule as CallableModule
+
+    find_events, make_effect = _segment, _make
+    workbench: CallableModule
+else:
+
+    def __getattr__(name: str) -> Any:
+        if name not in _PUBLIC:
+            raise AttributeError(f"module 'stickslip' has no attribute '{name}'")
+        module, _, attribute = _PUBLIC[name].partition(":")
+        found = importlib.import_module(f"{__name__}.{module}")
+        value = found if name == module else getattr(found, attribute or name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_PUBLIC})
+    return sorted(__all__)

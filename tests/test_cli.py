@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import csv
+import importlib
 import io
 import json
 import os
@@ -103,9 +105,28 @@ def test_public_names_are_there():
 
     for name in stickslip.__all__:
         assert getattr(stickslip, name) is not None
-    assert set(stickslip.__all__) <= set(dir(stickslip))
+    assert dir(stickslip) == sorted(stickslip.__all__)
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         stickslip.simulat  # noqa: B018
+
+
+def test_a_type_checker_sees_every_public_name_where_it_is():
+    """The block for type checkers, which never runs, names what is loaded when it is first used."""
+    import stickslip
+
+    (block,) = (
+        node for node in ast.parse(Path(stickslip.__file__).read_text()).body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    )  # fmt: skip
+    found = {
+        name.asname: getattr(importlib.import_module(f"stickslip.{node.module}"), name.name)
+        for node in block.body if isinstance(node, ast.ImportFrom) for name in node.names
+    }  # fmt: skip
+    found |= {"find_events": found.pop("_segment"), "make_effect": found.pop("_make")}
+    assert type(stickslip.workbench) is found.pop("CallableModule")
+    assert {"__version__", "workbench", *found} == set(stickslip.__all__)
+    for name, value in found.items():
+        assert getattr(stickslip, name) is value
 
 
 def test_simulate_prints_a_table_and_writes_nothing_unasked(scenario, capsys):

@@ -275,3 +275,11 @@ def test_the_papers_page_has_its_numbers() -> None:
     text = (DOCS / "paper.md").read_text(encoding="utf-8")
     for picture in re.findall(r"\]\((paper/\w+\.png)\)", text):
         assert (DOCS / picture).exists()
+
+
+def test_the_page_of_the_api_has_every_public_name() -> None:
+    import stickslip
+
+    page = (DOCS / "api.md").read_text()
+    named = set(re.findall(r"(?:auto\w+:: stickslip|`ss)\.(\w+)", page))
+    assert set(stickslip.__all__) - {"__version__"} <= named

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..system.units import factor_to_si, to_si
+from ..system.shown import Shown, facts
+from ..system.units import factor_to_si, shown, to_si
 from .resolution import estimate_resolution, noise_level
 
 Array = NDArray[np.float64]
@@ -204,8 +205,8 @@ def _reach(t: Array, y: Array, i: int, anchor: float, tolerance: float) -> int:
     return t.size - 1
 
 
-@dataclass(frozen=True, eq=False)
-class Trace:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trace(Shown):
     """A run in SI units; every array read-only, shape (n,).
 
     Args:
@@ -367,6 +368,25 @@ class Trace:
     def replace(self, **changes: object) -> Trace:
         """A copy with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+    def _parts(self) -> list[str]:
+        speed, spring = self.drive_velocity, self.spring_stiffness
+        what = {
+            "run": self.name,
+            "samples": self.time.size,
+            "length": shown(self.duration, "s"),
+            "sampling": shown(self.sampling_rate, "Hz"),
+            "drive": None if speed is None else shown(speed, "m/s"),
+            "spring": None if spring is None else shown(spring, "N/m"),
+            "contact": "virgin" if self.virgin else None,
+            "role": self.role,
+        }
+        ranges = {}
+        for name, unit in (*SIGNALS.items(), ("drive_position", "m"), ("normal_load", "N")):
+            values = getattr(self, name)
+            if values is not None:
+                ranges[name] = f"{shown(float(values.min()), unit)} to {shown(float(values.max()), unit)}"
+        return [facts(what), facts(ranges), *map(str, self.repairs), *self.warnings]
 
 
 def _si_array(values: Any, unit: str, what: str) -> Array:

@@ -14,7 +14,8 @@ from ..data.readers.repair import from_load_point
 from ..data.segment import Segmentation, segment
 from ..data.trace import Trace
 from ..errors import InputError, nearest
-from .shown import Shown, facts, table
+from ..system.shown import Shown, facts, table
+from .run import several
 
 if TYPE_CHECKING:
     import pandas
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from .forecast import Forecast
     from .inspection import Inspection
     from .run import Tell
-    from .static_fit import StaticFit
+    from .static_fit import Align, Sampling, StaticFit, Time
 
 
 class Campaign(Shown):
@@ -43,14 +44,17 @@ class Campaign(Shown):
     """
 
     def __init__(
-        self, description: files.Campaign, traces: Sequence[Trace], effects: Sequence[str | Path] = ()
+        self,
+        description: files.Campaign,
+        traces: Sequence[Trace],
+        effects: str | Path | Sequence[str | Path] = (),
     ) -> None:
-        self.description, self.traces, self.effects = description, tuple(traces), tuple(map(Path, effects))
+        self.description, self.traces, self.effects = description, tuple(traces), tuple(map(Path, several(effects)))
 
     @classmethod
     def from_traces(
         cls, traces: Sequence[Trace], rig: Mapping[str, Any] | None = None, title: str = "",
-        effects: Sequence[str | Path] = (),
+        effects: str | Path | Sequence[str | Path] = (),
     ) -> Campaign:  # fmt: skip
         """A campaign without a file.
 
@@ -132,7 +136,7 @@ class Campaign(Shown):
 
         return tuple(left_out(self.traces, self.scaled[0]))
 
-    def prepare(self, holdout: Sequence[str] = ()) -> Prepared:
+    def prepare(self, holdout: str | Sequence[str] = ()) -> Prepared:
         """The problem of the force along the measured motion, and where the fit of the base begins.
 
         Args:
@@ -144,49 +148,83 @@ class Campaign(Shown):
         from ..inference.diagnose.prepare import prepare
 
         try:
-            return prepare(self.description, self.displaced[0], self.scaled[0], holdout)
+            return prepare(self.description, self.displaced[0], self.scaled[0], several(holdout))
         except InputError as error:
             raise error.at(file=self._file) from None
 
-    def inspect(self) -> Inspection:
-        """Events of every run, what was mended or left out, and what these data can tell."""
+    def inspect(self, progress: Tell | None = None) -> Inspection:
+        """Events of every run, what was mended or left out, and what these data can tell.
+
+        Args:
+            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
+        """
         from .inspection import inspect
 
-        return inspect(self)
+        return inspect(self, progress)
 
     @overload
-    def fit(self, effects: Sequence[str] = ..., model: Literal["inertial"] = ..., **options: Any) -> Fit: ...
-    @overload
-    def fit(self, effects: Sequence[str], model: Literal["static"], **options: Any) -> StaticFit: ...
     def fit(
-        self, effects: Sequence[str] = (), model: Literal["inertial", "static"] = "inertial", **options: Any
-    ) -> Fit | StaticFit:
+        self, effects: str | Sequence[str] = ..., model: Literal["inertial"] = ..., *,
+        holdout: str | Sequence[str] = ..., progress: Tell | None = ...,
+    ) -> Fit: ...  # fmt: skip
+    @overload
+    def fit(
+        self, effects: tuple[()] = ..., *, model: Literal["static"], align: Align | None = ...,
+        time: Time | None = ..., v_lim: float | str | None = ..., sampling: Sampling | None = ...,
+        progress: Tell | None = ...,
+    ) -> StaticFit: ...  # fmt: skip
+    def fit(
+        self, effects: str | Sequence[str] = (), model: Literal["inertial", "static"] = "inertial", *,
+        holdout: str | Sequence[str] = (), align: Align | None = None, time: Time | None = None,
+        v_lim: float | str | None = None, sampling: Sampling | None = None, progress: Tell | None = None,
+    ) -> Fit | StaticFit:  # fmt: skip
         """Fit a model to all runs.
 
         Args:
             effects: of the dynamic model, such as ``"contact-ageing"`` or ``"machine-compliance:where=series"``.
             model: ``"inertial"``, the force along the measured motion, or ``"static"``, every creep process by itself.
-            options: ``holdout`` (names of runs no fit sees) and ``progress`` of the dynamic model; ``align``, ``time``,
-                ``v_lim``, ``sampling`` and ``progress`` of the static one (see ``stickslip fit --help``).
+            holdout: runs that no fit of the dynamic model sees.
+            align, time, v_lim, sampling: of the static model; see :func:`stickslip.objects.static_fit.fit_static`.
+            progress: told the stage and the share of it done; default a bar in a terminal or a notebook.
 
         Raises:
-            InputError: no run can take part, an effect that is not known or only shapes the backbone.
+            InputError: no such model, an argument that belongs to the other one, no run can take part, an effect that
+                is not known or only shapes the backbone.
             FitError: no finite model.
         """
         from .fit import fit
         from .static_fit import fit_static
 
+        dynamic = {"effects": effects, "holdout": holdout}
+        every = {"align": align, "time": time, "v_lim": v_lim, "sampling": sampling}
+        static: dict[str, Any] = {key: value for key, value in every.items() if value is not None}
+        if model not in ("inertial", "static"):
+            raise InputError(
+                "no such model", key="model", value=model, allowed='"inertial" or "static"',
+                hint="inertial is the dynamic one, which takes effects; static fits every creep process by itself",
+            )  # fmt: skip
+        for key, value in static.items() if model == "inertial" else dynamic.items():
+            if value:
+                other = "static" if model == "inertial" else "inertial"
+                raise InputError(
+                    f"an argument of the {other} model", key=key, value=value, hint=f'leave it out, or model="{other}"'
+                )
         if model == "static":
-            if effects:
-                raise InputError("effects belong to the dynamic model", key="effects", hint='use model="inertial"')
-            return fit_static(self, **options)
-        return fit(self, effects, **options)
+            return fit_static(self, **static, progress=progress)
+        return fit(self, effects, holdout=holdout, progress=progress)
 
-    def diagnose(self, **options: Any) -> Diagnosis:
+    def diagnose(
+        self, *, candidates: str | Sequence[str] | None = None, max_effects: int = 4,
+        holdout: str | Sequence[str] = (), jobs: int | None = None, time_limit: float | None = None,
+        out: str | Path | None = None, force: bool = False, progress: Tell | None = None,
+    ) -> Diagnosis:  # fmt: skip
         """Find the physical effect that the base model lacks; see :func:`stickslip.objects.diagnosis.diagnose`."""
         from .diagnosis import diagnose
 
-        return diagnose(self, **options)
+        return diagnose(
+            self, candidates=candidates, max_effects=max_effects, holdout=holdout, jobs=jobs, time_limit=time_limit,
+            out=out, force=force, progress=progress,
+        )  # fmt: skip
 
     def levels(self, name: str | None = None) -> xarray.Dataset:
         """Force of the spring at onset and arrest of every slip of a run, and when and where; no fit is needed.
@@ -218,7 +256,7 @@ class Campaign(Shown):
             train: share of its length from which everything is learned.
             at: mean recurrences after an arrest at which a forecast is made, once in each stick; default moments all
                 along, ten in a mean recurrence.
-            progress: told what is done and the share of it.
+            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
 
         Raises:
             InputError: no run of that name, too few slips, no load point or force, shares out of range.
@@ -281,15 +319,17 @@ def _with_spring(trace: Trace, described: files.Campaign) -> Trace:
     return trace
 
 
-def _load_effects(paths: Sequence[str | Path]) -> None:
+def _load_effects(paths: str | Path | Sequence[str | Path]) -> None:
     """Put effects of one's own into the catalogue, which is loaded for them only."""
     if paths:
         from ..simulation.conformance import load_effects
 
-        load_effects(paths)
+        load_effects(several(paths))
 
 
-def load_campaign(path: str | Path, effects: Sequence[str | Path] = (), progress: Tell | None = None) -> Campaign:
+def load_campaign(
+    path: str | Path, effects: str | Path | Sequence[str | Path] = (), progress: Tell | None = None
+) -> Campaign:
     """Read a campaign file and the runs it names.
 
     Args:

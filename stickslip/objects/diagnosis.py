@@ -21,13 +21,14 @@ from ..physics.effects import catalogue
 from ..show.report import abilities, write_report
 from ..show.report.diagnosis_result import trace_sections
 from ..simulation.conformance import try_laws
+from ..system.progress import telling
 from ..system.runstore import json_text, open_run, refuse_existing, versions
+from ..system.shown import facts, table
 from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .fit import Fit
 from .next_experiment import next_experiment
-from .run import Savable, Tell, dataset, head, silent
-from .shown import facts, table
+from .run import Savable, Tell, dataset, head, several
 from .wander import wander, wander_sentence
 
 if TYPE_CHECKING:
@@ -136,9 +137,9 @@ class Diagnosis(Savable):
 def diagnose(
     campaign: Campaign,
     *,
-    candidates: Sequence[str] | None = None,
+    candidates: str | Sequence[str] | None = None,
     max_effects: int = 4,
-    holdout: Sequence[str] = (),
+    holdout: str | Sequence[str] = (),
     jobs: int | None = None,
     time_limit: float | None = None,
     out: str | Path | None = None,
@@ -157,7 +158,7 @@ def diagnose(
         out: run folder for ``result.json``, ``arrays.nc``, ``report.html`` and the finished parts, from which an
             interrupted diagnosis goes on; default none.
         force: replace an existing run folder.
-        progress: told the stage and the share of it done.
+        progress: told the stage and the share of it done; default a bar in a terminal or a notebook.
 
     Raises:
         InputError: a tag or number that cannot be used, no run that can take part, a rig that cannot be.
@@ -165,8 +166,10 @@ def diagnose(
     """
     check_counts(max_effects, jobs)
     check_time(time_limit)
+    holdout = several(holdout)
     began = time.perf_counter()
     if candidates is not None:
+        candidates = several(candidates)
         _check_candidates(candidates)
     try_laws(catalogue.get(tag) for tag in (catalogue.tags() if candidates is None else candidates))
     rig = campaign.findings
@@ -175,12 +178,12 @@ def diagnose(
     except InputError as error:
         raise error.at(file=campaign.description.path) from None
 
-    def found(store: Store | None, ready: int) -> Diagnosis:
+    def found(store: Store | None, ready: int, tell: Tell) -> Diagnosis:
         # before minutes of fitting, in which a wrong unit may be mended
         first = [f.sentence for f in rig] + list(able.cannot)
         first += [f"resuming from {ready} finished parts"] if ready else []
-        if progress is not None and first:
-            progress("\n         ".join(["before anything is fitted:", *first]), 0.0)
+        if first:
+            tell("\n         ".join(["before anything is fitted:", *first]), 0.0)
         left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), 0.0)
         try:
             done = search(
@@ -194,17 +197,18 @@ def diagnose(
                 store=store,
                 time_limit=left,
                 wrong=stopping(rig),
-                progress=progress,
+                progress=tell,
             )
         except InputError as error:
             for finding in reversed(stopping(rig)):  # with the sign wrong in every run there are no slips to fit
                 error = error.with_hint(finding.sentence)
             raise error.at(file=campaign.description.path) from None
-        return _made(campaign, done, able, began, time_limit, progress or silent)
+        return _made(campaign, done, able, began, time_limit, tell)
 
     if out is None:
-        return found(None, 0)
-    with open_run(out, force=force, resume=True) as run:
+        with telling("diagnosing", progress) as tell:
+            return found(None, 0, tell)
+    with open_run(out, force=force, resume=True) as run, telling("diagnosing", progress) as tell:
         key = json_text(
             {
                 "inputs": campaign.inputs(),
@@ -215,7 +219,7 @@ def diagnose(
         )
         pieces = Pieces(run, key)
         try:
-            made = found(pieces, pieces.ready())
+            made = found(pieces, pieces.ready(), tell)
         except KeyboardInterrupt:
             text = f"{pieces.ready()} finished parts are kept, and the same command resumes from them"
             raise KeyboardInterrupt(text) from None

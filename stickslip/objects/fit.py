@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,21 +26,24 @@ from ..inference.force.residual import coordinates
 from ..physics.effects import catalogue
 from ..physics.effects.named import with_form
 from ..simulation.conformance import try_laws
+from ..system.progress import portion, telling
+from ..system.shown import facts
 from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rough_lines
 from .fit_result import fit_result
 from .fit_tables import STRENGTH, error_table, ladder_table, parameter_table
 from .free_cycles import free_run_errors, freely
 from .parameters_by_hand import moved, profile, refitted
 from .picture import FitPlots
-from .run import Savable, Tell, dataset, silent
-from .shown import facts
+from .run import Savable, Tell, dataset, several
 
 if TYPE_CHECKING:
     import arviz
     import pandas
     import xarray
 
+    from ..simulation.scenario.load import Scenario
     from .campaign import Campaign
+    from .fitted_run import Moves
 
 
 class Fit(Savable):
@@ -226,7 +230,7 @@ class Fit(Savable):
             made.__dict__["_where"] = self._where
         return made
 
-    def refit(self, locked: Sequence[str] = ()) -> Fit:
+    def refit(self, locked: str | Sequence[str] = ()) -> Fit:
         """Fitted anew from where it stands.
 
         Args:
@@ -235,7 +239,8 @@ class Fit(Savable):
         Raises:
             InputError: no free parameter of that name.
         """
-        return Fit(self.campaign, replaced(self.climbed, refitted(self, locked)))
+        with _told("refitting", "all parameters"):
+            return Fit(self.campaign, replaced(self.climbed, refitted(self, several(locked))))
 
     def add(self, effect: str) -> Fit:
         """The model with an effect more, fitted: ``fit.add("contact-ageing")``.
@@ -251,7 +256,8 @@ class Fit(Savable):
         if tag in self.effects:
             raise InputError("the effect is in the model already", key="effect", value=effect)
         try_laws([catalogue.get(tag)])
-        return Fit(self.campaign, extended(self.climbed, tag, form))
+        with _told("fitting", f"adding {tag}"):
+            return Fit(self.campaign, extended(self.climbed, tag, form))
 
     def remove(self, effect: str) -> Fit:
         """The model without one of its effects, fitted anew.
@@ -263,12 +269,16 @@ class Fit(Savable):
             raise InputError(
                 "the effect is not in the model", key="effect", value=effect, hint=nearest(effect, self.effects)
             )
-        return Fit(self.campaign, shortened(self.climbed, effect))
+        with _told("fitting", f"without {effect}"):
+            return Fit(self.campaign, shortened(self.climbed, effect))
 
     # what it foretells
 
     def predict(self, progress: Tell | None = None) -> pandas.DataFrame:
         """Errors of the model run freely, from arrest to arrest, through runs it was not fitted to.
+
+        Args:
+            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
 
         Returns:
             A row for each run: relative errors (1) of recurrence, slip and creep before the onset; slips missed.
@@ -295,24 +305,30 @@ class Fit(Savable):
         law = power_law(backbone(self._fit), self._contacts)
         return fitted_model(self._fit, law, self.climbed.prepared.traces, self._contacts, self.campaign.rig)
 
-    def scenario(self, changes: Sequence[str] = (), run: str | None = None, events: int = 5) -> Any:
+    def scenario(
+        self, changes: str | Sequence[str] = (), run: str | None = None, events: int = 5, drive: Moves | None = None
+    ) -> Scenario:
         """The model as a scenario, for :func:`stickslip.simulate`.
 
         Args:
             changes: such as ``"drive.velocity=100um/s"``.
             run: drive as this measured run was; default at the first run's velocity, for so many ``events``.
             events: slips to simulate where the drive has one velocity.
+            drive: another one: a velocity such as ``"800 um/s"`` (a number in m/s), or until when and how fast, piece
+                by piece, as of :meth:`stickslip.Trace.from_arrays`: ``[("4 s", "100 um/s"), ("5 s", 0)]``.
         """
         from .fitted_run import FittedRun
 
         record = FittedRun(Path(), {"title": self.campaign.title}, self.fitted)
-        return record.scenario(changes, run, events)
+        return record.scenario(changes, run, events, drive)
 
-    def simulate(self, changes: Sequence[str] = (), run: str | None = None, events: int = 5) -> xarray.Dataset:
-        """Run the model freely under another drive; arguments as of :meth:`scenario`."""
+    def simulate(
+        self, changes: str | Sequence[str] = (), run: str | None = None, events: int = 5, drive: Moves | None = None
+    ) -> xarray.Dataset:
+        """Run the model freely: ``fit.simulate(drive="800 um/s")``; arguments as of :meth:`scenario`."""
         from ..simulation.scenario import simulate
 
-        return simulate(self.scenario(changes, run, events))
+        return simulate(self.scenario(changes, run, events, drive))
 
     def profile(self, name: str, progress: Tell | None = None) -> dict[str, Any]:
         """Profile likelihood of a parameter: held at values around its best one, all others fitted.
@@ -324,9 +340,12 @@ class Fit(Savable):
         Raises:
             InputError: no free parameter of that name.
         """
-        return profile(self, name, progress or silent)
+        with telling(f"profile of {name}", progress) as tell:
+            return profile(self, name, tell)
 
-    def sample(self, draws: int = 200, tune: int = 100, chains: int = 2, seed: int = 0) -> arviz.InferenceData:
+    def sample(
+        self, draws: int = 200, tune: int = 100, chains: int = 2, seed: int = 0, progress: Tell | None = None
+    ) -> arviz.InferenceData:
         """Draw from the posterior by the No-U-Turn sampler (Hoffman & Gelman, JMLR 15 (2014) 1593; by nutpie).
 
         The covariance of the residuals is that of the fit, every event is marginalised; gradients are exact.
@@ -335,6 +354,7 @@ class Fit(Savable):
             draws, tune: of each chain, kept and for adaptation.
             chains: side by side.
             seed: of the draws.
+            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
 
         Returns:
             ``posterior`` holds the free parameters (SI, ``attrs["units"]``) and ``contact.strength``; its
@@ -345,14 +365,16 @@ class Fit(Savable):
         """
         from .posterior import sample
 
-        return sample(self, draws, tune, chains, seed)
+        with telling("sampling", progress) as tell:
+            return sample(self, draws, tune, chains, seed, tell)
 
     # what is kept
 
     def confirm(self, progress: Tell | None = None) -> Confirmation:
         """Base and last model run freely through the measured cycles; simulated once."""
         if self._confirmation is None:
-            self._confirmation = self.climbed.confirmed(progress or silent)
+            with telling("running freely", progress) as tell:
+                self._confirmation = self.climbed.confirmed(tell)
         return self._confirmation
 
     @cached_property
@@ -416,9 +438,16 @@ class Fit(Savable):
         return [facts(what), self.parameters[["value", "std", "unit"]], self.errors]
 
 
+@contextmanager
+def _told(title: str, text: str) -> Iterator[None]:
+    """Shows the shares of the work within, where somebody sees them."""
+    with telling(title, None) as tell, portion(0.0, 1.0, partial(tell, text)):
+        yield
+
+
 def fit(
-    campaign: Campaign, effects: Sequence[str] = (), *, holdout: Sequence[str] = (), key: str = "effects",
-    profiles: Sequence[str] = (), progress: Tell | None = None,
+    campaign: Campaign, effects: str | Sequence[str] = (), *, holdout: str | Sequence[str] = (),
+    key: str = "effects", profiles: Sequence[str] = (), progress: Tell | None = None,
 ) -> Fit:  # fmt: skip
     """Fit the dynamic model along the measured motion (see :meth:`Campaign.fit`).
 
@@ -430,7 +459,7 @@ def fit(
         profiles: parameters that will be asked for: a wrong name is an error before anything is fitted.
         progress: told the stage and the share of it done.
     """
-    forms = chosen(effects, key)
+    forms = chosen(several(effects), key)
     try_laws(catalogue.get(tag) for tag, _ in forms)
     prepared = campaign.prepare(holdout)
     own = [f.name for tag, form in forms for f in effect_parameters(catalogue.get(tag)(**form))]
@@ -438,4 +467,5 @@ def fit(
     for name in profiles:
         if name not in known:
             raise InputError("no free parameter of that name", key="--profile", value=name, hint=nearest(name, known))
-    return Fit(campaign, climb(prepared, forms, progress or silent))
+    with telling("fitting", progress) as tell:
+        return Fit(campaign, climb(prepared, forms, tell))

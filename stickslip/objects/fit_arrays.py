@@ -26,8 +26,13 @@ def parameter_covariance(fit: Fit) -> xarray.DataArray:
     names, found = [f.name for f in fit.free], fit.force_fit
     slope = np.array([f.slope(float(z)) for f, z in zip(fit.free, found.point.z, strict=True)])
     part = found.covariance[: len(names), : len(names)] * slope[:, None] * slope
+    units = [f.unit for f in fit.free]
     return xarray.DataArray(
-        part, dims=("parameter", "other"), coords={"parameter": names, "other": names}, name="covariance"
+        part,
+        dims=("parameter", "other"),
+        coords={"parameter": names, "other": names, "unit": ("parameter", units), "other_unit": ("other", units)},
+        name="covariance",
+        attrs={"units": "unit * other_unit", "long_name": "covariance of free parameters"},
     )
 
 

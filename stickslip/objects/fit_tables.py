@@ -10,7 +10,7 @@ import numpy as np
 from ..inference.force.errors import Sums, of_all
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.knots import PHASES
-from .shown import table
+from ..system.shown import table
 
 if TYPE_CHECKING:
     import pandas

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..data.trace import Drive
 from ..errors import InputError, RunFolderError, nearest
 from ..inference.fit.equations import solved
 from ..inference.fit.serialised import KEY, Driven, Fitted, constant_drive, from_record, pieces_drive, shared
@@ -18,7 +21,14 @@ from ..simulation.conformance import load_effects
 from ..simulation.scenario.load import Scenario, make_scenario
 from ..simulation.scenario.overrides import parse_assignment
 from ..system.runstore import RESULT, read_result
+from ..system.shown import Shown, facts, table
+from ..system.units import to_si
+from .run import several
 
+if TYPE_CHECKING:
+    import pandas
+
+Moves = float | str | Sequence[tuple[float | str, float | str]]  # a velocity, or until when and how fast
 EVENTS = 5  # slips that are simulated unless told otherwise
 FRICTION = 0.2  # where neither load nor friction of a contact is known; only their product acts
 _OTHERWISE = {  # parameters of a fit that a scenario has in another way -> what to set
@@ -27,8 +37,8 @@ _OTHERWISE = {  # parameters of a fit that a scenario has in another way -> what
 }
 
 
-@dataclass(frozen=True)
-class FittedRun:
+@dataclass(frozen=True, repr=False)
+class FittedRun(Shown):
     """A run folder of ``stickslip fit --model inertial`` or ``stickslip diagnose``.
 
     Attributes:
@@ -57,11 +67,17 @@ class FittedRun:
         return tuple(with_form(e) for e in self.fitted.composition.effects)
 
     @property
-    def parameters(self) -> dict[str, dict[str, Any]]:
-        """Name -> ``value`` and ``std`` (SI), ``unit`` and ``doc`` of every fitted parameter of the model."""
+    def parameters(self) -> pandas.DataFrame:
+        """Value and standard deviation (SI), unit, prior and meaning of every fitted parameter of the model."""
         values, std = self.fitted.values, self.fitted.std
         free = [f for f in self.fitted.composition.free if shared(f.name)]
-        return {f.name: {"value": values[f.name], "std": std[f.name], "unit": f.unit, "doc": f.doc} for f in free}
+        rows = {
+            f.name: {
+                "value": values[f.name], "std": std[f.name], "unit": f.unit, "prior": f.known, "meaning": f.doc,
+            }
+            for f in free
+        }  # fmt: skip
+        return table(rows, "parameter")
 
     @property
     def runs(self) -> tuple[Driven, ...]:
@@ -87,7 +103,10 @@ class FittedRun:
         """The equations that are solved, with the fitted values."""
         return solved(self.fitted)
 
-    def scenario(self, changes: Sequence[str] = (), trace: str | None = None, events: int = EVENTS) -> Scenario:
+    def scenario(
+        self, changes: str | Sequence[str] = (), trace: str | None = None, events: int = EVENTS,
+        drive: Moves | None = None,
+    ) -> Scenario:  # fmt: skip
         """The model as a scenario.
 
         Args:
@@ -95,17 +114,21 @@ class FittedRun:
                 gives them (``"rig.mass=0.1"``, ``"contact-ageing.rate=0"``).
             trace: drive as this measured run was; default at the first run's velocity, for so many ``events``.
             events: slips to simulate where the drive has one velocity.
+            drive: another one: a velocity such as ``"800 um/s"`` (a number in m/s), or until when and how fast, piece
+                by piece, as of :meth:`stickslip.Trace.from_arrays`: ``[("4 s", "100 um/s"), ("5 s", 0)]``.
 
         Raises:
-            InputError: no such run, or a change that is none.
+            InputError: no such run, a change or a drive that is none.
         """
         run = self._first() if trace is None else self._run(trace)
-        drive: dict[str, Any] = {"velocity": run.velocity, "events": events}
-        if trace is not None and run.pieces:
-            drive = {"piece": [{"velocity": v, "duration": dt} for v, dt in run.pieces]}
+        motion: dict[str, Any] = {"velocity": run.velocity, "events": events}
+        if drive is not None:
+            motion = _drive_table(drive, events)
+        elif trace is not None and run.pieces:
+            motion = {"piece": [{"velocity": v, "duration": dt} for v, dt in run.pieces]}
         spring = self._spring() if trace is None else run.stiffness
-        content = scenario_content(self.fitted, f"{self.title}: {' + '.join(self.parts)}", drive, spring)
-        given = [(self.key(name), value) for name, value in map(parse_assignment, changes)]
+        content = scenario_content(self.fitted, f"{self.title}: {' + '.join(self.parts)}", motion, spring)
+        given = [(self.key(name), value) for name, value in map(parse_assignment, several(changes))]
         made = make_scenario(content, self.folder).with_changes(given)
         return replace(made, path=self.folder / RESULT)
 
@@ -120,6 +143,11 @@ class FittedRun:
         table, _, rest = name.partition(".")
         tags = [effect.tag for effect in self.fitted.effects()]
         return f"block.{rest}" if table == "rig" else f"effect.{name}" if table in tags else name
+
+    def _parts(self) -> list[Any]:
+        verdict = self.result.get("verdict", {}).get("text")
+        what = {"folder": self.folder, "campaign": self.title, "model": " + ".join(self.parts), "verdict": verdict}
+        return [facts(what), self.parameters[["value", "std", "unit"]]]
 
     def _first(self) -> Driven:
         if not self.runs:
@@ -143,7 +171,25 @@ class FittedRun:
         return own[0] if own and None not in own else None
 
 
-def load_run(folder: str | Path, effects: Sequence[str | Path] = ()) -> FittedRun:
+def _drive_table(drive: Moves, events: int) -> dict[str, Any]:
+    """A drive in Python as the table of a scenario."""
+    if isinstance(drive, int | float | str):
+        return {"velocity": to_si(drive, "m/s", key="drive"), "events": events}
+    try:
+        ends, speeds = zip(*drive, strict=True)
+    except (TypeError, ValueError):
+        raise InputError(
+            "no drive", key="drive", value=drive,
+            allowed='a velocity ("800 um/s"), or pieces: until when and how fast ([("4 s", "100 um/s"), ("5 s", 0)])',
+        ) from None  # fmt: skip
+    until = [to_si(end, "s", key="drive") for end in ends]
+    moves = Drive.from_pieces(until, [to_si(speed, "m/s", key="drive") for speed in speeds])
+    lengths = np.diff(moves.times)
+    pieces = zip(np.diff(moves.positions) / lengths, lengths, strict=True)
+    return {"piece": [{"velocity": float(v), "duration": float(t)} for v, t in pieces]}
+
+
+def load_run(folder: str | Path, effects: str | Path | Sequence[str | Path] = ()) -> FittedRun:
     """Read the model that a fit or a diagnosis left in its run folder.
 
     Args:
@@ -156,7 +202,7 @@ def load_run(folder: str | Path, effects: Sequence[str | Path] = ()) -> FittedRu
     """
     folder = Path(folder)
     result = read_result(folder)
-    load_effects(effects)
+    load_effects(several(effects))
     section = result.get(KEY)
     if section is None:
         raise RunFolderError(

@@ -14,8 +14,9 @@ from ..inference.forecast.rolling import SHARES, Rolled, choose, prepare, roll
 from ..inference.forecast.scoring import quantiles
 from ..inference.forecast.telling import steps, told
 from ..inference.forecast.wander import Wander
+from ..system.progress import telling
+from ..system.shown import facts, table
 from .run import Savable, Tell, dataset, head
-from .shown import facts, table
 from .wander import most_slips
 
 if TYPE_CHECKING:
@@ -134,10 +135,14 @@ def forecast(
 ) -> Forecast:  # fmt: skip
     """See :meth:`Campaign.forecast`."""
     number = _chosen(campaign, run)
-    trace = campaign.traces[number]
     if at is not None and not at >= 0.0:
         raise InputError("a moment before the stick begins", key="at", value=at, allowed="0 or more")
-    tell: Tell = progress if progress is not None else lambda text, share: None
+    with telling("forecasting", progress) as tell:
+        return _forecast(campaign, number, train, at, tell)
+
+
+def _forecast(campaign: Campaign, number: int, train: float, at: float | None, tell: Tell) -> Forecast:
+    trace = campaign.traces[number]
     try:
         tell(f"levels of {trace.name}", 0.0)
         past, laws = prepare(trace, train)

@@ -14,7 +14,7 @@ from ..inference.diagnose.free_errors import errors
 from ..inference.diagnose.free_measures import simulated
 from ..inference.diagnose.prepare import Prepared
 from ..inference.force.fit import Fit
-from .shown import table
+from ..system.shown import table
 
 if TYPE_CHECKING:
     import pandas

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..system.progress import telling
 from ..system.runstore import open_run
-from .run import dataset, head
-from .shown import Shown, facts, table
+from ..system.shown import Shown, facts, table
+from .run import Tell, dataset, head
 
 if TYPE_CHECKING:
     import pandas
@@ -87,7 +88,7 @@ class Inspection(Shown):
         return [facts({"campaign": self.result["title"]}), self.campaign.summary, *lines]
 
 
-def inspect(campaign: Campaign) -> Inspection:
+def inspect(campaign: Campaign, progress: Tell | None = None) -> Inspection:
     """See :meth:`Campaign.inspect`."""
     from ..data.checks import rig_against_motion, stopping
     from ..inference.diagnose.spring import spring_finding
@@ -96,17 +97,19 @@ def inspect(campaign: Campaign) -> Inspection:
 
     rows: list[dict[str, Any]] = []
     variables: dict[str, tuple] = {}
-    traces, events = campaign.traces, campaign.events
-    for i, (trace, segmentation) in enumerate(zip(traces, events, strict=True)):
-        row = describe_trace(trace, segmentation)
-        ripple = stick_ripple(trace, segmentation) if trace.drive is not None else None
-        if ripple is not None:
-            key = f"trace{i}_ripple"
-            for name, unit in (("frequency", "Hz"), ("amplitude", ripple["unit"])):
-                variables[f"{key}_{name}"] = (key, ripple.pop(name), {"units": unit})
-            row["ripple"] = ripple
-        variables |= trace_pieces(trace, segmentation, i)
-        rows.append(row)
+    with telling("inspecting", progress) as tell:
+        traces, events = campaign.traces, campaign.events
+        for i, (trace, segmentation) in enumerate(zip(traces, events, strict=True)):
+            tell(trace.name, i / len(traces))
+            row = describe_trace(trace, segmentation)
+            ripple = stick_ripple(trace, segmentation) if trace.drive is not None else None
+            if ripple is not None:
+                key = f"trace{i}_ripple"
+                for name, unit in (("frequency", "Hz"), ("amplitude", ripple["unit"])):
+                    variables[f"{key}_{name}"] = (key, ripple.pop(name), {"units": unit})
+                row["ripple"] = ripple
+            variables |= trace_pieces(trace, segmentation, i)
+            rows.append(row)
     able = abilities(traces, events)
     rig = list(rig_against_motion(campaign.description, traces, events))
     if not stopping(rig) and (wrong := spring_finding(campaign.description, traces, events)) is not None:

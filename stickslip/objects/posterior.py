@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from ..errors import InputError
 from ..inference.fit.parameters import to_si
 from ..inference.force.posterior import Walked, walked
 from .fit_tables import STRENGTH
+from .run import Tell
 
 if TYPE_CHECKING:
     import arviz
@@ -20,7 +22,7 @@ ALIKE = 1.05  # R-hat from which the chains do not agree
 FEW = 100  # effective draws below which a 95 % interval is rough
 
 
-def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int) -> arviz.InferenceData:
+def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int, tell: Tell) -> arviz.InferenceData:
     """See :meth:`stickslip.Fit.sample`."""
     if min(draws, tune, chains) < 1:
         raise InputError(
@@ -32,10 +34,17 @@ def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int) -> arviz.Inf
     except ImportError:
         raise InputError("sampling needs nutpie and ArviZ", hint="pip install 'stickslip[posterior]'") from None
     way, names = walked(fit._fit), [f.name for f in fit.free]
+    done, total = itertools.count(1), chains * (draws + tune)
+
+    def drawn(x: np.ndarray) -> dict[str, Any]:
+        n = next(done)
+        tell(f"{n} of {total} draws", n / total)
+        return _expanded(way, names, x)
+
     model = from_pyfunc(
         way.size,
         lambda: lambda x, **_: way.at(np.asarray(x))[1:],
-        lambda *_: lambda x, **__: _expanded(way, names, np.asarray(x)),
+        lambda *_: lambda x, **__: drawn(np.asarray(x)),
         [np.dtype(np.float64)] * (len(names) + 1),
         [()] * (len(names) + 1),
         [*names, STRENGTH],

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from ..system.runstore import open_run, versions
-from .shown import Shown
+from ..system.shown import Shown
 
 if TYPE_CHECKING:
     import xarray
@@ -15,10 +15,12 @@ if TYPE_CHECKING:
     from .campaign import Campaign
 
 Tell = Callable[[str, float], None]
+Name = TypeVar("Name", bound=str | Path)
 
 
-def silent(text: str, share: float) -> None:
-    """Progress that nobody is told."""
+def several(names: Name | Sequence[Name]) -> tuple[Name, ...]:
+    """Names, of which a single one may stand by itself."""
+    return (names,) if isinstance(names, str | Path) else tuple(names)
 
 
 def head(campaign: Campaign, kind: str) -> dict[str, Any]:

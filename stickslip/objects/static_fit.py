@@ -5,12 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import InputError
+from ..system.progress import telling
+from ..system.shown import facts
 from ..system.units import to_si
-from .run import Savable, Tell, dataset, head, silent
-from .shown import facts
+from .run import Savable, Tell, dataset, head
 
 if TYPE_CHECKING:
     from .campaign import Campaign
+
+Align = Literal["consistent", "paper"]
+Time = Literal["exact", "paper"]
+Sampling = Literal["log", "uniform"]
 
 
 class StaticFit(Savable):
@@ -34,10 +39,10 @@ class StaticFit(Savable):
 def fit_static(
     campaign: Campaign,
     *,
-    align: Literal["consistent", "paper"] = "consistent",
-    time: Literal["exact", "paper"] = "exact",
+    align: Align = "consistent",
+    time: Time = "exact",
     v_lim: float | str = 1e-6,
-    sampling: Literal["log", "uniform"] = "log",
+    sampling: Sampling = "log",
     progress: Tell | None = None,
 ) -> StaticFit:
     """Fit the static model to every creep process (see :meth:`Campaign.fit`).
@@ -58,24 +63,25 @@ def fit_static(
     from ..show.report import describe_trace, trace_pieces
     from ..show.report.static_result import static_result
 
-    tell, file = progress or silent, campaign.description.path
+    file = campaign.description.path
     traces, found = campaign.traces, campaign.scaled[0]
 
     def rig_of(trace: Trace) -> StaticRig:
         return StaticRig.of(campaign.description.rig_of(trace.name), spring_stiffness=trace.spring_stiffness)
 
     try:
-        result, variables = static_result(
-            traces,
-            found,
-            rig_of,
-            align=align,
-            form=time,
-            v_lim=to_si(v_lim, "m/s", key="v_lim"),
-            sampling=sampling,
-            springs=campaign.rig.springs,
-            progress=lambda done, of: tell(f"{done} of {of} fitted", done / of),
-        )
+        with telling("creep processes", progress) as tell:
+            result, variables = static_result(
+                traces,
+                found,
+                rig_of,
+                align=align,
+                form=time,
+                v_lim=to_si(v_lim, "m/s", key="v_lim"),
+                sampling=sampling,
+                springs=campaign.rig.springs,
+                progress=lambda done, of: tell(f"{done} of {of} fitted", done / of),
+            )
     except InputError as error:
         raise error.at(file=file) from None
     notes = list(campaign.scaled[1])

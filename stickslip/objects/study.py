@@ -12,8 +12,9 @@ import numpy as np
 from ..errors import InputError, StickslipError
 from ..system.cluster import cluster
 from ..system.lifeline import end_with
+from ..system.progress import silent, telling
 from .campaign import load_campaign
-from .run import Tell
+from .run import Tell, several
 
 if TYPE_CHECKING:
     import xarray
@@ -22,10 +23,10 @@ WHOLE = ("error", "unseen_error", "cost", "cycles")
 
 
 def study(
-    campaigns: Mapping[str, str | Path] | Sequence[str | Path],
-    effects: Sequence[str] = (),
+    campaigns: Mapping[str, str | Path] | str | Path | Sequence[str | Path],
+    effects: str | Sequence[str] = (),
     *,
-    files: Sequence[str | Path] = (),
+    files: str | Path | Sequence[str | Path] = (),
     scheduler: str | None = None,
     workers: int | None = None,
     progress: Tell | None = None,
@@ -38,7 +39,7 @@ def study(
         files: Python files with effects of one's own; they must be there on every worker.
         scheduler: address of a running dask scheduler, ``tcp://host:8786``; default a cluster on this machine.
         workers: of the local cluster; default one a core.
-        progress: told which campaign is done and the share of all.
+        progress: told which campaign is done and the share of all; default a bar in a terminal or a notebook.
 
     Returns:
         Over ``campaign`` and ``parameter``: ``value`` and ``std`` (SI, unit in the coordinate ``unit``); over
@@ -49,23 +50,23 @@ def study(
         InputError: no campaign, two of one name, or no scheduler at that address.
         StickslipError: dask.distributed is missing.
     """
+    campaigns = campaigns if isinstance(campaigns, Mapping) else several(campaigns)
     named = dict(campaigns) if isinstance(campaigns, Mapping) else {_name(Path(p)): p for p in campaigns}
     if not named or len(named) != len(campaigns):
         raise InputError("at least one campaign is needed, each with a unique name", value=len(campaigns))
     found: dict[str, dict[str, Any]] = {}
-    with cluster(scheduler, workers) as client, client.as_current():
+    with telling("studying", progress) as tell, cluster(scheduler, workers) as client, client.as_current():
         from distributed import as_completed
 
         local = None if scheduler else os.getpid()
-        own = (tuple(effects), tuple(map(str, files)), local)
+        own = (several(effects), tuple(map(str, several(files))), local)
         work = {
             client.submit(_fitted, str(Path(path).resolve()), *own, pure=False): name for name, path in named.items()
         }
         for done in as_completed(work):
             name = work[done]
             found[name] = done.result()
-            if progress is not None:
-                progress(name, len(found) / len(named))
+            tell(name, len(found) / len(named))
     return _together({name: found[name] for name in named})
 
 
@@ -81,7 +82,7 @@ def _fitted(path: str, effects: tuple[str, ...], files: tuple[str, ...], parent:
         end_with(parent)
     cache.enable()
     try:
-        fit = load_campaign(path, files).fit(effects)
+        fit = load_campaign(path, files).fit(effects, progress=silent)
     except StickslipError as error:
         return {"note": str(error).split("\n")[0]}
     frame = fit.parameters

@@ -5,6 +5,7 @@ Set through environment variables before JAX is imported, so nothing here import
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 import tempfile
@@ -135,4 +136,7 @@ def forget_programs(ample: int = AMPLE) -> bool:
     much = bool(psutil.Process().memory_info().rss > ample)
     if much:
         jax.clear_caches()
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
+        if trim is not None:  # of the GNU library, which else keeps what was freed
+            trim(0)
     return much

@@ -7,13 +7,19 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from html import escape
 
 from ..errors import StickslipError
 
 PATIENCE = 1.0  # s before anything is shown
 LEAST = 0.05  # share of a stage that tells how long the rest takes
+REFRESH = 0.2  # s between two states of a bar under a cell
 EVERY = 30.0  # s between lines where there is no terminal
 Tell = Callable[..., None]
+
+
+def silent(text: str, share: float | None = None) -> None:
+    """Progress that nobody is told."""
 
 
 class Stage:
@@ -41,9 +47,70 @@ def working(title: str) -> Iterator[Tell]:
     ``share`` (0 to 1) is how much is done; time left follows from it. A notebook shows the bar under the cell; where
     stderr is neither that nor a terminal a line is written every half minute.
     """
-    if not sys.stderr.isatty() and "ipykernel" not in sys.modules:
+    if _in_notebook():
+        with _cell(title) as tell:
+            yield tell
+    elif sys.stderr.isatty():
+        with _bar(title) as tell:
+            yield tell
+    else:
         yield _lines(title)
-        return
+
+
+@contextmanager
+def telling(title: str, progress: Tell | None) -> Iterator[Tell]:
+    """Gives ``progress``; where that is None, a bar if a terminal or a notebook shows it, else silence.
+
+    Work that can be ended from elsewhere, as in the workbench, shows its progress there.
+    """
+    if progress is not None:
+        yield progress
+    elif _asked.get() is None and (_in_notebook() or sys.stderr.isatty()):
+        with working(title) as tell:
+            yield tell
+    else:
+        yield silent
+
+
+def _in_notebook() -> bool:
+    """Whether a kernel runs this, whose front end shows what is displayed."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return hasattr(shell, "kernel")
+
+
+@contextmanager
+def _cell(title: str) -> Iterator[Tell]:
+    """A bar under the cell of a notebook, taken away when the work is done."""
+    from IPython.display import HTML, display
+
+    began = last = time.monotonic()
+    stage, shown = Stage(began), None
+
+    def tell(text: str, share: float | None = None) -> None:
+        nonlocal last, shown
+        now = time.monotonic()
+        seconds = None if share is None else stage.left(now, share)
+        if now - began < PATIENCE or now - last < REFRESH:
+            return
+        last = now
+        left = "" if seconds is None else f", {seconds:.0f} s left"
+        done = "" if share is None else f' value="{share:.3f}"'
+        page = HTML(f"{escape(title)} <progress{done}></progress> {escape(text)} ({now - began:.0f} s{left})")
+        if shown is None:
+            shown = display(page, display_id=True)
+        else:
+            shown.update(page)
+
+    try:
+        yield tell
+    finally:
+        if shown is not None:
+            shown.update(HTML(""))
+
+
+@contextmanager
+def _bar(title: str) -> Iterator[Tell]:
+    """A bar on a terminal."""
     from rich import progress as bars
     from rich.console import Console
     from rich.text import Text
@@ -131,10 +198,15 @@ def showing(show: Callable[[float], None]) -> Iterator[None]:
 
 
 @contextmanager
-def portion(low: float, high: float) -> Iterator[None]:
-    """Within it shares count from ``low`` to ``high`` of the work around it, whose part this is."""
-    whole = _shown.get()
-    with showing(lambda share: None if whole is None else whole(low + (high - low) * share)):
+def portion(low: float, high: float, tell: Callable[[float], None] | None = None) -> Iterator[None]:
+    """Within it shares count from ``low`` to ``high`` of the work around it, whose part this is; ``tell`` hears too."""
+    shows = [show for show in (_shown.get(), tell) if show is not None]
+
+    def show(share: float) -> None:
+        for each in shows:
+            each(low + (high - low) * share)
+
+    with showing(show):
         yield
 
 

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 
-class _Callable(ModuleType):
+class CallableModule(ModuleType):
     """A package that can be called: its name is the function's."""
 
     def __call__(self, campaign: Any, *, tall: int = 1000, proxy: str | None = None) -> Any:
@@ -39,4 +39,4 @@ class _Callable(ModuleType):
         return Window(Session(campaign=campaign, effects=campaign.effects), tall, proxy)
 
 
-sys.modules[__name__].__class__ = _Callable
+sys.modules[__name__].__class__ = CallableModule

@@ -49,10 +49,9 @@ def model(session: Session, saved: FittedRun) -> None:
         asked = [f"--add {form}" for form in forms] + [f"--holdout {run}" for run in aside]
         code = f"fit = campaign.fit({forms!r}{f', holdout={aside!r}' if aside else ''})"
         session.take(Step(f"the model of {name}", fit, code, " ".join(["stickslip fit campaign.toml", *asked])))
-    values, own = saved.parameters, fit.values
+    values, own = saved.parameters["value"], fit.values
     moved = {
-        n: values[n]["value"] for n, std in fit.std.items()
-        if n in values and abs(values[n]["value"] - own[n]) > SAME * std
+        n: float(values[n]) for n, std in fit.std.items() if n in values and abs(values[n] - own[n]) > SAME * std
     }  # fmt: skip
     if moved:
         line = f"fit = fit.with_values({moved!r})"

@@ -131,7 +131,9 @@ def test_an_effect_is_added_once_and_taken_out_once(aged, base):
 
 def test_covariance_is_that_of_the_deviations(aged):
     c = aged.covariance
+    assert c.attrs["units"] == "unit * other_unit"
     for f in aged.free:
+        assert c.sel(parameter=f.name).unit == f.unit and c.sel(other=f.name).other_unit == f.unit
         assert np.sqrt(float(c.sel(parameter=f.name, other=f.name))) == pytest.approx(aged.std[f.name], rel=1e-9)
     assert np.linalg.eigvalsh(c.values / np.sqrt(np.outer(np.diag(c), np.diag(c)))).min() > -1e-9
 
@@ -142,7 +144,7 @@ def test_what_is_saved_is_what_is_shown(aged, tmp_path):
     assert kept["ladder"][-1]["train_error"] == pytest.approx(aged.error, rel=1e-9)
     assert kept["ladder"][-1]["heldout_error"] == pytest.approx(aged.unseen_error, rel=1e-9)
     again = ss.load_run(folder)
-    assert again.parameters["contact-ageing.rate"]["value"] == pytest.approx(aged.values["contact-ageing.rate"])
+    assert again.parameters.loc["contact-ageing.rate", "value"] == pytest.approx(aged.values["contact-ageing.rate"])
     free = aged.predict()
     assert kept["ladder"][-1]["free"]["recurrence"]["relative"] == pytest.approx(free.loc["all", "recurrence"])
     assert (folder / "report.html").stat().st_size > 10_000

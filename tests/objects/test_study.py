@@ -31,6 +31,11 @@ def test_a_study_has_the_numbers_of_the_fits_and_says_what_failed(tmp_path):
     assert told[-1][1] == 1.0 and {t for t, _ in told} == {"shipped", "broken"}
 
 
+def test_a_single_campaign_and_a_single_effect_stand_for_themselves():
+    found = ss.study(SHIPPED, "waer", workers=1)
+    assert list(found.campaign.values) == ["hidden-effect"] and "'waer'" in str(found.note.values[0])
+
+
 def test_campaigns_need_names_of_their_own():
     with pytest.raises(InputError, match="unique name"):
         ss.study([SHIPPED, SHIPPED])

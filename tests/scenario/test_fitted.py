@@ -67,11 +67,19 @@ def test_the_model_comes_back_as_it_was(folder):
     assert back.parts == ("static", "inertia", "contact-ageing", "viscous-drag")
     assert float(back.model.effects[0].rate) == pytest.approx(0.013, rel=1e-12)
     np.testing.assert_allclose(back.fitted.covariance, original.covariance)
-    assert back.parameters["contact.u_max"]["value"] == pytest.approx(0.95e-6)
+    assert back.parameters.loc["contact.u_max", "value"] == pytest.approx(0.95e-6)
     # the standard deviation of a logarithm times the value
     k = list(TRUTH).index("contact.u_max")
-    assert back.parameters["contact.u_max"]["std"] == pytest.approx(0.95e-6 * np.sqrt(original.covariance[k, k]))
-    assert "start.1" not in back.parameters
+    assert back.parameters.loc["contact.u_max", "std"] == pytest.approx(0.95e-6 * np.sqrt(original.covariance[k, k]))
+    assert "start.1" not in back.parameters.index
+
+
+def test_a_run_shows_its_model_and_not_all_that_was_kept(folder):
+    back = ss.load_run(folder)
+    text, html = repr(back), back._repr_html_()
+    assert text.startswith("<FittedRun>") and len(text) < 3000
+    assert "static + inertia + contact-ageing" in text and "contact.u_max" in text and "model_parts" not in text
+    assert html.count("<table") == 1 and "contact.u_max" in html
 
 
 def test_the_scenario_is_the_same_model(folder):
@@ -131,6 +139,31 @@ def test_a_run_can_be_driven_as_it_was_measured(folder):
     np.testing.assert_allclose([float(held(t)) for t in (1.7, 2.0)], 3.2e-4, rtol=1e-12)
     with pytest.raises(InputError, match="v200"):
         back.scenario(trace="v20")
+
+
+def test_a_drive_is_a_velocity_or_pieces(folder):
+    back = ss.load_run(folder)
+    assert back.scenario(drive="0.8 mm/s", events=3).file == back.scenario(["drive.velocity=0.8mm/s"], events=3).file
+    assert back.scenario(drive=8e-4).file.drive.velocity == 8e-4
+    made = build(back.scenario(trace="v200", drive=[("1.5 s", "100 um/s"), (2.0, 0), ("3 s", "-50 um/s")])).motion
+    assert made.duration == pytest.approx(3.0)
+    np.testing.assert_allclose(made.position(np.array([1.5, 2.0, 3.0])), [1.5e-4, 1.5e-4, 1e-4], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("drive", "words"),
+    [
+        ("800", "unit is missing"),
+        ("3 N", "drive: the unit"),
+        (["800 um/s"], "until when and how fast"),
+        ([], "until when and how fast"),
+        ([("2 s", "1 um/s"), ("1 s", 0)], "must be finite and increase"),
+        ({"velocity": 1.0}, "until when and how fast"),
+    ],
+)
+def test_a_drive_that_is_none_is_refused(folder, drive, words):
+    with pytest.raises(InputError, match=words):
+        ss.load_run(folder).scenario(drive=drive)
 
 
 def test_a_spring_of_its_own_belongs_to_its_run(tmp_path):

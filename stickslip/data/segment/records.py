@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
+
+from ...system.shown import Shown, facts, table
 
 PHASES = ("virgin loading", "stick", "hold", "nucleation", "slip", "ring-down", "continuous sliding")
 
@@ -100,8 +103,8 @@ class Dropped:
         return f"{self.count} {what} ({self.where}): {self.reason}"
 
 
-@dataclass(frozen=True)
-class Segmentation:
+@dataclass(frozen=True, repr=False)
+class Segmentation(Shown):
     """Events and phases of one trace.
 
     ``regime``: ``"stick-slip"``, ``"oscillation"`` (the block slows and hurries but hardly rests), ``"continuous
@@ -120,3 +123,19 @@ class Segmentation:
     def during(self, kind: str) -> tuple[Phase, ...]:
         """All phases of one kind."""
         return tuple(phase for phase in self.phases if phase.kind == kind)
+
+    def _parts(self) -> list[Any]:
+        length = self.settings.unit
+        rows = {
+            str(e.index + 1): {
+                "onset (s)": e.t_onset,
+                "arrest (s)": e.t_arrest,
+                f"slip ({length})": e.slip,
+                f"peak velocity ({length}/s)": e.peak_velocity,
+                "recurrence (s)": e.recurrence,
+            }
+            for e in self.events
+        }
+        what = {"run": self.name, "slips": len(self.events), "regime": self.regime, "reason": self.reason}
+        events = [table(rows, "slip number")] if rows else []
+        return [facts(what), *events, *(f"left out: {d}" for d in self.dropped), *self.warnings]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -120,13 +121,13 @@ def climb(prepared: Prepared, effects: Sequence[Form], tell: Tell) -> Climbed:
         _acts(tag, form)
     tell("the base model", 0.0)
     each = 1.0 / (len(effects) + 1)
-    with portion(0.0, each):
+    with portion(0.0, each, partial(tell, "the base model")):
         base = widened(fit(prepared.problem, prepared.start), [LEVEL], DISPERSION)
     first = Rung(("static",), None, static_residual(base), None, None)
     done = Climbed(prepared, (first, Rung.of(("static", "inertia"), "inertia", base)), {})
     for i, (tag, form) in enumerate(effects):
-        tell(f"adding {tag}", (i + 1) / (len(effects) + 2))
-        with portion((i + 1) * each, (i + 2) * each):
+        tell(f"adding {tag}", (i + 1) * each)
+        with portion((i + 1) * each, (i + 2) * each, partial(tell, f"adding {tag}")):
             done = extended(done, tag, form)
     return done
 

@@ -1,0 +1,68 @@
+"""Arguments of the objects: a single name stands for itself, and what cannot be meant is refused before any work."""
+
+from pathlib import Path
+
+import pytest
+
+import stickslip as ss
+from stickslip.errors import InputError
+
+SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return ss.load_campaign(SHIPPED)
+
+
+def test_a_model_that_is_none_is_refused(campaign):
+    with pytest.raises(InputError) as refused:
+        campaign.fit(model="dyn")
+    said = str(refused.value)
+    assert "no such model" in said and "'dyn'" in said and "allowed" in said and "to mend" in said
+
+
+def test_a_misspelt_argument_is_refused_by_the_method_itself(campaign):
+    for name, ask in (("fit", campaign.fit), ("diagnose", campaign.diagnose)):
+        with pytest.raises(TypeError, match=rf"Campaign\.{name}\(\) .* 'holdot'"):
+            ask(holdot="v050")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"model": "static", "effects": "wear"},
+        {"model": "static", "holdout": "v050"},
+        {"v_lim": "1 um/s"},
+        {"align": "paper"},
+    ],
+)
+def test_an_argument_of_the_other_model_is_refused(campaign, arguments):
+    key = list(arguments)[-1]
+    with pytest.raises(InputError, match=f"{key}: an argument of the") as refused:
+        campaign.fit(**arguments)
+    assert "leave it out" in refused.value.hint
+
+
+def test_a_single_name_is_not_read_letter_by_letter(campaign, tmp_path):
+    assert [k.name for k in campaign.prepare("v050").runs] == [k.name for k in campaign.prepare(["v050"]).runs]
+    assert "v050" not in [k.name for k in campaign.prepare("v050").runs]
+    asks = {
+        "waer": (lambda name: campaign.fit(effects=name), lambda name: campaign.diagnose(candidates=name)),
+        "v051": (lambda name: campaign.fit(holdout=name), lambda name: campaign.diagnose(holdout=name, jobs=1)),
+        str(tmp_path / "own.py"): (lambda name: ss.load_campaign(SHIPPED, name),),
+    }
+    for name, calls in asks.items():
+        for ask in calls:
+            with pytest.raises(InputError, match=name):
+                ask(name)
+
+
+def test_a_fit_takes_a_single_name(campaign):
+    fit = campaign.fit()
+    with pytest.raises(InputError, match=r"weakening\.dorp"):
+        fit.refit(locked="weakening.dorp")
+    change = "drive.velocity=0.8 mm/s"
+    one, several = (fit.scenario(changes).file.drive for changes in (change, [change]))
+    assert one == several == fit.scenario(drive="0.8 mm/s").file.drive
+    assert fit.simulate(drive="0.8 mm/s", events=1).sizes == fit.simulate(change, events=1).sizes
