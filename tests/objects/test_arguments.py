@@ -19,7 +19,7 @@ def test_a_model_that_is_none_is_refused(campaign):
     with pytest.raises(InputError) as refused:
         campaign.fit(model="dyn")
     said = str(refused.value)
-    assert "no such model" in said and "'dyn'" in said and "allowed" in said and "to mend" in said
+    assert "no such model" in said and "'dyn'" in said and "allowed" in said and "to fix" in said
 
 
 def test_a_misspelt_argument_is_refused_by_the_method_itself(campaign):
