@@ -46,7 +46,7 @@ if (!head) return false
 window.scrollBy(0, head.getBoundingClientRect().top - above)
 return true
 """
-LISTED = "return seen('.line').some((e) => e.textContent.startsWith('by the fall'))"
+LISTED = "return seen('.line').some((e) => e.textContent.startsWith('ordered by expected fall'))"
 FREE = "return seen('.line').some((e) => e.textContent.includes('the slip is'))"
 DONE = "return seen('.work .fill').length === 0"
 
