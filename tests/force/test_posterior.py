@@ -38,8 +38,8 @@ def test_near_the_optimum_it_is_the_normal_density_of_the_covariance(way):
     _, top, slope = way.at(np.zeros(way.size))
     assert np.linalg.norm(slope) < np.sqrt(SETTLED)  # a fit ends within that of its optimum
     for _ in range(5):
-        x = 0.03 * rng.standard_normal(way.size)  # farther out the valley bends
-        assert way.at(x)[1] - top == pytest.approx(slope @ x - 0.5 * x @ x, rel=0.1, abs=2e-4)
+        x = 0.01 * rng.standard_normal(way.size)  # farther out the valley bends, and elements begin to slide
+        assert way.at(x)[1] - top == pytest.approx(slope @ x - 0.5 * x @ x, rel=0.1, abs=2e-5)
 
 
 def test_beyond_a_bound_it_falls_steeply(way):

@@ -69,7 +69,10 @@ def measured(seen: Browser, python: Path, folder: Path) -> list[tuple[str, float
         done("its base fit")
         base = seen.unseen_error()
         seen.tab("missing")
-        seen.wait(lambda: seen.js("return seen('.line').some((e) => e.textContent.startsWith('ordered by expected fall'))"), 300)
+        seen.wait(
+            lambda: seen.js("return seen('.line').some((e) => e.textContent.startsWith('ordered by expected fall'))"),
+            300,
+        )
         done("every effect looked at")
         seen.press(".effect-row button", "Switch on")
         seen.wait(lambda: "contact-ageing" in seen.text(".model"), 200)

@@ -20,10 +20,7 @@ from .rigs import draw_setup
 from .sensor import counts, spot
 from .write import write_campaign
 
-RATE = 1e4  # counts in a second
 OVERSAMPLING = 4
-FINE = OVERSAMPLING * RATE  # samples in a second of what the sensor sees
-TITLE = "Steel block on V-grooves"
 LONGEST = 16.0  # s
 MOST_SLIPS = 25  # of a run with holds, at first
 OTHER_CASE = "a smaller amplitude, or another seed"
@@ -58,9 +55,12 @@ def make_campaign(
     virgin: bool = True,
     spring_known: bool | None = None,
     dt: float = 2e-5,
+    rate: float = 1e4,
+    quiet: bool = True,
     setup: Setup | None = None,
     recorder: str = "plain",
     grouped: bool = True,
+    title: str = "Steel block on V-grooves",
 ) -> dict[str, Any]:
     """Simulate a campaign with hidden effects and write ``campaign.toml`` and one CSV of counts per run.
 
@@ -101,12 +101,12 @@ def make_campaign(
     traces, listed = [], []
     for number, run in enumerate(runs):
         lines = [int(seeds[0]), number] if new_lines else int(seeds[0])
-        result, start, drive = _run(setup, lines, run, new_lines, virgin, dt, int(seeds[2]) + number)
-        read, events = _read(setup, result, start, noise)
+        result, start, drive = _run(setup, lines, run, new_lines, virgin, dt, rate, quiet, int(seeds[2]) + number)
+        read, events = _read(setup, result, start, rate, noise)
         if events["onset"].size < 3:
             raise InputError(f"run '{run.name}' shows {events['onset'].size} slips", key="effects", hint=OTHER_CASE)
         sticks = list(zip(events["arrest"][:-1], events["onset"][1:], strict=True))
-        recorded = record(recorder, read, sticks, RATE, faults)
+        recorded = record(recorder, read, sticks, rate, faults)
         traces.append((run, recorded, drive))
         columns = {key: [float(x) for x in col] for key, col in events.items()}
         listed.append({"name": run.name, "start": start, **columns, **recorded.truth})
@@ -115,7 +115,7 @@ def make_campaign(
     if not spring_known:
         shown_spring = (base_stiffness * guess, base_stiffness * guess / 3, base_stiffness * guess * 3)
     shown = {"mass": base_mass, "spring": shown_spring}
-    write_campaign(folder, TITLE, setup, shown, traces, RATE, virgin)
+    write_campaign(folder, title, setup, shown, traces, rate, virgin)
     truth = {
         "seed": seed,
         "effects": hidden,
@@ -134,7 +134,8 @@ def make_campaign(
 
 
 def _run(
-    setup: Setup, lines: int | list[int], run: Run, new_lines: bool, virgin: bool, dt: float, seed: int
+    setup: Setup, lines: int | list[int], run: Run, new_lines: bool, virgin: bool, dt: float, rate: float, quiet: bool,
+    seed: int,
 ) -> tuple[Result, float, list[tuple[float, float]]]:  # fmt: skip
     """The run, the time at which its record starts, and its drive as the file gives it."""
     pool = (MOST_SLIPS if run.pieces else run.events) + 3 if new_lines else 1
@@ -143,21 +144,22 @@ def _run(
             setup.surface, np.asarray(setup.rig.loads), lines,
             pool=pool, groups=setup.groups, roughness_spread=setup.roughness_spread,
         )  # fmt: skip
-        made = _with(bank, setup, run, new_lines, virgin, dt, seed)
+        made = _with(bank, setup, run, new_lines, virgin, dt, rate, quiet, seed)
         if not new_lines or made[0].event_columns["onset"].size < pool:
             return made
         pool *= 2  # no line comes twice
 
 
 def _with(
-    bank: Bank, setup: Setup, run: Run, new_lines: bool, virgin: bool, dt: float, seed: int
+    bank: Bank, setup: Setup, run: Run, new_lines: bool, virgin: bool, dt: float, rate: float, quiet: bool, seed: int
 ) -> tuple[Result, float, list[tuple[float, float]]]:
     def go(pieces: list[tuple[float, float]], duration: float, sampling: float, stop: tuple[int, float]) -> Result:
         return simulate(
-            setup.rig, Drive.pieces(pieces), bank, setup.effects, duration=duration, dt=dt, rate=sampling,
+            setup.rig, Drive.pieces(pieces), bank, setup.effects, duration=duration, dt=dt, rate=sampling, quiet=quiet,
             new_lines=new_lines, relaxation=setup.relaxation, seed=seed, stop=stop,
         )  # fmt: skip
 
+    fine = OVERSAMPLING * rate
     steady = [(1.0, run.velocity)]
     before = 0.0
     if not virgin:
@@ -166,18 +168,19 @@ def _with(
             raise InputError(f"run '{run.name}' does not stick and slip", key="effects", hint=OTHER_CASE)
         before = round(float(arrests[1] + 0.3 * (arrests[1] - arrests[0])), 3)
     if not run.pieces:
-        return go(steady, before + LONGEST, FINE, (run.events + (0 if virgin else 2), 0.4)), before, []
+        return go(steady, before + LONGEST, fine, (run.events + (0 if virgin else 2), 0.4)), before, []
     pieces = [(before + until, velocity) for until, velocity in run.pieces]
-    return go(pieces, pieces[-1][0], FINE, (0, 0.0)), before, list(run.pieces)
+    return go(pieces, pieces[-1][0], fine, (0, 0.0)), before, list(run.pieces)
 
 
 def _read(
-    setup: Setup, result: Result, start: float, rng: np.random.Generator
+    setup: Setup, result: Result, start: float, rate: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    fine = OVERSAMPLING * rate
     seen = spot(setup.sensor, result.displacement, result.contact_force, result.yaw)
-    first = round(start * FINE)
+    first = round(start * fine)
     seen = seen[first:] - seen[first]
-    read = counts(setup.sensor, seen, FINE, RATE, rng)
+    read = counts(setup.sensor, seen, fine, rate, rng)
     keep = result.event_columns["onset"] >= start
     return read, {
         key: col[keep] - (start if key in ("onset", "arrest") else 0.0) for key, col in result.event_columns.items()
