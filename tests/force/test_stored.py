@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 
+from stickslip.inference.diagnose.checkpoints import load_candidate, save_candidate
+from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit
+from stickslip.inference.force.signatures import Explained
 from stickslip.inference.force.stored import fit_arrays, fit_of
 from stickslip.inference.force.valleys import LEVEL, widened
 
@@ -21,3 +25,21 @@ def test_a_kept_fit_is_the_same(begun):
     assert again.cost == found.cost and again.evaluations == found.evaluations
     np.testing.assert_array_equal(again.residual, found.residual)
     np.testing.assert_array_equal(again.covariance, found.covariance)
+
+
+def test_what_events_may_not_differ_by_is_kept(begun):
+    """A law that is added may not let events differ more than its base does, also after an interruption."""
+    base = fit(begun.problem, begun.point)
+    bound = replace(base, scatter=base.scatter.within(base.scatter))
+    again = fit_of(begun.problem, fit_arrays(bound))
+    np.testing.assert_array_equal(again.scatter.most, base.scatter.sizes[: again.scatter.most.size])
+    pieces: dict[str, dict[str, np.ndarray]] = {}
+
+    class Kept:
+        load, save = pieces.get, pieces.__setitem__
+
+    (candidate,) = try_effect(base, Explained(base), "viscous-drag", [{}])
+    assert candidate.fit is not None and np.isfinite(candidate.fit.scatter.most).all()
+    save_candidate(Kept, "one", candidate)
+    loaded = load_candidate(Kept, "one", base)
+    np.testing.assert_array_equal(loaded.fit.scatter.most, candidate.fit.scatter.most)

@@ -12,8 +12,7 @@ from ...physics.effects import catalogue
 from ..force.candidates import Candidate, with_start
 from ..force.fit import Fit, at
 from ..force.problem import Problem
-from ..force.scatter import Scatter
-from ..force.stored import fit_arrays, fit_of, point_arrays, point_of
+from ..force.stored import fit_arrays, fit_of, point_arrays, point_of, scatter_arrays, scatter_of
 
 _FACTS = ("tag", "form", "promise", "note", "members", "visible", "start")
 
@@ -48,7 +47,7 @@ def save_candidate(store: Store, key: str, candidate: Candidate) -> None:
     """Keep a candidate."""
     head = json.dumps({name: getattr(candidate, name) for name in _FACTS})
     fit = candidate.fit
-    point = {} if fit is None else {**point_arrays(fit.point), "sizes": fit.scatter.sizes}
+    point = {} if fit is None else {**point_arrays(fit.point), **scatter_arrays(fit.scatter)}
     store.save(key, {"head": np.array(head), **point})
 
 
@@ -62,4 +61,4 @@ def load_candidate(store: Store, key: str, base: Fit) -> Candidate | None:
         return Candidate(**head, fit=None)
     effect = catalogue.get(head["tag"])(**head["form"])
     problem, _ = with_start(base.problem, effect, head["start"])
-    return Candidate(**head, fit=at(problem, point_of(found), Scatter(found["sizes"]), base))
+    return Candidate(**head, fit=at(problem, point_of(found), scatter_of(found), base))

@@ -27,13 +27,24 @@ def point_of(kept: Mapping[str, np.ndarray], prefix: str = "") -> Point:
     return Point(*(np.asarray(kept[prefix + name], float) for name in POINT))
 
 
+def scatter_arrays(scatter: Scatter) -> dict[str, Array]:
+    """Sizes of what is random by name, and what they may not pass."""
+    return {"sizes": scatter.sizes, "most": np.asarray(scatter.most, float)}
+
+
+def scatter_of(kept: Mapping[str, np.ndarray]) -> Scatter:
+    """The sizes again."""
+    sizes = Scatter(np.asarray(kept["sizes"], float))
+    return replace(sizes, most=np.asarray(kept["most"], float)) if "most" in kept else sizes  # files of before
+
+
 def fit_arrays(found: Fit) -> dict[str, np.ndarray]:
     """A fit by name."""
     problem = found.problem
     return {
         **point_arrays(found.point),
         **point_arrays(found.around, AROUND),
-        "sizes": found.scatter.sizes,
+        **scatter_arrays(found.scatter),
         "dropped": found.dropped,
         "reach": np.asarray(problem.composition.reach),
         "carrier": np.asarray([] if problem.carrier is None else problem.carrier),
@@ -56,7 +67,7 @@ def fit_of(problem: Problem, kept: Mapping[str, np.ndarray]) -> Fit:
     if kept["carrier"].size:
         problem = problem.carried_by(np.asarray(kept["carrier"], float))
     found = again(
-        problem, point_of(kept), Scatter(np.asarray(kept["sizes"], float)), np.asarray(kept["dropped"], bool),
+        problem, point_of(kept), scatter_of(kept), np.asarray(kept["dropped"], bool),
         point_of(kept, AROUND), int(kept["evaluations"]),
     )  # fmt: skip
     valleys = kept["valleys"]
