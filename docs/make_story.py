@@ -177,7 +177,7 @@ def candidates(axes: Axes, result: dict[str, Any]) -> None:
         if row["effect"] in named:
             text.set_fontweight("bold")
             text.set_color(MIDDLE)
-    axes.set(xlabel="error / what the data can tell")
+    axes.set(xlabel="error / floors")
     axes.set_title(f"3  Named: {', '.join(result['verdict']['effects']) or result['verdict']['kind']}")
     axes.legend(loc="lower left", handletextpad=0.2)  # those refused lie to the right, at the base
 
@@ -212,7 +212,7 @@ def ladder(axes: Axes, result: dict[str, Any]) -> None:
     axes.text(-0.25, 0.87, "as good as the data allow", color=DARK, fontsize=9, va="top")
     axes.set_xlim(-0.3, len(rungs) - 0.55)
     axes.set_xticks(x, ["static" if r["added"] is None else f"+ {r['added']}" for r in rungs])
-    axes.set(ylabel="error / what the data can tell")
+    axes.set(ylabel="error / floors")
     axes.set_title("4  The error falls, on unseen runs too")
     axes.legend(loc="upper right")
 
