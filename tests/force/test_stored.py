@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.inference.diagnose.checkpoints import load_candidate, save_candidate
+from stickslip.inference.diagnose.checkpoints import kept, load_candidate, save_candidate
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.signatures import Explained
@@ -25,6 +25,22 @@ def test_a_kept_fit_is_the_same(begun):
     assert again.cost == found.cost and again.evaluations == found.evaluations
     np.testing.assert_array_equal(again.residual, found.residual)
     np.testing.assert_array_equal(again.covariance, found.covariance)
+
+
+def test_an_interruption_changes_nothing(begun):
+    """Forces found on the way differ in the last digit from those found at the end: what goes on is the latter."""
+    found = fit(begun.problem, begun.point)
+    rounded = replace(found.forces, residual=found.forces.residual * (1.0 + 1e-15))
+    pieces: dict[str, dict[str, np.ndarray]] = {}
+
+    class Kept:
+        load, save = pieces.get, pieces.__setitem__
+
+    ends = [kept(store, "base", begun.problem, lambda: replace(found, forces=rounded)) for store in (None, Kept, Kept)]
+    assert list(pieces) == ["base"]
+    for end in ends[1:]:
+        assert end.cost == ends[0].cost
+        np.testing.assert_array_equal(end.residual, ends[0].residual)
 
 
 def test_what_events_may_not_differ_by_is_kept(begun):

@@ -28,14 +28,16 @@ class Store(Protocol):
 
 
 def kept(store: Store | None, key: str, problem: Problem, make: Callable[[], Fit]) -> Fit:
-    """A fit of the problem from the store, or made and kept there."""
-    found = store.load(key) if store is not None else None
-    if found is not None:
-        return fit_of(problem, found)
-    fit = make()
-    if store is not None:
-        store.save(key, fit_arrays(fit))
-    return fit
+    """A fit of the problem from the store, or made and kept there.
+
+    In every case as it is taken from there: a last digit decides in which dent of a rough valley a later search ends.
+    """
+    found = None if store is None else store.load(key)
+    if found is None:
+        found = fit_arrays(make())
+        if store is not None:
+            store.save(key, found)
+    return fit_of(problem, found)
 
 
 def name_of(tag: str, form: Mapping[str, str]) -> str:
