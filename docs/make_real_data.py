@@ -30,6 +30,7 @@ from real_data.robot_ramps import robot
 from real_data.rocks import rocks
 from real_data.surfaces import topographies
 from real_data.unresolved_slips import classroom, fault
+from real_data.wandering import paper_wandering
 
 from stickslip import __version__
 
@@ -38,6 +39,7 @@ DEFAULT = DOCS.parents[1] / "shared" / "data" / "real"
 PARTS: dict[str, Callable[[Path, Path], dict[str, Any]]] = {
     "paper": paper,
     "paper-slider-speeds": partial(diagnosed, "paper-slider-speeds"),
+    "paper-wandering": paper_wandering,
     "fault": fault,
     "classroom": classroom,
     "bolted-joint": bolted_joint,
@@ -48,6 +50,7 @@ PARTS: dict[str, Callable[[Path, Path], dict[str, Any]]] = {
     "drill-string": drill_string,
     "robot": robot,
     "robot-joint": partial(diagnosed, "robot-joint"),
+    "robot-joint-2": partial(diagnosed, "robot-joint-2"),
     "robot-loops": partial(diagnosed, "robot-loops"),
 }
 

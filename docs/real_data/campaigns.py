@@ -24,6 +24,7 @@ FOLDERS = {
     "reciprocating-loops-whole": "reciprocating-loops-200Hz",
     "drill-string": "torsional-rig-drillstring",
     "robot-joint": "robot-breakaway-creep/test1",
+    "robot-joint-2": "robot-breakaway-creep/test1",
     "robot-loops": "robot-breakaway-creep/test3",
     "friction-damper": "friction-damper-brfd",
     "bolted-joint": "bolted-joint-brb",

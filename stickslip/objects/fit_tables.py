@@ -10,6 +10,7 @@ import numpy as np
 from ..inference.force.errors import Sums, of_all
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.knots import PHASES
+from ..inference.force.prescribed import placeholders
 from ..system.shown import table
 
 if TYPE_CHECKING:
@@ -29,8 +30,11 @@ UNITS = {STRENGTH: "N", "rig.mass": "kg", "rig.spring_stiffness": "N/m"}
 def parameter_table(fit: Fit) -> pandas.DataFrame:
     """See :attr:`stickslip.Fit.parameters`."""
     free = {f.name: f for f in fit.free}
+    unused = placeholders(fit.force_fit.problem, fit.campaign.rig)
     rows: dict[str, dict[str, Any]] = {}
     for name, value in fit.values.items():
+        if name in unused:
+            continue
         f = free.get(name)
         rows[name] = {
             "value": value,

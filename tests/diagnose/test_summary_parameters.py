@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from stickslip.data.campaign import Rig
 from stickslip.inference.diagnose.summary import parameters
 from stickslip.inference.fit.parameters import effect_parameters
 from stickslip.physics.effects import catalogue
@@ -25,5 +26,5 @@ def test_a_small_amplitude_that_is_well_known_is_not_at_its_bound(value, std, no
         values={NAME: value}, std={NAME: std}, z=np.array([free[0].inward(value)]),
         composition=SimpleNamespace(free=free, fixed={}, mass=0.1),
     )  # fmt: skip
-    fit: Any = None
-    assert parameters(fit, found)[NAME]["note"] == note
+    fit: Any = SimpleNamespace(problem=SimpleNamespace(runs=[SimpleNamespace(prescribed=False)]))
+    assert parameters(fit, found, Rig())[NAME]["note"] == note

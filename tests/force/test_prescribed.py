@@ -19,7 +19,7 @@ from stickslip.inference.diagnose.prepare import Prepared
 from stickslip.inference.force.backbone import backbone
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit
-from stickslip.inference.force.prescribed import begin, stretches, thinned
+from stickslip.inference.force.prescribed import begin, placeholders, stretches, thinned
 from stickslip.inference.force.scales import Scales
 from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
@@ -252,6 +252,16 @@ def test_nothing_is_run_freely_and_the_report_says_so_in_words(plain):
     assert not found.models
     assert found.notes[0].startswith("no free simulation: the motion is prescribed")
     assert "Error" not in found.notes[0]
+
+
+def test_what_the_rig_lacks_is_no_parameter_of_it(plain):
+    """Nothing but the prescribed motion pulls; the numbers that stand for a spring and a mass are not "given"."""
+    assert placeholders(plain.problem, Rig()) == ("rig.spring_stiffness", "rig.mass")
+    assert placeholders(plain.problem, Rig(mass=0.1)) == ("rig.spring_stiffness",)
+    loops = ss.Campaign.from_traces([record(seed) for seed in (1, 2, 3)]).fit()
+    listed = set(loops.parameters.index)
+    assert "rig.damping" in listed and not listed & {"rig.spring_stiffness", "rig.mass"}
+    assert set(loops.result["parameters"]) & {"rig.spring_stiffness", "rig.mass"} == set()
 
 
 def test_one_step_of_the_velocity_is_fitted_but_not_diagnosed():

@@ -18,6 +18,7 @@ from ..force.fit import Fit
 from ..force.heldout import apart
 from ..force.knots import PHASES
 from ..force.linearised import Array
+from ..force.prescribed import placeholders
 from ..force.residual import coordinates
 from .decide import CHANCE, ERRORS, Judged, best_forms
 from .engine import Diagnosis, Round, Rung
@@ -88,7 +89,7 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
         ],
         "ladder": [_rung(r, d) for r in d.ladder],
         "scatter": d.fit.scatter.named(),
-        "parameters": parameters(d.fit, found),
+        "parameters": parameters(d.fit, found, rig),
         "backbone": section(d.shape),
         "held_out": "every run in turn; in halves if a run has its own parameters",
         "kept_aside": list(d.prepared.aside),
@@ -333,8 +334,8 @@ def _structure(d: Diagnosis) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def parameters(fit: Fit, found: Fitted) -> dict[str, dict[str, Any]]:
-    """Value, standard deviation, unit and meaning of every parameter, fixed ones included."""
+def parameters(fit: Fit, found: Fitted, rig: Rig) -> dict[str, dict[str, Any]]:
+    """Value, standard deviation, unit and meaning of every parameter, fixed ones that were given included."""
     out: dict[str, dict[str, Any]] = {}
     values, std = found.values, found.std
     for f, z in zip(found.composition.free, found.z, strict=True):
@@ -356,6 +357,8 @@ def parameters(fit: Fit, found: Fitted) -> dict[str, dict[str, Any]]:
         out[name] = {"value": value, "std": 0.0, "unit": unit, "doc": "", "note": "given"}
     mass = {"value": found.composition.mass, "std": 0.0, "unit": "kg", "doc": "mass of the block", "note": "given"}
     out.setdefault("rig.mass", mass)
+    for name in placeholders(fit.problem, rig):
+        del out[name]
     assert PULL not in out
     return out
 

@@ -248,3 +248,10 @@ def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Pr
         np.zeros(problem.readings.shape[1]),
     )
     return problem, with_weights(problem, point, strength)
+
+
+def placeholders(problem: Problem, rig: Rig) -> tuple[str, ...]:
+    """Parameters that are numbers only, where the motion is prescribed: the spring's, and a mass that is not stated."""
+    if not all(run.prescribed for run in problem.runs):
+        return ()
+    return ("rig.spring_stiffness", *(("rig.mass",) if rig.mass is None else ()))
