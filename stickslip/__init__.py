@@ -22,6 +22,7 @@ _PUBLIC = {
     "rough_bank": "physics.contact",
     "power_law_bank": "physics.contact",
     "load_run": "objects.fitted_run",
+    "load_fit": "objects.stored",
     "load_campaign": "objects.campaign",
     "Campaign": "objects.campaign",
     "study": "objects.study",
@@ -62,6 +63,7 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .objects.diagnosis import Diagnosis as Diagnosis
     from .objects.fit import Fit as Fit
     from .objects.fitted_run import load_run as load_run
+    from .objects.stored import load_fit as load_fit
     from .objects.study import study as study
     from .physics.contact import creep_curve as creep_curve
     from .physics.contact import power_law_bank as power_law_bank

@@ -18,7 +18,7 @@ from ..inference.diagnose.engine import Diagnosis as Found
 from ..inference.diagnose.engine import diagnose as search
 from ..inference.diagnose.summary import summary
 from ..physics.effects import catalogue
-from ..show.report import abilities, write_report
+from ..show.report import abilities
 from ..show.report.diagnosis_result import trace_sections
 from ..simulation.conformance import try_laws
 from ..system.progress import telling
@@ -28,7 +28,8 @@ from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .fit import Fit
 from .next_experiment import next_experiment
-from .run import Savable, Tell, dataset, head, several
+from .run import Savable, Tell, dataset, finish, head, several
+from .stored import load_fit
 from .wander import wander, wander_sentence
 
 if TYPE_CHECKING:
@@ -81,10 +82,11 @@ class Diagnosis(Savable):
         """The last model.
 
         Raises:
-            InputError: only the result of the diagnosis was kept.
+            RunFolderError: only the result of the diagnosis was kept.
         """
         if self.found is None:
-            raise InputError("of this diagnosis only the result was kept, not its models")
+            assert self.folder is not None
+            return load_fit(self.folder, self.campaign)
         gains = {tag: done.close[0].gain for tag, done in self.found.named.items() if done.close}
         made = Fit(self.campaign, Climbed(self.found.prepared, self.found.ladder, gains))
         made._confirmation = self.found.confirmation
@@ -122,6 +124,10 @@ class Diagnosis(Savable):
     def arrays(self) -> xarray.Dataset:
         """As in ``arrays.nc``."""
         return dataset(self.variables, self.campaign.title)
+
+    @property
+    def _models(self) -> Fit:
+        return self.best
 
     def _parts(self) -> list[Any]:
         told = self.verdict
@@ -225,7 +231,7 @@ def diagnose(
             raise KeyboardInterrupt(text) from None
         run.arrays(made.arrays)
         run.json(made.result)
-        write_report(run.folder)
+        finish(run, made.best)
     return made
 
 

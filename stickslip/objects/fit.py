@@ -427,6 +427,10 @@ class Fit(Savable):
     def _errors(self, residual: np.ndarray, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:
         return error_table(self._fit, self._summed(residual), measure)
 
+    @property
+    def _models(self) -> Fit:
+        return self
+
     def _parts(self) -> list[Any]:
         what = {
             "campaign": self.campaign.title,

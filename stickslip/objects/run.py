@@ -6,13 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from ..system.runstore import open_run, versions
+from ..system.runstore import Run, open_run, versions
 from ..system.shown import Shown
 
 if TYPE_CHECKING:
     import xarray
 
     from .campaign import Campaign
+    from .fit import Fit
 
 Tell = Callable[[str, float], None]
 Name = TypeVar("Name", bound=str | Path)
@@ -53,12 +54,20 @@ class Result(Protocol):
     def arrays(self) -> xarray.Dataset:
         """As in ``arrays.nc``."""
 
+    @property
+    def _models(self) -> Fit | None:
+        """To go on from, if any."""
+
 
 class Savable(Shown):
     """What a campaign gave, which can be kept as a run folder."""
 
+    @property
+    def _models(self) -> Fit | None:
+        return None
+
     def save(self: Result, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder: ``result.json``, ``arrays.nc`` and ``report.html``.
+        """Keep it as a run folder: ``result.json``, ``arrays.nc``, ``report.html``, and models to go on from.
 
         Args:
             folder: where; it appears when all of it is written.
@@ -68,11 +77,19 @@ class Savable(Shown):
         Raises:
             RunFolderError: the folder exists or cannot be written.
         """
-        from ..show.report import write_report
-
         result, arrays = {**self.result, **more}, self.arrays
         with open_run(folder, force=force) as run:
             run.arrays(arrays)
             run.json(result)
-            write_report(run.folder)
+            finish(run, self._models)
         return Path(folder)
+
+
+def finish(run: Run, fit: Fit | None) -> None:
+    """Write what a run folder holds besides its numbers: the models to go on from, and the report."""
+    from ..show.report import write_report
+    from .stored import write_models
+
+    if fit is not None:
+        write_models(run, fit)
+    write_report(run.folder)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import zipfile
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..errors import InputError, RunFolderError, StickslipError
 from ..inference.diagnose.climb import Climbed
 from ..inference.diagnose.engine import Rung, static_residual
 from ..inference.force.candidates import with_start
@@ -17,10 +21,12 @@ from ..inference.force.problem import Problem
 from ..inference.force.stored import fit_arrays, fit_of
 from ..physics.effects import catalogue
 from ..physics.params import specs, variants
-from .campaign import Campaign
+from ..system.runstore import Run, digests, read_result
+from .campaign import Campaign, load_campaign
 from .fit import Fit
 
 Arrays = dict[str, np.ndarray]
+MODELS = "models.npz"
 
 
 def packed(fit: Fit, keep: Callable[[ForceFit, Arrays], str]) -> dict[str, Any]:
@@ -43,7 +49,7 @@ def packed(fit: Fit, keep: Callable[[ForceFit, Arrays], str]) -> dict[str, Any]:
         if rung.fit is not None
     ]
     moved = None if fit._moved is None else keep(fit._moved, fit_arrays(fit._moved))
-    return {"rungs": rungs, "gains": dict(done.gains), "moved": moved}
+    return {"rungs": rungs, "gains": dict(done.gains), "moved": moved, "aside": list(done.prepared.aside)}
 
 
 def unpacked(campaign: Campaign, kept: Mapping[str, Any], load: Callable[[str], Mapping[str, np.ndarray]]) -> Fit:
@@ -58,7 +64,7 @@ def unpacked(campaign: Campaign, kept: Mapping[str, Any], load: Callable[[str], 
         InputError: an effect that is not in the catalogue any more.
         KeyError, ValueError: the data are damaged.
     """
-    prepared = campaign.prepare()
+    prepared = campaign.prepare(kept.get("aside", ()))
     ladder: list[Rung] = []
     problem = prepared.problem
     for row in kept["rungs"]:
@@ -75,6 +81,56 @@ def unpacked(campaign: Campaign, kept: Mapping[str, Any], load: Callable[[str], 
         moved = fit_of(problem, load(kept["moved"]))
         moved = at(moved.problem, moved.point, moved.scatter, last)
     return Fit(campaign, Climbed(prepared, tuple(ladder), dict(kept["gains"])), moved)
+
+
+def write_models(run: Run, fit: Fit) -> None:
+    """Keep a fit in a run folder, beside its result."""
+    arrays: Arrays = {}
+
+    def keep(_: ForceFit, own: Arrays) -> str:
+        name = str(len(arrays))
+        arrays.update({f"{name}/{key}": array for key, array in own.items()})
+        return name
+
+    record = json.dumps(packed(fit, keep))
+    with run.path(MODELS).open("wb") as stream:
+        np.savez(stream, allow_pickle=False, record=np.array(record), **arrays)
+
+
+def load_fit(folder: str | Path, campaign: Campaign | str | Path) -> Fit:
+    """The fit that :meth:`stickslip.Fit.save`, a diagnosis or a command left in its run folder, to go on from.
+
+    Args:
+        folder: of the run.
+        campaign: that was fitted, or its file.
+
+    Raises:
+        RunFolderError: no run folder, one without models (of the static model, or of an older version), or damaged.
+        InputError: the campaign cannot be read or holds other data; an effect that is not in the catalogue.
+    """
+    folder = Path(folder)
+    result = read_result(folder)
+    path = folder / MODELS
+    if not path.is_file():
+        hint = "stickslip.load_run(folder) takes up the model alone"
+        raise RunFolderError("this run keeps no fit to go on from", file=path, hint=hint)
+    own = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
+    if digests(own.inputs()) != digests(result.get("inputs", ())):
+        hint = "name the campaign that was fitted, with its files as they were"
+        raise InputError("the run is of other data than the campaign", file=folder, value=own.title, hint=hint)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+
+        def load(name: str) -> Arrays:
+            return {key.partition("/")[2]: v for key, v in arrays.items() if key.startswith(f"{name}/")}
+
+        return unpacked(own, json.loads(str(arrays["record"])), load)
+    except StickslipError:
+        raise
+    except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
+        what = f"the fit is damaged ({type(error).__name__}: {error})"
+        raise RunFolderError(what, file=path, hint="make the run again") from None
 
 
 def _effect(effect: Any) -> dict[str, Any]:

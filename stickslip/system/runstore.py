@@ -327,6 +327,11 @@ def file_record(path: str | Path) -> dict[str, str]:
     return {"file": str(path), "sha256": digest.hexdigest()}
 
 
+def digests(inputs: Iterable[Mapping[str, str]]) -> list[str]:
+    """Those of :func:`file_record`: the same data, whatever the way to them was written like."""
+    return [str(record.get("sha256")) for record in inputs]
+
+
 def versions() -> dict[str, str]:
     """Versions of what a result depends on."""
     found = {"python": platform.python_version()}

@@ -10,14 +10,14 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..objects.campaign import Campaign
-from ..system.runstore import json_text, read_result, write_aside
+from ..system.runstore import digests, json_text, read_result, write_aside
 
 if TYPE_CHECKING:
     from ..inference.force.fit import Fit as ForceFit
@@ -40,7 +40,7 @@ class Journal:
         path = campaign.description.path
         self.campaign = campaign
         self.folder = path.parent / FOLDER
-        own = hashlib.sha256(" ".join(_digests(campaign.inputs())).encode()).hexdigest()[:8]
+        own = hashlib.sha256(" ".join(digests(campaign.inputs())).encode()).hexdigest()[:8]
         self.file = self.folder / f"{path.stem}-{own}.json"
         self.diagnosis = self.folder / f"{path.stem}-{own}-diagnosis"
         self._names: dict[int, tuple[ForceFit, str]] = {}
@@ -56,7 +56,7 @@ class Journal:
         rows = [{**step, "fit": self._of(fit)} for step, fit in zip(steps, fits, strict=True)]
         self._packed = {id(fit): self._packed[id(fit)] for fit in fits}
         write_aside(
-            self.file, json_text({"schema": SCHEMA, "inputs": _digests(self.campaign.inputs()), "steps": rows, **more})
+            self.file, json_text({"schema": SCHEMA, "inputs": digests(self.campaign.inputs()), "steps": rows, **more})
         )
         self._clean({name for row in rows for name in _named(row["fit"])})
 
@@ -71,7 +71,7 @@ class Journal:
         if not self.file.is_file():
             return [], [], {}
         kept = json.loads(self.file.read_text(encoding="utf-8"))
-        if kept.get("schema") != SCHEMA or kept.get("inputs") != _digests(self.campaign.inputs()):
+        if kept.get("schema") != SCHEMA or kept.get("inputs") != digests(self.campaign.inputs()):
             return [], [], {}
         steps, fits = [], []
         for row in kept.pop("steps"):
@@ -87,7 +87,7 @@ class Journal:
         if not (self.diagnosis / "result.json").is_file():
             return None
         result = read_result(self.diagnosis)
-        same = _digests(result.get("inputs", ())) == _digests(self.campaign.inputs())
+        same = digests(result.get("inputs", ())) == digests(self.campaign.inputs())
         return Diagnosis(self.campaign, None, dict(result), {}, self.diagnosis) if same else None
 
     def _of(self, fit: Fit) -> dict[str, Any]:
@@ -131,11 +131,6 @@ class Journal:
             if name.isalnum() and len(name) == 20 and name not in used:
                 path.unlink(missing_ok=True)
         self._names = {key: value for key, value in self._names.items() if value[1] in used}
-
-
-def _digests(inputs: Iterable[Mapping[str, str]]) -> list[str]:
-    """Of the data, whatever the way to them was written like."""
-    return [str(record.get("sha256")) for record in inputs]
 
 
 def _named(row: Mapping[str, Any]) -> list[str]:

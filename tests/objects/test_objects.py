@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import stickslip as ss
-from stickslip.errors import InputError
+from stickslip.errors import InputError, RunFolderError
 from stickslip.inference.force.problem import Problem
 from stickslip.system.runstore import read_result
 
@@ -148,6 +148,31 @@ def test_what_is_saved_is_what_is_shown(aged, tmp_path):
     free = aged.predict()
     assert kept["ladder"][-1]["free"]["recurrence"]["relative"] == pytest.approx(free.loc["all", "recurrence"])
     assert (folder / "report.html").stat().st_size > 10_000
+
+
+def test_a_fit_that_was_saved_goes_on(aged, campaign, tmp_path):
+    moved = aged.with_values({"contact-ageing.rate": 1.1 * aged.values["contact-ageing.rate"]})
+    for number, fit in enumerate((aged, moved)):
+        folder = fit.save(tmp_path / str(number))
+        again = ss.load_fit(folder, SHIPPED)
+        assert again.effects == ("contact-ageing",) and again.by_hand == fit.by_hand
+        assert again.values == fit.values and again.error == fit.error and again.unseen_error == fit.unseen_error
+        np.testing.assert_array_equal(again.covariance, fit.covariance)
+        pd.testing.assert_frame_equal(again.ladder, fit.ladder)
+    assert ss.load_fit(folder, campaign).remove("contact-ageing").effects == ()
+
+
+def test_a_fit_goes_on_with_its_own_data_only(aged, campaign, tmp_path):
+    folder = aged.save(tmp_path / "run")
+    with pytest.raises(InputError, match="other data"):
+        ss.load_fit(folder, ss.Campaign.from_traces(campaign.traces[:2], {"mass": "89.4 g"}))
+    models = folder / "models.npz"
+    models.write_bytes(models.read_bytes()[:500])
+    with pytest.raises(RunFolderError, match="damaged"):
+        ss.load_fit(folder, campaign)
+    models.unlink()
+    with pytest.raises(RunFolderError, match="keeps no fit"):
+        ss.load_fit(folder, campaign)
 
 
 @pytest.mark.parametrize("kind", ["numpy", "pandas", "xarray"])
