@@ -251,7 +251,7 @@ class _Pieces:
         made_of = csr_array(one_way - one_way @ bowed)  # values in the middles from means
         x = made_of @ seen
         v, slow = np.concatenate(self.v), np.concatenate(self.slow)
-        v = self._velocity(knot_t, x, v, np.asarray(trace.drive.breakpoints), times)
+        v = self._velocity(knot_t, x, v, np.asarray(trace.drive.breakpoints), events, times)
         inner = np.arange(2, v.size - 2)
         bends = np.zeros(v.size)
         bends[inner] = (v[inner + 2] - v[inner - 2]) / (knot_t[inner + 2] - knot_t[inner - 2])
@@ -324,14 +324,15 @@ class _Pieces:
         )  # fmt: skip
         return selected(knots_made, keep)
 
-    def _velocity(self, t: Array, x: Array, v: Array, breaks: Array, times: Scales) -> Array:
+    def _velocity(self, t: Array, x: Array, v: Array, breaks: Array, events: tuple[Event, ...], times: Scales) -> Array:
         """At the knots (m/s), where the means over the windows tell it and where the smoothed record does."""
         slow = np.concatenate(self.slow)
         turns = np.diff(slow.astype(int), prepend=0) != 0
         parts = np.diff(np.searchsorted(breaks, t), prepend=0) != 0
         stretch = np.where(slow, np.cumsum(turns | parts), -1)
         stretch[0] = -1  # where the record begins
-        return crept(t, x, np.concatenate(self.weight), stretch, self.step, v, times.ring or times.half)
+        onsets = np.array([*(e.t_onset for e in events), np.nan])[np.concatenate(self.event)]
+        return crept(t, x, np.concatenate(self.weight), stretch, onsets, self.step, v, times.ring or times.half)
 
     def _reading(self, smoother: Smoother, shape: tuple[int, int]) -> csr_array:
         """From samples to knots: means over windows, and smoothed samples."""

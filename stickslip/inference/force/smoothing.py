@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 BACK = 5.0  # noise levels of one sample within which a step back is noise
 STEPS = 6.0  # of the sensor that the block moves by while its velocity in the creep is found
-DEGREE, LEAST = 4, 2  # of the polynomial for it, and windows at either side
+DEGREE, LEAST = 4, 2  # of the polynomial for it, and windows at either side (where it ends, more at the other)
 
 
 def unsteady(x: Array, t: Array, events: tuple[Event, ...], rate: float) -> float:
@@ -102,22 +102,28 @@ def _local(length: int, degree: int, period: float | None = None) -> tuple[Array
     return np.asarray((value / scale) @ solved), np.asarray((slope / scale) @ solved)
 
 
-def crept(t: Array, x: Array, weight: Array, stretch: Index, step: float, speed: Array, period: float) -> Array:
+def crept(
+    t: Array, x: Array, weight: Array, stretch: Index, onset: Array, step: float, speed: Array, period: float
+) -> Array:
     """Velocity where the block creeps and begins to slip (m/s), shape (n,), as the given ``speed`` elsewhere.
 
     The slope of a polynomial through the windows around one, so many that the block moves by some steps of its sensor
-    in them: over two periods of the ringing alone, the velocity of a nucleation is that of the noise. Windows of a
-    stretch in which it does not move so far, or is as far within two periods, keep the ``speed``.
+    in them: over two periods of the ringing alone, the velocity of a nucleation is that of the noise. It is one in the
+    logarithm of the time that is left to the onset, in which a block creeps evenly that becomes ever faster. Windows of
+    a stretch in which it does not move so far, or is as far within two periods, keep the ``speed``.
 
     Args:
         t, x: middles of the windows (s) and means of the reading (m).
         weight: samples of each.
         stretch: numbers windows between which nothing changes the motion suddenly; negative where there is none.
+        onset: of the slip after each (s), NaN where none follows.
         step: of the sensor (m).
         speed: what else is known of the velocity (m/s), NaN where nothing is.
         period: of the ringing (s).
     """
-    far, root = 0.5 * STEPS * step, np.sqrt(weight)
+    far, root, left = 0.5 * STEPS * step, np.sqrt(weight), (onset - t) / period
+    course = np.where(np.isnan(left), t / period, -np.arcsinh(left))
+    pace = np.where(np.isnan(left), 1.0, 1.0 / np.sqrt(1.0 + left**2)) / period
     out = np.where(np.isnan(speed), np.gradient(x, t), speed)
     for own in np.split(np.arange(t.size), np.flatnonzero(np.diff(stretch)) + 1):
         first, last = int(own[0]), int(own[-1])
@@ -128,14 +134,14 @@ def crept(t: Array, x: Array, weight: Array, stretch: Index, step: float, speed:
             before, after = np.flatnonzero(away[: i - first]), np.flatnonzero(away[i - first :])
             if not before.size and not after.size:
                 continue
-            low = max(first, min(first + int(before[-1]) if before.size else first, i - LEAST))
-            high = min(last, max(i + int(after[0]) if after.size else last, i + LEAST))
+            low = max(first, min(first + int(before[-1]) if before.size else first, i - LEAST, last - 2 * LEAST))
+            high = min(last, max(i + int(after[0]) if after.size else last, i + LEAST, first + 2 * LEAST))
             if t[high] - t[low] < 2.0 * period and np.isfinite(speed[i]):
                 continue
-            around, scale = slice(low, high + 1), max(t[i] - t[low], t[high] - t[i])
+            around, scale = slice(low, high + 1), max(course[i] - course[low], course[high] - course[i])
             powers = np.arange(min(DEGREE, high - low - 1) + 1)
-            matrix = ((t[around, None] - t[i]) / scale) ** powers * root[around, None]
-            out[i] = np.linalg.lstsq(matrix, x[around] * root[around], rcond=None)[0][1] / scale
+            matrix = ((course[around, None] - course[i]) / scale) ** powers * root[around, None]
+            out[i] = np.linalg.lstsq(matrix, x[around] * root[around], rcond=None)[0][1] / scale * pace[i]
     return out
 
 
