@@ -121,6 +121,30 @@ def cases(found: dict[str, Any]) -> str:
 # --- performance ------------------------------------------------------------------------------------------------------
 
 
+@_drawn
+def ranks(found: dict[str, Any]) -> str:
+    """How well draws of the posterior hold the true values, a row for each parameter of ``posterior.json``."""
+    rows = [
+        [f"`{name}`", f"{p['chance']:.2f}", *(f"{100 * share:.0f} %" for share in p["within"].values()),
+         f"{p['mean off']:+.2f} ± {found['campaigns'] ** -0.5:.2f}", f"{p['of the fit']:.2f}"]
+        for name, p in found["parameters"].items()
+    ]  # fmt: skip
+    within = [f"within {share}" for share in next(iter(found["parameters"].values()))["within"]]
+    head = ["parameter", "chance of such ranks", *within, "mean error / deviation", "deviation / that of the fit"]
+    return table(head, rows)
+
+
+@_drawn
+def decided(found: dict[str, Any]) -> str:
+    """Campaigns that left a set, the experiment that was proposed and made, and what was left of the set."""
+    rows = [
+        [f"`{c['hidden']}`", ", ".join(f"`{tag}`" for tag in c["set"]), c["experiment"],
+         ", ".join(f"`{tag}`" for tag in c["left"]) or c["after"]]
+        for c in found["cases"] if "left" in c
+    ]  # fmt: skip
+    return table(["hidden", "set", "experiment", "left after it"], rows)
+
+
 def aims(found: dict[str, Any]) -> str:
     """What the program is to reach, and what was measured."""
     if not found:
