@@ -30,7 +30,7 @@ TOLD: dict[tuple[str, ...], tuple[str, ...]] = {
     ("adhesion",): ("c_i + ε F_s k_i/Σ_j k_j", "F_s → (1 + ε) F_s"),
     ("base-vibration",): ("-m a_b sin(2π f t + φ)",),
     ("contact-ageing",): ("1 + β ln(1 + θ/t_0)", "θ' = 1 - |x'| θ/D", "θ(0) = θ_1"),
-    ("contact-damping",): ("-η x' Σ_i k_i [1 - (f_i/C_i)^2]",),
+    ("contact-damping",): ("-η x' Σ_(|f_i| < C_i) k_i",),
     ("contact-renewal",): ("∂_t g_i + |x'| ∂_a g_i = k_i x'", "|g_i| ≤ C_i", "e^(-a/l)"),
     ("curvature",): ("(1-ε) u_i + ε (3 F_s)/(2 k) (1 - Q_i^2)", "Q_i = Σ_(u_j > u_i) k_j/k"),
     ("direct-effect", "shifted"): ("a ln(1 + |x'|/v^*)", "¬asinh"),
