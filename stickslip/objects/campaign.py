@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from .static_fit import Align, Sampling, StaticFit, Time
 
 
-class Campaign(Shown):
-    """Measured runs of one apparatus.
+class Campaign(Shown, Mapping[str, Trace]):
+    """Measured runs of one apparatus, by name: ``campaign["v050"]``, ``for name, trace in campaign.items()``.
 
     Args:
         description: what the campaign file says, or what
@@ -92,11 +92,26 @@ class Campaign(Shown):
     def __len__(self) -> int:
         return len(self.traces)
 
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
     def __getitem__(self, name: str) -> Trace:
-        for trace in self.traces:
-            if trace.name == name:
-                return trace
-        raise InputError(f"there is no trace '{name}'", file=self._file, hint=nearest(name, self.names))
+        found = self.get(name)
+        if found is not None:
+            return found
+        hint = nearest(name, self.names) if isinstance(name, str) else "by number: campaign.traces[0]"
+        allowed = None if isinstance(name, str) else ", ".join(self.names)
+        raise InputError(f"there is no trace {name!r}", file=self._file, allowed=allowed, hint=hint)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """The run of that name, or the default where there is none."""
+        return next((trace for trace in self.traces if trace.name == name), default)
+
+    __eq__ = object.__eq__  # of itself alone: comparing every sample is not what a dictionary or a set asks for
+    __hash__ = object.__hash__
 
     @cached_property
     def events(self) -> tuple[Segmentation, ...]:
