@@ -1,6 +1,6 @@
 """Parameters that know what they are: value, unit, bounds, prior, null value and source, kept beside the field.
 
-A physical class is an ``equinox.Module`` whose fields are made by :func:`parameter`; :func:`specs` reads them back.
+A physical class is a :class:`Parametrised` whose fields are made by :func:`parameter`; :func:`specs` reads them back.
 Names are local to the class; nothing here is a global table.
 """
 
@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..errors import InputError
+from ..system.units import shown
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,21 @@ class Spec:
 def span(lower: float, upper: float, unit: str) -> str:
     """A range with its unit, which a pure number does not have."""
     return f"{lower:g} ... {upper:g}{'' if unit == '1' else f' {unit}'}"
+
+
+class Parametrised(eqx.Module):
+    """What has fields made by :func:`parameter`: it shows their values with units."""
+
+    def __repr__(self) -> str:
+        known = specs(self)
+        said = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        text = (f"{name}={_said(value, known[name].unit if name in known else '1')}" for name, value in said.items())
+        return f"{type(self).__name__}({', '.join(text)})"
+
+
+def _said(value: Any, unit: str) -> str:
+    number = isinstance(value, (float, np.ndarray, jax.Array)) and not isinstance(value, jax.core.Tracer)
+    return shown(float(value), unit) if number and np.ndim(value) == 0 else eqx.tree_pformat(value)
 
 
 def _as_float(value: Any) -> Any:

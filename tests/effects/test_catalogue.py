@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -43,6 +44,19 @@ def no_user_effects(monkeypatch: pytest.MonkeyPatch) -> None:
 def write(path: Path, text: str) -> Path:
     path.write_text(text)
     return path
+
+
+def test_laws_show_their_values_with_units() -> None:
+    effect = catalogue.make("rate-and-state", evolution=0.01, slip_distance="30 um", law="slip")
+    text = repr(effect)
+    assert text.startswith("RateAndState(") and "evolution=0.01, " in text and "slip_distance=30 µm" in text
+    assert "law='slip'" in text and "f64" not in text
+    assert "mass=50 g" in repr(Block(mass=0.05)) and "healing_time=20 ms" in repr(Weakening())
+    lanes = repr(Block(mass=jnp.ones(3)))  # as within vmap, and where it is traced
+    assert "mass=f64[3]" in lanes and "damping=10 N s/m" in lanes
+    seen: list[str] = []
+    jax.jit(lambda block: seen.append(repr(block)) or block.mass)(Block())
+    assert "mass=f64[]" in seen[0]
 
 
 def test_a_users_effect_takes_part(tmp_path: Path, no_user_effects: None) -> None:
