@@ -90,6 +90,18 @@ def test_loading_again_replaces(tmp_path: Path, no_user_effects: None) -> None:
     assert list(tmp_path.iterdir()) == [path]  # no byte code beside the user's file
 
 
+def test_a_cell_that_is_run_again_replaces_its_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a notebook does, whose classes are all of the module __main__."""
+    monkeypatch.setattr(catalogue.EFFECTS, "_own", dict(catalogue.EFFECTS._own))
+    cell = MY_EFFECT.replace("class", "from stickslip.effects import register\n@register\nclass", 1)
+    names = {"__name__": "__main__"}
+    for summary in ("as it was", "as it is"):
+        exec(cell.replace("friction follows the sine of the displacement", summary), names)  # noqa: S102
+    assert catalogue.get("humming") is names["Humming"] and catalogue.get("humming").summary == "as it is"
+    with pytest.raises(InputError, match="taken by another effect"):
+        exec(cell.replace("Humming", "Another"), names)  # noqa: S102
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
