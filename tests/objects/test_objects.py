@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 import stickslip as ss
 from stickslip.errors import InputError, RunFolderError
@@ -243,6 +244,18 @@ def test_pictures_have_units(aged):
         assert name == "errors" or any(" / " in label for label in labels), name
     with pytest.raises(InputError, match="age"):
         aged.plot.residual("agee")
+
+
+def test_pictures_are_drawn_in_axes_of_ones_own(base):
+    """In a figure with other things, as for a paper."""
+    for name in ("trace", "force", "creep", "residual", "backbone", "errors"):
+        own = Figure()
+        axes = own.subplots(3, 1)
+        ax = axes[:2] if name == "force" else axes[0]
+        assert getattr(base.plot, name)(ax=ax) is own and len(own.axes) == 3 and not own.legends
+        assert [a.has_data() for a in axes] == [True, name == "force", False], name
+    with pytest.raises(InputError, match="allowed: 2"):
+        base.plot.force(ax=Figure().subplots())
 
 
 def test_a_value_set_by_hand_costs_one_evaluation_without_derivatives(base):
