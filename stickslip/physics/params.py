@@ -1,4 +1,4 @@
-"""Parameters that know what they are: value, unit, bounds, prior, null value and source, kept beside the field.
+"""Parameters that know what they are: value, unit, bounds, prior and null value, kept beside the field.
 
 A physical class is a :class:`Parametrised` whose fields are made by :func:`parameter`; :func:`specs` reads them back.
 Names are local to the class; nothing here is a global table.
@@ -30,7 +30,6 @@ class Spec:
         log: whether it is sought and drawn on a logarithmic scale.
         grid: values from which a search starts, for shape parameters that are not identified at the null.
         doc: meaning in words.
-        source: the equation or paper.
         symbol: LaTeX symbol.
         ends: ends of the range where the law becomes a special case (a sharp corner, no direct effect): a fit may
             arrive there, which says nothing against it.
@@ -49,7 +48,6 @@ class Spec:
     null: float | None = None
     log: bool = False
     grid: tuple[float, ...] = ()
-    source: str = ""
     symbol: str = ""
     ends: tuple[float, ...] = ()
     prior: float | None = None
@@ -98,7 +96,6 @@ def parameter(
     null: float | None = None,
     log: bool = False,
     grid: tuple[float, ...] = (),
-    source: str = "",
     symbol: str = "",
     ends: tuple[float, ...] = (),
     prior: float | None = None,
@@ -106,7 +103,7 @@ def parameter(
     usual: tuple[float, float] | None = None,
 ) -> Any:
     """A field of a physical class: a 64-bit float with its :class:`Spec`. Arguments as there."""
-    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, source, symbol, ends, prior, width, usual)
+    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, symbol, ends, prior, width, usual)
     return eqx.field(default=float(default), converter=_as_float, metadata={"spec": spec})
 
 
