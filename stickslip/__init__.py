@@ -24,6 +24,7 @@ _PUBLIC = {
     "load_run": "objects.fitted_run",
     "load_fit": "objects.stored",
     "load_campaign": "objects.campaign",
+    "load_example": "objects.example",
     "Campaign": "objects.campaign",
     "study": "objects.study",
     "Fit": "objects.fit",
@@ -61,6 +62,7 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .objects.campaign import Campaign as Campaign
     from .objects.campaign import load_campaign as load_campaign
     from .objects.diagnosis import Diagnosis as Diagnosis
+    from .objects.example import load_example as load_example
     from .objects.fit import Fit as Fit
     from .objects.fitted_run import load_run as load_run
     from .objects.stored import load_fit as load_fit

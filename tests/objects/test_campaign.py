@@ -8,6 +8,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
+from stickslip.objects import example
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 NAMES = ["v050", "v100", "v200", "v400", "holds"]
@@ -16,6 +17,14 @@ NAMES = ["v050", "v100", "v200", "v400", "holds"]
 @pytest.fixture(scope="module")
 def campaign():
     return ss.load_campaign(SHIPPED)
+
+
+def test_the_shipped_one_is_had_from_everywhere(campaign, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert ss.load_example().inputs() == campaign.inputs()
+    monkeypatch.setattr(example, "example", lambda: None)
+    with pytest.raises(InputError, match="from the repository"):
+        ss.load_example()
 
 
 def test_its_runs_are_had_as_from_a_dictionary(campaign):
