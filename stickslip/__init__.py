@@ -40,6 +40,7 @@ _PUBLIC = {
     "slip_derivatives": "simulation.solve",
     "Vibrometer": "physics.sensor",
     "measure": "physics.sensor",
+    "effects": "effects",
     "make_effect": "physics.effects.catalogue:make",
     "StickslipError": "errors",
     "InputError": "errors",
@@ -52,6 +53,7 @@ __all__ = ["__version__", *_PUBLIC]
 
 
 if TYPE_CHECKING:  # the same for editors and type checkers
+    from . import effects as effects
     from .data.segment import segment as _segment
     from .data.trace import Trace as Trace
     from .errors import FitError as FitError

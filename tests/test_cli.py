@@ -119,7 +119,7 @@ def test_a_type_checker_sees_every_public_name_where_it_is():
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
     )  # fmt: skip
     found = {
-        name.asname: getattr(importlib.import_module(f"stickslip.{node.module}"), name.name)
+        name.asname: getattr(importlib.import_module(".".join(filter(None, ("stickslip", node.module)))), name.name)
         for node in block.body if isinstance(node, ast.ImportFrom) for name in node.names
     }  # fmt: skip
     found |= {"find_events": found.pop("_segment"), "make_effect": found.pop("_make")}

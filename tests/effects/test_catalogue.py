@@ -151,6 +151,17 @@ def test_names_and_values_are_checked() -> None:
         catalogue.make("tilt", by="weight")
 
 
+def test_the_catalogue_is_a_table_to_choose_from() -> None:
+    import stickslip as ss
+
+    found = ss.effects.table()
+    assert list(found.index) == catalogue.tags()
+    friction = found.query("family == 'friction'")
+    assert 5 < len(friction) < len(found) and friction.loc["contact-ageing", "source"].startswith("Dieterich")
+    assert found.loc["drive-ripple", "acts as"] == "Drive"
+    assert found.loc["contact-ageing", "parameters"].split(", ")[0] == "rate"
+
+
 def test_what_is_confused_is_confused_both_ways() -> None:
     for tag in catalogue.tags():
         for other, experiment in catalogue.alike(tag).items():
