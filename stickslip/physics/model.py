@@ -147,7 +147,7 @@ class Forces(NamedTuple):
         return self.spring - self.contact - self.viscous + self.body
 
 
-class Model(eqx.Module):
+class Model(Parametrised):
     """A spring-driven block on a rough contact.
 
     Attributes:

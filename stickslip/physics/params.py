@@ -66,7 +66,7 @@ def span(lower: float, upper: float, unit: str) -> str:
 
 
 class Parametrised(eqx.Module):
-    """What has fields made by :func:`parameter`: it shows their values with units."""
+    """What has fields made by :func:`parameter`, or is made of such parts: it shows their values with units."""
 
     def __repr__(self) -> str:
         known = specs(self)
@@ -76,6 +76,8 @@ class Parametrised(eqx.Module):
 
 
 def _said(value: Any, unit: str) -> str:
+    if isinstance(value, Parametrised | tuple):
+        return repr(value)
     number = isinstance(value, (float, np.ndarray, jax.Array)) and not isinstance(value, jax.core.Tracer)
     return shown(float(value), unit) if number and np.ndim(value) == 0 else eqx.tree_pformat(value)
 
