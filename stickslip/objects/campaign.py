@@ -241,11 +241,11 @@ class Campaign(Shown, Mapping[str, Trace]):
             out=out, force=force, progress=progress,
         )  # fmt: skip
 
-    def levels(self, name: str | None = None) -> xarray.Dataset:
+    def levels(self, run: str | None = None) -> xarray.Dataset:
         """Force of the spring at onset and arrest of every slip of a run, and when and where; no fit is needed.
 
         Args:
-            name: of the run; default the first.
+            run: its name; default the first.
 
         Returns:
             See :func:`stickslip.inference.forecast.levels`.
@@ -255,7 +255,7 @@ class Campaign(Shown, Mapping[str, Trace]):
         """
         from ..inference.forecast import levels
 
-        trace = self.traces[0] if name is None else self[name]
+        trace = self.traces[0] if run is None else self[run]
         try:
             return levels(trace, self.scaled[0][self.names.index(trace.name)])
         except InputError as error:
@@ -280,19 +280,19 @@ class Campaign(Shown, Mapping[str, Trace]):
 
         return forecast(self, run, train, at, progress)
 
-    def to_xarray(self, name: str) -> xarray.Dataset:
+    def to_xarray(self, run: str) -> xarray.Dataset:
         """Signals of a run over time (s), SI units in the attributes."""
         import xarray
 
         from ..data.trace import SIGNALS
 
-        trace = self[name]
+        trace = self[run]
         units = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
         signals = {key: ("time", getattr(trace, key), {"units": unit}) for key, unit in units.items()}
         known = {key: v for key, v in signals.items() if v[1] is not None}
         if trace.drive is not None:
             known["load_point"] = ("time", trace.drive.position(trace.time), {"units": "m"})
-        return xarray.Dataset(known, coords={"time": ("time", trace.time, {"units": "s"})}, attrs={"title": name})
+        return xarray.Dataset(known, coords={"time": ("time", trace.time, {"units": "s"})}, attrs={"title": run})
 
     @property
     def summary(self) -> pandas.DataFrame:

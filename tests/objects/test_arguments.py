@@ -1,11 +1,14 @@
 """Arguments of the objects: a single name stands for itself, and what cannot be meant is refused before any work."""
 
+import inspect
 from pathlib import Path
 
 import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
+from stickslip.objects.fitted_run import FittedRun
+from stickslip.objects.picture import FitPlots
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 
@@ -66,3 +69,12 @@ def test_a_fit_takes_a_single_name(campaign):
     one, several = (fit.scenario(changes).file.drive for changes in (change, [change]))
     assert one == several == fit.scenario(drive="0.8 mm/s").file.drive
     assert fit.simulate(drive="0.8 mm/s", events=1).sizes == fit.simulate(change, events=1).sizes
+
+
+def test_a_run_is_asked_for_by_one_word_everywhere():
+    asked = (
+        *(ss.Campaign.levels, ss.Campaign.forecast, ss.Campaign.to_xarray, ss.Fit.freely, ss.Fit.scenario),
+        *(ss.Fit.simulate, FitPlots.trace, FitPlots.force, FitPlots.creep, FittedRun.scenario, FittedRun.model_of),
+    )
+    for method in asked:
+        assert "run" in inspect.signature(method).parameters, method
