@@ -26,6 +26,7 @@ _PUBLIC = {
     "load_campaign": "objects.campaign",
     "load_example": "objects.example",
     "Campaign": "objects.campaign",
+    "compare": "objects.compare",
     "study": "objects.study",
     "Fit": "objects.fit",
     "Diagnosis": "objects.diagnosis",
@@ -63,6 +64,7 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .errors import StickslipError as StickslipError
     from .objects.campaign import Campaign as Campaign
     from .objects.campaign import load_campaign as load_campaign
+    from .objects.compare import compare as compare
     from .objects.diagnosis import Diagnosis as Diagnosis
     from .objects.example import load_example as load_example
     from .objects.fit import Fit as Fit

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 import stickslip as ss
 from stickslip.errors import InputError, RunFolderError
+from stickslip.inference.diagnose.decide import Judge
 from stickslip.inference.force.problem import Problem
 from stickslip.system.runstore import read_result
 
@@ -235,6 +236,21 @@ def test_notebooks_show_tables_and_escape_what_comes_from_files(campaign, base):
         assert html.count("<table") >= 1 and "</div>" in html
     named = ss.Campaign.from_traces([campaign.traces[0].replace(name="<script>x</script>")], RIG, "<b>t</b>")
     assert "<script>" not in named._repr_html_() and "<b>" not in named._repr_html_()
+
+
+def test_fits_are_compared_by_what_they_foretell(campaign, base, aged):
+    found = ss.compare({"base": base, "aged": aged})
+    assert list(found.index) == ["aged", "base"] and found.loc["aged", ["behind", "+-"]].tolist() == [0.0, 0.0]
+    columns = ["error", "error std", "unseen error", "unseen std"]  # all in floors of the better one, as its ladder has
+    assert np.allclose(found.loc[["base", "aged"], columns], aged.ladder[columns].iloc[1:], rtol=1e-9)
+    # as a diagnosis judges the effect beside the base
+    judged = Judge(base.force_fit, 1).beside(aged.force_fit, 1)
+    assert found.loc["base", "behind"] == pytest.approx(judged.unseen.sum(), rel=1e-9)
+    assert 0.0 < found.loc["base", "+-"] < 0.2 * found.loc["base", "behind"]
+    with pytest.raises(InputError, match="'holds' is a fit of other runs than 'all'"):
+        ss.compare({"all": base, "holds": campaign.fit(holdout=["v050", "v100", "v200"])})
+    with pytest.raises(InputError, match="nothing to compare"):
+        ss.compare({})
 
 
 def test_pictures_have_units(aged):
