@@ -238,6 +238,25 @@ def test_notebooks_show_tables_and_escape_what_comes_from_files(campaign, base):
     assert "<script>" not in named._repr_html_() and "<b>" not in named._repr_html_()
 
 
+def test_a_fit_says_which_parameters_are_tied(base):
+    """Of draws from its covariance."""
+    found = base.correlations
+    names = list(base.covariance.parameter.values)
+    scale = np.sqrt(np.diag(base.covariance.values))
+    whitened = base.covariance.values / np.outer(scale, scale)
+    draws = np.random.default_rng(1).multivariate_normal(np.zeros(len(names)), whitened, 40_000)
+    for _, one, other, r in found.itertuples():
+        at = [names.index(one), names.index(other)]
+        assert r == pytest.approx(np.corrcoef(draws[:, at].T)[0, 1], abs=0.02)
+    assert len(found) == len(names) * (len(names) - 1) / 2 and found.correlation.abs().is_monotonic_decreasing
+    strongest = found.iloc[0]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("stickslip.objects.fit.TIED", abs(strongest.correlation) - 1e-6)
+        assert f"tied by the data: {strongest['of']} and {strongest['and']} ({strongest.correlation:.2f})" in repr(base)
+        patch.setattr("stickslip.objects.fit.TIED", 1.0)
+        assert "tied" not in repr(base)
+
+
 def test_fits_are_compared_by_what_they_foretell(campaign, base, aged):
     found = ss.compare({"base": base, "aged": aged})
     assert list(found.index) == ["aged", "base"] and found.loc["aged", ["behind", "+-"]].tolist() == [0.0, 0.0]
