@@ -157,7 +157,7 @@ class Drive(_Rebuilt):
 
     @property
     def speed(self) -> float:
-        """The speed at which the drive moves when it moves: the time-weighted median of |v| over moving pieces, m/s."""
+        """The speed at which the drive moves when it moves: the median over time of its moving pieces, m/s."""
         lengths = np.diff(self.times)
         speeds = np.abs(np.diff(self.positions) / lengths)
         moving = speeds > 0.05 * speeds.max(initial=0.0)
