@@ -41,6 +41,7 @@ _PUBLIC = {
     "slip_derivatives": "simulation.solve",
     "Vibrometer": "physics.sensor",
     "measure": "physics.sensor",
+    "keep_compiled": "system.cache",
     "effects": "effects",
     "make_effect": "physics.effects.catalogue:make",
     "StickslipError": "errors",
@@ -89,6 +90,7 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .simulation.scenario import steady_sliding as steady_sliding
     from .simulation.solve import integrate as integrate
     from .simulation.solve import slip_derivatives as slip_derivatives
+    from .system.cache import keep_compiled as keep_compiled
     from .workbench import CallableModule as CallableModule
 
     find_events, make_effect = _segment, _make

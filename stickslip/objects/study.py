@@ -80,7 +80,7 @@ def _fitted(path: str, effects: tuple[str, ...], files: tuple[str, ...], parent:
 
     if parent is not None:
         end_with(parent)
-    cache.enable()
+    cache.keep_compiled()
     try:
         fit = load_campaign(path, files).fit(effects, progress=silent)
     except StickslipError as error:
