@@ -151,7 +151,7 @@ def test_tdms(tmp_path):
 def test_tdms_without_its_package(tmp_path, monkeypatch, refuses):
     tdms(tmp_path / "a.tdms")
     monkeypatch.setitem(sys.modules, "nptdms", None)
-    refuses(lambda: read_columns(tmp_path / "a.tdms"), "npTDMS", "pip install 'stickslip[tdms]'")
+    refuses(lambda: read_columns(tmp_path / "a.tdms"), "nptdms", "pip install 'stickslip[tdms]'")
 
 
 def cut(tmp_path, make, name):

@@ -9,6 +9,8 @@ import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.objects.fitted_run import FittedRun
 from stickslip.objects.picture import FitPlots
+from stickslip.objects.posterior import sample
+from stickslip.system.progress import silent
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 
@@ -78,3 +80,18 @@ def test_a_run_is_asked_for_by_one_word_everywhere():
     )
     for method in asked:
         assert "run" in inspect.signature(method).parameters, method
+
+
+@pytest.mark.parametrize(
+    ("missing", "extra", "ask"),
+    [
+        ("panel", "workbench", ss.workbench),
+        ("distributed", "distributed", lambda campaign: ss.study(SHIPPED)),
+        ("nutpie", "posterior", lambda campaign: sample(campaign, 1, 1, 1, 0, silent)),
+    ],
+)
+def test_a_package_that_is_missing_is_named_with_how_to_install_it(campaign, monkeypatch, missing, extra, ask):
+    monkeypatch.setattr("stickslip.system.extras.find_spec", lambda name: None if name == missing else name)
+    with pytest.raises(InputError, match=f"needs {missing}, which is not installed") as refused:
+        ask(campaign)
+    assert refused.value.hint == f"pip install 'stickslip[{extra}]'"

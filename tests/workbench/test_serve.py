@@ -202,10 +202,7 @@ def test_a_scenario_is_simulated_and_opened(tmp_path):
 
 
 def test_what_is_missing_to_run_it_is_said(monkeypatch, capsys):
-    import importlib.util
-
-    find = importlib.util.find_spec
-    monkeypatch.setattr("stickslip.cli.open.importlib.util.find_spec", lambda n: None if n == "panel" else find(n))
+    monkeypatch.setattr("stickslip.system.extras.find_spec", lambda name: None if name == "panel" else name)
     assert run(["open", "campaign.toml"]) == 2
     assert "pip install 'stickslip[workbench]'" in capsys.readouterr().err
 
