@@ -53,6 +53,10 @@ class Scenario(Shown):
         """A copy with keys such as ``("contact.H", 0.5)`` set; checked as a file is."""
         return _checked(dict(self.content), self.path, self.sha256, (*self.changes, *changes), changes, "")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # the class of its file is made for the kind of contact, so it is read again
+        return _checked, (dict(self.content), self.path, self.sha256, self.changes, (), "")
+
     def _parts(self) -> list[str]:
         tables = [
             f"{name}: {facts(table)}"
