@@ -24,7 +24,9 @@ _PUBLIC = {
     "load_run": "objects.fitted_run",
     "load_fit": "objects.stored",
     "load_campaign": "objects.campaign",
+    "load_example": "objects.example",
     "Campaign": "objects.campaign",
+    "compare": "objects.compare",
     "study": "objects.study",
     "Fit": "objects.fit",
     "Diagnosis": "objects.diagnosis",
@@ -39,6 +41,8 @@ _PUBLIC = {
     "slip_derivatives": "simulation.solve",
     "Vibrometer": "physics.sensor",
     "measure": "physics.sensor",
+    "keep_compiled": "system.cache",
+    "effects": "effects",
     "make_effect": "physics.effects.catalogue:make",
     "StickslipError": "errors",
     "InputError": "errors",
@@ -51,6 +55,7 @@ __all__ = ["__version__", *_PUBLIC]
 
 
 if TYPE_CHECKING:  # the same for editors and type checkers
+    from . import effects as effects
     from .data.segment import segment as _segment
     from .data.trace import Trace as Trace
     from .errors import FitError as FitError
@@ -60,7 +65,9 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .errors import StickslipError as StickslipError
     from .objects.campaign import Campaign as Campaign
     from .objects.campaign import load_campaign as load_campaign
+    from .objects.compare import compare as compare
     from .objects.diagnosis import Diagnosis as Diagnosis
+    from .objects.example import load_example as load_example
     from .objects.fit import Fit as Fit
     from .objects.fitted_run import load_run as load_run
     from .objects.stored import load_fit as load_fit
@@ -83,6 +90,7 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .simulation.scenario import steady_sliding as steady_sliding
     from .simulation.solve import integrate as integrate
     from .simulation.solve import slip_derivatives as slip_derivatives
+    from .system.cache import keep_compiled as keep_compiled
     from .workbench import CallableModule as CallableModule
 
     find_events, make_effect = _segment, _make

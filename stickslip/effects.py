@@ -20,7 +20,7 @@ from .physics.effects.base import (
     Stiffness,
     Threshold,
 )
-from .physics.effects.catalogue import forms, get, load_file, make, register, roles, tags
+from .physics.effects.catalogue import forms, get, load_file, make, register, roles, table, tags
 from .physics.params import parameter, variant
 from .simulation.conformance import check_effect
 
@@ -46,6 +46,7 @@ __all__ = [
     "parameter",
     "register",
     "roles",
+    "table",
     "tags",
     "variant",
 ]

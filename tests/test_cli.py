@@ -100,6 +100,20 @@ def test_importing_the_package_imports_nothing():
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
 
 
+def test_a_notebook_keeps_what_it_compiles_where_it_is_asked_to(tmp_path):
+    code = (
+        "import stickslip as ss; folder = ss.keep_compiled(); import jax, jax.numpy as jnp;"
+        "jax.jit(lambda x: x + 1.0)(jnp.ones(3)).block_until_ready(); print(folder, len([*folder.iterdir()]))"
+    )
+    own = {k: v for k, v in os.environ.items() if not k.startswith(("JAX_", "STICKSLIP_"))}
+    made = subprocess.run(
+        [sys.executable, "-c", code], env={**own, "XDG_CACHE_HOME": str(tmp_path)}, capture_output=True, text=True,
+        timeout=60,
+    )  # fmt: skip
+    folder, number = made.stdout.split()
+    assert Path(folder).is_relative_to(tmp_path) and int(number) > 0
+
+
 def test_public_names_are_there():
     import stickslip
 
@@ -119,7 +133,7 @@ def test_a_type_checker_sees_every_public_name_where_it_is():
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
     )  # fmt: skip
     found = {
-        name.asname: getattr(importlib.import_module(f"stickslip.{node.module}"), name.name)
+        name.asname: getattr(importlib.import_module(".".join(filter(None, ("stickslip", node.module)))), name.name)
         for node in block.body if isinstance(node, ast.ImportFrom) for name in node.names
     }  # fmt: skip
     found |= {"find_events": found.pop("_segment"), "make_effect": found.pop("_make")}
@@ -544,7 +558,7 @@ def test_compiled_code_is_kept_and_can_be_switched_off(scenario, tmp_path_factor
     kept = list((home / "stickslip" / "compiled").glob("jit_call-*"))  # of what was traced before
     assert kept, "the integrator itself must be in the cache"
     off = tmp_path_factory.mktemp("off")
-    code = "from stickslip.system import cache; assert cache.enable() is None; import os, equinox\n"
+    code = "from stickslip.system import cache; assert cache.keep_compiled() is None; import os, equinox\n"
     code += "assert equinox._config.EQX_ON_ERROR == 'nan'"  # else it would compile code with other last digits
     environment |= {"XDG_CACHE_HOME": str(off), "STICKSLIP_NO_CACHE": "1"}
     assert subprocess.run([sys.executable, "-c", code], env=environment, timeout=60).returncode == 0

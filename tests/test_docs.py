@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import json
 import re
@@ -275,6 +276,23 @@ def test_the_papers_page_has_its_numbers() -> None:
     text = (DOCS / "paper.md").read_text(encoding="utf-8")
     for picture in re.findall(r"\]\((paper/\w+\.png)\)", text):
         assert (DOCS / picture).exists()
+
+
+def test_the_page_of_the_api_has_what_public_functions_take_and_return() -> None:
+    """Classes of this package, by their names in the signatures."""
+    import stickslip
+
+    told = re.findall(r"auto\w+:: stickslip\.(?:\w+\.)*(\w+)", (DOCS / "api.md").read_text())
+    own = {node.name for path in (ROOT / "stickslip").rglob("*.py") for node in ast.parse(path.read_text()).body
+           if isinstance(node, ast.ClassDef)}  # fmt: skip
+    asked = {
+        (name, word)
+        for name in stickslip.__all__
+        for note in getattr(getattr(stickslip, name), "__annotations__", {}).values()
+        for word in re.findall(r"[A-Z]\w+", str(note))
+    }
+    tables = {word for word in own if word.endswith("Table")}  # of a scenario's file, which have a page of their own
+    assert {(name, word) for name, word in asked if word in own - tables and word not in told} == set()
 
 
 def test_the_page_of_the_api_has_every_public_name() -> None:

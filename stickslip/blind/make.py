@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RunFolderError, StickslipError
+from ..system.extras import need
 from ..system.lifeline import end_with
 from ..system.runstore import Run, json_text, open_run, versions
 from .mix import MIX, Case, case_seed, plan
@@ -49,14 +50,14 @@ def make_challenge(
         The digest of the seal.
 
     Raises:
-        RunFolderError: the folder exists. InputError: number or seed makes no sense. StickslipError: numba is missing.
+        RunFolderError: the folder exists. InputError: number or seed makes no sense, or numba is missing.
     """
     folder = Path(folder)
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise RunFolderError(
             "something is there already, and a challenge is never replaced", file=folder, hint="choose another folder"
         )
-    _need_numba()
+    need("the generator of the challenge", "challenge", "numba")
     planned = plan(cases, seed) if own is None else list(own)
     with open_run(folder, resume=True) as run:
         made = _make_all(run, planned, seed, grouped, os.cpu_count() or 1 if jobs is None else jobs, tell)
@@ -74,15 +75,6 @@ def make_challenge(
         seal = make_seal(run.folder, files, cases=len(planned), versions=versions())
         shutil.rmtree(run.folder / MADE)
     return seal
-
-
-def _need_numba() -> None:
-    try:
-        import numba  # noqa: F401
-    except ImportError:
-        raise StickslipError(
-            "the generator of the challenge needs numba\n  to fix: pip install 'stickslip[challenge]'"
-        ) from None
 
 
 def _make_all(

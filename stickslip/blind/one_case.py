@@ -69,7 +69,7 @@ def do_case(campaign: str, runs: str, case: str, diagnosis: Diagnosis, session: 
     """
     from ..system import cache
 
-    cache.enable()
+    cache.keep_compiled()
     began = time.monotonic()
     try:
         return _attempt(campaign, Path(runs), case, diagnosis, session, began)

@@ -107,7 +107,7 @@ def run(arguments: Sequence[str]) -> int:
     """Run a command line and return its exit code; every error is one message on stderr."""
     try:
         threads.one_for_linear_algebra()
-        cache.enable()
+        cache.keep_compiled()
         result = make_app()(list(arguments), exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
         return result if isinstance(result, int) else 0

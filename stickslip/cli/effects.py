@@ -161,8 +161,7 @@ def _traces(cls: type[Effect]) -> tuple[xarray.Dataset, xarray.Dataset, dict[str
     """Traces without and with an effect, and the amplitude it was given."""
     from ..simulation.scenario.demonstration import with_and_without
 
-    with show.progress_bar("both traces") as watch:
-        return with_and_without(cls, watch)
+    return with_and_without(cls)
 
 
 def _sketched(cls: type[Effect]) -> list[str]:

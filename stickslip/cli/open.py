@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import ipaddress
 from pathlib import Path
 
 from ..errors import InputError
+from ..workbench import need_pages
 from .parameters import Files
 
-NEEDED = ("panel", "bokeh", "tsdownsample", "watchfiles")
 LOOPBACK = "127.0.0.1"
 
 
@@ -42,12 +41,7 @@ def open(
     address:
         Another address of this machine under which the server is reached, from other machines as well.
     """
-    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"the workbench needs {', '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} not installed",
-            hint="pip install 'stickslip[workbench]'",
-        )
+    need_pages()
     from ..workbench.opening import offered, opened
     from ..workbench.serve import serve
     from ..workbench.session import Session

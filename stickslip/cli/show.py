@@ -3,55 +3,13 @@
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ..system.units import shown
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from ..simulation.scenario import Progress
-
-PATIENCE = 1.0  # s before a progress bar appears
-
-
-@contextmanager
-def progress_bar(title: str = "simulating") -> Iterator[Callable[[Progress], None]]:
-    """A bar with simulated time and events so far, on stderr, only on a terminal and only after a second."""
-    if not sys.stderr.isatty():
-        yield lambda progress: None
-        return
-    from rich import progress as bars
-    from rich.console import Console
-
-    bar = bars.Progress(
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.TextColumn("{task.fields[text]}"),
-        bars.TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    task = bar.add_task(title, total=1.0, text="")
-    began, visible = time.monotonic(), False
-
-    def watch(progress: Progress) -> None:
-        nonlocal visible
-        if not visible and time.monotonic() - began > PATIENCE:
-            bar.start()
-            visible = True
-        share = progress.time / progress.end if progress.end > 0 else 1.0
-        text = f"{progress.time:.4g} of {progress.end:.4g} s simulated, {progress.events} events"
-        bar.update(task, completed=share, text=text)
-
-    try:
-        yield watch
-    finally:
-        if visible:
-            bar.stop()
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:

@@ -119,8 +119,7 @@ def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
     from ..show.simulated import numbers, write_single
     from ..simulation.scenario import record
 
-    with show.progress_bar() as watch:
-        recording = record(scenario, watch)
+    recording = record(scenario)
     if run is not None:
         write_single(run, scenario, recording)
     return numbers(recording)
@@ -132,16 +131,15 @@ def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str,
 
     members = scenarios_of(scenario, sweep)
     done: list[xarray.Dataset] = []
-    with show.progress_bar() as watch:
-        try:
-            for data in simulate_series(members, lambda number, p: watch(p)):
-                done.append(data)
-                if sys.stderr.isatty():
-                    value = f"{sweep.key} = {members[len(done) - 1][0]:.4g}"
-                    print(f"{len(done)} of {len(members)}: {value}: {data.attrs['verdict']}", file=sys.stderr)
-        except KeyboardInterrupt:
-            if run is None or not done:
-                raise
+    try:
+        for data in simulate_series(members):
+            done.append(data)
+            if sys.stderr.isatty():
+                value = f"{sweep.key} = {members[len(done) - 1][0]:.4g}"
+                print(f"{len(done)} of {len(members)}: {value}: {data.attrs['verdict']}", file=sys.stderr)
+    except KeyboardInterrupt:
+        if run is None or not done:
+            raise
     table = summary(scenario, sweep.key, [value for value, _ in members], done)
     if run is not None:
         write_series(run, members, table, done)

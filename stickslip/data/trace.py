@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -40,8 +40,16 @@ class Repair:
         return f"{self.kind}: {self.count} ({self.where}): {self.reason}"
 
 
+class _Rebuilt:
+    """Pickled and copied as what it is made of: the copy is checked, and its arrays are read-only again."""
+
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        values = (getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]  # a dataclass
+        return type(self), tuple(dict(v) if isinstance(v, MappingProxyType) else v for v in values)
+
+
 @dataclass(frozen=True)
-class Provenance:
+class Provenance(_Rebuilt):
     """Where a trace came from: file, its SHA-256, the reader, and quantity -> column and unit."""
 
     file: str = ""
@@ -55,7 +63,7 @@ class Provenance:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class Drive(_Rebuilt):
     """The load point's position against time, piecewise linear.
 
     Args:
@@ -149,7 +157,7 @@ class Drive:
 
     @property
     def speed(self) -> float:
-        """The speed at which the drive moves when it moves: the time-weighted median of |v| over moving pieces, m/s."""
+        """The speed at which the drive moves when it moves: the median over time of its moving pieces, m/s."""
         lengths = np.diff(self.times)
         speeds = np.abs(np.diff(self.positions) / lengths)
         moving = speeds > 0.05 * speeds.max(initial=0.0)
@@ -206,7 +214,7 @@ def _reach(t: Array, y: Array, i: int, anchor: float, tolerance: float) -> int:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trace(Shown):
+class Trace(Shown, _Rebuilt):
     """A run in SI units; every array read-only, shape (n,).
 
     Args:

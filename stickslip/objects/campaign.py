@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from .static_fit import Align, Sampling, StaticFit, Time
 
 
-class Campaign(Shown):
-    """Measured runs of one apparatus.
+class Campaign(Shown, Mapping[str, Trace]):
+    """Measured runs of one apparatus, by name: ``campaign["v050"]``, ``for name, trace in campaign.items()``.
 
     Args:
         description: what the campaign file says, or what
@@ -92,11 +92,26 @@ class Campaign(Shown):
     def __len__(self) -> int:
         return len(self.traces)
 
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
     def __getitem__(self, name: str) -> Trace:
-        for trace in self.traces:
-            if trace.name == name:
-                return trace
-        raise InputError(f"there is no trace '{name}'", file=self._file, hint=nearest(name, self.names))
+        found = self.get(name)
+        if found is not None:
+            return found
+        hint = nearest(name, self.names) if isinstance(name, str) else "by number: campaign.traces[0]"
+        allowed = None if isinstance(name, str) else ", ".join(self.names)
+        raise InputError(f"there is no trace {name!r}", file=self._file, allowed=allowed, hint=hint)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """The run of that name, or the default where there is none."""
+        return next((trace for trace in self.traces if trace.name == name), default)
+
+    __eq__ = object.__eq__  # of itself alone: comparing every sample is not what a dictionary or a set asks for
+    __hash__ = object.__hash__
 
     @cached_property
     def events(self) -> tuple[Segmentation, ...]:
@@ -226,11 +241,11 @@ class Campaign(Shown):
             out=out, force=force, progress=progress,
         )  # fmt: skip
 
-    def levels(self, name: str | None = None) -> xarray.Dataset:
+    def levels(self, run: str | None = None) -> xarray.Dataset:
         """Force of the spring at onset and arrest of every slip of a run, and when and where; no fit is needed.
 
         Args:
-            name: of the run; default the first.
+            run: its name; default the first.
 
         Returns:
             See :func:`stickslip.inference.forecast.levels`.
@@ -240,7 +255,7 @@ class Campaign(Shown):
         """
         from ..inference.forecast import levels
 
-        trace = self.traces[0] if name is None else self[name]
+        trace = self.traces[0] if run is None else self[run]
         try:
             return levels(trace, self.scaled[0][self.names.index(trace.name)])
         except InputError as error:
@@ -265,19 +280,19 @@ class Campaign(Shown):
 
         return forecast(self, run, train, at, progress)
 
-    def to_xarray(self, name: str) -> xarray.Dataset:
+    def to_xarray(self, run: str) -> xarray.Dataset:
         """Signals of a run over time (s), SI units in the attributes."""
         import xarray
 
         from ..data.trace import SIGNALS
 
-        trace = self[name]
+        trace = self[run]
         units = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
         signals = {key: ("time", getattr(trace, key), {"units": unit}) for key, unit in units.items()}
         known = {key: v for key, v in signals.items() if v[1] is not None}
         if trace.drive is not None:
             known["load_point"] = ("time", trace.drive.position(trace.time), {"units": "m"})
-        return xarray.Dataset(known, coords={"time": ("time", trace.time, {"units": "s"})}, attrs={"title": name})
+        return xarray.Dataset(known, coords={"time": ("time", trace.time, {"units": "s"})}, attrs={"title": run})
 
     @property
     def summary(self) -> pandas.DataFrame:

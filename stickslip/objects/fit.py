@@ -23,6 +23,7 @@ from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import deviations
 from ..inference.force.heldout import apart
 from ..inference.force.residual import coordinates
+from ..inference.uncertainty import TIED
 from ..physics.effects import catalogue
 from ..physics.effects.named import with_form
 from ..simulation.conformance import try_laws
@@ -30,7 +31,7 @@ from ..system.progress import portion, telling
 from ..system.shown import facts
 from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rough_lines
 from .fit_result import fit_result
-from .fit_tables import STRENGTH, error_table, ladder_table, parameter_table
+from .fit_tables import STRENGTH, correlation_table, error_table, ladder_table, parameter_table
 from .free_cycles import free_run_errors, freely
 from .parameters_by_hand import moved, profile, refitted
 from .picture import FitPlots
@@ -129,6 +130,11 @@ class Fit(Savable):
     def covariance(self) -> xarray.DataArray:
         """Covariance (SI) of the free parameters that all runs share, shape (a, a)."""
         return parameter_covariance(self)
+
+    @property
+    def correlations(self) -> pandas.DataFrame:
+        """Correlations of the free parameters that all runs share, the strongest pair first."""
+        return correlation_table(self)
 
     # how far it is from the measurement
 
@@ -439,7 +445,10 @@ class Fit(Savable):
             "on unseen runs": f"{self.unseen_error:.3g}" if np.isfinite(self.unseen_error) else "one event holds none",
             "parameters": "set by hand" if self.by_hand else None,
         }
-        return [facts(what), self.parameters[["value", "std", "unit"]], self.errors]
+        rows = self.correlations.itertuples(index=False)
+        tied = ", ".join(f"{one} and {other} ({r:.2f})" for one, other, r in rows if abs(r) > TIED)
+        table = self.parameters[["value", "std", "unit"]]
+        return [facts(what), table, *([f"tied by the data: {tied}"] if tied else []), self.errors]
 
 
 @contextmanager

@@ -46,6 +46,16 @@ def parameter_table(fit: Fit) -> pandas.DataFrame:
     return table(rows, "parameter")
 
 
+def correlation_table(fit: Fit) -> pandas.DataFrame:
+    """See :attr:`stickslip.Fit.correlations`."""
+    names, covariance = [f.name for f in fit.free], fit.covariance.values
+    std = np.sqrt(np.diag(covariance))
+    found = covariance / np.maximum(np.outer(std, std), 1e-300)
+    pairs = sorted(zip(*np.tril_indices(len(names), -1), strict=True), key=lambda pair: -abs(found[pair]))
+    rows = {str(n): {"of": names[j], "and": names[i], "correlation": found[i, j]} for n, (i, j) in enumerate(pairs, 1)}
+    return table(rows, "pair")
+
+
 def error_table(fit: ForceFit, found: Sums, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:
     """A measure of :func:`sums`: a row for each phase, a column for each run."""
     problem, (squares, numbers) = fit.problem, found

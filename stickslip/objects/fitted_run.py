@@ -89,22 +89,22 @@ class FittedRun(Shown):
         """The model, driven as the first measured run was."""
         return self.model_of(self._first())
 
-    def model_of(self, trace: str | Driven) -> Model:
+    def model_of(self, run: str | Driven) -> Model:
         """The model, driven as a measured run was (from time zero).
 
         Raises:
             InputError: there is no such run.
         """
-        run = self._run(trace)
-        drive = pieces_drive(run.pieces) if run.pieces else constant_drive(run.velocity)
-        return self.fitted.model(drive, run.stiffness)
+        driven = self._run(run)
+        drive = pieces_drive(driven.pieces) if driven.pieces else constant_drive(driven.velocity)
+        return self.fitted.model(drive, driven.stiffness)
 
     def equations(self) -> Equations:
         """The equations that are solved, with the fitted values."""
         return solved(self.fitted)
 
     def scenario(
-        self, changes: str | Sequence[str] = (), trace: str | None = None, events: int = EVENTS,
+        self, changes: str | Sequence[str] = (), run: str | None = None, events: int = EVENTS,
         drive: Moves | None = None,
     ) -> Scenario:  # fmt: skip
         """The model as a scenario.
@@ -112,7 +112,7 @@ class FittedRun(Shown):
         Args:
             changes: such as ``"drive.velocity=100um/s"``, as after ``--set``; parameters also by the name that the fit
                 gives them (``"rig.mass=0.1"``, ``"contact-ageing.rate=0"``).
-            trace: drive as this measured run was; default at the first run's velocity, for so many ``events``.
+            run: drive as this measured run was; default at the first run's velocity, for so many ``events``.
             events: slips to simulate where the drive has one velocity.
             drive: another one: a velocity such as ``"800 um/s"`` (a number in m/s), or until when and how fast, piece
                 by piece, as of :meth:`stickslip.Trace.from_arrays`: ``[("4 s", "100 um/s"), ("5 s", 0)]``.
@@ -120,13 +120,13 @@ class FittedRun(Shown):
         Raises:
             InputError: no such run, a change or a drive that is none.
         """
-        run = self._first() if trace is None else self._run(trace)
-        motion: dict[str, Any] = {"velocity": run.velocity, "events": events}
+        driven = self._first() if run is None else self._run(run)
+        motion: dict[str, Any] = {"velocity": driven.velocity, "events": events}
         if drive is not None:
             motion = _drive_table(drive, events)
-        elif trace is not None and run.pieces:
-            motion = {"piece": [{"velocity": v, "duration": dt} for v, dt in run.pieces]}
-        spring = self._spring() if trace is None else run.stiffness
+        elif run is not None and driven.pieces:
+            motion = {"piece": [{"velocity": v, "duration": dt} for v, dt in driven.pieces]}
+        spring = self._spring() if run is None else driven.stiffness
         content = scenario_content(self.fitted, f"{self.title}: {' + '.join(self.parts)}", motion, spring)
         given = [(self.key(name), value) for name, value in map(parse_assignment, several(changes))]
         made = make_scenario(content, self.folder).with_changes(given)
@@ -154,14 +154,14 @@ class FittedRun(Shown):
             raise RunFolderError("the fitted model names no measured run", file=self.folder / RESULT)
         return self.runs[0]
 
-    def _run(self, trace: str | Driven) -> Driven:
-        if isinstance(trace, Driven):
-            return trace
-        found = [run for run in self.runs if run.name in (trace, Path(trace).stem)]
+    def _run(self, run: str | Driven) -> Driven:
+        if isinstance(run, Driven):
+            return run
+        found = [driven for driven in self.runs if driven.name in (run, Path(run).stem)]
         if not found:
-            names = [run.name for run in self.runs]
+            names = [driven.name for driven in self.runs]
             raise InputError(
-                "no run of that name was fitted", file=self.folder / RESULT, value=trace, hint=nearest(trace, names)
+                "no run of that name was fitted", file=self.folder / RESULT, value=run, hint=nearest(run, names)
             )
         return found[0]
 

@@ -1,16 +1,18 @@
-"""Pictures of a fit: ``fit.plot.force()`` and the others; each returns a matplotlib figure."""
+"""Pictures of a fit: ``fit.plot.force()`` and the others."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError, nearest
-from ..show.plots.style import DARK, LIGHT, MIDDLE, figure, of_run, plain, scaled, signed_log, styled
+from ..show.plots.style import DARK, LIGHT, MIDDLE, of_run, panels, plain, scaled, signed_log, styled
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from .fit import Fit
@@ -25,33 +27,85 @@ AGAINST = {
     "load point": "load_point",
     "event": "event",
 }
+NAMED = {"age": "time in contact", "place": "displacement", "event": "number of the event"}
 PARTS = 15  # of a variable's range, each with as many points, whose medians are drawn
 WIDEST = 4.0  # floors that are shown
 
 
 class FitPlots:
-    """The pictures of a fit."""
+    """The pictures of a fit, each of which returns its matplotlib figure.
+
+    All of them take ``ax``: axes to draw in, of a figure of one's own.
+    """
 
     def __init__(self, fit: Fit) -> None:
         self._fit = fit
 
-    def trace(self, run: str | None = None) -> Figure:
+    @styled
+    def trace(self, run: str | None = None, *, ax: Axes | None = None) -> Figure:
         """Displacement and load point of a run (default the first), with onsets."""
-        return trace(self._fit, self._run(run))
+        name = self._run(run)
+        prepared = self._fit.climbed.prepared
+        number = [k.name for k in prepared.runs].index(name)
+        measured, events = prepared.traces[number], prepared.segmentations[number].events
+        made, (ax,) = panels(ax, width=8.0, height=3.4)
+        every = slice(None, None, max(measured.time.size // 20000, 1))
+        assert measured.displacement is not None and measured.drive is not None
+        k, unit = scaled(measured.displacement, "m")
+        t = measured.time[every]
+        ax.plot(t, measured.drive.position(t) * k, color=MIDDLE, ls="--", lw=1.0, label="load point")
+        ax.plot(t, measured.displacement[every] * k, color=DARK, lw=1.0, label="block")
+        onsets = np.array([e.t_onset for e in events])
+        at = np.interp(onsets, measured.time, measured.displacement)
+        ax.plot(onsets, at * k, "v", ms=4, color=MIDDLE, label="onset")
+        ax.set(xlabel="time / s", ylabel=f"displacement / {unit}", title=plain(name))
+        ax.legend(loc="upper left")
+        return made
 
-    def force(self, run: str | None = None, event: int | None = None) -> Figure:
+    @styled
+    def force(self, run: str | None = None, event: int | None = None, *, ax: Sequence[Axes] | None = None) -> Figure:
         """Measured and model force in one cycle, the difference below with the band that noise and scatter allow.
 
         Args:
             run: default the first. event: number of the cycle in the run from 0; default the middle one.
+            ax: two axes, the one for the difference last.
         """
-        return force(self._fit, *self._cycle(run, event))
+        own, name, number = self._cycle(run, event)
+        made, (top, low) = panels(ax, rows=2, width=8.0, height=5.2)
+        t = own.time.values - own.time.values[0]
+        k, unit = scaled(own.measured.values, "N")
+        top.plot(t, own.measured.values * k, color=DARK, lw=1.6, label="measured")
+        label = plain(" + ".join(self._fit.parts))
+        top.plot(t, own.model.values * k, color=MIDDLE, ls="--", lw=1.2, label=label)
+        top.set(ylabel=f"force of the contact / {unit}", title=plain(f"{name}, cycle {number + 1}"))
+        top.legend(loc="lower right")
+        k, unit = scaled(own.residual.values, "N")
+        floor = 2.0 * own.floor.values * k
+        low.fill_between(t, -floor, floor, color=LIGHT, alpha=0.35, lw=0, label="two standard deviations")
+        low.plot(t, own.residual.values * k, color=MIDDLE, lw=1.0)
+        low.set(xlabel="time in the cycle / s", ylabel=f"measured - model / {unit}")
+        low.legend(loc="best")
+        return made
 
-    def creep(self, run: str | None = None, event: int | None = None) -> Figure:
+    @styled
+    def creep(self, run: str | None = None, event: int | None = None, *, ax: Axes | None = None) -> Figure:
         """Displacement before an onset against the time to it, measured and where the model would be in balance."""
-        return creep(self._fit, *self._cycle(run, event))
+        own, name, number = self._cycle(run, event)
+        own = own.isel(point=np.flatnonzero(own.phase.values == "creep"))
+        made, (ax,) = panels(ax, width=7.0, height=3.8)
+        runs = {k.name: k for k in self._fit.climbed.prepared.runs}
+        spring = runs[name].stiffness or self._fit.values["rig.spring_stiffness"]
+        x, model, t = own.displacement.values, balanced(own, spring), own.time.values
+        k, unit = scaled(x - x[0], "m")
+        ax.plot(t - t[-1], (x - x[0]) * k, color=DARK, lw=1.6, label="measured")
+        ax.plot(t - t[-1], (model - x[0]) * k, color=MIDDLE, ls="--", lw=1.2, label="model")
+        title = plain(f"{name}, cycle {number + 1}")
+        ax.set(xlabel="time before the onset / s", ylabel=f"creep / {unit}", title=title)
+        ax.legend(loc="upper left")
+        return made
 
-    def residual(self, against: str = "age") -> Figure:
+    @styled
+    def residual(self, against: str = "age", *, ax: Axes | None = None) -> Figure:
         """Residual force over its floor against a variable, by run, with running medians.
 
         Args:
@@ -60,15 +114,68 @@ class FitPlots:
         """
         if against not in AGAINST:
             raise InputError("no such variable", key="against", value=against, hint=nearest(against, list(AGAINST)))
-        return residual(self._fit, against)
+        data = self._fit.force
+        kept = data.isel(point=np.flatnonzero(~data.left_out.values))
+        own_figure = ax is None
+        made, (ax,) = panels(ax, width=7.5, height=4.2)
+        name = AGAINST[against]
+        x, z = kept[name].values, kept.residual.values / kept.floor.values
+        k, unit = (1.0, "") if name == "event" else scaled(x, str(kept[name].attrs["units"]))
+        for i, run in enumerate(dict.fromkeys(kept.run.values)):
+            own = kept.run.values == run
+            curve = of_run(i)
+            order = np.flatnonzero(own)[np.argsort(x[own])]
+            ax.plot(x[order] * k, np.clip(z[order], -6, 6), ".", ms=2.0, color=curve["color"], alpha=0.3)
+            pieces = [p for p in np.array_split(order, PARTS) if p.size]
+            middle = [np.median(x[p]) * k for p in pieces]
+            medians = [np.median(z[p]) for p in pieces]
+            ax.plot(middle, medians, color=curve["color"], ls=curve["ls"], lw=1.5, label=plain(run, 24))
+        if name in ("velocity", "time_in_contact"):
+            signed_log(ax, x * k)
+        ax.axhline(0.0, color=LIGHT, lw=0.8)
+        label = NAMED.get(against, against)
+        label = f"{label} / {unit}" if unit else label
+        ax.set(xlabel=label, ylabel="residual force / floor", ylim=(-WIDEST, WIDEST))
+        if own_figure:
+            made.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
+        else:
+            ax.legend(fontsize=8)
+        return made
 
-    def backbone(self) -> Figure:
+    @styled
+    def backbone(self, *, ax: Axes | None = None) -> Figure:
         """The contact's backbone as measured, with its band, and a rough contact's law."""
-        return backbone(self._fit.backbone)
+        data = self._fit.backbone
+        made, (ax,) = panels(ax, width=7.0, height=4.2)
+        u, f, std = data.displacement.values, data.force.values, data["std"].values
+        m, length = scaled(u[u < 2.0 * data.attrs["u_max"]], "m")
+        k, unit = scaled(f, "N")
+        ax.fill_between(u * m, (f - 2 * std) * k, (f + 2 * std) * k, color=LIGHT, alpha=0.5, lw=0)
+        ax.plot(u * m, f * k, color=DARK, lw=1.6, label="measured, two standard deviations")
+        label = "rough contact: 1 - (1 - u/u_max)^p"
+        ax.plot(u * m, data.law.values * k, color=MIDDLE, ls="--", lw=1.2, label=label)
+        ax.set(xlabel=f"displacement from the force-free contact / {length}", ylabel=f"force / {unit}")
+        ax.set_xlim(0.0, 1.6 * data.attrs["u_max"] * m)
+        ax.legend(loc="lower right")
+        return made
 
-    def errors(self) -> Figure:
+    @styled
+    def errors(self, *, ax: Axes | None = None) -> Figure:
         """Error by phase of the cycle and run."""
-        return errors(self._fit)
+        from matplotlib.colors import TwoSlopeNorm
+
+        found: Any = self._fit.errors
+        values = found.to_numpy(float)
+        made, (ax,) = panels(ax, width=1.8 + 1.1 * values.shape[1], height=1.2 + 0.5 * values.shape[0])
+        norm = TwoSlopeNorm(1.0, 0.0, max(float(np.nanmax(values)), 2.0))
+        ax.imshow(values, cmap="PuOr_r", norm=norm, aspect="auto")
+        ax.grid(False)
+        ax.set_xticks(range(values.shape[1]), [plain(c, 16) for c in found.columns], rotation=30, ha="right")
+        ax.set_yticks(range(values.shape[0]), list(found.index))
+        for (i, j), v in np.ndenumerate(values):
+            ax.text(j, i, f"{v:.2f}", ha="center", va="center", color=DARK if norm(v) < 0.8 else "white")
+        ax.set_title("error in floors")
+        return made
 
     def _run(self, run: str | None) -> str:
         names = [k.name for k in self._fit.climbed.prepared.runs]
@@ -90,129 +197,7 @@ class FitPlots:
         return own.isel(point=np.argsort(own.time.values)), name, chosen
 
 
-@styled
-def trace(fit: Fit, name: str) -> Figure:
-    """See :meth:`FitPlots.trace`."""
-    prepared = fit.climbed.prepared
-    number = [k.name for k in prepared.runs].index(name)
-    run, events = prepared.traces[number], prepared.segmentations[number].events
-    made, axes = figure(1, 1, width=8.0, height=3.4)
-    ax = axes[0, 0]
-    every = slice(None, None, max(run.time.size // 20000, 1))
-    assert run.displacement is not None and run.drive is not None
-    k, unit = scaled(run.displacement, "m")
-    t = run.time[every]
-    ax.plot(t, run.drive.position(t) * k, color=MIDDLE, ls="--", lw=1.0, label="load point")
-    ax.plot(t, run.displacement[every] * k, color=DARK, lw=1.0, label="block")
-    onsets = np.array([e.t_onset for e in events])
-    ax.plot(onsets, np.interp(onsets, run.time, run.displacement) * k, "v", ms=4, color=MIDDLE, label="onset")
-    ax.set(xlabel="time / s", ylabel=f"displacement / {unit}", title=plain(name))
-    ax.legend(loc="upper left")
-    return made
-
-
-@styled
-def force(fit: Fit, own: xarray.Dataset, name: str, event: int) -> Figure:
-    """See :meth:`FitPlots.force`."""
-    made, axes = figure(2, 1, width=8.0, height=5.2)
-    top, low = axes[0, 0], axes[1, 0]
-    t = own.time.values - own.time.values[0]
-    k, unit = scaled(own.measured.values, "N")
-    top.plot(t, own.measured.values * k, color=DARK, lw=1.6, label="measured")
-    top.plot(t, own.model.values * k, color=MIDDLE, ls="--", lw=1.2, label=plain(" + ".join(fit.parts)))
-    top.set(ylabel=f"force of the contact / {unit}", title=plain(f"{name}, cycle {event + 1}"))
-    top.legend(loc="lower right")
-    k, unit = scaled(own.residual.values, "N")
-    floor = 2.0 * own.floor.values * k
-    low.fill_between(t, -floor, floor, color=LIGHT, alpha=0.35, lw=0, label="two standard deviations")
-    low.plot(t, own.residual.values * k, color=MIDDLE, lw=1.0)
-    low.set(xlabel="time in the cycle / s", ylabel=f"measured - model / {unit}")
-    low.legend(loc="best")
-    return made
-
-
 def balanced(own: xarray.Dataset, spring: float) -> np.ndarray:
     """Displacement (m) at which the model's contact and the spring would be in balance, as far as the tangent tells."""
     stiffness = np.maximum(own.stiffness.values, 0.0) + spring
     return np.asarray(own.displacement.values + own.residual.values / stiffness)
-
-
-@styled
-def creep(fit: Fit, own: xarray.Dataset, name: str, event: int) -> Figure:
-    """See :meth:`FitPlots.creep`."""
-    own = own.isel(point=np.flatnonzero(own.phase.values == "creep"))
-    made, axes = figure(1, 1, width=7.0, height=3.8)
-    ax = axes[0, 0]
-    runs = {k.name: k for k in fit.climbed.prepared.runs}
-    spring = runs[name].stiffness or fit.values["rig.spring_stiffness"]
-    x, model, t = own.displacement.values, balanced(own, spring), own.time.values
-    k, unit = scaled(x - x[0], "m")
-    ax.plot(t - t[-1], (x - x[0]) * k, color=DARK, lw=1.6, label="measured")
-    ax.plot(t - t[-1], (model - x[0]) * k, color=MIDDLE, ls="--", lw=1.2, label="model")
-    ax.set(xlabel="time before the onset / s", ylabel=f"creep / {unit}", title=plain(f"{name}, cycle {event + 1}"))
-    ax.legend(loc="upper left")
-    return made
-
-
-@styled
-def residual(fit: Fit, against: str) -> Figure:
-    """See :meth:`FitPlots.residual`."""
-    data = fit.force
-    kept = data.isel(point=np.flatnonzero(~data.left_out.values))
-    made, axes = figure(1, 1, width=7.5, height=4.2)
-    ax = axes[0, 0]
-    name = AGAINST[against]
-    x, z = kept[name].values, kept.residual.values / kept.floor.values
-    k, unit = (1.0, "") if name == "event" else scaled(x, str(kept[name].attrs["units"]))
-    for i, run in enumerate(dict.fromkeys(kept.run.values)):
-        own = kept.run.values == run
-        curve = of_run(i)
-        order = np.flatnonzero(own)[np.argsort(x[own])]
-        ax.plot(x[order] * k, np.clip(z[order], -6, 6), ".", ms=2.0, color=curve["color"], alpha=0.3)
-        pieces = [p for p in np.array_split(order, PARTS) if p.size]
-        middle = [np.median(x[p]) * k for p in pieces]
-        ax.plot(middle, [np.median(z[p]) for p in pieces], **curve, lw=1.5, label=plain(run, 24))
-    if name in ("velocity", "time_in_contact"):
-        signed_log(ax, x * k)
-    ax.axhline(0.0, color=LIGHT, lw=0.8)
-    label = {"age": "time in contact", "place": "displacement", "event": "number of the event"}.get(against, against)
-    ax.set(xlabel=f"{label} / {unit}" if unit else label, ylabel="residual force / floor", ylim=(-WIDEST, WIDEST))
-    made.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
-    return made
-
-
-@styled
-def backbone(data: xarray.Dataset) -> Figure:
-    """See :meth:`FitPlots.backbone`."""
-    made, axes = figure(1, 1, width=7.0, height=4.2)
-    ax = axes[0, 0]
-    u, f, std = data.displacement.values, data.force.values, data["std"].values
-    m, length = scaled(u[u < 2.0 * data.attrs["u_max"]], "m")
-    k, unit = scaled(f, "N")
-    ax.fill_between(u * m, (f - 2 * std) * k, (f + 2 * std) * k, color=LIGHT, alpha=0.5, lw=0)
-    ax.plot(u * m, f * k, color=DARK, lw=1.6, label="measured, two standard deviations")
-    ax.plot(u * m, data.law.values * k, color=MIDDLE, ls="--", lw=1.2, label="rough contact: 1 - (1 - u/u_max)^p")
-    ax.set(xlabel=f"displacement from the force-free contact / {length}", ylabel=f"force / {unit}")
-    ax.set_xlim(0.0, 1.6 * data.attrs["u_max"] * m)
-    ax.legend(loc="lower right")
-    return made
-
-
-@styled
-def errors(fit: Fit) -> Figure:
-    """See :meth:`FitPlots.errors`."""
-    found: Any = fit.errors
-    values = found.to_numpy(float)
-    made, axes = figure(1, 1, width=1.8 + 1.1 * values.shape[1], height=1.2 + 0.5 * values.shape[0])
-    ax = axes[0, 0]
-    from matplotlib.colors import TwoSlopeNorm
-
-    norm = TwoSlopeNorm(1.0, 0.0, max(float(np.nanmax(values)), 2.0))
-    ax.imshow(values, cmap="PuOr_r", norm=norm, aspect="auto")
-    ax.grid(False)
-    ax.set_xticks(range(values.shape[1]), [plain(c, 16) for c in found.columns], rotation=30, ha="right")
-    ax.set_yticks(range(values.shape[0]), list(found.index))
-    for (i, j), v in np.ndenumerate(values):
-        ax.text(j, i, f"{v:.2f}", ha="center", va="center", color=DARK if norm(v) < 0.8 else "white")
-    ax.set_title("error in floors")
-    return made

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..inference.fit.parameters import to_si
 from ..inference.force.posterior import Walked, walked
+from ..system.extras import need
 from .fit_tables import STRENGTH
 from .run import Tell
 
@@ -28,11 +29,10 @@ def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int, tell: Tell) 
         raise InputError(
             "out of range", key="draws, tune, chains", value=f"{draws}, {tune}, {chains}", allowed="1 or more"
         )
-    try:
-        import nutpie
-        from nutpie.compiled_pyfunc import from_pyfunc
-    except ImportError:
-        raise InputError("sampling needs nutpie and ArviZ", hint="pip install 'stickslip[posterior]'") from None
+    need("sampling", "posterior", "nutpie", "arviz")
+    import nutpie
+    from nutpie.compiled_pyfunc import from_pyfunc
+
     way, names = walked(fit._fit), [f.name for f in fit.free]
     done, total = itertools.count(1), chains * (draws + tune)
 

@@ -47,8 +47,7 @@ def study(
         campaign could not be fitted (its numbers are nan).
 
     Raises:
-        InputError: no campaign, two of one name, or no scheduler at that address.
-        StickslipError: dask.distributed is missing.
+        InputError: no campaign, two of one name, no scheduler at that address, or dask.distributed is missing.
     """
     campaigns = campaigns if isinstance(campaigns, Mapping) else several(campaigns)
     named = dict(campaigns) if isinstance(campaigns, Mapping) else {_name(Path(p)): p for p in campaigns}
@@ -80,7 +79,7 @@ def _fitted(path: str, effects: tuple[str, ...], files: tuple[str, ...], parent:
 
     if parent is not None:
         end_with(parent)
-    cache.enable()
+    cache.keep_compiled()
     try:
         fit = load_campaign(path, files).fit(effects, progress=silent)
     except StickslipError as error:

@@ -29,10 +29,10 @@ from .effects.base import (
     Stiffness,
     Threshold,
 )
-from .params import parameter
+from .params import Parametrised, parameter
 
 
-class Block(eqx.Module):
+class Block(Parametrised):
     """The moving body and the spring that pulls it."""
 
     mass: Array = parameter(0.0894, unit="kg", lower=1e-9, upper=1e6, doc="mass of the block", symbol="m")
@@ -44,7 +44,7 @@ class Block(eqx.Module):
     )
 
 
-class Weakening(eqx.Module):
+class Weakening(Parametrised):
     """Lagged weakening of all caps by slip, healing by rest; Coulomb's constant friction in the limit v -> 0."""
 
     ratio: Array = parameter(
@@ -147,7 +147,7 @@ class Forces(NamedTuple):
         return self.spring - self.contact - self.viscous + self.body
 
 
-class Model(eqx.Module):
+class Model(Parametrised):
     """A spring-driven block on a rough contact.
 
     Attributes:

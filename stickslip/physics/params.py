@@ -1,6 +1,6 @@
-"""Parameters that know what they are: value, unit, bounds, prior, null value and source, kept beside the field.
+"""Parameters that know what they are: value, unit, bounds, prior and null value, kept beside the field.
 
-A physical class is an ``equinox.Module`` whose fields are made by :func:`parameter`; :func:`specs` reads them back.
+A physical class is a :class:`Parametrised` whose fields are made by :func:`parameter`; :func:`specs` reads them back.
 Names are local to the class; nothing here is a global table.
 """
 
@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..errors import InputError
+from ..system.units import shown
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,6 @@ class Spec:
         log: whether it is sought and drawn on a logarithmic scale.
         grid: values from which a search starts, for shape parameters that are not identified at the null.
         doc: meaning in words.
-        source: the equation or paper.
         symbol: LaTeX symbol.
         ends: ends of the range where the law becomes a special case (a sharp corner, no direct effect): a fit may
             arrive there, which says nothing against it.
@@ -48,7 +48,6 @@ class Spec:
     null: float | None = None
     log: bool = False
     grid: tuple[float, ...] = ()
-    source: str = ""
     symbol: str = ""
     ends: tuple[float, ...] = ()
     prior: float | None = None
@@ -64,6 +63,23 @@ class Spec:
 def span(lower: float, upper: float, unit: str) -> str:
     """A range with its unit, which a pure number does not have."""
     return f"{lower:g} ... {upper:g}{'' if unit == '1' else f' {unit}'}"
+
+
+class Parametrised(eqx.Module):
+    """What has fields made by :func:`parameter`, or is made of such parts: it shows their values with units."""
+
+    def __repr__(self) -> str:
+        known = specs(self)
+        said = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        text = (f"{name}={_said(value, known[name].unit if name in known else '1')}" for name, value in said.items())
+        return f"{type(self).__name__}({', '.join(text)})"
+
+
+def _said(value: Any, unit: str) -> str:
+    if isinstance(value, Parametrised | tuple):
+        return repr(value)
+    number = isinstance(value, (float, np.ndarray, jax.Array)) and not isinstance(value, jax.core.Tracer)
+    return shown(float(value), unit) if number and np.ndim(value) == 0 else eqx.tree_pformat(value)
 
 
 def _as_float(value: Any) -> Any:
@@ -82,7 +98,6 @@ def parameter(
     null: float | None = None,
     log: bool = False,
     grid: tuple[float, ...] = (),
-    source: str = "",
     symbol: str = "",
     ends: tuple[float, ...] = (),
     prior: float | None = None,
@@ -90,7 +105,7 @@ def parameter(
     usual: tuple[float, float] | None = None,
 ) -> Any:
     """A field of a physical class: a 64-bit float with its :class:`Spec`. Arguments as there."""
-    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, source, symbol, ends, prior, width, usual)
+    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, symbol, ends, prior, width, usual)
     return eqx.field(default=float(default), converter=_as_float, metadata={"spec": spec})
 
 

@@ -24,8 +24,11 @@ _SETTINGS = {
 }
 
 
-def enable() -> Path | None:
+def keep_compiled() -> Path | None:
     """Keep compiled code in the user's cache folder, and compile the same code where nothing can be kept.
+
+    Commands, their workers and the workbench do so by themselves. In Python it is left to you, for it sets JAX for the
+    whole process: call it before anything is simulated or fitted.
 
     Returns:
         The folder, or None where it is switched off (``STICKSLIP_NO_CACHE=1``), cannot be written, or JAX has its own

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, StickslipError
+from ..errors import InputError
+from .extras import need
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -35,15 +36,12 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         workers: of the local cluster; default the number of cores.
 
     Raises:
-        InputError: no scheduler answers there. StickslipError: dask.distributed is missing.
+        InputError: no scheduler answers there, or dask.distributed is missing.
     """
-    try:
-        import dask
-        from distributed import Client, LocalCluster
-    except ImportError:
-        raise StickslipError(
-            "work on many campaigns needs dask.distributed\n  to fix: pip install 'stickslip[distributed]'"
-        ) from None
+    need("work on many campaigns", "distributed", "dask", "distributed")
+    import dask
+    from distributed import Client, LocalCluster
+
     if scheduler is not None:
         if workers is not None:
             raise InputError("an existing cluster has its own workers", key="--workers", hint="leave --workers out")

@@ -38,9 +38,9 @@ class Registry(Generic[T]):
         self._plugged: dict[str, T] | None = None
 
     def register(self, name: str, thing: T) -> T:
-        """Add a thing under a name that must be free."""
-        if name in self._own:
-            raise InputError(f"a {self.what} of this name is already registered", value=name)
+        """Add a thing under a name that must be free; what is defined anew (a cell run again) is replaced."""
+        if name in self._own and _definition(self._own[name]) != _definition(thing):
+            raise InputError(f"the name is taken by another {self.what}", value=name)
         self._own[name] = thing
         return thing
 
@@ -91,3 +91,9 @@ class Registry(Generic[T]):
             else:
                 warnings.warn(f"the {self.what} '{name}' of {package} is left out: the name is taken", stacklevel=3)
         return found
+
+
+def _definition(thing: object) -> tuple[str, str]:
+    """Where a class, or that of an object, is defined."""
+    cls = thing if isinstance(thing, type) else type(thing)
+    return cls.__module__, cls.__qualname__

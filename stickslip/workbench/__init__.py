@@ -9,6 +9,17 @@ import sys
 from types import ModuleType
 from typing import Any
 
+from ..system.extras import need
+
+
+def need_pages() -> None:
+    """Refuse to begin without the packages that the pages are made with.
+
+    Raises:
+        InputError: some are not installed.
+    """
+    need("the workbench", "workbench", "panel", "bokeh", "tsdownsample", "watchfiles")
+
 
 class CallableModule(ModuleType):
     """A package that can be called: its name is the function's."""
@@ -26,8 +37,9 @@ class CallableModule(ModuleType):
             A :class:`stickslip.workbench.serve.Window`, which ends the server with ``close()`` or a ``with`` block.
 
         Raises:
-            InputError: the server cannot listen.
+            InputError: the server cannot listen, or packages that the pages are made with are not installed.
         """
+        need_pages()
         import os
 
         from .serve import Window

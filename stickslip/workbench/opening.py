@@ -8,9 +8,9 @@ from typing import Any
 
 from ..errors import InputError
 from ..objects.campaign import load_campaign
+from ..objects.example import example
 from ..system.runstore import RESULT, read_result
 from .session import Session
-from .shipped import example
 
 CAMPAIGN = "campaign.toml"
 TRACES = "[[trace]]"

@@ -1,25 +1,11 @@
-"""The campaign that is shipped: where it is, and a copy of it to work in."""
+"""A copy of the shipped campaign to work in."""
 
 from __future__ import annotations
 
 import shutil
-from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
-EXAMPLE = Path("hidden-effect") / "campaign.toml"
-
-
-def example() -> Path | None:
-    """The campaign that is shipped: of a clone, or of the installed distribution; None where it was left out."""
-    of_clone = Path(__file__).parents[2] / "scenarios" / EXAMPLE
-    if of_clone.is_file():
-        return of_clone
-    with suppress(PackageNotFoundError):
-        for file in files("stickslip") or ():
-            if file.match(f"stickslip/{EXAMPLE.as_posix()}"):
-                return Path(str(file.locate())).resolve()
-    return None
+from ..objects.example import EXAMPLE, example
 
 
 def copied(path: Path, home: Path | None) -> bool:

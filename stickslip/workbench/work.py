@@ -172,7 +172,7 @@ def _child(there: Connection, work: bytes, files: Sequence[str], parent: int) ->
 
     end_with(parent)
     threads.one_for_linear_algebra()
-    cache.enable()
+    cache.keep_compiled()
     from ..simulation.conformance import load_effects
 
     def tell(text: str, share: float) -> None:

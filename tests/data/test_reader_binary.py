@@ -151,7 +151,7 @@ def test_tdms(tmp_path):
 def test_tdms_without_its_package(tmp_path, monkeypatch, refuses):
     tdms(tmp_path / "a.tdms")
     monkeypatch.setitem(sys.modules, "nptdms", None)
-    refuses(lambda: read_columns(tmp_path / "a.tdms"), "npTDMS", "pip install 'stickslip[tdms]'")
+    refuses(lambda: read_columns(tmp_path / "a.tdms"), "nptdms", "pip install 'stickslip[tdms]'")
 
 
 def cut(tmp_path, make, name):
@@ -191,10 +191,10 @@ def test_content_counts_more_than_the_ending(tmp_path):
     assert read_columns(tmp_path / "a.csv").reader == "numpy"
 
 
-def test_a_plug_in_reader_is_found_and_a_broken_one_left_out(tmp_path, monkeypatch):
+def test_a_plug_in_reader_is_found_and_broken_ones_are_left_out(tmp_path, monkeypatch):
     from importlib.metadata import EntryPoint
 
-    from stickslip.data.readers import Columns, Reader, Registry
+    from stickslip.data.readers import Columns
     from stickslip.system import registry
 
     class Mine:
@@ -206,20 +206,30 @@ def test_a_plug_in_reader_is_found_and_a_broken_one_left_out(tmp_path, monkeypat
         def read(self, path):
             return Columns({"x": np.frombuffer(path.read_bytes()[4:])})
 
+    class Blind:
+        name, suffixes, description, read = "blind", (".blind",), "a reader that cannot look", Mine.read
+
+    class Failing(Mine):
+        name = "failing"
+
+        def sniff(self, path, head):
+            return head[1 << 20] == 0
+
     class Point(EntryPoint):
         def load(self):
             if self.name == "broken":
                 raise RuntimeError("no")
-            return Mine
+            return {"failing": Failing, "blind": Blind, "mine": Mine}[self.name]
 
-    points = [Point("mine", "m:Mine", "stickslip.readers"), Point("broken", "b:B", "stickslip.readers")]
+    points = [Point(name, f"m:{name}", "stickslip.readers") for name in ("failing", "broken", "blind", "mine")]
     monkeypatch.setattr(registry, "entry_points", lambda group: points if group == "stickslip.readers" else [])
-    plugged: Registry[Reader] = Registry("stickslip.readers", "reader", lambda loaded: loaded())
-    with pytest.warns(UserWarning, match="'broken' of b:B cannot be loaded"):
-        assert plugged.names() == ["mine"]
-    monkeypatch.setattr(READERS, "_plugged", dict(plugged.items()))
+    monkeypatch.setattr(READERS, "_plugged", None)
+    with pytest.warns(UserWarning, match="'broken' of m:broken cannot be loaded") as told:
+        assert READERS.names()[-2:] == ["failing", "mine"]
+    assert len(told) == 2 and "Blind" in str(told[1].message) and "add sniff" in str(told[1].message)
     (tmp_path / "a.mine").write_bytes(b"MINE" + X.tobytes())
-    columns = read_columns(tmp_path / "a.mine")
+    with pytest.warns(RuntimeWarning, match="'failing' fails on a.mine, and is passed over: IndexError"):
+        columns = read_columns(tmp_path / "a.mine")
     assert columns.reader == "mine"
     assert np.array_equal(columns.data["x"], X)
 

@@ -1,7 +1,10 @@
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Drive, Provenance, Trace
 from stickslip.errors import InputError
 
 
@@ -14,6 +17,21 @@ def test_trace_cannot_be_changed_from_outside():
         trace.displacement[0] = 1.0
     with pytest.raises(AttributeError):
         trace.name = "b"
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])  # noqa: S301  (bytes of its own)
+def test_a_copy_says_the_same_and_cannot_be_changed_either(again):
+    """As a worker of another process gets it."""
+    t = np.arange(5.0)
+    came = Provenance("run.csv", "ab12", "text", {"displacement": "x [um]"})
+    trace = Trace("a", t, displacement=t**2, drive=Drive.constant(1e-4, 0.0, 4.0), virgin=True, provenance=came)
+    found = again(trace)
+    assert found is not trace and found.name == "a" and found.virgin and found.provenance == came
+    assert np.array_equal(found.displacement, t**2) and np.array_equal(found.drive.positions, trace.drive.positions)
+    for values in (found.time, found.displacement, found.drive.times):
+        assert not values.flags.writeable
+    with pytest.raises(TypeError):
+        found.provenance.columns["displacement"] = "y"
 
 
 @pytest.mark.parametrize(

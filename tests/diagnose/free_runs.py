@@ -55,7 +55,7 @@ def rows(name: str, folder: Path, seed: int, hidden: tuple[Any, ...] = ()) -> li
 
 def main() -> None:
     """Make the table and keep it."""
-    cache.enable()
+    cache.keep_compiled()
     with tempfile.TemporaryDirectory() as folder:
         at = Path(folder)
         found = [

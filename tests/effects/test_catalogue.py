@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -45,6 +46,21 @@ def write(path: Path, text: str) -> Path:
     return path
 
 
+def test_laws_show_their_values_with_units() -> None:
+    effect = catalogue.make("rate-and-state", evolution=0.01, slip_distance="30 um", law="slip")
+    text = repr(effect)
+    assert text.startswith("RateAndState(") and "evolution=0.01, " in text and "slip_distance=30 µm" in text
+    assert "law='slip'" in text and "f64" not in text
+    assert "mass=50 g" in repr(Block(mass=0.05)) and "healing_time=20 ms" in repr(Weakening())
+    model = Model(Block(), power_law_bank(0.26, 1e-6, 3.6, n=24), Weakening(), LoadPoint(*jnp.eye(2)), (effect,))
+    assert repr(Block()) in repr(model) and text in repr(model) and "stiffness=f64[24]" in repr(model)
+    lanes = repr(Block(mass=jnp.ones(3)))  # as within vmap, and where it is traced
+    assert "mass=f64[3]" in lanes and "damping=10 N s/m" in lanes
+    seen: list[str] = []
+    jax.jit(lambda block: seen.append(repr(block)) or block.mass)(Block())
+    assert "mass=f64[]" in seen[0]
+
+
 def test_a_users_effect_takes_part(tmp_path: Path, no_user_effects: None) -> None:
     assert len(MY_EFFECT.strip().splitlines()) < 20
     (cls,) = catalogue.load_file(write(tmp_path / "my_effect.py", MY_EFFECT))
@@ -74,6 +90,18 @@ def test_loading_again_replaces(tmp_path: Path, no_user_effects: None) -> None:
         catalogue.load_file(write(path, "import os\n\nos.no_such_thing()\n"))
     assert catalogue.get("humming") is second  # a faulty edit leaves the last good one
     assert list(tmp_path.iterdir()) == [path]  # no byte code beside the user's file
+
+
+def test_a_cell_that_is_run_again_replaces_its_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a notebook does, whose classes are all of the module __main__."""
+    monkeypatch.setattr(catalogue.EFFECTS, "_own", dict(catalogue.EFFECTS._own))
+    cell = MY_EFFECT.replace("class", "from stickslip.effects import register\n@register\nclass", 1)
+    names = {"__name__": "__main__"}
+    for summary in ("as it was", "as it is"):
+        exec(cell.replace("friction follows the sine of the displacement", summary), names)  # noqa: S102
+    assert catalogue.get("humming") is names["Humming"] and catalogue.get("humming").summary == "as it is"
+    with pytest.raises(InputError, match="taken by another effect"):
+        exec(cell.replace("Humming", "Another"), names)  # noqa: S102
 
 
 @pytest.mark.parametrize(
@@ -123,6 +151,17 @@ def test_names_and_values_are_checked() -> None:
         catalogue.make("drive-ripple", ripple="6 s")
     with pytest.raises(InputError, match="spring, contact"):
         catalogue.make("tilt", by="weight")
+
+
+def test_the_catalogue_is_a_table_to_choose_from() -> None:
+    import stickslip as ss
+
+    found = ss.effects.table()
+    assert list(found.index) == catalogue.tags()
+    friction = found.query("family == 'friction'")
+    assert 5 < len(friction) < len(found) and friction.loc["contact-ageing", "source"].startswith("Dieterich")
+    assert found.loc["drive-ripple", "acts as"] == "Drive"
+    assert found.loc["contact-ageing", "parameters"].split(", ")[0] == "rate"
 
 
 def test_what_is_confused_is_confused_both_ways() -> None:

@@ -194,6 +194,19 @@ def test_the_commands_say_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert "; prior: log-normal around 2e-06 m, factor 25.1\n" in told
 
 
+def test_papers_are_named_from_which_the_laws_are() -> None:
+    """What one cites who publishes a fit: of every part of the model, and of no other effect."""
+    words = of_tags(["static", "inertia", "wear", "contact-ageing"])
+    told = dict(words.sources)
+    assert list(told) == ["contact", "elements", "wear", "contact-ageing"] and "Grzemba" in told["contact"]
+    for tag in ("wear", "contact-ageing"):
+        assert told[tag] == catalogue.get(tag).source
+    text = words.text().partition("\nSources:\n")[2].splitlines()
+    assert [line.split()[0] for line in text] == list(told)
+    assert r"\item contact-ageing: Dieterich, J. Geophys. Res. 77 (1972) 3690" in words.latex()
+    assert r"Baumberger \& Caroli" in words.latex()
+
+
 def test_one_symbol_one_meaning() -> None:
     """In every model of two effects, whatever their forms, also where two LaTeX commands print the same letter."""
     block, weakening = Block(), Weakening()

@@ -120,7 +120,7 @@ def test_an_output_that_is_no_known_container_is_traced_every_time(folder):
 
 ADDS = """
 from stickslip.system import cache
-cache.enable()
+cache.keep_compiled()
 from stickslip.system.traced import Program
 print(Program(lambda x: x + 1.0, "adds")(1.0))
 """

@@ -1,11 +1,16 @@
 """Arguments of the objects: a single name stands for itself, and what cannot be meant is refused before any work."""
 
+import inspect
 from pathlib import Path
 
 import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
+from stickslip.objects.fitted_run import FittedRun
+from stickslip.objects.picture import FitPlots
+from stickslip.objects.posterior import sample
+from stickslip.system.progress import silent
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 
@@ -66,3 +71,27 @@ def test_a_fit_takes_a_single_name(campaign):
     one, several = (fit.scenario(changes).file.drive for changes in (change, [change]))
     assert one == several == fit.scenario(drive="0.8 mm/s").file.drive
     assert fit.simulate(drive="0.8 mm/s", events=1).sizes == fit.simulate(change, events=1).sizes
+
+
+def test_a_run_is_asked_for_by_one_word_everywhere():
+    asked = (
+        *(ss.Campaign.levels, ss.Campaign.forecast, ss.Campaign.to_xarray, ss.Fit.freely, ss.Fit.scenario),
+        *(ss.Fit.simulate, FitPlots.trace, FitPlots.force, FitPlots.creep, FittedRun.scenario, FittedRun.model_of),
+    )
+    for method in asked:
+        assert "run" in inspect.signature(method).parameters, method
+
+
+@pytest.mark.parametrize(
+    ("missing", "extra", "ask"),
+    [
+        ("panel", "workbench", ss.workbench),
+        ("distributed", "distributed", lambda campaign: ss.study(SHIPPED)),
+        ("nutpie", "posterior", lambda campaign: sample(campaign, 1, 1, 1, 0, silent)),
+    ],
+)
+def test_a_package_that_is_missing_is_named_with_how_to_install_it(campaign, monkeypatch, missing, extra, ask):
+    monkeypatch.setattr("stickslip.system.extras.find_spec", lambda name: None if name == missing else name)
+    with pytest.raises(InputError, match=f"needs {missing}, which is not installed") as refused:
+        ask(campaign)
+    assert refused.value.hint == f"pip install 'stickslip[{extra}]'"

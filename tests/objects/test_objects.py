@@ -6,9 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 import stickslip as ss
 from stickslip.errors import InputError, RunFolderError
+from stickslip.inference.diagnose.decide import Judge
 from stickslip.inference.force.problem import Problem
 from stickslip.system.runstore import read_result
 
@@ -236,6 +238,40 @@ def test_notebooks_show_tables_and_escape_what_comes_from_files(campaign, base):
     assert "<script>" not in named._repr_html_() and "<b>" not in named._repr_html_()
 
 
+def test_a_fit_says_which_parameters_are_tied(base):
+    """Of draws from its covariance."""
+    found = base.correlations
+    names = list(base.covariance.parameter.values)
+    scale = np.sqrt(np.diag(base.covariance.values))
+    whitened = base.covariance.values / np.outer(scale, scale)
+    draws = np.random.default_rng(1).multivariate_normal(np.zeros(len(names)), whitened, 40_000)
+    for _, one, other, r in found.itertuples():
+        at = [names.index(one), names.index(other)]
+        assert r == pytest.approx(np.corrcoef(draws[:, at].T)[0, 1], abs=0.02)
+    assert len(found) == len(names) * (len(names) - 1) / 2 and found.correlation.abs().is_monotonic_decreasing
+    strongest = found.iloc[0]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("stickslip.objects.fit.TIED", abs(strongest.correlation) - 1e-6)
+        assert f"tied by the data: {strongest['of']} and {strongest['and']} ({strongest.correlation:.2f})" in repr(base)
+        patch.setattr("stickslip.objects.fit.TIED", 1.0)
+        assert "tied" not in repr(base)
+
+
+def test_fits_are_compared_by_what_they_foretell(campaign, base, aged):
+    found = ss.compare({"base": base, "aged": aged})
+    assert list(found.index) == ["aged", "base"] and found.loc["aged", ["behind", "+-"]].tolist() == [0.0, 0.0]
+    columns = ["error", "error std", "unseen error", "unseen std"]  # all in floors of the better one, as its ladder has
+    assert np.allclose(found.loc[["base", "aged"], columns], aged.ladder[columns].iloc[1:], rtol=1e-9)
+    # as a diagnosis judges the effect beside the base
+    judged = Judge(base.force_fit, 1).beside(aged.force_fit, 1)
+    assert found.loc["base", "behind"] == pytest.approx(judged.unseen.sum(), rel=1e-9)
+    assert 0.0 < found.loc["base", "+-"] < 0.2 * found.loc["base", "behind"]
+    with pytest.raises(InputError, match="'holds' is a fit of other runs than 'all'"):
+        ss.compare({"all": base, "holds": campaign.fit(holdout=["v050", "v100", "v200"])})
+    with pytest.raises(InputError, match="nothing to compare"):
+        ss.compare({})
+
+
 def test_pictures_have_units(aged):
     for name in ("trace", "force", "creep", "residual", "backbone", "errors"):
         made = getattr(aged.plot, name)()
@@ -243,6 +279,18 @@ def test_pictures_have_units(aged):
         assert name == "errors" or any(" / " in label for label in labels), name
     with pytest.raises(InputError, match="age"):
         aged.plot.residual("agee")
+
+
+def test_pictures_are_drawn_in_axes_of_ones_own(base):
+    """In a figure with other things, as for a paper."""
+    for name in ("trace", "force", "creep", "residual", "backbone", "errors"):
+        own = Figure()
+        axes = own.subplots(3, 1)
+        ax = axes[:2] if name == "force" else axes[0]
+        assert getattr(base.plot, name)(ax=ax) is own and len(own.axes) == 3 and not own.legends
+        assert [a.has_data() for a in axes] == [True, name == "force", False], name
+    with pytest.raises(InputError, match="allowed: 2"):
+        base.plot.force(ax=Figure().subplots())
 
 
 def test_a_value_set_by_hand_costs_one_evaluation_without_derivatives(base):

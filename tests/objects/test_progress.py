@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import stickslip as ss
+from stickslip.simulation.scenario.demonstration import RIG
 from stickslip.system import progress
 from stickslip.system.progress import cancellable, portion, telling
 
@@ -33,6 +34,12 @@ def test_a_terminal_shows_a_bar_by_default(monkeypatch):
     assert "fitting" in screen.getvalue() and "the base model" in screen.getvalue()
     fit.add("contact-ageing")
     assert "adding contact-ageing" in screen.getvalue()
+
+
+def test_a_simulation_shows_one_too(monkeypatch):
+    screen = terminal(monkeypatch)
+    ss.simulate(ss.make_scenario(RIG))
+    assert "simulating" in screen.getvalue() and "s simulated, " in screen.getvalue()
 
 
 def test_the_callers_own_is_told_and_no_bar_is_shown(monkeypatch):

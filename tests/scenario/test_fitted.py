@@ -131,21 +131,21 @@ def test_without_a_known_load_the_strength_is_kept(tmp_path):
 
 def test_a_run_can_be_driven_as_it_was_measured(folder):
     back = ss.load_run(folder)
-    scenario = back.scenario(trace="v200")
+    scenario = back.scenario(run="v200")
     motion = build(scenario).motion
     assert motion.duration == pytest.approx(2.9)
     np.testing.assert_allclose(motion.position(np.array([1.6, 2.1, 2.9])), [3.2e-4, 3.2e-4, 4.8e-4], rtol=1e-9)
     held = back.model_of("v200").load_point
     np.testing.assert_allclose([float(held(t)) for t in (1.7, 2.0)], 3.2e-4, rtol=1e-12)
     with pytest.raises(InputError, match="v200"):
-        back.scenario(trace="v20")
+        back.scenario(run="v20")
 
 
 def test_a_drive_is_a_velocity_or_pieces(folder):
     back = ss.load_run(folder)
     assert back.scenario(drive="0.8 mm/s", events=3).file == back.scenario(["drive.velocity=0.8mm/s"], events=3).file
     assert back.scenario(drive=8e-4).file.drive.velocity == 8e-4
-    made = build(back.scenario(trace="v200", drive=[("1.5 s", "100 um/s"), (2.0, 0), ("3 s", "-50 um/s")])).motion
+    made = build(back.scenario(run="v200", drive=[("1.5 s", "100 um/s"), (2.0, 0), ("3 s", "-50 um/s")])).motion
     assert made.duration == pytest.approx(3.0)
     np.testing.assert_allclose(made.position(np.array([1.5, 2.0, 3.0])), [1.5e-4, 1.5e-4, 1e-4], rtol=1e-12)
 
@@ -172,7 +172,7 @@ def test_a_spring_of_its_own_belongs_to_its_run(tmp_path):
     back = ss.load_run(folder_of(tmp_path / "fit", Fitted(fitted.composition, fitted.z, fitted.covariance, runs)))
     assert float(back.model_of("soft").block.spring_stiffness) == pytest.approx(170.0)
     assert float(back.model_of("hard").block.spring_stiffness) == pytest.approx(1000.0)
-    assert build(back.scenario(trace="soft")).model.block.spring_stiffness == pytest.approx(170.0)
+    assert build(back.scenario(run="soft")).model.block.spring_stiffness == pytest.approx(170.0)
     assert build(back.scenario()).model.block.spring_stiffness == pytest.approx(1000.0)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import pytest
 
 from stickslip.errors import InputError
@@ -217,3 +219,19 @@ def test_python_dictionaries_are_checked_alike():
     with pytest.raises(InputError, match="did you mean 'mass'"):
         make_scenario(rig(block__mas=1))
     assert make_scenario(rig()).changed(drive__velocity="1 mm/s").file.drive.velocity == pytest.approx(1e-3)
+
+
+def test_a_scenario_shows_what_was_written_and_changed():
+    made = make_scenario(rig(effect=[{"type": "contact-ageing", "rate": 0.01}, {"type": "wear"}]))
+    text = repr(made.changed(block__mass="50 g"))
+    assert text.startswith("<Scenario>") and "Table" not in text and len(text) < 1500
+    assert "block: mass: 50 g; " in text and "changed: block.mass" in text and "changed" not in repr(made)
+    assert "effect: type: contact-ageing; rate: 0.01\n\neffect: type: wear" in text
+    assert "block: mass: 50 g" in made.changed(block__mass="50 g")._repr_html_()
+
+
+def test_a_scenario_goes_to_another_process(tmp_path):
+    made = load_scenario(write(tmp_path, rig(effect=[{"type": "wear"}])), ["block.mass=50g"]).changed(contact__bins=64)
+    there = pickle.loads(pickle.dumps(made))  # noqa: S301  (bytes of its own)
+    assert there == made and there.changes == made.changes and there.path == made.path
+    assert there.file.block.mass == pytest.approx(0.05) and there.changed(block__mass="1 kg").file.block.mass == 1.0

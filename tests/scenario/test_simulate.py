@@ -9,7 +9,7 @@ import pytest
 import xarray
 
 from stickslip.errors import InputError
-from stickslip.simulation.scenario import Progress, make_scenario, record, simulate
+from stickslip.simulation.scenario import make_scenario, record, simulate
 from stickslip.simulation.scenario.events import UNITS
 
 from .conftest import rig
@@ -167,12 +167,11 @@ def test_an_effect_of_the_catalogue_acts():
 
 
 def test_progress_ends_at_the_end_and_counts_events():
-    seen: list[Progress] = []
-    simulate(make_scenario(rig()), seen.append)
-    times = [p.time for p in seen]
-    assert times == sorted(times)
-    assert seen[-1].events == 3
-    assert all(p.time <= p.end for p in seen)
+    heard: list[tuple[str, float]] = []
+    simulate(make_scenario(rig()), lambda text, share: heard.append((text, share)))
+    shares = [share for _, share in heard]
+    assert shares == sorted(shares) and 0.0 < shares[-1] <= 1.0
+    assert heard[-1][0].endswith("s simulated, 3 slips")
 
 
 def test_an_output_that_would_not_fit_is_refused():

@@ -31,7 +31,7 @@ def command(*arguments: object) -> int:
     """The exit code of a command in a process of its own, as a user gives it.
 
     In a process that has JAX already, checked errors inside compiled code may stand otherwise (see
-    :func:`stickslip.system.cache.enable`), and last digits with them.
+    :func:`stickslip.system.cache.keep_compiled`), and last digits with them.
     """
     whole = [sys.executable, "-m", "stickslip", *map(str, arguments)]
     return subprocess.run(whole, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.DEVNULL).returncode

@@ -16,13 +16,15 @@ import pytest
 from stickslip.cli import run
 from stickslip.errors import InputError
 from stickslip.inference.fit.serialised import KEY, record
+from stickslip.objects import example as example_file
+from stickslip.objects.example import example
 from stickslip.system.runstore import json_text
-from stickslip.workbench import own, shipped
+from stickslip.workbench import own
 from stickslip.workbench.journal import FOLDER
 from stickslip.workbench.opening import campaign_of, offered, opened
 from stickslip.workbench.serve import PATIENCE, _free
 from stickslip.workbench.session import Note, Session
-from stickslip.workbench.shipped import copied, example, to_work_in
+from stickslip.workbench.shipped import copied, to_work_in
 
 from .browser import Served
 from .conftest import SCENARIO
@@ -200,10 +202,7 @@ def test_a_scenario_is_simulated_and_opened(tmp_path):
 
 
 def test_what_is_missing_to_run_it_is_said(monkeypatch, capsys):
-    import importlib.util
-
-    find = importlib.util.find_spec
-    monkeypatch.setattr("stickslip.cli.open.importlib.util.find_spec", lambda n: None if n == "panel" else find(n))
+    monkeypatch.setattr("stickslip.system.extras.find_spec", lambda name: None if name == "panel" else name)
     assert run(["open", "campaign.toml"]) == 2
     assert "pip install 'stickslip[workbench]'" in capsys.readouterr().err
 
@@ -340,9 +339,9 @@ def test_the_example_is_offered_without_a_clone(tmp_path, monkeypatch):
             return site / self
 
     listed = [Installed("stickslip/__init__.py"), Installed("../../share/stickslip/hidden-effect/campaign.toml")]
-    monkeypatch.setattr(shipped, "__file__", str(site / "stickslip" / "workbench" / "shipped.py"))
-    monkeypatch.setattr(shipped, "files", lambda name: listed if name == "stickslip" else None)
+    monkeypatch.setattr(example_file, "__file__", str(site / "stickslip" / "objects" / "example.py"))
+    monkeypatch.setattr(example_file, "files", lambda name: listed if name == "stickslip" else None)
     (tmp_path / "empty").mkdir()
     assert offered(tmp_path / "empty") == [campaign]
-    monkeypatch.setattr(shipped, "files", lambda name: None)  # an editable install without its sources
+    monkeypatch.setattr(example_file, "files", lambda name: None)  # an editable install without its sources
     assert offered(tmp_path / "empty") == []

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ...errors import InputError, nearest
 from ...system.registry import Registry
-from .base import HEAD_BYTES, Columns, Reader, split_unit
+from .base import HEAD_BYTES, PARTS, Columns, Reader, split_unit
 from .hdf import HdfReader
 from .json_arrays import JsonReader
 from .mat import MatReader
@@ -23,11 +23,20 @@ from .uff import UffReader
 __all__ = ["READERS", "Columns", "Reader", "beside", "find_reader", "read_columns", "split_unit", "supported"]
 
 
-def _instance(loaded: object) -> Reader:
-    return loaded() if isinstance(loaded, type) else loaded  # type: ignore[return-value]
+def accept(loaded: object) -> Reader:
+    """A plug-in's reader, made where it is a class.
+
+    Raises:
+        InputError: what it lacks.
+    """
+    reader = loaded() if isinstance(loaded, type) else loaded
+    lacking = [part for part in PARTS if not hasattr(reader, part)]
+    if lacking:
+        raise InputError("a reader is not complete", value=type(reader).__name__, hint=f"add {', '.join(lacking)}")
+    return reader  # type: ignore[return-value]
 
 
-READERS: Registry[Reader] = Registry("stickslip.readers", "reader", _instance)
+READERS: Registry[Reader] = Registry("stickslip.readers", "reader", accept)
 # a file that many could read goes to the first: NetCDF and MATLAB 7.3 are HDF5 too, and text is the last resort
 _BUILT_IN: tuple[Reader, ...] = (
     NetcdfReader(),
@@ -48,6 +57,16 @@ def supported() -> str:
     readers: list[Reader] = [reader for _, reader in READERS.items()]
     readers.append(_TEXT)
     return "; ".join(f"{reader.description}: {' '.join(reader.suffixes)}" for reader in readers)
+
+
+def _knows(reader: Reader, path: Path, head: bytes) -> bool:
+    """Whether a reader takes a file; one that fails while it looks must not keep the others from it."""
+    try:
+        return reader.sniff(path, head)
+    except Exception as error:  # whatever a foreign reader raises
+        said = f"the reader '{reader.name}' fails on {path.name}, and is passed over: {error!r}"
+        warnings.warn(said, RuntimeWarning, stacklevel=2)
+        return False
 
 
 def beside(path: Path) -> list[str]:
@@ -79,7 +98,7 @@ def find_reader(path: str | Path, name: str | None = None) -> Reader:
     if name is not None:
         return _TEXT if name == _TEXT.name else READERS.get(name)
     for _, reader in READERS.items():
-        if reader.sniff(path, head):
+        if _knows(reader, path, head):
             return reader
     if _TEXT.sniff(path, head):
         return _TEXT

@@ -89,6 +89,9 @@ class Reader(Protocol):
         """All numeric columns of a file; `InputError` where it cannot be read."""
 
 
+PARTS = (*Reader.__annotations__, "sniff", "read")  # what every reader has
+
+
 def split_unit(header: str) -> tuple[str, str | None]:
     """``"displacement [um]"`` -> ``("displacement", "um")``; ``(None)`` where no unit is given."""
     match = _UNIT.match(header.strip())

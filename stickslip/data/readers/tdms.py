@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
+from ...system.extras import need
 from .base import Columns, add_array, need_columns
 
 
@@ -22,14 +23,9 @@ class TdmsReader:
         return head.startswith(b"TDSm")
 
     def read(self, path: Path) -> Columns:
-        try:
-            import nptdms
-        except ImportError:
-            raise InputError(
-                "reading TDMS files needs the package npTDMS, which is not installed",
-                file=path,
-                hint="pip install 'stickslip[tdms]', or export the file as CSV",
-            ) from None
+        need("reading TDMS files", "tdms", "nptdms", file=path, instead="export the file as CSV")
+        import nptdms
+
         columns = Columns({})
         nptdms.log.log_manager.set_level(logging.ERROR)  # what it tells of a file cut short is told below
         try:

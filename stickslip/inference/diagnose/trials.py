@@ -110,7 +110,7 @@ def _in_worker(job: bytes, tag: str, forms: list[dict[str, str]], files: tuple[s
 
     end_with(parent)
     threads.alone(False)
-    cache.enable()
+    cache.keep_compiled()
     for file in files:
         if not any(str(m.__file__) == file for m in catalogue.user_modules()):
             catalogue.load_file(file)

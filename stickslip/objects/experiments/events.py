@@ -12,7 +12,7 @@ from ...data.segment import Segmentation, crept, segment
 from ...data.trace import Drive, Trace
 from ...simulation.scenario import Scenario
 from ...simulation.scenario.recording import Recording
-from ...simulation.scenario.simulation import Progress, record
+from ...simulation.scenario.simulation import record
 from ...system.progress import breathe
 from ..campaign import Campaign
 from ..fit import Fit
@@ -41,10 +41,10 @@ class Simulated:
 def run(made: Scenario, tell: Tell | None = None, text: str = "simulating") -> Recording:
     """A scenario, freely integrated; ends where it is cancelled."""
 
-    def progress(p: Progress) -> None:
+    def progress(said: str, share: float) -> None:
         breathe()
         if tell is not None:
-            tell(f"{text}: {p.time:.3g} s, {p.events} slips", p.time / p.end if p.end > 0 else 0.0)
+            tell(f"{text}: {said}", share)
 
     return record(made, progress)
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import abc
 from typing import Any, ClassVar, Literal, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
 from ..contact import Bank
+from ..params import Parametrised
 
 _GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 4 / 9), (0.5 + 0.15**0.5, 5 / 18))  # Gauss-Legendre on (0, 1)
 
@@ -86,7 +86,7 @@ class Contact(NamedTuple):
     mass: Array | float = 0.0
 
 
-class Effect(eqx.Module):
+class Effect(Parametrised):
     """A physical effect of the catalogue or of a user.
 
     Class attributes say what a person must know; fields made by :func:`~stickslip.physics.params.parameter` are its

@@ -12,13 +12,17 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError, nearest
+from ...system import shown
 from ...system.registry import Registry
 from ...system.units import to_si
 from ..params import Spec, check, specs, variants
 from .base import Effect, Memory
+
+if TYPE_CHECKING:
+    import pandas
 
 OWN = "one of your own needs --effect FILE.py"
 FAMILIES = ("contact", "friction", "block", "geometry", "drive", "sensor")
@@ -118,6 +122,21 @@ def user_modules() -> list[ModuleType]:
 def all() -> dict[str, type[Effect]]:
     """Tag -> class of every effect."""
     return {**dict(EFFECTS), **_user}
+
+
+def table() -> pandas.DataFrame:
+    """A row for each effect: family, summary, roles, parameters, the source of its law."""
+    rows = {
+        tag: {
+            "family": cls.family,
+            "summary": cls.summary,
+            "acts as": ", ".join(roles(cls)),
+            "parameters": ", ".join(specs(cls)),
+            "source": cls.source,
+        }
+        for tag, cls in all().items()
+    }
+    return shown.table(rows, "tag")
 
 
 def get(tag: str) -> type[Effect]:
@@ -266,4 +285,4 @@ def _roles() -> list[type[Effect]]:
 
 
 def _roles_hint() -> str:
-    return "roles of stickslip.physics.effects: " + ", ".join(r.__name__ for r in _roles())
+    return "roles of stickslip.effects: " + ", ".join(r.__name__ for r in _roles())

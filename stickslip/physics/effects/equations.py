@@ -26,7 +26,11 @@ _ACTS = {
     BodyForce: "adds a force on the block",
     Sensor: "changes what is read",
 }
-_CONTACT = "Ciavarella-Jaeger theorem"
+_SOURCES = (
+    ("contact", "Grzemba, Phys. Mesomech. 17 (2014) 39; Ciavarella, J. Appl. Mech. 65 (1998) 998; "
+     "Jäger, Arch. Appl. Mech. 65 (1995) 478"),
+    ("elements", "Iwan, J. Appl. Mech. 34 (1967) 612"),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ class PowerLaw:
             ("elements", "N_e", "1"),
         )
         return tuple(
-            Row(symbol, f"contact.{name}", float(getattr(self, name)), unit, _without_unit(symbol), _CONTACT)
+            Row(symbol, f"contact.{name}", float(getattr(self, name)), unit, _without_unit(symbol))
             for name, symbol, unit in told
         )
 
@@ -93,7 +97,8 @@ def equations(
     rows += contact.rows() if isinstance(contact, PowerLaw) else contact or ()
     for effect, own in zip(effects, other, strict=True):
         rows += _rows(effect.tag, effect, own)
-    return Equations(tuple(names), tuple(lines), tuple(rows), tuple(_told(lines, rows, effects, other)))
+    sources = (*_SOURCES, *((e.tag, e.source) for e in effects if e.source))
+    return Equations(tuple(names), tuple(lines), tuple(rows), tuple(_told(lines, rows, effects, other)), sources)
 
 
 def of_model(model: Any, contact: PowerLaw | None = None) -> Equations:
@@ -194,7 +199,7 @@ def _rows(key: str, thing: Any, other: Mapping[str, str]) -> Iterator[Row]:
         number = float(value) if value.shape == () else None
         symbol = symbols.symbol_of(name, spec.symbol)
         shown = other.get(symbol) or symbols.replaced(symbol, other)
-        yield Row(shown, f"{key}.{name}", number, spec.unit, spec.doc, spec.source)
+        yield Row(shown, f"{key}.{name}", number, spec.unit, spec.doc)
 
 
 def _told(

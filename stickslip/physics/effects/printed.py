@@ -19,14 +19,13 @@ class Line:
 
 @dataclass(frozen=True)
 class Row:
-    """One parameter: symbol (LaTeX), dotted name, value (``None`` where not given), SI unit, meaning, source."""
+    """One parameter: symbol (LaTeX), dotted name, value (``None`` where not given), SI unit, meaning."""
 
     symbol: str
     name: str
     value: float | None
     unit: str
     doc: str
-    source: str = ""
 
 
 @dataclass(frozen=True)
@@ -38,12 +37,14 @@ class Equations:
         lines: the equations.
         rows: the parameters.
         symbols: LaTeX and meaning of the symbols that are no parameters.
+        sources: part of the model, and the papers or books that its law is from.
     """
 
     model: tuple[str, ...]
     lines: tuple[Line, ...]
     rows: tuple[Row, ...]
     symbols: tuple[tuple[str, str], ...] = ()
+    sources: tuple[tuple[str, str], ...] = ()
 
     def text(self) -> str:
         """For a terminal."""
@@ -54,10 +55,11 @@ class Equations:
         out += [*(["", "Parameters:"] if cells else []), *_columns(cells)]
         told = [(plain(symbol), meaning) for symbol, meaning in self.symbols]
         out += [*(["", "Symbols (a prime is the rate of change in time):"] if told else []), *_columns(told)]
+        out += [*(["", "Sources:"] if self.sources else []), *_columns(self.sources)]
         return "\n".join(out) + "\n"
 
     def latex(self) -> str:
-        """A fragment for a document that loads ``amsmath``: an ``align*`` and one or two ``tabular``."""
+        """A fragment for a document that loads ``amsmath``: an ``align*``, one or two ``tabular``, the sources."""
         lines = [
             rf"  & {line.latex}" + (rf" && \text{{{_escape(line.title)}}}" if line.title else "") + r" \\"
             for line in self.lines
@@ -71,6 +73,9 @@ class Equations:
         for layout, body in (("lllll", rows), ("ll", told)):
             if body:
                 parts += [rf"\begin{{tabular}}{{{layout}}}", *body, r"\end{tabular}"]
+        if self.sources:
+            items = [rf"  \item {_escape(part)}: {_escape(source)}" for part, source in self.sources]
+            parts += [r"\begin{itemize}", *items, r"\end{itemize}"]
         return "\n".join([*parts, ""])
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ParamSpec
 
 import numpy as np
 
+from ...errors import InputError
 from ...system.runstore import write_aside
 from ...system.units import PREFIXES, power_for, takes_prefix
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:  # what only takes colours from here need not wait for matplot
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+P = ParamSpec("P")
 # dark, middle and light, so that a grey print keeps them apart; the line styles differ as well
 DARK, MIDDLE, LIGHT = "#14213d", "#c8553d", "#8d99ae"
 # of runs, in reports and in the workbench: the first three of Okabe and Ito, the others as far from all as may be
@@ -46,11 +48,11 @@ def of_run(number: int) -> dict[str, str]:
     return {"color": RUNS[number % len(RUNS)], "ls": _DASHES[number % len(_DASHES)]}
 
 
-def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     """Decorator of a function that makes a figure: it is drawn in this look, and nobody else's settings change."""
 
     @functools.wraps(draw)
-    def wrapper(*args: Any, **kwargs: Any) -> Figure:
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
         from matplotlib import rc_context
 
         with rc_context(_LOOK):
@@ -67,6 +69,23 @@ def figure(rows: int = 1, columns: int = 1, *, width: float = 7.0, height: float
     made = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(made)
     return made, np.asarray(made.subplots(rows, columns, squeeze=False))
+
+
+def panels(
+    given: Axes | Sequence[Axes] | None, rows: int = 1, *, width: float = 7.0, height: float = 4.2
+) -> tuple[Figure, list[Axes]]:
+    """The axes to draw in, one above the other, and their figure: those given, else a :func:`figure` of that size.
+
+    Raises:
+        InputError: another number of axes is needed.
+    """
+    if given is None:
+        made, axes = figure(rows, width=width, height=height)
+        return made, list(axes[:, 0])
+    found = list(np.ravel(np.asarray(given, dtype=object)))
+    if len(found) != rows:
+        raise InputError("another number of axes", key="ax", value=len(found), allowed=str(rows))
+    return found[0].figure, found
 
 
 def plain(text: object, most: int = 120) -> str:

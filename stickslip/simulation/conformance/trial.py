@@ -24,7 +24,7 @@ def load_effects(paths: Iterable[str | Path]) -> list[type[Effect]]:
     """Put the effects of users' Python files into the catalogue, and try their laws.
 
     Raises:
-        InputError: as of :func:`stickslip.physics.effects.load_file` and of :func:`try_laws`.
+        InputError: as of :func:`stickslip.effects.load_file` and of :func:`try_laws`.
     """
     return [cls for path in paths for cls in catalogue.load_file(path, try_laws)]
 

@@ -3,12 +3,11 @@
 from .build import Setup, build
 from .load import Scenario, load_scenario, make_scenario
 from .recording import Recording
-from .simulation import Progress, record, simulate
+from .simulation import record, simulate
 from .stability import Sliding, steady_sliding
 from .static import StaticCreep, static_creep
 
 __all__ = [
-    "Progress",
     "Recording",
     "Scenario",
     "Setup",

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ...physics.effects.base import Effect
 from ...physics.params import specs
 from .load import make_scenario
-from .simulation import Progress, simulate
+from .simulation import simulate
 
 if TYPE_CHECKING:
     import xarray
@@ -45,11 +44,9 @@ def typical_amplitude(cls: type[Effect]) -> float:
     return null + 0.2 * (end - null)
 
 
-def with_and_without(
-    cls: type[Effect], progress: Callable[[Progress], None] | None = None
-) -> tuple[xarray.Dataset, xarray.Dataset, dict[str, float]]:
+def with_and_without(cls: type[Effect]) -> tuple[xarray.Dataset, xarray.Dataset, dict[str, float]]:
     """Data sets of `simulate` without and with an effect, and the amplitude it was given."""
     values = {cls.amplitude: float(f"{typical_amplitude(cls):.3g}")}
-    without = simulate(make_scenario(RIG), progress)
-    with_it = simulate(make_scenario({**RIG, "effect": [{"type": cls.tag, **values}]}), progress)
+    without = simulate(make_scenario(RIG))
+    with_it = simulate(make_scenario({**RIG, "effect": [{"type": cls.tag, **values}]}))
     return without, with_it, values

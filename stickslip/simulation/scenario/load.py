@@ -12,12 +12,13 @@ from pydantic import ValidationError
 from ...data.campaign.place import key_lines, readable
 from ...data.campaign.toml_file import read_toml
 from ...errors import InputError
+from ...system.shown import Shown, facts
 from .overrides import parse_assignment, with_overrides
 from .schema import ScenarioFile, file_model
 
 
-@dataclass(frozen=True)
-class Scenario:
+@dataclass(frozen=True, repr=False)
+class Scenario(Shown):
     """A validated scenario.
 
     Args:
@@ -51,6 +52,20 @@ class Scenario:
     def with_changes(self, changes: Sequence[tuple[str, Any]]) -> Scenario:
         """A copy with keys such as ``("contact.H", 0.5)`` set; checked as a file is."""
         return _checked(dict(self.content), self.path, self.sha256, (*self.changes, *changes), changes, "")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # the class of its file is made for the kind of contact, so it is read again
+        return _checked, (dict(self.content), self.path, self.sha256, self.changes, (), "")
+
+    def _parts(self) -> list[str]:
+        tables = [
+            f"{name}: {facts(table)}"
+            for name, content in self.content.items()
+            for table in (content if isinstance(content, list) else [content])
+            if isinstance(table, Mapping)
+        ]
+        changed = ", ".join(key for key, _ in self.changes)
+        return [facts({"title": self.title, "file": self.path, "changed": changed}), *tables]
 
 
 def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:

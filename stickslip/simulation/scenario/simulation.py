@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -18,6 +16,7 @@ from ...errors import InputError
 from ...physics.effects.base import Drive, Spring
 from ...physics.model import Model
 from ...physics.sensor import Vibrometer, measure
+from ...system.progress import Tell, telling
 from ..solve import Stats, Steps, Trajectory, integrate
 from ..solve.trajectory import energy_error
 from .build import Setup, build
@@ -35,27 +34,12 @@ _MOST_SAMPLES = 200_000_000
 PACKAGES = ("stickslip", "numpy", "jax", "diffrax", "equinox")
 
 
-@dataclass(frozen=True)
-class Progress:
-    """How far a simulation is.
-
-    Attributes:
-        time: reached (s).
-        end: of the run, or the latest end of a run that stops after so many events (s).
-        events: slips so far.
-    """
-
-    time: float
-    end: float
-    events: int
-
-
-def simulate(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> xarray.Dataset:
+def simulate(scenario: Scenario, progress: Tell | None = None) -> xarray.Dataset:
     """Simulate a scenario.
 
     Args:
         scenario: from `load_scenario`.
-        progress: called now and then.
+        progress: told how far it is and the share of it; default a bar in a terminal or a notebook.
 
     Returns:
         A data set with the dimensions ``time`` (the output's samples), ``event`` and ``static``; every variable has its
@@ -76,12 +60,13 @@ def simulate(scenario: Scenario, progress: Callable[[Progress], None] | None = N
     return record(scenario, progress).dataset()
 
 
-def record(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> Recording:
+def record(scenario: Scenario, progress: Tell | None = None) -> Recording:
     """`simulate` without making a data set of it; arguments and errors as there."""
     setup = build(scenario)
     file = scenario.file
     sliding = steady_sliding(file.block, file.weakening, setup.contact.strength, setup.motion.speed)
-    trajectory, events, end = _run(scenario, setup, sliding, progress)
+    with telling("simulating", progress) as tell:
+        trajectory, events, end = _run(scenario, setup, sliding, tell)
     samples = math.floor(end * file.output.sampling_rate) + 1
     if samples > _MOST_SAMPLES:
         raise InputError(
@@ -95,9 +80,7 @@ def record(scenario: Scenario, progress: Callable[[Progress], None] | None = Non
     return _recording(scenario, setup, trajectory, events, sliding, t)
 
 
-def _run(
-    scenario: Scenario, setup: Setup, sliding: Sliding, progress: Callable[[Progress], None] | None
-) -> tuple[Trajectory, Events, float]:
+def _run(scenario: Scenario, setup: Setup, sliding: Sliding, tell: Tell) -> tuple[Trajectory, Events, float]:
     """Integrate to the end of the drive or until the wanted number of slips is complete."""
     wanted, solver = scenario.file.drive.events, scenario.file.solver
     parts: list[Trajectory] = []
@@ -107,8 +90,8 @@ def _run(
     count = 0
 
     def report(reached: float, steps: Steps) -> None:
-        if progress is not None:
-            progress(Progress(reached, last, count))
+        slips = f"{count} slip{'' if count == 1 else 's'}"
+        tell(f"{reached:.4g} of {last:.4g} s simulated, {slips}", reached / last if last > 0.0 else 1.0)
 
     for end in ends:
         part, state = integrate(
@@ -119,7 +102,7 @@ def _run(
             tolerance=setup.tolerance,
             stops=setup.motion.stops,
             largest_step=solver.largest_step,
-            progress=report if progress is not None else None,
+            progress=report,
         )
         parts.append(part)
         now = end

@@ -32,7 +32,13 @@ class Sliding:
 
 
 def steady_sliding(block: BlockTable, law: WeakeningTable, strength: float, velocity: float) -> Sliding:
-    """Analyse steady sliding at a velocity (m/s), for contacts of total strength ``strength`` (N) at full friction."""
+    """Analyse steady sliding.
+
+    Args:
+        block, law: the tables of a scenario, ``scenario.file.block`` and ``scenario.file.weakening``.
+        strength: full friction of all contacts (N).
+        velocity: of the drive (m/s).
+    """
     drop = (1.0 - law.ratio) * strength
     speed = abs(velocity)
     limit = _critical_stiffness(block, law, drop, speed)

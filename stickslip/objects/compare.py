@@ -1,0 +1,62 @@
+"""Fits of the same runs side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+from ..inference.diagnose.decide import standard_error
+from ..inference.force.errors import of_all, sums
+from ..inference.force.fit import deviations
+from ..inference.force.heldout import apart, folds, halves, unseen
+from ..system.shown import table
+from .fit import Fit
+
+if TYPE_CHECKING:
+    import pandas
+
+
+def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
+    """Fits of the same runs, the one that predicts unseen runs best first.
+
+    Args:
+        fits: by a name of each, such as ``{"with": fit, "without": fit.remove("wear")}``.
+
+    Returns:
+        A row for each: ``model``; ``error`` and ``unseen error`` in floors of the first one, with their standard
+        deviations; ``behind``, by how much less likely than by the first one the runs are that are left out, each in
+        turn (twice the logarithm of the likelihood), and ``+-``, its standard error, by how much events differ. Fits
+        within two or three of it predict equally well.
+
+    Raises:
+        InputError: no fit, fits of other runs, or a single event, which leaves nothing to predict it from.
+    """
+    if not fits:
+        raise InputError("there is nothing to compare", allowed='fits by name, {"base": campaign.fit(), ...}')
+    first, *others = fits.values()
+    problem = first.force_fit.problem
+    for name, other in zip([*fits][1:], others, strict=True):
+        same = np.array_equal(problem.of, other.force_fit.problem.of)  # the points of every event
+        if not same or first.campaign.inputs() != other.campaign.inputs():
+            raise InputError(f"'{name}' is a fit of other runs than '{next(iter(fits))}'", hint="fit the same campaign")
+    if problem.events < 2:
+        raise InputError("one event cannot be predicted from others", hint="measure more slips")
+    own = any(fit.force_fit.problem.composition.phases for fit in fits.values())
+    left_out = (halves if own else folds)(first.force_fit)
+    costs = {name: unseen(fit.force_fit, left_out).cost for name, fit in fits.items()}
+    order = sorted(fits, key=lambda name: float(costs[name].sum()))
+    best = fits[order[0]].force_fit
+    floor = deviations(best)
+    rows = {}
+    for name in order:
+        fit, worse = fits[name].force_fit, costs[name] - costs[order[0]]
+        error, std = of_all(sums(best, fit.marginal, floor))
+        unseen_error, unseen_std = of_all(sums(best, apart(fit), floor))
+        rows[name] = {
+            "model": " + ".join(fits[name].parts), "error": error, "error std": std, "unseen error": unseen_error,
+            "unseen std": unseen_std, "behind": float(worse.sum()), "+-": standard_error(worse),
+        }  # fmt: skip
+    return table(rows, "fit")
