@@ -66,7 +66,7 @@ def test_a_trial_in_a_worker_ends_with_the_diagnosis(monkeypatch):
 
     ends = []
     monkeypatch.setattr(lifeline, "end_with", ends.append)
-    monkeypatch.setattr(cache, "enable", lambda: None)
+    monkeypatch.setattr(cache, "keep_compiled", lambda: None)
     monkeypatch.setattr(trials, "Explained", lambda base: f"explained {base}")
     monkeypatch.setattr(trials, "try_effect", lambda *arguments: arguments)
     made = loads(trials._in_worker(dumps("base"), "wear", [{"course": "linear"}], (), 4321))

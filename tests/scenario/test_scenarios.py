@@ -21,6 +21,7 @@ RUNS = {
     "static_vs_inertial": ["sweep.values=[5e-5, 2e-4]", "contact.springs=512", "contact.lines=20"],
     "slide_hold_slide": ["drive.piece.4.duration=5", "drive.piece.6.duration=50", "contact.springs=512"],
     "paper_slider": ["drive.duration=20"],
+    "paper_slider_wandering": ["drive.duration=20"],
     "sphere": ["drive.events=2", "contact.springs=1024"],
 }
 

@@ -30,13 +30,14 @@ class Store(Protocol):
 def kept(store: Store | None, key: str, problem: Problem, make: Callable[[], Fit]) -> Fit:
     """A fit of the problem from the store, or made and kept there.
 
-    In every case as it is taken from there: a last digit decides in which dent of a rough valley a later search ends.
+    In both cases as it is taken from there: a last digit decides in which dent of a rough valley a later search ends.
     """
-    found = None if store is None else store.load(key)
+    if store is None:
+        return make()
+    found = store.load(key)
     if found is None:
         found = fit_arrays(make())
-        if store is not None:
-            store.save(key, found)
+        store.save(key, found)
     return fit_of(problem, found)
 
 

@@ -107,8 +107,12 @@ def _apart(one: Fit, other: Fit) -> Array:
 
 
 def _variance(offset: Array, rise: Array) -> float:
-    """Of the parabola through a profile, the nearest in squares; where it does not rise, of the width looked at."""
+    """Of the parabola through a profile, the nearest in squares; where it does not rise, of the width looked at.
+
+    Where it has risen by more than is looked for, an error counts by the rise: a wall says nothing of the floor.
+    """
     widest = float(np.abs(offset).max())
     size = offset / widest
-    bend = float(np.polynomial.polynomial.polyfit(size, rise, 2)[2]) if offset.size > 2 else float(rise[-1])
+    counts = 1.0 / np.maximum(rise, RISE)
+    bend = float(np.polynomial.polynomial.polyfit(size, rise, 2, w=counts)[2]) if offset.size > 2 else float(rise[-1])
     return widest**2 / max(bend, 1.0)
