@@ -118,9 +118,6 @@ def cases(found: dict[str, Any]) -> str:
     )
 
 
-# --- performance ------------------------------------------------------------------------------------------------------
-
-
 @_drawn
 def ranks(found: dict[str, Any]) -> str:
     """How well draws of the posterior hold the true values, a row for each parameter of ``posterior.json``."""
@@ -134,15 +131,7 @@ def ranks(found: dict[str, Any]) -> str:
     return table(head, rows)
 
 
-@_drawn
-def decided(found: dict[str, Any]) -> str:
-    """Campaigns that left a set, the experiment that was proposed and made, and what was left of the set."""
-    rows = [
-        [f"`{c['hidden']}`", ", ".join(f"`{tag}`" for tag in c["set"]), c["experiment"],
-         ", ".join(f"`{tag}`" for tag in c["left"]) or c["after"]]
-        for c in found["cases"] if "left" in c
-    ]  # fmt: skip
-    return table(["hidden", "set", "experiment", "left after it"], rows)
+# --- performance ------------------------------------------------------------------------------------------------------
 
 
 def aims(found: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@
 A campaign of two short runs hides one effect. Where the diagnosis ends with a set that holds it, the first proposed
 experiment that changes nothing but the drive is made on the same rig by the simulator, and the campaign with this run
 is diagnosed again among the effects of the set. FOLDER keeps what is finished, and the same command goes on from there.
-Writes docs/results/ambiguous.json, for docs/diagnosis.md.
+Writes docs/results/ambiguous.json.
 """
 
 from __future__ import annotations
