@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data.checks import stopping
-from ..errors import InputError, nearest
+from ..errors import InputError, RunFolderError, nearest
 from ..inference.diagnose.checkpoints import Store
 from ..inference.diagnose.climb import Climbed
 from ..inference.diagnose.engine import Diagnosis as Found
@@ -85,7 +85,8 @@ class Diagnosis(Savable):
             RunFolderError: only the result of the diagnosis was kept.
         """
         if self.found is None:
-            assert self.folder is not None
+            if self.folder is None:
+                raise RunFolderError("of this diagnosis only the result was kept, not its models")
             return load_fit(self.folder, self.campaign)
         gains = {tag: done.close[0].gain for tag, done in self.found.named.items() if done.close}
         made = Fit(self.campaign, Climbed(self.found.prepared, self.found.ladder, gains))
@@ -126,8 +127,8 @@ class Diagnosis(Savable):
         return dataset(self.variables, self.campaign.title)
 
     @property
-    def _models(self) -> Fit:
-        return self.best
+    def _models(self) -> Fit | None:
+        return None if self.found is None and self.folder is None else self.best
 
     def _parts(self) -> list[Any]:
         told = self.verdict

@@ -66,7 +66,7 @@ def diagnosis(
     work = partial(_diagnosed, source, tuple(files), out)
 
     def made(found: tuple[dict[str, Any], dict[str, Any]]) -> None:
-        done(Diagnosis(campaign, None, *found))
+        done(Diagnosis(campaign, None, *found, folder=out))
 
     return Search(work, files, tell, made, failed)
 

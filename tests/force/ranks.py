@@ -101,7 +101,7 @@ def picture(found: dict[str, Any]) -> Any:
         ax.axhspan(-band, band, color=LIGHT, alpha=0.3, lw=0)
         ax.axhline(0.0, color=DARK, lw=0.6)
         ax.plot(at, below, color=DARK, lw=1.4)
-        ax.set(title=name.split(".")[1].replace("_", " "), xlabel="rank / draws", ylim=(-0.35, 0.35))
+        ax.set(title=name.split(".")[1].replace("_", " "), xlabel="rank / draws", ylim=(-0.6, 0.6))
     axes[0, 0].set_ylabel("share below, less the rank")
     for ax in axes[0, 1:]:
         ax.set_yticklabels([])

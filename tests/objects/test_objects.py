@@ -164,6 +164,18 @@ def test_a_fit_that_was_saved_goes_on(aged, campaign, tmp_path):
     assert ss.load_fit(folder, campaign).remove("contact-ageing").effects == ()
 
 
+def test_a_diagnosis_goes_on_from_its_folder(campaign, tmp_path):
+    """Its best model is there again with the folder; without one its result alone can be kept."""
+    made = campaign.diagnose(candidates=["wear"], max_effects=1, jobs=1, out=tmp_path / "run")
+    kept = ss.Diagnosis(campaign, None, made.result, made.variables, tmp_path / "run")
+    assert kept.best.values == made.best.values
+    assert ss.load_fit(made.save(tmp_path / "again"), campaign).values == made.best.values
+    alone = ss.Diagnosis(campaign, None, made.result, made.variables)
+    assert not (alone.save(tmp_path / "alone") / "models.npz").exists()
+    with pytest.raises(RunFolderError, match="only the result"):
+        _ = alone.best
+
+
 def test_a_fit_goes_on_with_its_own_data_only(aged, campaign, tmp_path):
     folder = aged.save(tmp_path / "run")
     with pytest.raises(InputError, match="other data"):
