@@ -224,7 +224,7 @@ def test_the_table_of_rates_has_the_parts_that_are_measured(tables: ModuleType) 
 
 
 def test_every_picture_has_a_script() -> None:
-    own = [ROOT / "tests" / "forecast" / f"{name}.py" for name in ("real", "simulated")]
+    own = [ROOT / "tests" / f"{name}.py" for name in ("forecast/real", "forecast/simulated", "force/ranks")]
     files = [*DOCS.glob("*.py"), *DOCS.glob("*/*.py"), *own]
     scripts = "\n".join(path.read_text(encoding="utf-8") for path in files)
     pictures = [p for folder in ("images", "paper", "figures", "verification") for p in (DOCS / folder).glob("*.png")]
