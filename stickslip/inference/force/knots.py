@@ -186,8 +186,7 @@ class _Pieces:
     def windows(self, edges: Index, e: int, t: Array, x: Array, d: Array, speed: Array | None = None) -> None:
         """Means over the windows between ``edges``; with the ``speed`` of every sample those that are not compared.
 
-        Where it creeps, the velocity is what the means beside one another say. Windows of a nucleation are so short
-        that the smoothed record knows it better.
+        The ``speed`` is that of the smoothed record, which is kept where the windows do not tell it better.
         """
         count = np.diff(edges)
         if count.size == 0 or edges[-1] <= edges[0]:
