@@ -28,6 +28,7 @@ import stickslip as ss
 from stickslip.blind.generator import Run, make_campaign
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, figure, styled
+from tests.finished import each
 
 ROOT = Path(__file__).parents[2]
 RUNS = (Run("v100", 1e-4, 5), Run("v400", 4e-4, 5))
@@ -113,16 +114,11 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--number", type=int, default=60)
     options = parser.parse_args()
-    options.folder.mkdir(parents=True, exist_ok=True)
     cases = []
-    for seed in range(SEED, SEED + APART * options.number, APART):
-        path = options.folder / f"{seed}.json"
-        if not path.is_file():
-            text = json.dumps(one(seed))
-            path.with_suffix(".part").write_text(text, encoding="utf-8")
-            path.with_suffix(".part").replace(path)
-        cases.append(json.loads(path.read_text(encoding="utf-8")))
-        print(path.stem, cases[-1]["trust"], {k: v["rank"] for k, v in cases[-1]["parameters"].items()}, flush=True)
+    seeds = range(SEED, SEED + APART * options.number, APART)
+    for name, case in each(options.folder, map(str, seeds), lambda seed: one(int(seed))):
+        cases.append(case)
+        print(name, case["trust"], {k: v["rank"] for k, v in case["parameters"].items()}, flush=True)
     found = tally(cases)
     head = {
         "version": ss.__version__,
