@@ -4,52 +4,30 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline
 
-import stickslip as ss
 from stickslip.inference.force import smoothing
 from stickslip.inference.force.smoothing import crept
-from stickslip.simulation.conformance.rig import base_model
-from stickslip.simulation.solve import Tolerance, integrate
 
-SPEED, RATE, END = 1e-4, 1e4, 6.0  # m/s, Hz, s
-COUNT, NOISE = 7.9e-9, 1.3e-9  # m
-RIG = {"mass": "0.0894 kg", "spring_stiffness": "1000 N/m", "contacts": 4, "normal_force": "0.31 N"}
+from .counted import Moved, moved, read
 
 
 @pytest.fixture(scope="module")
-def motion():
-    """The base model, and until when it was simulated (s)."""
-    times = np.array([0.0, END])
-    model = eqx.tree_at(
-        lambda m: (m.load_point.times, m.load_point.positions, m.block.mass, m.block.spring_stiffness),
-        base_model(()), tuple(jnp.asarray(a) for a in (times, times * SPEED, 0.0894, 1000.0)),
-    )  # fmt: skip
-    steps = integrate(model, END, tolerance=Tolerance(1e-4, 1e-12, 1e-9), largest_step=4e-3)[0].steps
-    return CubicHermiteSpline(steps.t, steps.x, steps.v), float(steps.t[-1])
+def motion() -> Moved:
+    """The base model at 100 um/s."""
+    return moved(1e-4, 6.0)
 
 
-def off(motion) -> np.ndarray:
+def off(motion: Moved) -> np.ndarray:
     """Relative errors of velocities from 1 to 30 um/s, in the later part of sticks."""
-    course, end = motion
-    t = np.arange(0.0, end, 1.0 / RATE)
-    read = course(t) + NOISE * np.random.default_rng(2).standard_normal(t.size)
-    trace = ss.Trace.from_arrays(
-        "run", time=t, displacement=COUNT * np.round(read / COUNT), drive_velocity=SPEED, resolution=COUNT
-    )
-    campaign = ss.Campaign.from_traces(
-        [trace], {**RIG, "friction_coefficient": {"guess": 0.21, "lower": 0.15, "upper": 0.3}}
-    )
+    campaign = read([motion], seed=2)
     (run,) = campaign.prepare().problem.runs
     events = campaign.events[0].events
     late = np.zeros(run.t.size, bool)
     for before, event in pairwise(events):
         late |= (run.t > 0.5 * (before.t_arrest + event.t_onset)) & (run.t < event.t_onset)
-    true = course(run.t, 1)
+    true = motion.course(run.t, 1)
     own = late & (true > 1e-6) & (true < 3e-5)
     assert own.sum() > 80
     return run.v[own] / true[own] - 1.0

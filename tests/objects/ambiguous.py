@@ -2,9 +2,10 @@
 
     python -m tests.objects.ambiguous FOLDER [--number 24]
 
-A campaign of two short runs hides one effect. Where the diagnosis ends with a set that holds it, the first proposed
-experiment that changes nothing but the drive is made on the same rig by the simulator, and the campaign with this run
-is diagnosed again among the effects of the set. FOLDER keeps what is finished, and the same command goes on from there.
+A campaign of two short runs hides one effect, and is diagnosed among this and those that the catalogue says it is
+confused with. Where that ends with a set that holds it, the first proposed experiment that changes nothing but the
+drive is made on the same rig by the simulator, and the campaign with this run is diagnosed again among the set. Effects
+that only shape the backbone are left out. FOLDER keeps what is finished, and the same command goes on from there.
 Writes docs/results/ambiguous.json.
 """
 
@@ -21,11 +22,14 @@ import numpy as np
 import stickslip as ss
 from stickslip.blind.generator import Run, make_campaign
 from stickslip.errors import InputError
+from stickslip.inference.force.candidates import every_form
 from stickslip.objects import next_experiment
 from stickslip.objects.diagnosis import Diagnosis
 from stickslip.objects.experiments import Setting
 from stickslip.objects.experiments.setting import settled
+from stickslip.physics.effects import catalogue
 from tests.diagnose.development import hidden, visible
+from tests.finished import each
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results" / "ambiguous.json"
 RUNS = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4))
@@ -36,9 +40,10 @@ LONGEST = 30.0  # s of an experiment; the simulator takes every spring through e
 
 def one(folder: Path, number: int) -> dict[str, Any]:
     """A campaign, its set, the experiment, and what is said after it."""
-    tags = visible()
+    tags = [tag for tag in visible() if every_form([tag])]
     law = hidden(tags[number % len(tags)], 1.0 if number // len(tags) % 2 == 0 else -1.0, MULTIPLE)
-    made: dict[str, Any] = {"hidden": law.tag, "seed": SEED + number}
+    among = [law.tag, *catalogue.get(law.tag).confused_with]
+    made: dict[str, Any] = {"hidden": law.tag, "seed": SEED + number, "among": among}
 
     def campaign(name: str, *runs: Run) -> ss.Campaign:
         case = folder / f"{number:03d}-{name}"
@@ -48,7 +53,7 @@ def one(folder: Path, number: int) -> dict[str, Any]:
         return ss.load_campaign(case / "campaign.toml")
 
     try:
-        first = campaign("before").diagnose(jobs=1, max_effects=1, progress=silent)
+        first = campaign("before").diagnose(jobs=1, max_effects=1, candidates=among, progress=silent)
     except InputError as error:
         return {**made, "before": "not made", "note": error.what}
     made |= {"before": first.verdict["kind"], "set": list(first.verdict["set"])}
@@ -111,16 +116,11 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--number", type=int, default=24)
     options = parser.parse_args()
-    options.folder.mkdir(parents=True, exist_ok=True)
     cases = []
-    for number in range(options.number):
-        path = options.folder / f"{number:03d}.json"
-        if not path.is_file():
-            text = json.dumps(one(options.folder, number))
-            path.with_suffix(".part").write_text(text, encoding="utf-8")
-            path.with_suffix(".part").replace(path)
-        cases.append(json.loads(path.read_text(encoding="utf-8")))
-        print(number, cases[-1], flush=True)
+    numbers = (f"{number:03d}" for number in range(options.number))
+    for number, case in each(options.folder, numbers, lambda number: one(options.folder, int(number))):
+        cases.append(case)
+        print(number, case, flush=True)
     found = {
         "version": ss.__version__,
         "date": date.today().isoformat(),

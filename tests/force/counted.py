@@ -1,0 +1,61 @@
+"""Motions of the solver, and campaigns of them through a sensor that counts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+import stickslip as ss
+from stickslip.physics.model import Model
+from stickslip.simulation.conformance.rig import base_model
+from stickslip.simulation.solve import Tolerance, integrate
+
+RATE, COUNT, NOISE = 1e4, 7.9e-9, 1.3e-9  # Hz, m, m
+MASS, STIFFNESS = 0.0894, 1000.0  # kg, N/m
+RIG = {
+    "mass": f"{MASS} kg", "spring_stiffness": f"{STIFFNESS} N/m", "contacts": 4, "normal_force": "0.31 N",
+    "friction_coefficient": {"guess": 0.21, "lower": 0.15, "upper": 0.3},
+}  # fmt: skip
+
+
+class Moved(NamedTuple):
+    """A run of the solver: the model, its motion (s to m), how long it is (s), and the drive's velocity (m/s)."""
+
+    model: Model
+    course: CubicHermiteSpline
+    end: float
+    speed: float
+
+
+def moved(speed: float, end: float, tolerance: float = 1e-4, **weakening: float) -> Moved:
+    """The base model under a steady drive; ``damping`` and ``healing_time`` may be others than the rig's."""
+    times = np.array([0.0, end])
+    values = [times, times * speed, MASS, STIFFNESS]
+
+    def of(m: Model) -> list[object]:
+        own = {"damping": m.block.damping, "healing_time": m.weakening.healing_time}
+        fields = [m.load_point.times, m.load_point.positions, m.block.mass, m.block.spring_stiffness]
+        return [*fields, *(own[name] for name in weakening)]
+
+    model = eqx.tree_at(of, base_model(()), [jnp.asarray(a) for a in (*values, *weakening.values())])
+    steps = integrate(model, end, tolerance=Tolerance(tolerance, 1e-12, 1e-9), largest_step=4e-3)[0].steps
+    return Moved(model, CubicHermiteSpline(steps.t, steps.x, steps.v), float(steps.t[-1]), speed)
+
+
+def read(runs: Sequence[Moved], seed: int, noise: float = NOISE, count: float = COUNT) -> ss.Campaign:
+    """A campaign of runs, seen with white noise (m) and in counts (m), of which there may be none."""
+    random, traces = np.random.default_rng(seed), []
+    for run in runs:
+        t = np.arange(0.0, run.end, 1.0 / RATE)
+        x = run.course(t) + noise * random.standard_normal(t.size)
+        x = count * np.round(x / count) if count else x
+        name = f"v{1e6 * run.speed:.0f}"
+        traces.append(
+            ss.Trace.from_arrays(name, time=t, displacement=x, drive_velocity=run.speed, resolution=count or 1e-13)
+        )
+    return ss.Campaign.from_traces(traces, RIG)
