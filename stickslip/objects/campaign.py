@@ -14,6 +14,7 @@ from ..data.readers.repair import from_load_point
 from ..data.segment import Segmentation, segment
 from ..data.trace import Trace
 from ..errors import InputError, nearest
+from ..system.progress import telling
 from ..system.shown import Shown, facts, table
 from .run import several
 
@@ -350,7 +351,7 @@ def load_campaign(
     Args:
         path: of the TOML file (``stickslip new campaign`` writes one with every key explained).
         effects: Python files with effects of one's own; their code is run.
-        progress: told what is read and the share of it done.
+        progress: told what is read and the share of it done; default a bar where a terminal or a notebook shows one.
 
     Raises:
         InputError: the file, a trace, a unit or an effect's file cannot be used.
@@ -358,8 +359,8 @@ def load_campaign(
     _load_effects(effects)
     description = files.load_campaign(path)
     traces = []
-    for i, entry in enumerate(description.entries):
-        if progress is not None:
-            progress(f"reading {entry.label}", i / len(description.entries))
-        traces.append(files.load_trace(description, entry))
+    with telling("reading", progress) as tell:
+        for i, entry in enumerate(description.entries):
+            tell(f"reading {entry.label}", i / len(description.entries))
+            traces.append(files.load_trace(description, entry))
     return Campaign(description, traces, effects)

@@ -28,6 +28,7 @@ def terminal(monkeypatch, kind=Terminal):
 
 def test_a_terminal_shows_a_bar_by_default(monkeypatch):
     screen, campaign = terminal(monkeypatch), ss.load_campaign(SHIPPED)
+    assert "reading" in screen.getvalue()
     campaign.inspect()
     assert "inspecting" in screen.getvalue() and "holds" in screen.getvalue()
     fit = campaign.fit()
