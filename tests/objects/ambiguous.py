@@ -78,7 +78,9 @@ def silent(text: str, share: float) -> None:
 def proposed(found: Diagnosis) -> tuple[str, Run | None]:
     """The first experiment that only another drive makes, in words and for the simulator; none where there is none."""
     assert found.found is not None
-    done = next(done for done in found.found.named.values() if len(done.close) > 1)
+    done = next((done for done in found.found.named.values() if len(done.close) > 1), None)
+    if done is None:  # a wrong entry of the rig does as well, and nothing is named
+        return "", None
     judged = done.close[0]
     model = next_experiment._fit(found.campaign, found.found, done, judged.tag, judged.candidate.fit)
     options = next_experiment._options(model)
