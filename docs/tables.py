@@ -131,6 +131,28 @@ def ranks(found: dict[str, Any]) -> str:
     return table(head, rows)
 
 
+@_drawn
+def experiments(found: dict[str, Any]) -> str:
+    """Sets that campaigns left, the proposed experiment, and what was left with its run (``ambiguous.json``)."""
+
+    def tags(names: Sequence[str]) -> str:
+        return ", ".join(f"`{name}`" for name in names)
+
+    rows = []
+    for c in found["cases"]:
+        if c["before"] == "ambiguous":
+            others = [tag for tag in c["set"] if tag != c["hidden"]]
+            rows.append(
+                [f"`{c['hidden']}`", tags(others) or "a wrong entry of the rig",
+                 c.get("experiment") or "none of the drive alone", tags(c.get("left", ()))]
+            )  # fmt: skip
+    told = (
+        f"Of {found['campaigns']} campaigns {len(rows)} left a set. In {found['made']} of them such an experiment was "
+        f"proposed and made. {found['alone']} of these were left with the hidden effect alone."
+    )
+    return f"{told}\n\n{table(['hidden', 'not told from it', 'proposed experiment', 'left with its run'], rows)}"
+
+
 # --- performance ------------------------------------------------------------------------------------------------------
 
 

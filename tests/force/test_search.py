@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import FitError
+from stickslip.inference.force import candidates
 from stickslip.inference.force.candidates import Candidate, Start, _at, _columns, from_end, try_effect, with_start
 from stickslip.inference.force.descent import SETTLED, descend
 from stickslip.inference.force.fit import fit, refit
@@ -15,6 +16,8 @@ from stickslip.inference.force.linearised import FARTHEST, Linearised
 from stickslip.inference.force.scatter import Whitening
 from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
+
+from .conftest import made, seen
 
 
 @pytest.fixture(scope="module")
@@ -109,3 +112,19 @@ def test_derivatives_that_no_covariance_holds_end_a_search_in_words(base):
     bad = replace(base.slopes, local=1e200 * base.slopes.local)
     with pytest.raises(FitError, match="too large"), np.errstate(all="ignore"):
         descend(base.problem, base.point, bad, base.scatter, base.known, base.blocks, 4)
+
+
+def test_what_gains_nothing_small_is_found_from_a_large_amplitude(tmp_path, monkeypatch):
+    """The base has taken its part of a sensor that is a third of a millisecond late; a small one makes it worse."""
+    case = made(tmp_path / "case", 11, [seen("sensor-low-pass", "first order", 6.0)], spring_known=True)
+    base = fit(case.problem, case.point)
+    explained = Explained(base)
+
+    def gain() -> float:
+        (found,) = try_effect(base, explained, "sensor-low-pass", [{}])
+        assert found.promise < 1.0
+        return base.cost - found.fit.cost
+
+    assert gain() > 50.0
+    monkeypatch.setattr(candidates, "FAR", 1e-9)
+    assert gain() < 5.0
