@@ -86,7 +86,8 @@ class Diagnosis(Savable):
         """
         if self.found is None:
             if self.folder is None:
-                raise RunFolderError("of this diagnosis only the result was kept, not its models")
+                hint = "diagnose the campaign again with out=FOLDER, which keeps them"
+                raise RunFolderError("of this diagnosis only the result was kept, not its models", hint=hint)
             return load_fit(self.folder, self.campaign)
         gains = {tag: done.close[0].gain for tag, done in self.found.named.items() if done.close}
         made = Fit(self.campaign, Climbed(self.found.prepared, self.found.ladder, gains))
