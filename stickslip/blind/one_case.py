@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RunFolderError, StickslipError
+from ..system import process
 from ..system.runstore import RESULT, is_of_the_disk, json_text, write_aside
 
 Diagnosis = Callable[[Path, Path], Any]
@@ -67,9 +68,7 @@ def do_case(campaign: str, runs: str, case: str, diagnosis: Diagnosis, session: 
     Returns:
         ``case``, ``state`` ("done", "failed" or "refused", by the disk), ``message`` and ``seconds``.
     """
-    from ..system import cache
-
-    cache.keep_compiled()
+    process.begin()
     began = time.monotonic()
     try:
         return _attempt(campaign, Path(runs), case, diagnosis, session, began)
@@ -78,7 +77,7 @@ def do_case(campaign: str, runs: str, case: str, diagnosis: Diagnosis, session: 
             raise
         return _told(case, REFUSED, str(error), began)
     finally:
-        cache.forget_programs()
+        process.forget_programs()
 
 
 def _attempt(

@@ -18,7 +18,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError
 
 from .. import __version__
 from ..errors import InputError, StickslipError, nearest
-from ..system import cache, threads
+from ..system import process
 
 # module and function in it -> what it does, in one line
 COMMANDS = {
@@ -106,8 +106,7 @@ def keep_interrupts() -> None:
 def run(arguments: Sequence[str]) -> int:
     """Run a command line and return its exit code; every error is one message on stderr."""
     try:
-        threads.one_for_linear_algebra()
-        cache.keep_compiled()
+        process.begin()
         result = make_app()(list(arguments), exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
         return result if isinstance(result, int) else 0

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, StickslipError
+from ..system import process
 from ..system.cluster import cluster
 from ..system.lifeline import end_with
 from ..system.progress import silent, telling
@@ -75,11 +76,9 @@ def _name(path: Path) -> str:
 
 def _fitted(path: str, effects: tuple[str, ...], files: tuple[str, ...], parent: int | None) -> dict[str, Any]:
     """One campaign, in a worker."""
-    from ..system import cache
-
     if parent is not None:
         end_with(parent)
-    cache.keep_compiled()
+    process.begin()
     try:
         fit = load_campaign(path, files).fit(effects, progress=silent)
     except StickslipError as error:

@@ -5,7 +5,6 @@ Set through environment variables before JAX is imported, so nothing here import
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
 import tempfile
@@ -15,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 OFF = "STICKSLIP_NO_CACHE"
-AMPLE = 3 * 2**29  # bytes that a process may hold between two pieces of its work
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"
 _SETTINGS = {
     "JAX_COMPILATION_CACHE_DIR": "",
@@ -126,20 +124,3 @@ def _folder(name: str = "compiled") -> Path | None:
             return folder
     except OSError:
         return None
-
-
-def forget_programs(ample: int = AMPLE) -> bool:
-    """Let go of what JAX has compiled in this process, if the process holds more than ``ample`` bytes.
-
-    Every effect, and every campaign, leaves programs of its own behind. Returns whether so.
-    """
-    import jax
-    import psutil
-
-    much = bool(psutil.Process().memory_info().rss > ample)
-    if much:
-        jax.clear_caches()
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
-        if trim is not None:  # of the GNU library, which else keeps what was freed
-            trim(0)
-    return much

@@ -27,6 +27,7 @@ from .cache import folder_for
 
 PACKAGE = Path(__file__).parents[1]
 MADE_WITH = ("jax", "jaxlib", "diffrax", "equinox", "lineax", "optimistix", "numpy")  # and with this package's code
+WIDEST = 512  # bits of a vector, where the processor has them; XLA itself takes half
 FORGOTTEN = 30 * 86400.0  # s after which traces of other versions are removed
 _DIGEST = hashlib.sha256().digest_size
 _IMPORTED = time.time()
@@ -46,7 +47,7 @@ class Program:
 
     def __init__(self, function: Callable[..., Any], name: str | None) -> None:
         self.function, self.name = function, name
-        self._traced = jax.jit(function)
+        self._traced = _compiled(function)
         self._ready: dict[Any, Callable[..., Any]] = {}
         self._lock = Lock()
 
@@ -83,9 +84,13 @@ class Program:
             try:
                 kept = bytes(export.export(jax.jit(flat))(*leaves).serialize())
             except (NotImplementedError, ValueError):  # calls back into Python, or returns no known container
-                return jax.jit(flat)
+                return _compiled(flat)
             _write(path, kept)
-        return jax.jit(export.deserialize(bytearray(kept)).call)
+        return _compiled(export.deserialize(bytearray(kept)).call)
+
+
+def _compiled(function: Callable[..., Any]) -> Any:
+    return jax.jit(function, compiler_options={"xla_cpu_prefer_vector_width": WIDEST})
 
 
 def of_this_package(structure: Any) -> bool:

@@ -167,12 +167,11 @@ def end_all() -> None:
 def _child(there: Connection, work: bytes, files: Sequence[str], parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server's own; it ends this process
     os.environ.setdefault("PYTHONWARNINGS", QUIET)
-    from ..system import cache, threads
+    from ..system import process
     from ..system.lifeline import end_with
 
     end_with(parent)
-    threads.one_for_linear_algebra()
-    cache.keep_compiled()
+    process.begin()
     from ..simulation.conformance import load_effects
 
     def tell(text: str, share: float) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from stickslip.system.cache import forget_programs
+from stickslip.system.process import forget_programs
 
 
 def test_compiled_programs_go_where_a_process_holds_much_and_only_there():

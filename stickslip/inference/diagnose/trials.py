@@ -5,21 +5,23 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from cloudpickle import dumps, loads
 from joblib import Parallel, delayed
 
 from ...physics.contact import Bank
 from ...physics.effects import catalogue
 from ...physics.effects.base import Memory
-from ...system.cache import forget_programs
+from ...system import process, threads
+from ...system.lifeline import end_with
 from ..force.candidates import Candidate, every_form, try_effect
 from ..force.fit import Fit
 from ..force.signatures import Explained
+from .carriage import Carriage
 from .checkpoints import Store, load_candidate, name_of, save_candidate
 
 Tell = Callable[[str, float], None]
@@ -76,16 +78,16 @@ def _made(base: Fit, work: Sequence[Job], jobs: int) -> Iterator[list[Candidate]
         explained = Explained(base)
         for tag, forms in work:
             yield try_effect(base, explained, tag, forms)
-            forget_programs()
+            process.forget_programs()
         return
     files = tuple(str(m.__file__) for m in catalogue.user_modules())
-    job = dumps(base)
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), TemporaryDirectory(prefix="stickslip-") as folder:
         warnings.filterwarnings("ignore", message="A worker stopped")
+        job = Path(folder) / "base"
+        carriage = Carriage.packed(base, job)
         pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
-        yield from (
-            loads(a) for a in pool(delayed(_in_worker)(job, tag, forms, files, os.getpid()) for tag, forms in work)
-        )
+        jobs_of = (delayed(_in_worker)(job, tag, forms, files, os.getpid()) for tag, forms in work)
+        yield from map(carriage.unpack, pool(jobs_of))
 
 
 def _size(base: Fit, tag: str, forms: Sequence[Mapping[str, str]]) -> int:
@@ -100,25 +102,22 @@ def _size(base: Fit, tag: str, forms: Sequence[Mapping[str, str]]) -> int:
     return total
 
 
-_kept: dict[int, tuple[Fit, Explained]] = {}
+_kept: dict[Path, tuple[Carriage, Explained]] = {}
 
 
-def _in_worker(job: bytes, tag: str, forms: list[dict[str, str]], files: tuple[str, ...], parent: int) -> Any:
+def _in_worker(job: Path, tag: str, forms: list[dict[str, str]], files: tuple[str, ...], parent: int) -> bytes:
     """One effect in a worker, which loads the user's files first and keeps the base of its last job."""
-    from ...system import cache, threads
-    from ...system.lifeline import end_with
-
     end_with(parent)
     threads.alone(False)
-    cache.keep_compiled()
+    process.begin()
     for file in files:
         if not any(str(m.__file__) == file for m in catalogue.user_modules()):
             catalogue.load_file(file)
-    key = hash(job)
-    if key not in _kept:
+    if job not in _kept:
         _kept.clear()
-        base = loads(job)
-        _kept[key] = (base, Explained(base))
-    made = dumps(try_effect(*_kept[key], tag, forms))
-    forget_programs()
+        carriage = Carriage(job)
+        _kept[job] = (carriage, Explained(carriage.base))
+    carriage, explained = _kept[job]
+    made = carriage.pack(try_effect(carriage.base, explained, tag, forms))
+    process.forget_programs()
     return made

@@ -30,8 +30,8 @@ STARTS = 4  # members of a family from which a refit is begun
 SHORT = 6  # evaluations from each start, after which the better half of them goes to its end
 EVEN = 1.0  # of two forms' costs: less is no reason to try one from where the other ended
 LARGE = 4.0  # times the promised amplitude: the model without the effect has taken a part of it, and laws may be bent
-FAR = 0.25  # of the way to a bound: large, where nothing small is seen
-PROMISING = 3.0  # fall of the cost that chance alone promises; where no more is, one start serves
+FAR = 0.25  # of the way to a bound, from where an effect is begun of which nothing small is seen
+PROMISING = 3.0  # fall of the cost that chance alone promises
 BESIDE = 0.03  # of the amplitude from which a refit gained nothing, from where it is begun anew
 ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 
@@ -195,11 +195,12 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
         values = {**members[i], effect.amplitude: null + part * size}
         if values not in [s.values for s in starts]:
             starts.append(Start(values, point, None, float(errors[i])))
-    first = unlike[0]
-    for bound in (spec.lower, spec.upper):
-        if bound != null:
-            values = {**members[first], effect.amplitude: null + FAR * (bound - null)}
-            starts.append(Start(values, base.point, None, float(errors[first])))
+    if falls[unlike[0]] <= PROMISING:  # nothing small is seen of it, which says nothing of a large one
+        first = unlike[0]
+        for bound in (spec.lower, spec.upper):
+            if bound != null:
+                values = {**members[first], effect.amplitude: null + FAR * (bound - null)}
+                starts.append(Start(values, base.point, None, float(errors[first])))
     found, start = _best_of(base, effect, starts)
     if found.cost > base.cost:  # a dent beside the model without the effect, which is begun at itself
         values = {**start.values, effect.amplitude: null + BESIDE * (start.values[effect.amplitude] - null)}

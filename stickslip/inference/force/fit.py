@@ -60,6 +60,9 @@ class Fit:
     evaluations: int
     valleys: tuple[Array, ...] = ()
 
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in vars(self).items() if name != "_system"}  # large, and soon found again
+
     @cached_property
     def slopes(self) -> Slopes:
         """Forces with all their derivatives: found when asked for where a hand moved the model."""
