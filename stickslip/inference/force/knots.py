@@ -123,12 +123,13 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     d = np.asarray(trace.drive.position(t))
     breaks = np.searchsorted(t, trace.drive.breakpoints)
     x = x - hum(t, x, trace, found, times.slip, times.hum)
-    followed, speed, smoother = smoothed(x, noise, rate, times)
+    arrests = np.searchsorted(t, [e.t_arrest for e in found.events])
+    followed, speed, smoother = smoothed(x, noise, rate, times, arrests)
     steady, raw = speed, x
     step = max(trace.resolution or 0.0, 2.0 * noise, UNSTEADY * unsteady(x, t, found.events, rate))
     if extra is not None:
         x = x + extra[: x.size]
-        followed, speed, smoother = smoothed(x, noise, rate, times)
+        followed, speed, smoother = smoothed(x, noise, rate, times, arrests)
     phi, first, second = kernels(times.half, rate)
     h = phi.size // 2
     pieces = _Pieces(step)

@@ -40,24 +40,27 @@ class Smoother:
     """Weights of the samples around one in its smoothed displacement.
 
     Attributes:
-        slow, fast: of slow motion and of what is added to it, shape (2 h + 1,) both.
-        gain: how much of that is added at every sample, shape (N,).
+        slow, fast: of slow motion and of what is added to it, by where a sample lies in its window, shape (L, L) both.
+        first: sample that the window of every one begins with, shape (N,).
+        gain: how much is added at every sample, shape (N,).
     """
 
     slow: Array
     fast: Array
+    first: Index
     gain: Array
 
     def matrix(self, index: Index) -> csr_array:
         """From all samples to the smoothed displacement at some of them."""
-        h, n = self.slow.size // 2, self.gain.size
-        around = np.clip(index[:, None] + np.arange(-h, h + 1), 0, n - 1)
-        weights = self.slow + self.gain[index][:, None] * self.fast
-        rows = np.repeat(np.arange(index.size), 2 * h + 1)
+        length, n = len(self.slow), self.gain.size
+        first = self.first[index]
+        around = np.minimum(first[:, None] + np.arange(length), n - 1)
+        weights = self.slow[index - first] + self.gain[index][:, None] * self.fast[index - first]
+        rows = np.repeat(np.arange(index.size), length)
         return coo_array((weights.ravel(), (rows, around.ravel())), shape=(index.size, n)).tocsr()
 
 
-def smoothed(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, Array, Smoother]:
+def smoothed(x: Array, noise: float, rate: float, times: Scales, breaks: Index) -> tuple[Array, Array, Smoother]:
     """Displacement and velocity where every sample counts, and how the former is made of the samples.
 
     At every sample a cubic and a ringing that grows or decays, over two of its periods (where none is heard, a cubic
@@ -65,41 +68,88 @@ def smoothed(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array,
     top of them what a polynomial of the fourth degree over half a period adds, shrunk by as much as noise adds to it in
     squares. The noise of one sample, taken for motion, would be a path that weakens the contact and makes it young; a
     ringing that is smoothed away would be a force of the contact, which is stiff.
+
+    No window reaches over a break, an arrest: there a contact that slid begins to hold, and no function that is smooth
+    describes both sides (the mean over it is off alike at every arrest, by a fifth of the noise of one sample).
+
+    Args:
+        x: samples (m), shape (N,).
+        noise: of one (m).
+        rate: of the samples (1/s).
+        times: of the campaign.
+        breaks: first samples after the breaks, in order.
     """
     period = (times.ring or times.half) * rate
     long = round(2.0 * period if times.ring else period) // 2 * 2 + 1
     short = round(0.5 * period) // 2 * 2 + 1
-    if long < (9 if times.ring else 5):  # too few samples for what would be fitted to them
-        return x, np.gradient(x) * rate, Smoother(np.ones(1), np.zeros(1), np.zeros(x.size))
+    if long < (9 if times.ring else 5) or x.size < long:  # too few samples for what would be fitted to them
+        alone = Smoother(np.ones((1, 1)), np.zeros((1, 1)), np.arange(x.size), np.zeros(x.size))
+        return x, np.gradient(x) * rate, alone
     slow, drift = _local(long, 3, period if times.ring else None)
-    close, run = _local(short, 4) if short >= 7 else _local(3, 2)
-    pad = (long - close.size) // 2
-    fast, rush = np.pad(close, pad) - slow, np.pad(run, pad) - drift
-    added = correlate1d(x, fast, mode="nearest")
-    level = noise**2 * float((fast**2).sum())
-    seen = np.maximum(uniform_filter1d(added**2, round(period) // 2 * 2 + 1), 1e-300)
+    close, run = _within(long, *(_local(short, 4) if short >= 7 else _local(3, 2)))
+    fast, rush = close - slow, run - drift
+    first = _windows(x.size, long, breaks)
+    place = np.arange(x.size) - first
+    added = _applied(fast, x, first)
+    over = round(period) // 2 * 2 + 1
+    level = uniform_filter1d(noise**2 * (fast**2).sum(axis=1)[place], over)
+    seen = np.maximum(uniform_filter1d(added**2, over), 1e-300)
     gain = np.sqrt(np.maximum(1.0 - level / seen, 0.0))
-    followed = correlate1d(x, slow, mode="nearest") + gain * added
-    speed = correlate1d(x, drift, mode="nearest") + gain * correlate1d(x, rush, mode="nearest")
-    return followed, speed * rate, Smoother(slow, fast, gain)
+    followed = _applied(slow, x, first) + gain * added
+    speed = _applied(drift, x, first) + gain * _applied(rush, x, first)
+    return followed, speed * rate, Smoother(slow, fast, first, gain)
+
+
+def _windows(n: int, length: int, breaks: Index) -> Index:
+    """First sample of the window of every sample, in its middle where no break is near, shape (n,).
+
+    Breaks that leave no room for a window between them are none.
+    """
+    edges = [0]
+    for at in breaks.tolist():
+        if at - edges[-1] >= length and n - at >= length:
+            edges.append(at)
+    low = np.repeat(edges, np.diff([*edges, n]))
+    high = np.repeat([*edges[1:], n], np.diff([*edges, n])) - length
+    return np.clip(np.arange(n) - length // 2, low, high)
+
+
+def _applied(weights: Array, x: Array, first: Index) -> Array:
+    """What weights (L, L), by where a sample lies in its window, give of the samples, shape (N,)."""
+    length = len(weights)
+    out = correlate1d(x, weights[length // 2], mode="nearest")
+    place = np.arange(x.size) - first
+    aside = np.flatnonzero(place != length // 2)
+    out[aside] = (weights[place[aside]] * x[first[aside][:, None] + np.arange(length)]).sum(axis=1)
+    return out
+
+
+def _within(length: int, value: Array, slope: Array) -> tuple[Array, Array]:
+    """Weights of shorter windows within longer ones, as much in their middles as there is room, shape (L, L) both."""
+    short = len(value)
+    out = np.zeros((2, length, length))
+    for i in range(length):
+        at = min(max(i - short // 2, 0), length - short)
+        out[0, i, at : at + short], out[1, i, at : at + short] = value[i - at], slope[i - at]
+    return out[0], out[1]
 
 
 def _local(length: int, degree: int, period: float | None = None) -> tuple[Array, Array]:
-    """Weights of the samples around one in the value and the slope (1/sample) there of a function fitted to them.
+    """Weights of the samples of a window in the value and the slope (1/sample) at each of them of a function fitted.
 
-    A polynomial, and with a period (in samples) a wave whose amplitude changes linearly besides.
+    A polynomial, and with a period (in samples) a wave whose amplitude changes linearly besides. Shape (L, L) both.
     """
     i = np.arange(length) - length // 2
-    columns = [i.astype(float) ** k for k in range(degree + 1)]
-    value, slope = np.eye(degree + 1)[:2]
+    powers = np.arange(degree + 1)
+    columns, slopes = i[:, None] ** powers.astype(float), powers * i[:, None] ** np.maximum(powers - 1.0, 0.0)
     if period is not None:
         turn = 2.0 * np.pi / period
-        columns += [np.cos(turn * i), np.sin(turn * i), i * np.cos(turn * i), i * np.sin(turn * i)]
-        value, slope = np.append(value, [1.0, 0.0, 0.0, 0.0]), np.append(slope, [0.0, turn, 1.0, 0.0])
-    matrix = np.stack(columns, axis=1)
-    scale = np.abs(matrix).max(axis=0)
-    solved = np.linalg.pinv(matrix / scale)
-    return np.asarray((value / scale) @ solved), np.asarray((slope / scale) @ solved)
+        c, s = np.cos(turn * i), np.sin(turn * i)
+        columns = np.column_stack([columns, c, s, i * c, i * s])
+        slopes = np.column_stack([slopes, -turn * s, turn * c, c - turn * i * s, s + turn * i * c])
+    scale = np.abs(columns).max(axis=0)
+    solved = np.linalg.pinv(columns / scale)
+    return np.asarray((columns / scale) @ solved), np.asarray((slopes / scale) @ solved)
 
 
 def crept(
