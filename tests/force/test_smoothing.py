@@ -83,7 +83,7 @@ def test_a_block_in_nucleation_is_as_fast_as_it_is():
 
 
 def test_at_an_arrest_nothing_is_off_alike_every_time():
-    """A contact that slid holds from there on: a window over the arrest is off by a third of the noise of one sample."""
+    """A contact that slid holds from there on: a window over the arrest is off by a third of the noise of a sample."""
     samples, amplitude, at = 19.0, 2e-8, 1000
     i = np.arange(2000) - at + 0.5
     turn = 2.0 * np.pi / samples
