@@ -228,7 +228,7 @@ def _next(past: Past, law: Wander, rise: bool) -> dict[str, float] | None:
 def _notes(past: Past, at: float | None, law: Wander, rise: bool) -> list[str]:
     """What should be known of how it was made."""
     where = "all along, even in time" if at is None else f"{at:g} mean recurrences after each arrest"
-    how = f"{law}, {'with' if rise else 'without'} the rise of the level of late"
+    how = f"{law}, {'with' if rise else 'without'} the recent rise of the level"
     said = [
         f"Forecasts are made {where}; each uses only what was measured by then.",
         f"Chosen within the part for training: {how}.",

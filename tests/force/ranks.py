@@ -103,7 +103,7 @@ def picture(found: dict[str, Any]) -> Any:
         ax.axhline(0.0, color=DARK, lw=0.6)
         ax.plot(at, below, color=DARK, lw=1.4)
         ax.set(title=name.split(".")[1].replace("_", " "), xlabel="rank / draws", ylim=(-0.6, 0.6))
-    axes[0, 0].set_ylabel("share below, less the rank")
+    axes[0, 0].set_ylabel("ECDF of ranks - uniform")
     for ax in axes[0, 1:]:
         ax.set_yticklabels([])
     return made

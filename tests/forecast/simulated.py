@@ -65,7 +65,7 @@ def held(found: Rolled) -> list[float]:
 
 @styled
 def picture(rows: dict[str, dict[str, Any]]) -> Any:
-    """Share of what came within intervals, less the share that they are called by."""
+    """Observed less nominal coverage of central intervals."""
     made, axes = figure(1, 1, width=6.0, height=3.6)
     ax = axes[0, 0]
     ax.axhspan(-3.0, 3.0, color=LIGHT, alpha=0.3, lw=0, label="aim")
@@ -74,7 +74,7 @@ def picture(rows: dict[str, dict[str, Any]]) -> Any:
         off = 100.0 * (np.array(row["held"]) - SHARES)
         error = 100.0 * np.sqrt(SHARES * (1.0 - SHARES) / row["slips"])
         ax.errorbar(100.0 * SHARES, off, error, marker=mark, ms=4, lw=1.0, color=color, label=f"wanders along {along}")
-    ax.set(xlabel="central interval / %", ylabel="what came within it, less that / %", ylim=(-10.0, 10.0))
+    ax.set(xlabel="central interval / %", ylabel="observed - nominal coverage / %", ylim=(-10.0, 10.0))
     ax.legend(fontsize="x-small", ncols=2)
     return made
 
