@@ -14,10 +14,10 @@ from typing import Any
 RESULTS = Path(__file__).resolve().parent / "results"
 MISSING = "*Not measured yet.*"
 PARTS = {
-    "one": "one effect, at ten times the amplitude from which it can be seen",
+    "one": "one effect, at ten times its detection limit",
     "strong": "one effect, at the largest plausible amplitude",
     "two": "two effects",
-    "left-out": "one effect, which is not in the catalogue that is tried",
+    "left-out": "one effect, which is left out of the catalogue",
     "nothing": "nothing hidden",
 }
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -100,9 +100,17 @@ def rate(found: dict[str, Any] | None) -> str:
 
 @_drawn
 def cases(found: dict[str, Any]) -> str:
-    """Every campaign of a part: what was hidden, what was said, and how far the error on unseen runs fell."""
+    """Every campaign of a part: hidden effects, answer, and the fall of the error on unseen runs."""
     return table(
-        ["hidden", "lines", "times detection", "margin", "answer", "named, or the set", "error on unseen runs"],
+        [
+            "hidden",
+            "rough lines",
+            "amplitude / detection limit",
+            "margin",
+            "answer",
+            "named, or the set",
+            "error on unseen runs / floors",
+        ],
         [
             [
                 ", ".join(case["hidden"]) or "nothing",
@@ -120,20 +128,22 @@ def cases(found: dict[str, Any]) -> str:
 
 @_drawn
 def ranks(found: dict[str, Any]) -> str:
-    """How well draws of the posterior hold the true values, a row for each parameter of ``posterior.json``."""
+    """How well the posterior contains the true values, a row for each parameter of ``posterior.json``."""
     rows = [
         [f"`{name}`", f"{p['chance']:.2f}", *(f"{100 * share:.0f} %" for share in p["within"].values()),
          f"{p['mean off']:+.2f} ± {found['campaigns'] ** -0.5:.2f}", f"{p['of the fit']:.2f}"]
         for name, p in found["parameters"].items()
     ]  # fmt: skip
-    within = [f"within {share}" for share in next(iter(found["parameters"].values()))["within"]]
-    head = ["parameter", "chance of such ranks", *within, "mean error / deviation", "deviation / that of the fit"]
+    within = [
+        f"in the {share.replace('%', ' %')} interval" for share in next(iter(found["parameters"].values()))["within"]
+    ]
+    head = ["parameter", "p-value of uniform ranks", *within, "mean error / std", "std / that of the fit"]
     return table(head, rows)
 
 
 @_drawn
 def experiments(found: dict[str, Any]) -> str:
-    """Sets that campaigns left, the proposed experiment, and what was left with its run (``ambiguous.json``)."""
+    """Sets of ambiguous campaigns, the proposed experiment, and the set with its run (``ambiguous.json``)."""
 
     def tags(names: Sequence[str]) -> str:
         return ", ".join(f"`{name}`" for name in names)
@@ -147,24 +157,24 @@ def experiments(found: dict[str, Any]) -> str:
                  c.get("experiment") or "none of the drive alone", tags(c.get("left", ()))]
             )  # fmt: skip
     told = (
-        f"Of {found['campaigns']} campaigns {len(rows)} left a set. In {found['made']} of them such an experiment was "
-        f"proposed and made. {found['alone']} of these were left with the hidden effect alone."
+        f"Of {found['campaigns']} campaigns {len(rows)} end with a set. For {found['made']} of them such an experiment "
+        f"is proposed and made. In {found['alone']} of these only the hidden effect remains."
     )
-    return f"{told}\n\n{table(['hidden', 'not told from it', 'proposed experiment', 'left with its run'], rows)}"
+    return f"{told}\n\n{table(['hidden', 'others in the set', 'proposed experiment', 'set with its run'], rows)}"
 
 
 # --- performance ------------------------------------------------------------------------------------------------------
 
 
 def aims(found: dict[str, Any]) -> str:
-    """What the program is to reach, and what was measured."""
+    """Targets, and what was measured."""
     if not found:
         return MISSING
     rows = [
         [r["aim"], r["measured"], r["reached"], r["date"].replace("-", "\u2011"), f"`{r['command']}`"]
         for r in found["rows"]
     ]
-    return table(["aim", "measured", "reached", "date", "measured by"], rows) + f"\n\n*{found['machine']}.*"
+    return table(["target", "measured", "reached", "date", "measured by"], rows) + f"\n\n*{found['machine']}.*"
 
 
 @_drawn
@@ -204,7 +214,7 @@ def by_drive(found: dict[str, Any]) -> str:
 
 
 def _seconds(run: dict[str, Any] | None, found: dict[str, Any], setting: bool = False) -> str:
-    """Processor seconds of a run, with what is short of enough."""
+    """Processor seconds of a run, and its error where it is not accurate enough."""
     if run is None:
         return ""
     seconds = run["processor_s"]
@@ -214,7 +224,7 @@ def _seconds(run: dict[str, Any] | None, found: dict[str, Any], setting: bool = 
     text = "below 0.001" if seconds < 5e-4 else f"{seconds:.3g}"
     if setting and run["setting"]:
         text += f" ({run['setting']})"
-    return text if run["enough"] else f"{text}; onset off by {power(run['onset'], 0)}"
+    return text if run["enough"] else f"{text}; onset error {power(run['onset'], 0)}"
 
 
 @_drawn

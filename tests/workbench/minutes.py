@@ -63,21 +63,21 @@ def measured(seen: Browser, python: Path, folder: Path) -> list[tuple[str, float
     try:
         seen.driver.get(served.url)
         seen.wait(lambda: "Open the shipped example" in seen.text("button"), 120)
-        done("the page that offers the shipped campaign")
+        done("page with the shipped campaign")
         seen.press("button", "Open the shipped example")
         seen.idle(200)
-        done("its base fit")
+        done("fit of the base model")
         base = seen.unseen_error()
         seen.tab("missing")
         seen.wait(
             lambda: seen.js("return seen('.line').some((e) => e.textContent.startsWith('ordered by expected fall'))"),
             300,
         )
-        done("every effect looked at")
+        done("expected gain of every effect")
         seen.press(".effect-row button", "Switch on")
         seen.wait(lambda: "contact-ageing" in seen.text(".model"), 200)
         seen.idle(200)
-        done("the one that promised most fitted")
+        done("fit of the effect with the largest expected gain")
         assert seen.unseen_error() < 0.9 * base, (base, seen.unseen_error())
     finally:
         served.end()
@@ -97,7 +97,7 @@ def main() -> None:
         python = folder / "own" / "bin" / "python"
         asked = [f"{made}[workbench]", "-c", str(ROOT / "constraints.txt")]
         subprocess.run([str(python), "-m", "pip", "install", "-q", *asked], check=True, env=bare(), cwd=folder)
-        stages = [("the installation", time.monotonic() - began)]
+        stages = [("installation", time.monotonic() - began)]
         (folder / "empty").mkdir()
         seen = chromium()
         try:
@@ -107,7 +107,7 @@ def main() -> None:
     whole = sum(seconds for _, seconds in stages)
     found = {
         "version": __version__, "date": date.today().isoformat(), "command": "python -m tests.workbench.minutes",
-        "machine": f"{os.cpu_count()} processors", "columns": ["what", "measured", "aim"],
+        "machine": f"{os.cpu_count()} processors", "columns": ["what", "measured", "target"],
         "rows": [*([what, f"{seconds:.0f} s", ""] for what, seconds in stages),
                  ["from pip install to the first fall of the error", f"{whole:.0f} s", f"{AIM:.0f} s"]],
     }  # fmt: skip

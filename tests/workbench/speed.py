@@ -184,27 +184,31 @@ def main() -> None:
             seen.close(), served.end()
         since, asked = (statistics.median(v) for v in zip(*opened_short, strict=True))
         rows += [
-            ["the shipped campaign is drawn after the command, its files not in memory", f"{cold:.1f} s", "8 s"],
+            [
+                "first picture of the shipped campaign after the command, its files not in memory",
+                f"{cold:.1f} s",
+                "8 s",
+            ],
             ["the same, started again", f"{since:.1f} s", "3 s"],
-            ["of which after the browser has asked for the page", f"{asked:.1f} s", ""],
-            ["errors after a move of a slider", spread(told, "ms"), "100 ms"],
-            ["all curves after it, but those of the free simulation", spread(drawn, "ms"), "100 ms"],
+            ["of this, after the request of the browser", f"{asked:.1f} s", ""],
+            ["errors after a slider is moved", spread(told, "ms"), "100 ms"],
+            ["all curves after it, except the free simulation", spread(drawn, "ms"), "100 ms"],
         ]
         served, seen, since, asked = opened(long_campaign(Path(name) / "long"))
-        rows += [["five runs of a million samples are drawn after the command", f"{since:.1f} s", ""]]
-        for zoom, words in ((False, "moved along"), (True, "zoomed into")):
+        rows += [["first picture of five runs of a million samples after the command", f"{since:.1f} s", ""]]
+        for zoom, words in ((False, "panning of"), (True, "zooming into")):
             redraws = seen.driver.execute_async_script(DEEP + GLIDE, zoom)
-            rows += [[f"redraws in a second while such a run is {words}", f"{redraws:.0f}", "30"]]
+            rows += [[f"redraws per second during {words} such a run", f"{redraws:.0f}", "30"]]
             time.sleep(2.0)
         seen.close(), served.end()
     busy = os.getloadavg()[1]
     most, rare, size = lateness()
-    told_late = f"up to {most:.0f} ms nine times of ten, {rare:.0f} ms 99 of 100"
+    told_late = f"up to {most:.0f} ms in 90 % of the cases, {rare:.0f} ms in 99 %"
     rows += [
-        ["the server is late while a fit goes on in its process", told_late, ""],
-        ["a fit, were it sent to another process", f"{size:.0f} MB", ""],
+        ["delay of the server during a fit in its process", told_late, ""],
+        ["size of a fit, if it were sent to another process", f"{size:.0f} MB", ""],
         [
-            f"what else ran meanwhile: load of the {os.cpu_count()} processors, this script's own in it",
+            f"load of the {os.cpu_count()} processors meanwhile, this script included",
             f"{busy:.0f}",
             "",
         ],
@@ -212,7 +216,7 @@ def main() -> None:
     found: dict[str, Any] = {
         "version": __version__, "date": date.today().isoformat(), "command": "python -m tests.workbench.speed",
         "machine": f"{os.cpu_count()} processors, Chromium without a screen and without a graphics card",
-        "columns": ["what", "measured", "aim"], "rows": rows,
+        "columns": ["what", "measured", "target"], "rows": rows,
     }  # fmt: skip
     RESULTS.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     print(json.dumps(rows, indent=1))
