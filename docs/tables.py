@@ -82,7 +82,10 @@ def rates(found: dict[str, Any]) -> str:
         return MISSING
     parts = {key: found[key] for key in PARTS if found.get(key)}
     rows: list[list[object]] = [["campaigns", *(len(part["cases"]) for part in parts.values())]]
-    counted = [[name, *(rate(part["rates"].get(name)) for part in parts.values())] for name in names]
+    counted = [
+        [name.replace("tellable", "identifiable"), *(rate(part["rates"].get(name)) for part in parts.values())]
+        for name in names
+    ]
     rows += [row for row in counted if any(row[1:])]
     lacking = [words for key, words in PARTS.items() if key not in parts]
     sources = [f"`{k}` version {p['version']}, {p['date']}, seed {p['seed']}" for k, p in parts.items()]
@@ -134,16 +137,15 @@ def ranks(found: dict[str, Any]) -> str:
          f"{p['mean off']:+.2f} ± {found['campaigns'] ** -0.5:.2f}", f"{p['of the fit']:.2f}"]
         for name, p in found["parameters"].items()
     ]  # fmt: skip
-    within = [
-        f"in the {share.replace('%', ' %')} interval" for share in next(iter(found["parameters"].values()))["within"]
-    ]
+    shares = next(iter(found["parameters"].values()))["within"]
+    within = [f"in the {share.replace('%', ' %')} interval" for share in shares]
     head = ["parameter", "p-value of uniform ranks", *within, "mean error / std", "std / that of the fit"]
     return table(head, rows)
 
 
 @_drawn
 def experiments(found: dict[str, Any]) -> str:
-    """Sets of ambiguous campaigns, the proposed experiment, and the set with its run (``ambiguous.json``)."""
+    """Sets of ambiguous campaigns, the proposed experiment, and what is named with its run (``ambiguous.json``)."""
 
     def tags(names: Sequence[str]) -> str:
         return ", ".join(f"`{name}`" for name in names)
@@ -151,16 +153,16 @@ def experiments(found: dict[str, Any]) -> str:
     rows = []
     for c in found["cases"]:
         if c["before"] == "ambiguous":
-            others = [tag for tag in c["set"] if tag != c["hidden"]]
-            rows.append(
-                [f"`{c['hidden']}`", tags(others) or "a wrong entry of the rig",
-                 c.get("experiment") or "none of the drive alone", tags(c.get("left", ()))]
-            )  # fmt: skip
+            others = tags([tag for tag in c["set"] if tag != c["hidden"]]) or "a wrong entry of the rig"
+            within = "" if c["hidden"] in c["set"] else " (without the hidden effect)"
+            left = tags(c["left"]) or f"none, `{c['after']}`" if "left" in c else ""
+            made = c["experiment"] or "none of the drive alone" if "experiment" in c else "not made"
+            rows.append([f"`{c['hidden']}`", others + within, made, left])
     told = (
         f"Of {found['campaigns']} campaigns {len(rows)} end with a set. For {found['made']} of them such an experiment "
         f"is proposed and made. In {found['alone']} of these only the hidden effect remains."
     )
-    return f"{told}\n\n{table(['hidden', 'others in the set', 'proposed experiment', 'set with its run'], rows)}"
+    return f"{told}\n\n{table(['hidden', 'others in the set', 'proposed experiment', 'named with its run'], rows)}"
 
 
 # --- performance ------------------------------------------------------------------------------------------------------

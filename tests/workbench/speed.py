@@ -185,7 +185,7 @@ def main() -> None:
         since, asked = (statistics.median(v) for v in zip(*opened_short, strict=True))
         rows += [
             [
-                "first picture of the shipped campaign after the command, its files not in memory",
+                "first picture of the shipped campaign after the command, files not in memory",
                 f"{cold:.1f} s",
                 "8 s",
             ],
