@@ -290,7 +290,7 @@ def caption(f: dict[str, Any]) -> str:
         f"model, fitted to the first creep, describes it to {s['residual_percent']} % (H = {s['H']}) and fails after "
         f"it: the second slip comes after {s['second_stick_s']} s, the model needs {s['model_stick_s']} s for every "
         f"stick and ends without a slip. **3** Error with each effect: {f['refitted']} of {f['tried']} that these data "
-        f"can test were refitted; verdict `{f['verdict']}`, effects named: {named} (2 Δ log-likelihood = {f['gains'][0]}"
+        f"can test were refitted; verdict `{f['verdict']}`, named: {named} (2 Δ log-likelihood = {f['gains'][0]}"
         f"{second}). **4** Error on fitted runs {arrow.join(_digits(v) for v in f['fitted'])}, on unseen ones "
         f"{arrow.join(_digits(v) for v in f['unseen'])}, in floors: 1 is as good as noise and scatter allow.*"
     )
