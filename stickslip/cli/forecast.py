@@ -55,8 +55,8 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
     lines = [
         f"{result['title']}: {result['run']}, {train['of']} slips, {train['slips']} of them for training",
         f"level at onset: varies by {100 * ties['variation']:.2g} %; less a running mean over {ties['window']} slips "
-        f"{ties['carried_over']:.2f} of it is carried over to the next slip, correlation with the level at arrest "
-        f"{ties['with_arrest']:.2f}, with the time waited {ties['with_waiting']:.2f}",
+        f"its correlation is {ties['carried_over']:.2f} with the level at the next onset, {ties['with_arrest']:.2f} "
+        f"with that at the arrest, {ties['with_waiting']:.2f} with the time since the last onset",
         result["coordinate"]["text"],
         "",
     ]

@@ -142,7 +142,7 @@ def picture(slider: Forecast, fault: Forecast) -> Any:
     r = np.array(rows)
     beside.fill_between(r[:, 0], r[:, 2], r[:, 4], color=LIGHT, alpha=0.6, lw=0, label="90 % interval")
     beside.plot(r[:, 0], r[:, 3], color=MIDDLE, lw=1.4, label="median")
-    beside.plot(r[:, 0], r[:, 1], color=DARK, lw=0.9, ls="--", label="what came")
+    beside.plot(r[:, 0], r[:, 1], color=DARK, lw=0.9, ls="--", label="measured")
     beside.set(xlabel="time since the end of training / s", ylabel="time to the next slip / s")
     beside.set_title("laboratory fault")
     beside.legend(loc="upper right", ncols=3)

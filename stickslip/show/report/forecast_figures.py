@@ -34,7 +34,7 @@ def levels_picture(data: xarray.Dataset) -> Figure:
 
 @styled
 def calibration_picture(data: xarray.Dataset) -> Figure:
-    """Forecast intervals against what came, and how often what came lay below each share of the forecast."""
+    """Forecast intervals against measured times, and the distribution of their forecast probabilities."""
     made, axes = figure(1, 2, width=11.0, height=3.8)
     ax, beside = axes[0, 0], axes[0, 1]
     order = np.argsort(data.truth.values, kind="stable")
@@ -55,6 +55,6 @@ def calibration_picture(data: xarray.Dataset) -> Figure:
         pit = np.sort(data.pit.sel(forecaster=name).values)
         beside.plot(share, np.searchsorted(pit, share, side="right") / pit.size, style, color=colour, label=str(name))
     beside.plot([0, 1], [0, 1], color=DARK, lw=0.6)
-    beside.set(xlabel="share of the forecast below what came", ylabel="share of slips")
+    beside.set(xlabel="forecast probability of an earlier slip", ylabel="share of slips")
     beside.legend(loc="upper left")
     return made

@@ -55,7 +55,7 @@ def pictures(result: dict[str, Any], data: xarray.Dataset) -> Iterator[tuple[str
         )
         yield (
             "forecast",
-            "Forecasts of the later slips against what came, and their calibration.",
+            "Forecast against measured time to the next slip, and calibration of the forecasts.",
             calibration_picture(data),
         )
     if result.get("static") and "creep0_time" in data:
