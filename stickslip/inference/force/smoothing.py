@@ -50,6 +50,13 @@ class Smoother:
     first: Index
     gain: Array
 
+    @property
+    def squares(self) -> Array:
+        """Variance of the smoothed displacement over that of a sample, shape (N,)."""
+        place = np.arange(self.gain.size) - self.first
+        one, both, two = (self.slow**2).sum(1), (self.slow * self.fast).sum(1), (self.fast**2).sum(1)
+        return np.asarray(one[place] + self.gain * (2.0 * both[place] + self.gain * two[place]))
+
     def matrix(self, index: Index) -> csr_array:
         """From all samples to the smoothed displacement at some of them."""
         length, n = len(self.slow), self.gain.size
