@@ -124,7 +124,7 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     noise = max(float(trace.noise or 0.0), 1e-13)
     d = np.asarray(trace.drive.position(t))
     breaks = np.searchsorted(t, trace.drive.breakpoints)
-    arrests = np.searchsorted(t, [e.t_arrest for e in found.events])
+    arrests = (np.array([e.t_arrest for e in found.events]) - t[0]) * rate
     hums = hum(t, x, trace, found, times.slip, times.hum)
     x = unrounded(x, hums, trace.resolution or 0.0, noise, rate, times, arrests)
     followed, speed, smoother = smoothed(x, noise, rate, times, arrests)
@@ -158,7 +158,7 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
 
 
 def unrounded(
-    readings: Array, hums: Array, count: float, noise: float, rate: float, times: Scales, arrests: Index
+    readings: Array, hums: Array, count: float, noise: float, rate: float, times: Scales, arrests: Array
 ) -> Array:
     """Readings (m) without the hum and, if they are counts, what rounding adds in the mean where the motion is."""
     x = readings - hums

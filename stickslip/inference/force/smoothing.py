@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,39 +37,69 @@ def unsteady(x: Array, t: Array, events: tuple[Event, ...], rate: float) -> floa
     return float(np.median(found)) if found else 0.0
 
 
+class Bend(NamedTuple):
+    """Weights for the samples around an arrest.
+
+    Attributes:
+        low: the first of these m samples.
+        first: the first of the M samples that they are made of.
+        slow, fast: see :class:`Smoother`, shape (m, M) both.
+    """
+
+    low: int
+    first: int
+    slow: Array
+    fast: Array
+
+
 @dataclass(frozen=True)
 class Smoother:
     """Weights of the samples around one in its smoothed displacement.
 
     Attributes:
-        slow, fast: of slow motion and of what is added to it, by where a sample lies in its window, shape (L, L) both.
-        first: sample that the window of every one begins with, shape (N,).
-        gain: how much is added at every sample, shape (N,).
+        slow, fast: of slow motion and of what is added to it, shape (2 h + 1,) both.
+        gain: how much of that is added at every sample, shape (N,).
+        bends: other weights where the block comes to rest.
     """
 
     slow: Array
     fast: Array
-    first: Index
     gain: Array
+    bends: tuple[Bend, ...] = ()
 
     @property
     def squares(self) -> Array:
         """Variance of the smoothed displacement over that of a sample, shape (N,)."""
-        place = np.arange(self.gain.size) - self.first
-        one, both, two = (self.slow**2).sum(1), (self.slow * self.fast).sum(1), (self.fast**2).sum(1)
-        return np.asarray(one[place] + self.gain * (2.0 * both[place] + self.gain * two[place]))
+        out = _squares(self.slow, self.fast, self.gain)
+        for bend in self.bends:
+            own = slice(bend.low, bend.low + len(bend.slow))
+            out[own] = _squares(bend.slow, bend.fast, self.gain[own])
+        return out
 
     def matrix(self, index: Index) -> csr_array:
         """From all samples to the smoothed displacement at some of them."""
-        length, n = len(self.slow), self.gain.size
-        first = self.first[index]
-        around = np.minimum(first[:, None] + np.arange(length), n - 1)
-        weights = self.slow[index - first] + self.gain[index][:, None] * self.fast[index - first]
-        rows = np.repeat(np.arange(index.size), length)
-        return coo_array((weights.ravel(), (rows, around.ravel())), shape=(index.size, n)).tocsr()
+        h, n = self.slow.size // 2, self.gain.size
+        place = np.arange(index.size)
+        parts = []
+        for bend in self.bends:
+            own = np.flatnonzero((index >= bend.low) & (index < bend.low + len(bend.slow)))
+            at = index[own] - bend.low
+            weights = bend.slow[at] + self.gain[index[own]][:, None] * bend.fast[at]
+            parts.append((own, np.broadcast_to(bend.first + np.arange(weights.shape[1]), weights.shape), weights))
+            place = place[~np.isin(place, own)]
+        around = np.clip(index[place][:, None] + np.arange(-h, h + 1), 0, n - 1)
+        parts.append((place, around, self.slow + self.gain[index[place]][:, None] * self.fast))
+        rows = np.concatenate([np.repeat(own, weights.shape[1]) for own, _, weights in parts])
+        columns, values = (np.concatenate([part[i].ravel() for part in parts]) for i in (1, 2))
+        return coo_array((values, (rows, columns)), shape=(index.size, n)).tocsr()
 
 
-def smoothed(x: Array, noise: float, rate: float, times: Scales, breaks: Index) -> tuple[Array, Array, Smoother]:
+def _squares(slow: Array, fast: Array, gain: Array) -> Array:
+    one, both, two = ((a * b).sum(axis=-1) for a, b in ((slow, slow), (slow, fast), (fast, fast)))
+    return np.asarray(one + gain * (2.0 * both + gain * two))
+
+
+def smoothed(x: Array, noise: float, rate: float, times: Scales, arrests: Array) -> tuple[Array, Array, Smoother]:
     """Displacement and velocity where every sample counts, and how the former is made of the samples.
 
     At every sample a cubic and a ringing that grows or decays, over two of its periods (where none is heard, a cubic
@@ -76,87 +108,120 @@ def smoothed(x: Array, noise: float, rate: float, times: Scales, breaks: Index) 
     squares. The noise of one sample, taken for motion, would be a path that weakens the contact and makes it young; a
     ringing that is smoothed away would be a force of the contact, which is stiff.
 
-    No window reaches over a break, an arrest: there a contact that slid begins to hold, and no function that is smooth
-    describes both sides (the mean over it is off alike at every arrest, by a fifth of the noise of one sample).
+    Around an arrest there are two such functions, one before and one after it, with the same displacement, velocity and
+    acceleration at the arrest: there a contact that slid begins to hold, and the force on the block has a kink. One
+    function over it would be off alike at every arrest, by a third of the noise of a sample.
 
     Args:
         x: samples (m), shape (N,).
         noise: of one (m).
         rate: of the samples (1/s).
         times: of the campaign.
-        breaks: first samples after the breaks, in order.
+        arrests: where the block comes to rest, in samples from the first, in order.
     """
     period = (times.ring or times.half) * rate
     long = round(2.0 * period if times.ring else period) // 2 * 2 + 1
     short = round(0.5 * period) // 2 * 2 + 1
-    if long < (9 if times.ring else 5) or x.size < long:  # too few samples for what would be fitted to them
-        alone = Smoother(np.ones((1, 1)), np.zeros((1, 1)), np.arange(x.size), np.zeros(x.size))
-        return x, np.gradient(x) * rate, alone
-    slow, drift = _local(long, 3, period if times.ring else None)
-    close, run = _within(long, *(_local(short, 4) if short >= 7 else _local(3, 2)))
-    fast, rush = close - slow, run - drift
-    first = _windows(x.size, long, breaks)
-    place = np.arange(x.size) - first
-    added = _applied(fast, x, first)
+    if long < (9 if times.ring else 5):  # too few samples for what would be fitted to them
+        return x, np.gradient(x) * rate, Smoother(np.ones(1), np.zeros(1), np.zeros(x.size))
+    wave = period if times.ring else None
+    slow, drift = _local(np.arange(long) - long // 2, np.zeros(1), 3, wave)
+    short, degree = (short, 4) if short >= 7 else (3, 2)
+    close, run = _local(np.arange(short) - short // 2, np.zeros(1), degree)
+    fast, rush = _beside(close, slow), _beside(run, drift)
+    level = np.full(x.size, noise**2 * float((fast**2).sum()))
+    added = correlate1d(x, fast[0], mode="nearest")
+    followed, speed = correlate1d(x, slow[0], mode="nearest"), correlate1d(x, drift[0], mode="nearest")
+    hurried = correlate1d(x, rush[0], mode="nearest")
+    bends = []
+    for at in _with_room(arrests, 2 * long, x.size):
+        first = int(at) + 1 - long  # two windows, the later of which begins with the arrest
+        own, all_of_it = slice(int(at) + 1 - long // 2, int(at) + 1 + long // 2), x[first : first + 2 * long]
+        values, slopes = _bent(long, wave, round(8.0 * (at % 1.0)) / 8.0)
+        centres = np.arange(own.start, own.stop) - first
+        near, hasty = _centred(close[0], centres, 2 * long), _centred(run[0], centres, 2 * long)
+        bends.append(Bend(own.start, first, values, near - values))
+        level[own] = noise**2 * ((near - values) ** 2).sum(axis=1)
+        added[own], followed[own] = (near - values) @ all_of_it, values @ all_of_it
+        speed[own], hurried[own] = slopes @ all_of_it, (hasty - slopes) @ all_of_it
     over = round(period) // 2 * 2 + 1
-    level = uniform_filter1d(noise**2 * (fast**2).sum(axis=1)[place], over)
     seen = np.maximum(uniform_filter1d(added**2, over), 1e-300)
-    gain = np.sqrt(np.maximum(1.0 - level / seen, 0.0))
-    followed = _applied(slow, x, first) + gain * added
-    speed = _applied(drift, x, first) + gain * _applied(rush, x, first)
-    return followed, speed * rate, Smoother(slow, fast, first, gain)
+    gain = np.sqrt(np.maximum(1.0 - uniform_filter1d(level, over) / seen, 0.0))
+    smoother = Smoother(slow[0], fast[0], gain, tuple(bends))
+    return followed + gain * added, (speed + gain * hurried) * rate, smoother
 
 
-def _windows(n: int, length: int, breaks: Index) -> Index:
-    """First sample of the window of every sample, in its middle where no break is near, shape (n,).
+def _with_room(arrests: Array, room: int, n: int) -> list[float]:
+    """Arrests with so many samples around them, half of them at either side, that hold no other arrest."""
+    apart = np.diff(np.concatenate([[-np.inf], arrests, [np.inf]]))
+    inside = (arrests >= 0.5 * room) & (arrests < n - 0.5 * room - 1)
+    return [float(a) for a in arrests[inside & (apart[:-1] > 0.5 * room) & (apart[1:] > 0.5 * room)]]
 
-    Breaks that leave no room for a window between them are none.
+
+@lru_cache(maxsize=64)
+def _bent(long: int, period: float | None, after: float) -> tuple[Array, Array]:
+    """Weights of two windows in displacement and velocity around an arrest between them, shape (m, 2 L) both.
+
+    Args:
+        long: samples in a window, L.
+        period: of the ringing (samples).
+        after: by how much the arrest comes after the last sample of the first window (samples).
     """
-    edges = [0]
-    for at in breaks.tolist():
-        if at - edges[-1] >= length and n - at >= length:
-            edges.append(at)
-    low = np.repeat(edges, np.diff([*edges, n]))
-    high = np.repeat([*edges[1:], n], np.diff([*edges, n])) - length
-    return np.clip(np.arange(n) - length // 2, low, high)
+    i = np.arange(2 * long) - (long - 1) - after
+    return _local(i, i[long - long // 2 : long + long // 2], 3, period, bent=True)
 
 
-def _applied(weights: Array, x: Array, first: Index) -> Array:
-    """What weights (L, L), by where a sample lies in its window, give of the samples, shape (N,)."""
-    length = len(weights)
-    out = correlate1d(x, weights[length // 2], mode="nearest")
-    place = np.arange(x.size) - first
-    aside = np.flatnonzero(place != length // 2)
-    out[aside] = (weights[place[aside]] * x[first[aside][:, None] + np.arange(length)]).sum(axis=1)
+def _centred(weights: Array, centres: Index, length: int) -> Array:
+    """The same weights around several samples of a window, shape (m, L)."""
+    out = np.zeros((centres.size, length))
+    first = centres - weights.size // 2
+    out[np.arange(centres.size)[:, None], first[:, None] + np.arange(weights.size)] = weights
     return out
 
 
-def _within(length: int, value: Array, slope: Array) -> tuple[Array, Array]:
-    """Weights of shorter windows within longer ones, as much in their middles as there is room, shape (L, L) both."""
-    short = len(value)
-    out = np.zeros((2, length, length))
-    for i in range(length):
-        at = min(max(i - short // 2, 0), length - short)
-        out[0, i, at : at + short], out[1, i, at : at + short] = value[i - at], slope[i - at]
-    return out[0], out[1]
+def _beside(short: Array, long: Array) -> Array:
+    """Weights of a window less those of a longer one with the same middle, shape (1, L)."""
+    return np.asarray(np.pad(short, ((0, 0), ((long.shape[1] - short.shape[1]) // 2,) * 2)) - long)
 
 
-def _local(length: int, degree: int, period: float | None = None) -> tuple[Array, Array]:
-    """Weights of the samples of a window in the value and the slope (1/sample) at each of them of a function fitted.
+def _local(i: Array, at: Array, degree: int, period: float | None = None, bent: bool = False) -> tuple[Array, Array]:
+    """Weights of samples in the values and the slopes (1/sample) of a function fitted to them, shape (m, L) both.
 
-    A polynomial, and with a period (in samples) a wave whose amplitude changes linearly besides. Shape (L, L) both.
+    A polynomial, and with a period (in samples) a wave whose amplitude changes linearly besides. A ``bent`` one is
+    another after zero than before, with two derivatives in common there.
+
+    Args:
+        i: the samples, shape (L,).
+        at: where values and slopes are wanted (samples), shape (m,).
+        degree: of the polynomial.
+        period: of the wave (samples).
+        bent: whether it is bent at zero.
     """
-    i = np.arange(length) - length // 2
+    matrix, (values, slopes) = _functions(i, degree, period, bent)[0], _functions(at, degree, period, bent)
+    scale = np.abs(matrix).max(axis=0)
+    solved = np.linalg.pinv(matrix / scale)
+    return np.asarray((values / scale) @ solved), np.asarray((slopes / scale) @ solved)
+
+
+def _functions(i: Array, degree: int, period: float | None, bent: bool) -> tuple[Array, Array]:
+    """Values of the functions of :func:`_local` and their slopes, shape (m, f) both."""
+    i = np.asarray(i, float)[:, None]
     powers = np.arange(degree + 1)
-    columns, slopes = i[:, None] ** powers.astype(float), powers * i[:, None] ** np.maximum(powers - 1.0, 0.0)
+    values, slopes = [i**powers], [powers * i ** np.maximum(powers - 1, 0)]
     if period is not None:
         turn = 2.0 * np.pi / period
         c, s = np.cos(turn * i), np.sin(turn * i)
-        columns = np.column_stack([columns, c, s, i * c, i * s])
-        slopes = np.column_stack([slopes, -turn * s, turn * c, c - turn * i * s, s + turn * i * c])
-    scale = np.abs(columns).max(axis=0)
-    solved = np.linalg.pinv(columns / scale)
-    return np.asarray((columns / scale) @ solved), np.asarray((slopes / scale) @ solved)
+        values.append(np.hstack([c, s, i * c, i * s]))
+        slopes.append(np.hstack([-turn * s, turn * c, c - turn * i * s, s + turn * i * c]))
+    if bent:
+        after = i > 0.0
+        values.append(after * i**3)
+        slopes.append(after * 3.0 * i**2)
+    if bent and period is not None:  # each less its first powers up to the square
+        t = turn * i
+        values.append(after * np.hstack([c - 1.0 + 0.5 * t**2, s - t, i * (c - 1.0), i * (s - t)]))
+        slopes.append(after * np.hstack([turn * (t - s), turn * (c - 1.0), c - 1.0 - t * s, s - t + t * (c - 1.0)]))
+    return np.hstack(values), np.hstack(slopes)
 
 
 def crept(
