@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,9 +135,9 @@ def smoothed(x: Array, noise: float, rate: float, times: Scales, arrests: Array)
     hurried = correlate1d(x, rush[0], mode="nearest")
     bends = []
     for at in _with_room(arrests, 2 * long, x.size):
-        first = int(at) + 1 - long  # two windows, the later of which begins with the arrest
+        first = int(at) + 1 - long
         own, all_of_it = slice(int(at) + 1 - long // 2, int(at) + 1 + long // 2), x[first : first + 2 * long]
-        values, slopes = _bent(long, wave, round(8.0 * (at % 1.0)) / 8.0)
+        values, slopes = _bent(long, long // 2, wave, round(8.0 * (at % 1.0)) / 8.0)
         centres = np.arange(own.start, own.stop) - first
         near, hasty = _centred(close[0], centres, 2 * long), _centred(run[0], centres, 2 * long)
         bends.append(Bend(own.start, first, values, near - values))
@@ -159,16 +159,16 @@ def _with_room(arrests: Array, room: int, n: int) -> list[float]:
 
 
 @lru_cache(maxsize=64)
-def _bent(long: int, period: float | None, after: float) -> tuple[Array, Array]:
-    """Weights of two windows in displacement and velocity around an arrest between them, shape (m, 2 L) both.
+def _bent(side: int, near: int, period: float | None, after: float) -> tuple[Array, Array]:
+    """Weights of the samples around an arrest in displacement and velocity near it, shape (2 near, 2 side) both.
 
     Args:
-        long: samples in a window, L.
+        side, near: samples at either side that count, and of which displacement and velocity are wanted.
         period: of the ringing (samples).
-        after: by how much the arrest comes after the last sample of the first window (samples).
+        after: by how much the arrest comes after the last sample before it (samples).
     """
-    i = np.arange(2 * long) - (long - 1) - after
-    return _local(i, i[long - long // 2 : long + long // 2], 3, period, bent=True)
+    i = np.arange(2 * side) - (side - 1) - after
+    return _local(i, i[side - near : side + near], 3, period, bent=True)
 
 
 def _centred(weights: Array, centres: Index, length: int) -> Array:
@@ -184,7 +184,7 @@ def _beside(short: Array, long: Array) -> Array:
     return np.asarray(np.pad(short, ((0, 0), ((long.shape[1] - short.shape[1]) // 2,) * 2)) - long)
 
 
-def _local(i: Array, at: Array, degree: int, period: float | None = None, bent: bool = False) -> tuple[Array, Array]:
+def _local(i: Any, at: Any, degree: int, period: float | None = None, bent: bool = False) -> tuple[Array, Array]:
     """Weights of samples in the values and the slopes (1/sample) of a function fitted to them, shape (m, L) both.
 
     A polynomial, and with a period (in samples) a wave whose amplitude changes linearly besides. A ``bent`` one is
@@ -203,18 +203,19 @@ def _local(i: Array, at: Array, degree: int, period: float | None = None, bent: 
     return np.asarray((values / scale) @ solved), np.asarray((slopes / scale) @ solved)
 
 
-def _functions(i: Array, degree: int, period: float | None, bent: bool) -> tuple[Array, Array]:
+def _functions(i: Any, degree: int, period: float | None, bent: bool) -> tuple[Array, Array]:
     """Values of the functions of :func:`_local` and their slopes, shape (m, f) both."""
     i = np.asarray(i, float)[:, None]
     powers = np.arange(degree + 1)
-    values, slopes = [i**powers], [powers * i ** np.maximum(powers - 1, 0)]
+    values: list[Array] = [i**powers]
+    slopes: list[Array] = [powers * i ** np.maximum(powers - 1, 0)]
     if period is not None:
         turn = 2.0 * np.pi / period
         c, s = np.cos(turn * i), np.sin(turn * i)
         values.append(np.hstack([c, s, i * c, i * s]))
         slopes.append(np.hstack([-turn * s, turn * c, c - turn * i * s, s + turn * i * c]))
     if bent:
-        after = i > 0.0
+        after = np.where(i > 0.0, 1.0, 0.0)
         values.append(after * i**3)
         slopes.append(after * 3.0 * i**2)
     if bent and period is not None:  # each less its first powers up to the square
