@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from stickslip.inference.force.along import Held, Way, along, turning
+from stickslip.inference.force.along import Held, Way, along
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Effect
 from stickslip.physics.model import Model
@@ -106,16 +106,17 @@ def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> Way:
     x, v = np.concatenate([x, np.full(more, x[-1])]), np.concatenate([v, np.zeros(more)])
     ones = np.ones(KNOTS)
     return Way(
-        *map(jnp.asarray, (t, x, v, np.interp(t, TIMES, POSITIONS), turning(t, v), ones, ones)),
+        *map(jnp.asarray, (t, x, v, np.interp(t, TIMES, POSITIONS), ones, ones)),
         shape=0.0 * ones,
         load=ones,
         force=0.0 * ones,
+        bend=jnp.concatenate([jnp.zeros(1), -0.5 * jnp.diff(t) * jnp.diff(v)]),
     )
 
 
-def held(slips: Slips, turns: bool = True) -> Held:
-    """What the model holds along it, at the solver's steps; ``turns`` lets it know where steps turn."""
-    way = slips.way if turns else slips.way._replace(turn=jnp.zeros(KNOTS))
+def held(slips: Slips, bends: bool = True) -> Held:
+    """What the model holds along it, at the solver's steps; ``bends`` lets it know how fast they slow down."""
+    way = slips.way if bends else slips.way._replace(bend=None)
     return at_steps(march(slips.model, way), slips)
 
 

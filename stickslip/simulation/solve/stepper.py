@@ -222,10 +222,8 @@ def _work(y0: State, contact: Contact, v: tuple, f: tuple, h: Array, model: Mode
 
 
 def _path(t: Array, dt: Array, x0: Array, v0: Array, v: Array, dx: Array, lead: Array) -> Motion:
-    """The increment, with its turning point where the velocity changes sign (parabola through the end velocities)."""
-    reverses = v0 * v < 0.0
-    turn = jnp.where(reverses, 0.5 * dt * v0 * v0 / jnp.where(reverses, v0 - v, 1.0), 0.0)
-    return Motion(t, dt, x0 + dx, v, turn, dx, lead)
+    """The increment, with a velocity that changes linearly."""
+    return Motion(t, dt, x0 + dx, v, 0.5 * dt * (v0 - v), dx, lead)
 
 
 @jax.jit  # traced once, though every step calls it four times and its derivative twice
