@@ -174,8 +174,7 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
         def stage(t: Array, dt: Array, known_dx: Array, known_v: Array, guess: Array) -> tuple:
             """Solve v = known_v + D h a(v), dx = known_dx + D h v; the path runs from the start of the step."""
             problem = (model, bank, y0, contact, t, dt, known_dx, known_v, model.lead(t), dh)
-            v, slope, converged = _root(problem, guess, exact, self.newton_steps)
-            _, state, forces, motion = _increment(v, *problem)
+            v, slope, converged, (state, forces, motion) = _root(problem, guess, exact, self.newton_steps)
             return v, (v - known_v) / dh, state, forces, motion, slope, converged
 
         tg = t0 + GAMMA * h
@@ -226,7 +225,7 @@ def _path(t: Array, dt: Array, x0: Array, v0: Array, v: Array, dx: Array, lead: 
     return Motion(t, dt, x0 + dx, v, 0.5 * dt * (v0 - v), dx, lead)
 
 
-@jax.jit  # traced once, though every step calls it four times and its derivative twice
+@jax.jit  # traced once, though every step calls it and its derivative twice
 def _increment(
     v: Array,
     model: Model,
@@ -239,38 +238,44 @@ def _increment(
     known_v: Array,
     lead: Array,
     dh: Array,
-) -> tuple[Array, State, Forces, Motion]:
+) -> tuple[Array, tuple[State, Forces, Motion]]:
     """Residual of a stage's equation for the end velocity ``v``, and what the increment then leads to."""
     motion = _path(t, dt, y0.x, y0.v, v, known_dx + dh * v, lead)
     state, forces = model.advance(y0, bank, contact, motion)
-    return v - known_v - dh * forces.net / model.mass(), state, forces, motion
+    return v - known_v - dh * forces.net / model.mass(), (state, forces, motion)
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
-def _root(problem: tuple, guess: Array, exact: Array, most: int) -> tuple[Array, Array, Array]:
-    """Root of the scalar, monotone, piecewise smooth residual; slope at the root; whether it was reached."""
+def _root(problem: tuple, guess: Array, exact: Array, most: int) -> tuple[Array, Array, Array, Any]:
+    """Root of the scalar, monotone, piecewise smooth residual; slope near it; whether it was reached; what follows.
+
+    Most residuals are all but straight, and one step is enough: what follows from its end tells.
+    """
 
     def cond(carry: tuple) -> Array:
-        _, _, step, n = carry
-        return (abs(step) > exact) & (n < most)
+        _, _, step, n, _ = carry
+        return (n == 0) | (abs(step) > exact) & (n < most)
 
     def body(carry: tuple) -> tuple:
-        v, _, _, n = carry
+        v, _, _, n, _ = carry
         value, slope = jax.jvp(lambda v: _increment(v, *problem)[0], (v,), (jnp.ones(()),))
-        step = value / slope
-        return v - step, slope, step, n + 1
+        v = v - value / slope
+        value, end = _increment(v, *problem)
+        return v, slope, value / slope, n + 1, end
 
-    v, slope, step, _ = jax.lax.while_loop(cond, body, (guess, jnp.ones(()), jnp.full((), jnp.inf), 0))
-    return v, slope, abs(step) <= exact
+    blank = jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), jax.eval_shape(_increment, guess, *problem)[1])
+    v, slope, step, _, end = jax.lax.while_loop(cond, body, (guess, jnp.ones(()), jnp.full((), jnp.inf), 0, blank))
+    return v, slope, abs(step) <= exact, end
 
 
 @_root.defjvp
 def _root_jvp(most: int, primals: tuple, tangents: tuple) -> tuple:
     """Implicit function theorem; the slope only serves the error estimate and carries no derivative."""
     problem, guess, exact = primals
-    v, slope, converged = _root(problem, guess, exact, most)
+    found = v, slope, _, _ = _root(problem, guess, exact, most)
     # Newton's own slope belongs to the point before its last step
     _, tangent = jax.jvp(lambda v: _increment(v, *problem)[0], (v,), (jnp.ones(()),))
     _, change = jax.jvp(lambda *p: _increment(v, *p)[0], problem, tangents[0])
-    zero = np.zeros((), jax.dtypes.float0)
-    return (v, slope, converged), (-change / tangent, jnp.zeros_like(slope), zero)
+    moved = -change / tangent
+    _, (_, end) = jax.jvp(_increment, (v, *problem), (moved, *tangents[0]))
+    return found, (moved, jnp.zeros_like(slope), np.zeros((), jax.dtypes.float0), end)
