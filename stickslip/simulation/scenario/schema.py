@@ -114,7 +114,7 @@ class SolverTable(Table):
     would miss 1e-3 and 1 nm).
     """
 
-    relative: Annotated[float, quantity("1", above=0, most=1)] = 1e-3
+    relative: Annotated[float, quantity("1", above=0, most=1)] = 3e-5
     displacement: Annotated[float, quantity("m", above=0, most=1e-6)] = 1e-12
     velocity: Annotated[float, quantity("m/s", above=0, most=1e-3)] = 1e-8
     largest_step: Annotated[float, quantity("s", above=0, most=100)] = 0.05

@@ -92,7 +92,7 @@ class Tolerance(eqx.Module):
         inaudible: amplitude of the ringing's velocity (m/s) that need not be resolved; slower creep is all the same.
     """
 
-    relative: Any = eqx.field(default=3e-3, converter=jnp.asarray)
+    relative: Any = eqx.field(default=1e-4, converter=jnp.asarray)
     displacement: Any = eqx.field(default=3e-12, converter=jnp.asarray)
     velocity: Any = eqx.field(default=3e-8, converter=jnp.asarray)
     ringing: Any = eqx.field(default=0.0, converter=jnp.asarray)
