@@ -110,7 +110,7 @@ def test_steps_of_the_default_tolerance_will_do_for_a_few_per_cent():
 
 def test_steps_that_miss_an_arrest_are_refused():
     with pytest.raises(SolveError, match="too coarse to meet an arrest"):
-        solved(1e-3, 1, GRIDS)
+        solved(1e-4, 1, GRIDS)
 
 
 def test_a_run_without_a_slip_is_refused():
