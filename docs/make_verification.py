@@ -340,7 +340,7 @@ def derivative() -> plt.Figure:
     fig, (left, right) = axes(2)
     size = len(derivatives.BASE)
     start, early, end = 5.13, 5.16, 5.23
-    _, state = integrate(derivatives.build(jnp.zeros(size)), start, tolerance=tighter(10.0))
+    _, state = integrate(derivatives.build(jnp.zeros(size)), start, tolerance=tighter(100.0))
     n = round((end - start) / 2e-5)
 
     def outcomes(theta: jax.Array) -> jax.Array:

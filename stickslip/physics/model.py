@@ -244,11 +244,9 @@ class Model(Parametrised):
                 body = body + e.force(m, motion, contact)
         slides = jnp.abs(state.force) >= (1.0 - 1e-9) * state.cap
         mean_cap = jnp.where(slides, 0.5 * (state.cap + cap), cap)
-        trial = state.force + stiffness * motion.turn
-        # without a turning point a cap that falls meets what the motion has unloaded, not what came before it
-        force = jnp.where(motion.turn == 0.0, trial, _held_back(trial, cap))
-        slid = jnp.abs(trial - force)
-        trial = force + stiffness * (motion.dx - motion.turn)
+        force = _stuck_within(state.force, stiffness, state.cap, cap, motion)
+        slid = jnp.abs(state.force - force)
+        trial = force + stiffness * motion.dx
         flow = jnp.zeros(())
         for e, m in zip(self.effects, memory, strict=True):
             if isinstance(e, Flow):
@@ -304,6 +302,22 @@ def _held_back(trial: Array, cap: Array) -> Array:
     # not jnp.clip, whose derivative weighs ties: a loop of derivatives takes a tenth longer with it;
     # asked so that a cap that is no number gives a force that is none
     return jnp.where(jnp.abs(trial) <= cap, trial, jnp.where(trial < 0.0, -cap, cap))
+
+
+def _stuck_within(force: Array, stiffness: Array, cap: Array, after: Array, motion: Motion) -> Array:
+    """Forces (N) from which elements go elastically to the end of the increment, its end apart.
+
+    A block that slows down lets go of what slides: an element sticks where its cap, on a line from ``cap`` to
+    ``after``, outgrows it.
+    """
+    if motion.bend is None:
+        return force
+    sign = jnp.where(motion.bend < 0.0, -1.0, 1.0)
+    whole = 2.0 * jnp.abs(motion.bend) * stiffness
+    outgrown = sign * (motion.dx + motion.bend) * stiffness - (after - cap)
+    sticks = (outgrown > 0.0) & (outgrown < whole)
+    least = cap - 0.5 * outgrown**2 / jnp.where(sticks, whole, 1.0)
+    return jnp.where(sticks & (sign * force > least), sign * least, force)
 
 
 def _compliance(stiffness: Array) -> Array:

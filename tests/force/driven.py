@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from stickslip.inference.force.along import Held, Way, along, turning
+from stickslip.inference.force.along import Held, Way, along
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Effect
 from stickslip.physics.model import Model
@@ -84,7 +84,7 @@ def with_effects(model: Model, effects: tuple[Effect, ...]) -> Model:
     return Model(model.block, model.bank, model.weakening, model.load_point, effects)
 
 
-def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE) -> Slips:
+def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE, knots: int = KNOTS) -> Slips:
     """The rig with effects, from rest to its third slip and on."""
     model = base_model(effects)
     model = eqx.tree_at(
@@ -95,27 +95,28 @@ def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE) -> Sli
     trajectory, _ = integrate(model, END, tolerance=tolerance, largest_step=4e-3)
     s = trajectory.steps
     i = np.flatnonzero(s.v[1:] * s.v[:-1] < 0.0)
-    return Slips(model, s, way_of(s.t, s.x, s.v), int(i[0]) + 1 if i.size else s.t.size)
+    return Slips(model, s, way_of(s.t, s.x, s.v, knots), int(i[0]) + 1 if i.size else s.t.size)
 
 
-def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> Way:
+def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray, knots: int = KNOTS) -> Way:
     """A motion under the rig's drive, drawn out at rest to the one size."""
-    more = KNOTS - t.size
+    more = knots - t.size
     assert more >= 0
     t = np.concatenate([t, t[-1] + 1e-3 * np.arange(1, more + 1)])
     x, v = np.concatenate([x, np.full(more, x[-1])]), np.concatenate([v, np.zeros(more)])
-    ones = np.ones(KNOTS)
+    ones = np.ones(knots)
     return Way(
-        *map(jnp.asarray, (t, x, v, np.interp(t, TIMES, POSITIONS), turning(t, v), ones, ones)),
+        *map(jnp.asarray, (t, x, v, np.interp(t, TIMES, POSITIONS), ones, ones)),
         shape=0.0 * ones,
         load=ones,
         force=0.0 * ones,
+        bend=jnp.concatenate([jnp.zeros(1), -0.5 * jnp.diff(t) * jnp.diff(v)]),
     )
 
 
-def held(slips: Slips, turns: bool = True) -> Held:
-    """What the model holds along it, at the solver's steps; ``turns`` lets it know where steps turn."""
-    way = slips.way if turns else slips.way._replace(turn=jnp.zeros(KNOTS))
+def held(slips: Slips, bends: bool = True) -> Held:
+    """What the model holds along it, at the solver's steps; ``bends`` lets it know how fast they slow down."""
+    way = slips.way if bends else slips.way._replace(bend=None)
     return at_steps(march(slips.model, way), slips)
 
 

@@ -9,11 +9,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from scipy.interpolate import CubicHermiteSpline
 
 from stickslip.physics.contact import Bank
 from stickslip.physics.model import Model, State
 from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
 
+from . import brute_force
 from .rig import FAR, MASS, bank, drive, rig, slips, tighter
 from .slip_events import run
 
@@ -30,6 +32,16 @@ def _fixed(model: Model, state: State, t0: Array, t1: Array, step: Array) -> tup
     )  # fmt: skip
     x, v = solution.ys
     return x[0], v[0]
+
+
+@functools.partial(jax.jit, static_argnums=2)
+def _every(model: Model, end: Array, most: int, step: Array) -> tuple[Array, Array, Array]:
+    """Time, displacement and velocity at the start and after each equal step, at most so many."""
+    return diffrax.diffeqsolve(
+        TERM, ContactStepper(Tolerance(1e-9, 1e-18, 1e-15)), 0.0, end, step, model.rest(),
+        args=(model, model.shaped()), saveat=diffrax.SaveAt(t0=True, steps=True, fn=lambda t, y, args: (t, y.x, y.v)),
+        adjoint=diffrax.ForwardMode(), stepsize_controller=diffrax.ConstantStepSize(), max_steps=most,
+    ).ys  # fmt: skip
 
 
 def fixed_steps(model: Model, state: State, t0: float, t1: float, steps: int) -> tuple[float, float]:
@@ -71,6 +83,36 @@ def second_event(springs: int = 128, factor: float = 1.0, **options: float) -> n
     """Onset of the first event; slip, peak velocity and recurrence of the second (QUANTITIES; s, m, m/s, s)."""
     e = run(rig(springs=bank(springs), **options), 6.3, tighter(factor)).events
     return np.array([e.onset[0], e.size[1], e.peak[1], e.recurrence[0]])
+
+
+QUICK = {"spring_stiffness": 3000.0, "ratio": 0.7}  # of a rig that slips four times within a second
+
+
+@functools.cache
+def _quick_reference(end: float) -> brute_force.Path:
+    load_point = drive((FAR, 2e-4))
+    b = bank()
+    return brute_force.simulate(
+        b.stiffness, b.strength, duration=end, mass=MASS, damping=10.0, slip_distance=1e-6, healing_time=0.02,
+        times=load_point.times, positions=load_point.positions, dt=2e-7, every=100, **QUICK,
+    )  # fmt: skip
+
+
+@functools.cache
+def later_onsets(step: float, grids: int = 8, end: float = 1.1) -> np.ndarray:
+    """Errors of the onsets of four slips by steps of about so many seconds, over the period, shape (grids, 4).
+
+    Each of the grids has steps longer by 0.2 % than those before, and meets the slips elsewhere in a step.
+    """
+    model, path = rig(2e-4, **QUICK), _quick_reference(end)
+    exact = slips(*path).onset
+    found = []
+    for longer in 1.0 + 0.002 * np.arange(grids):
+        made = np.array(_every(model, jnp.asarray(end), round(end / step) + 2, jnp.asarray(longer * step)))
+        t, x, v = made[:, np.isfinite(made[0])]
+        curve, at = CubicHermiteSpline(t, x, v), path.t[path.t < t[-1]]
+        found.append(slips(at, curve(at), curve(at, 1)).onset)
+    return (np.array(found) - exact) / np.median(np.diff(exact))
 
 
 def onset_scatter(damping: float, kicks: np.ndarray, duration: float = 9.0) -> np.ndarray:

@@ -24,7 +24,7 @@ DEFAULT = Tolerance()
 
 def tighter(factor: float) -> Tolerance:
     """The default tolerance, divided."""
-    return Tolerance(3e-3 / factor, 3e-12 / factor, 3e-8 / factor)
+    return Tolerance(1e-4 / factor, 3e-12 / factor, 3e-8 / factor)
 
 
 def drive(*pieces: tuple[float, float]) -> LoadPoint:

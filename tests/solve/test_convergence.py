@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from .convergence import onset_scatter, oscillator_errors, second_event, slip_errors
+from .convergence import later_onsets, onset_scatter, oscillator_errors, second_event, slip_errors
 from .rig import order
 
 
@@ -21,6 +21,14 @@ def test_second_order_within_a_slip():
     errors = slip_errors(steps)
     assert order(1.0 / steps, errors) == pytest.approx(2.0, abs=0.15)
     assert errors[0] < 2e-8
+
+
+def test_second_order_from_slip_to_slip_wherever_in_a_step_elements_stick():
+    steps = (5e-5, 2.5e-5, 1.25e-5)
+    errors = np.array([later_onsets(step) for step in steps])
+    for onset in np.abs(errors.mean(axis=1)).T:
+        assert order(np.array(steps), onset) == pytest.approx(2.0, abs=0.15)
+    assert np.all(errors.std(axis=1)[0] < 1e-6)
 
 
 @pytest.mark.slow

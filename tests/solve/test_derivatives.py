@@ -24,7 +24,7 @@ START, EARLY, END = 5.13, 5.16, 5.23  # s; the slip begins at 5.18 s
 @functools.cache
 def _slip():
     """Outcomes of one slip by steps of 2e-5 s as a function of theta, and their derivatives (parameter, outcome)."""
-    _, state = integrate(build(jnp.zeros(len(BASE))), START, tolerance=tighter(10.0))
+    _, state = integrate(build(jnp.zeros(len(BASE))), START, tolerance=tighter(100.0))
     n = round((END - START) / 2e-5)
 
     def outcomes(theta):

@@ -64,8 +64,8 @@ def test_times_and_peaks_lie_between_the_steps():
 
 
 def test_durations_and_sizes_are_known_far_below_a_step():
-    """Duration and slip against brute force with 2 us: a fiftieth of a step, and better with the tolerance."""
-    expected = brute_slips(np.zeros(10), 2e-6)
+    """Duration and slip against brute force with 0.25 us: a fiftieth of a step, and better with the tolerance."""
+    expected = brute_slips(np.zeros(10), 2.5e-7)
     wrong = []
     for factor in (1.0, 10.0, 100.0):
         trajectory, _ = integrate(rig(), 7.1, tolerance=tighter(factor))

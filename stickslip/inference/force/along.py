@@ -12,9 +12,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from ...physics.contact import Bank
 from ...physics.effects.base import Contact, Drive, Memory, Motion, Sensor
@@ -30,23 +28,24 @@ class Way(NamedTuple):
     Attributes:
         t, x, v: time (s), displacement (m) and velocity (m/s) of the block.
         drive: the load point as the drive was told (m).
-        turn: from the knot before to the turning point within the increment (m); zero where there is none.
         strength, stretch: factors on caps and on yield displacements of all elements, which vary from event to event.
         shape: power of an element's yield displacement, over the mean of all, by which it is stretched besides.
         load: normal load over its median, 1 where it was not measured.
         force: that was measured to pull the block where no spring does (N).
+        bend: of the path from the knot before (m), see :class:`~stickslip.physics.effects.base.Motion`; None where
+            knots lie so close to each arrest that straight paths do.
     """
 
     t: Any
     x: Any
     v: Any
     drive: Any
-    turn: Any
     strength: Any
     stretch: Any
     shape: Any
     load: Any
     force: Any
+    bend: Any = None
 
 
 class Held(NamedTuple):
@@ -91,16 +90,16 @@ def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
     mass = model.mass()
     start = model.rest(way.t[0], way.x[0], way.v[0])
     dt, dx = jnp.diff(way.t, prepend=way.t[:1]), jnp.diff(way.x, prepend=way.x[:1])
-    items = (way.t, dt, way.x, dx, way.v, led, way.turn, way.strength, way.stretch, way.shape, way.load)
+    items = (way.t, dt, way.x, dx, way.v, led, way.strength, way.stretch, way.shape, way.load)
     apart = departures(bank)
     share = 1.0 / jnp.where(bank.strength > 0.0, bank.strength, 1.0)
 
     def step(i: Array, carry: tuple[State, Array, Held]) -> tuple[State, Array, Held]:
         state, pull, held = carry
-        t, dt, x, dx, v, at, turn, strength, stretch, shape, load = (a[i] for a in items)
+        t, dt, x, dx, v, at, strength, stretch, shape, load = (a[i] for a in items)
         own = Bank(bank.stiffness * jnp.exp(jnp.log(strength / stretch) - shape * apart), bank.strength * strength)
         contact = Contact(state.force, own.stiffness, own.strength, pull, state.cap, mass)
-        motion = Motion(t, dt, x, v, turn, dx, at, load=load)
+        motion = Motion(t, dt, x, v, None if way.bend is None else way.bend[i], dx, at, load=load)
         state, forces = model.advance(state, own, contact, motion)
         sticks = jnp.abs(state.force) < state.cap * (1.0 - 1e-6)
         tangent = jnp.sum(jnp.where(sticks, state.stiffness, 0.0))
@@ -123,14 +122,6 @@ def departures(bank: Bank) -> Array:
     """Logarithm of every element's yield displacement over the geometric mean of all, shape (k,)."""
     reach = jnp.log(bank.strength / bank.stiffness)
     return reach - jnp.mean(reach)
-
-
-def turning(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Way from the knot before to the turning point of each increment (m), by a constant deceleration; else zero."""
-    before, after = v[:-1], v[1:]
-    reverses = before * after < 0.0
-    apart = np.where(reverses, before - after, 1.0)
-    return np.concatenate([[0.0], np.where(reverses, 0.5 * np.diff(t) * before**2 / apart, 0.0)])
 
 
 def undone(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Way:
@@ -184,7 +175,7 @@ def read(
         states, readings = carry
         t, dt, x, dx, v, at, f = (a[i] for a in items)
         contact = Contact(zero, bank.stiffness, bank.strength, f, zero, mass)
-        motion = Motion(t, dt, x, v, jnp.zeros(()), dx, at)
+        motion = Motion(t, dt, x, v, None, dx, at)
         states = tuple(
             e.advance(m, motion, contact) if isinstance(e, Memory) else m for e, m in zip(sensors, states, strict=True)
         )

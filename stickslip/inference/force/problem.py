@@ -235,9 +235,8 @@ def _padded(k: Knots, n: int, load: float | None) -> Way:
     def grown(a: Array, step: float = 0.0) -> Array:
         return np.concatenate([a, a[-1] + step * np.arange(1, n - a.size + 1)])
 
-    # turning points are knots
     return Way(
-        grown(k.t, 1e-3), grown(k.x), np.concatenate([k.v, np.zeros(n - k.v.size)]), grown(k.drive), np.zeros(n),
+        grown(k.t, 1e-3), grown(k.x), np.concatenate([k.v, np.zeros(n - k.v.size)]), grown(k.drive),
         np.ones(n), np.ones(n), np.zeros(n), np.ones(n) if load is None else grown(k.load / load),
         grown(k.force),
     )  # fmt: skip

@@ -25,7 +25,8 @@ class Motion(NamedTuple):
     Attributes:
         t, dt: time at the end (s) and duration (s).
         x, v: displacement (m) and velocity (m/s) of the block at the end.
-        turn: displacement from the start to the turning point (m); zero where there is none.
+        bend: at the share s of the duration the displacement is ``s dx + s (1 - s) bend`` (m): half the duration times
+            what the velocity loses; None of a straight path.
         dx: displacement from the start to the end (m).
         load_point: displacement of the load point at the end (m).
         pull: force of the driving spring at the end (N); filled in by the model.
@@ -36,11 +37,19 @@ class Motion(NamedTuple):
     dt: Array
     x: Array
     v: Array
-    turn: Array
+    bend: Array | None
     dx: Array
     load_point: Array
     pull: Array | float = 0.0
     load: Array | float = 1.0
+
+    @property
+    def turn(self) -> Array:
+        """Displacement from the start to the turning point (m); zero where there is none."""
+        if self.bend is None:
+            return jnp.zeros(())
+        turns = abs(self.dx) < abs(self.bend)
+        return jnp.where(turns, 0.25 * (self.dx + self.bend) ** 2 / jnp.where(turns, self.bend, 1.0), 0.0)
 
     @property
     def path(self) -> Array:

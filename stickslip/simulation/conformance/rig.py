@@ -174,14 +174,12 @@ def prescribed() -> Motion:
     dt, v = np.array(parts).T
     before = np.append(0.0, v[:-1])
     dx = 0.5 * dt * (before + v)
-    reverses = before * v < 0
-    turn = np.where(reverses, 0.5 * dt * before**2 / np.where(reverses, before - v, 1.0), 0.0)
     fields = (
         np.cumsum(dt),
         dt,
         np.cumsum(dx),
         v,
-        turn,
+        0.5 * dt * (before - v),
         dx,
         0.0 * dt,
         0.0 * dt,

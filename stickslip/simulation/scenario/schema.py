@@ -110,11 +110,10 @@ class SensorTable(Table):
 class SolverTable(Table):
     """Error allowed in a step (see `stickslip.simulation.solve.Tolerance`) and the longest step.
 
-    The defaults keep the recurrence to 3e-4 of itself and creep to 0.3 nm on the paper's rig (ten times looser ones
-    would miss 1e-3 and 1 nm).
+    The defaults keep the recurrence to 2e-5 of itself and creep to 0.3 nm on the paper's rig.
     """
 
-    relative: Annotated[float, quantity("1", above=0, most=1)] = 1e-3
+    relative: Annotated[float, quantity("1", above=0, most=1)] = 3e-5
     displacement: Annotated[float, quantity("m", above=0, most=1e-6)] = 1e-12
     velocity: Annotated[float, quantity("m/s", above=0, most=1e-3)] = 1e-8
     largest_step: Annotated[float, quantity("s", above=0, most=100)] = 0.05

@@ -86,7 +86,7 @@ sampling_rate = "10 kHz"
 
 # Error allowed in a step; tighten all three by ten to see what it changes
 # [solver]
-# relative = 1e-3                  # of the step's own increment and of its velocity
+# relative = 3e-5                  # of the step's own increment and of its velocity
 # displacement = "1 pm"
 # velocity = "10 nm/s"
 

@@ -106,7 +106,7 @@ def slip_derivatives(
         SolveError: no slip is complete within the run, the block does not come to rest after one, or the steps are too
             coarse to meet where it does.
     """
-    tolerance = Tolerance(3e-4, 3e-13, 3e-9) if tolerance is None else tolerance
+    tolerance = Tolerance(1e-5, 3e-13, 3e-9) if tolerance is None else tolerance
     theta = jnp.asarray(theta, float)
     model = build(theta)
     trajectory, _ = integrate(model, end, state=start(model), tolerance=tolerance)

@@ -22,9 +22,9 @@ from ...system.traced import Program, of_this_package
 from .stepper import ContactStepper, Increments, Step, Tolerance
 from .trajectory import Stats, Steps, Trajectory, energy_error
 
-PIECE = 4096  # steps between two looks at the clock; bounds the memory of one compiled call
+PIECE = 16384  # steps between two looks at the clock; bounds the memory of one compiled call
 SMALLEST_STEP = 1e-10  # s; four orders below the period of any contact resonance a vibrometer could see
-LEAST_ADVANCE = 1e-2  # of the contact's period in PIECE steps; the tightest tolerance takes a hundred times as much
+LEAST_ADVANCE = 4e-2  # of the contact's period in PIECE steps; the tightest tolerance takes a hundred times as much
 
 _TERM = Increments()
 _BLANK: Any = 0
