@@ -58,17 +58,19 @@ def test_workers_of_a_killed_sweep_end(tmp_path):
                 os.kill(int(path.name), signal.SIGKILL)
 
 
-def test_a_trial_in_a_worker_ends_with_the_diagnosis(monkeypatch):
+def test_a_trial_in_a_worker_ends_with_the_diagnosis(monkeypatch, tmp_path):
+
     from cloudpickle import dumps, loads
 
     from stickslip.inference.diagnose import trials
-    from stickslip.system import cache, lifeline
+    from stickslip.system import cache
 
     ends = []
-    monkeypatch.setattr(lifeline, "end_with", ends.append)
+    monkeypatch.setattr(trials, "end_with", ends.append)
     monkeypatch.setattr(cache, "keep_compiled", lambda: None)
     monkeypatch.setattr(trials, "Explained", lambda base: f"explained {base}")
     monkeypatch.setattr(trials, "try_effect", lambda *arguments: arguments)
-    made = loads(trials._in_worker(dumps("base"), "wear", [{"course": "linear"}], (), 4321))
-    assert made == ("base", "explained base", "wear", [{"course": "linear"}])
+    (tmp_path / "base").write_bytes(dumps("base"))
+    made = loads(trials._in_worker(tmp_path / "base", "wear", [{"course": "linear"}], (), 4321))
+    assert made == ["base", "explained base", "wear", [{"course": "linear"}]]
     assert ends == [4321]
