@@ -62,7 +62,8 @@ def main() -> None:
             values = np.array([f[tag][0] for f in found])
             row[name], row[f"{name}, most"] = float(values.mean()), float(values.max())
         print(name, {tag: round(row[name], 1) for tag, row in rows.items()}, flush=True)
-    head = {"version": ss.__version__, "date": date.today().isoformat(), "command": "python -m tests.force.absent"}
+    command = f"python -m tests.force.absent --number {options.number}"
+    head = {"version": ss.__version__, "date": date.today().isoformat(), "command": command}
     sensors = {name: {"noise": noise, "count": count} for name, (noise, count) in SENSORS.items()}
     result = {**head, "readings": options.number, "sensors": sensors, "effects": rows}
     RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
