@@ -59,7 +59,6 @@ def test_workers_of_a_killed_sweep_end(tmp_path):
 
 
 def test_a_trial_in_a_worker_ends_with_the_diagnosis(monkeypatch, tmp_path):
-
     from cloudpickle import dumps, loads
 
     from stickslip.inference.diagnose import trials

@@ -1,0 +1,30 @@
+"""What a process of the program's own sets for itself."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+FAULTS = """
+import resource, sys
+import numpy as np
+from stickslip.system import process
+if sys.argv[1] == "begun":
+    process.begin()
+np.ones(10**6)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(50):
+    np.ones(10**6)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts page faults, and sets the GNU library")
+def test_freed_memory_is_kept_and_not_cleared_anew():
+    def faults(how: str) -> int:
+        made = subprocess.run([sys.executable, "-c", FAULTS, how], capture_output=True, text=True, check=True)
+        return int(made.stdout)
+
+    assert faults("begun") < 0.1 * faults("plain")
