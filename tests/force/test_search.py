@@ -115,8 +115,8 @@ def test_derivatives_that_no_covariance_holds_end_a_search_in_words(base):
 
 
 def test_what_gains_nothing_small_is_found_from_a_large_amplitude(tmp_path, monkeypatch):
-    """The base has taken its part of a sensor that is a third of a millisecond late; a small one makes it worse."""
-    case = made(tmp_path / "case", 11, [seen("sensor-low-pass", "first order", 6.0)], spring_known=True)
+    """The base has taken its part of a sensor that is two thirds of a millisecond late; a small one makes it worse."""
+    case = made(tmp_path / "case", 11, [seen("sensor-low-pass", "first order", 10.0)], spring_known=True)
     base = fit(case.problem, case.point)
     explained = Explained(base)
 

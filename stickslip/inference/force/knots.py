@@ -17,6 +17,7 @@ from scipy.sparse import coo_array, csr_array
 
 from ...data.segment import Event, Segmentation
 from ...data.trace import Trace
+from .counts import counted, rounding
 from .inserted_knots import Inserted
 from .kernels import band, kernels
 from .mains import hum
@@ -32,6 +33,7 @@ Index = NDArray[np.intp]
 CREEP, NUCLEATION, SLIP, RING = range(4)
 PHASES = ("creep", "nucleation", "slip", "ring-down")
 POINTS = ("at", "phase", "of", "rate", "acceleration", "place", "elapsed", "force_noise")
+PASSES = 2  # of what rounding adds, each from where the last one leads
 UNSTEADY = 4.0  # levels of slow noise by which two windows must differ
 
 
@@ -122,13 +124,15 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     noise = max(float(trace.noise or 0.0), 1e-13)
     d = np.asarray(trace.drive.position(t))
     breaks = np.searchsorted(t, trace.drive.breakpoints)
-    x = x - hum(t, x, trace, found, times.slip, times.hum)
-    followed, speed, smoother = smoothed(x, noise, rate, times)
+    arrests = (np.array([e.t_arrest for e in found.events]) - t[0]) * rate
+    hums = hum(t, x, trace, found, times.slip, times.hum)
+    x = unrounded(x, hums, trace.resolution or 0.0, noise, rate, times, arrests)
+    followed, speed, smoother = smoothed(x, noise, rate, times, arrests)
     steady, raw = speed, x
     step = max(trace.resolution or 0.0, 2.0 * noise, UNSTEADY * unsteady(x, t, found.events, rate))
     if extra is not None:
         x = x + extra[: x.size]
-        followed, speed, smoother = smoothed(x, noise, rate, times)
+        followed, speed, smoother = smoothed(x, noise, rate, times, arrests)
     phi, first, second = kernels(times.half, rate)
     h = phi.size // 2
     pieces = _Pieces(step)
@@ -151,6 +155,22 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
         last = len(events)
         pieces.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, speed)
     return pieces.made(trace, t, x, (phi, first, second), events, noise, times, smoother)
+
+
+def unrounded(
+    readings: Array, hums: Array, count: float, noise: float, rate: float, times: Scales, arrests: Array
+) -> Array:
+    """Readings (m) without the hum and, if they are counts, what rounding adds in the mean where the motion is."""
+    x = readings - hums
+    if not counted(readings, count):
+        return x
+    before = noise**2 - count**2 / 12.0
+    out = x
+    for _ in range(PASSES):
+        followed, _, smoother = smoothed(out, noise, rate, times, arrests)
+        spread = np.sqrt(max(before, 0.0) + noise**2 * smoother.squares)
+        out = x - rounding(followed + hums - readings[0], count, spread)
+    return out
 
 
 class _Pieces:

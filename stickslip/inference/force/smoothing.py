@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +37,21 @@ def unsteady(x: Array, t: Array, events: tuple[Event, ...], rate: float) -> floa
     return float(np.median(found)) if found else 0.0
 
 
+class Bend(NamedTuple):
+    """Weights for the samples around an arrest.
+
+    Attributes:
+        low: the first of these m samples.
+        first: the first of the M samples that they are made of.
+        slow, fast: see :class:`Smoother`, shape (m, M) both.
+    """
+
+    low: int
+    first: int
+    slow: Array
+    fast: Array
+
+
 @dataclass(frozen=True)
 class Smoother:
     """Weights of the samples around one in its smoothed displacement.
@@ -42,22 +59,47 @@ class Smoother:
     Attributes:
         slow, fast: of slow motion and of what is added to it, shape (2 h + 1,) both.
         gain: how much of that is added at every sample, shape (N,).
+        bends: other weights where the block comes to rest.
     """
 
     slow: Array
     fast: Array
     gain: Array
+    bends: tuple[Bend, ...] = ()
+
+    @property
+    def squares(self) -> Array:
+        """Variance of the smoothed displacement over that of a sample, shape (N,)."""
+        out = _squares(self.slow, self.fast, self.gain)
+        for bend in self.bends:
+            own = slice(bend.low, bend.low + len(bend.slow))
+            out[own] = _squares(bend.slow, bend.fast, self.gain[own])
+        return out
 
     def matrix(self, index: Index) -> csr_array:
         """From all samples to the smoothed displacement at some of them."""
         h, n = self.slow.size // 2, self.gain.size
-        around = np.clip(index[:, None] + np.arange(-h, h + 1), 0, n - 1)
-        weights = self.slow + self.gain[index][:, None] * self.fast
-        rows = np.repeat(np.arange(index.size), 2 * h + 1)
-        return coo_array((weights.ravel(), (rows, around.ravel())), shape=(index.size, n)).tocsr()
+        place = np.arange(index.size)
+        parts = []
+        for bend in self.bends:
+            own = np.flatnonzero((index >= bend.low) & (index < bend.low + len(bend.slow)))
+            at = index[own] - bend.low
+            weights = bend.slow[at] + self.gain[index[own]][:, None] * bend.fast[at]
+            parts.append((own, np.broadcast_to(bend.first + np.arange(weights.shape[1]), weights.shape), weights))
+            place = place[~np.isin(place, own)]
+        around = np.clip(index[place][:, None] + np.arange(-h, h + 1), 0, n - 1)
+        parts.append((place, around, self.slow + self.gain[index[place]][:, None] * self.fast))
+        rows = np.concatenate([np.repeat(own, weights.shape[1]) for own, _, weights in parts])
+        columns, values = (np.concatenate([part[i].ravel() for part in parts]) for i in (1, 2))
+        return coo_array((values, (rows, columns)), shape=(index.size, n)).tocsr()
 
 
-def smoothed(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array, Array, Smoother]:
+def _squares(slow: Array, fast: Array, gain: Array) -> Array:
+    one, both, two = ((a * b).sum(axis=-1) for a, b in ((slow, slow), (slow, fast), (fast, fast)))
+    return np.asarray(one + gain * (2.0 * both + gain * two))
+
+
+def smoothed(x: Array, noise: float, rate: float, times: Scales, arrests: Array) -> tuple[Array, Array, Smoother]:
     """Displacement and velocity where every sample counts, and how the former is made of the samples.
 
     At every sample a cubic and a ringing that grows or decays, over two of its periods (where none is heard, a cubic
@@ -65,41 +107,122 @@ def smoothed(x: Array, noise: float, rate: float, times: Scales) -> tuple[Array,
     top of them what a polynomial of the fourth degree over half a period adds, shrunk by as much as noise adds to it in
     squares. The noise of one sample, taken for motion, would be a path that weakens the contact and makes it young; a
     ringing that is smoothed away would be a force of the contact, which is stiff.
+
+    Around an arrest there are two such functions, one before and one after it, with the same displacement, velocity and
+    acceleration at the arrest: there a contact that slid begins to hold, and the force on the block has a kink. One
+    function over it would be off alike at every arrest, by a third of the noise of a sample.
+
+    Args:
+        x: samples (m), shape (N,).
+        noise: of one (m).
+        rate: of the samples (1/s).
+        times: of the campaign.
+        arrests: where the block comes to rest, in samples from the first, in order.
     """
     period = (times.ring or times.half) * rate
     long = round(2.0 * period if times.ring else period) // 2 * 2 + 1
     short = round(0.5 * period) // 2 * 2 + 1
     if long < (9 if times.ring else 5):  # too few samples for what would be fitted to them
         return x, np.gradient(x) * rate, Smoother(np.ones(1), np.zeros(1), np.zeros(x.size))
-    slow, drift = _local(long, 3, period if times.ring else None)
-    close, run = _local(short, 4) if short >= 7 else _local(3, 2)
-    pad = (long - close.size) // 2
-    fast, rush = np.pad(close, pad) - slow, np.pad(run, pad) - drift
-    added = correlate1d(x, fast, mode="nearest")
-    level = noise**2 * float((fast**2).sum())
-    seen = np.maximum(uniform_filter1d(added**2, round(period) // 2 * 2 + 1), 1e-300)
-    gain = np.sqrt(np.maximum(1.0 - level / seen, 0.0))
-    followed = correlate1d(x, slow, mode="nearest") + gain * added
-    speed = correlate1d(x, drift, mode="nearest") + gain * correlate1d(x, rush, mode="nearest")
-    return followed, speed * rate, Smoother(slow, fast, gain)
+    wave = period if times.ring else None
+    slow, drift = _local(np.arange(long) - long // 2, np.zeros(1), 3, wave)
+    short, degree = (short, 4) if short >= 7 else (3, 2)
+    close, run = _local(np.arange(short) - short // 2, np.zeros(1), degree)
+    fast, rush = _beside(close, slow), _beside(run, drift)
+    level = np.full(x.size, noise**2 * float((fast**2).sum()))
+    added = correlate1d(x, fast[0], mode="nearest")
+    followed, speed = correlate1d(x, slow[0], mode="nearest"), correlate1d(x, drift[0], mode="nearest")
+    hurried = correlate1d(x, rush[0], mode="nearest")
+    bends = []
+    for at in _with_room(arrests, 2 * long, x.size):
+        first = int(at) + 1 - long
+        own, all_of_it = slice(int(at) + 1 - long // 2, int(at) + 1 + long // 2), x[first : first + 2 * long]
+        values, slopes = _bent(long, long // 2, wave, round(8.0 * (at % 1.0)) / 8.0)
+        centres = np.arange(own.start, own.stop) - first
+        near, hasty = _centred(close[0], centres, 2 * long), _centred(run[0], centres, 2 * long)
+        bends.append(Bend(own.start, first, values, near - values))
+        level[own] = noise**2 * ((near - values) ** 2).sum(axis=1)
+        added[own], followed[own] = (near - values) @ all_of_it, values @ all_of_it
+        speed[own], hurried[own] = slopes @ all_of_it, (hasty - slopes) @ all_of_it
+    over = round(period) // 2 * 2 + 1
+    seen = np.maximum(uniform_filter1d(added**2, over), 1e-300)
+    gain = np.sqrt(np.maximum(1.0 - uniform_filter1d(level, over) / seen, 0.0))
+    smoother = Smoother(slow[0], fast[0], gain, tuple(bends))
+    return followed + gain * added, (speed + gain * hurried) * rate, smoother
 
 
-def _local(length: int, degree: int, period: float | None = None) -> tuple[Array, Array]:
-    """Weights of the samples around one in the value and the slope (1/sample) there of a function fitted to them.
+def _with_room(arrests: Array, room: int, n: int) -> list[float]:
+    """Arrests with so many samples around them, half of them at either side, that hold no other arrest."""
+    apart = np.diff(np.concatenate([[-np.inf], arrests, [np.inf]]))
+    inside = (arrests >= 0.5 * room) & (arrests < n - 0.5 * room - 1)
+    return [float(a) for a in arrests[inside & (apart[:-1] > 0.5 * room) & (apart[1:] > 0.5 * room)]]
 
-    A polynomial, and with a period (in samples) a wave whose amplitude changes linearly besides.
+
+@lru_cache(maxsize=64)
+def _bent(side: int, near: int, period: float | None, after: float) -> tuple[Array, Array]:
+    """Weights of the samples around an arrest in displacement and velocity near it, shape (2 near, 2 side) both.
+
+    Args:
+        side, near: samples at either side that count, and of which displacement and velocity are wanted.
+        period: of the ringing (samples).
+        after: by how much the arrest comes after the last sample before it (samples).
     """
-    i = np.arange(length) - length // 2
-    columns = [i.astype(float) ** k for k in range(degree + 1)]
-    value, slope = np.eye(degree + 1)[:2]
-    if period is not None:
-        turn = 2.0 * np.pi / period
-        columns += [np.cos(turn * i), np.sin(turn * i), i * np.cos(turn * i), i * np.sin(turn * i)]
-        value, slope = np.append(value, [1.0, 0.0, 0.0, 0.0]), np.append(slope, [0.0, turn, 1.0, 0.0])
-    matrix = np.stack(columns, axis=1)
+    i = np.arange(2 * side) - (side - 1) - after
+    return _local(i, i[side - near : side + near], 3, period, bent=True)
+
+
+def _centred(weights: Array, centres: Index, length: int) -> Array:
+    """The same weights around several samples of a window, shape (m, L)."""
+    out = np.zeros((centres.size, length))
+    first = centres - weights.size // 2
+    out[np.arange(centres.size)[:, None], first[:, None] + np.arange(weights.size)] = weights
+    return out
+
+
+def _beside(short: Array, long: Array) -> Array:
+    """Weights of a window less those of a longer one with the same middle, shape (1, L)."""
+    return np.asarray(np.pad(short, ((0, 0), ((long.shape[1] - short.shape[1]) // 2,) * 2)) - long)
+
+
+def _local(i: Any, at: Any, degree: int, period: float | None = None, bent: bool = False) -> tuple[Array, Array]:
+    """Weights of samples in the values and the slopes (1/sample) of a function fitted to them, shape (m, L) both.
+
+    A polynomial, and with a period (in samples) a wave whose amplitude changes linearly besides. A ``bent`` one is
+    another after zero than before, with two derivatives in common there.
+
+    Args:
+        i: the samples, shape (L,).
+        at: where values and slopes are wanted (samples), shape (m,).
+        degree: of the polynomial.
+        period: of the wave (samples).
+        bent: whether it is bent at zero.
+    """
+    matrix, (values, slopes) = _functions(i, degree, period, bent)[0], _functions(at, degree, period, bent)
     scale = np.abs(matrix).max(axis=0)
     solved = np.linalg.pinv(matrix / scale)
-    return np.asarray((value / scale) @ solved), np.asarray((slope / scale) @ solved)
+    return np.asarray((values / scale) @ solved), np.asarray((slopes / scale) @ solved)
+
+
+def _functions(i: Any, degree: int, period: float | None, bent: bool) -> tuple[Array, Array]:
+    """Values of the functions of :func:`_local` and their slopes, shape (m, f) both."""
+    i = np.asarray(i, float)[:, None]
+    powers = np.arange(degree + 1)
+    values: list[Array] = [i**powers]
+    slopes: list[Array] = [powers * i ** np.maximum(powers - 1, 0)]
+    if period is not None:
+        turn = 2.0 * np.pi / period
+        c, s = np.cos(turn * i), np.sin(turn * i)
+        values.append(np.hstack([c, s, i * c, i * s]))
+        slopes.append(np.hstack([-turn * s, turn * c, c - turn * i * s, s + turn * i * c]))
+    if bent:
+        after = np.where(i > 0.0, 1.0, 0.0)
+        values.append(after * i**3)
+        slopes.append(after * 3.0 * i**2)
+    if bent and period is not None:  # each less its first powers up to the square
+        t = turn * i
+        values.append(after * np.hstack([c - 1.0 + 0.5 * t**2, s - t, i * (c - 1.0), i * (s - t)]))
+        slopes.append(after * np.hstack([turn * (t - s), turn * (c - 1.0), c - 1.0 - t * s, s - t + t * (c - 1.0)]))
+    return np.hstack(values), np.hstack(slopes)
 
 
 def crept(

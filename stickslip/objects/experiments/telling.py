@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.signal import detrend
 
 from ...data.segment import segment
 from ...data.trace import Drive, Trace
@@ -24,6 +25,7 @@ from .events import MEASURES, Tell, run
 from .setting import Setting, changed, scenario, settled
 
 READ, CREEP, SWING = "slip as read", "creep in the hold", "swing in the hold"
+SEEN = 1e-9  # m, swing that a sensor may show
 
 
 @dataclass(frozen=True)
@@ -189,7 +191,8 @@ def signs(recording: Recording) -> dict[str, np.ndarray]:
     if still.size > 2:
         first, last = int(still[0]), int(still[-1]) + 1
         out[CREEP] = np.array([read[last] - read[first]])
-        out[SWING] = np.array([np.ptp(read[(first + last) // 2 : last])])
+        swing = np.ptp(detrend(read[(first + last) // 2 : last]))
+        out[SWING] = np.array([swing if swing > SEEN else 0.0])
     return out
 
 
