@@ -15,7 +15,7 @@ from ...physics.effects.base import Effect
 from ...physics.params import specs, variants
 from ...system.progress import portion
 from ..force.candidates import shapes_backbone, try_effect
-from ..force.fit import Fit, deviations, fit
+from ..force.fit import Fit, deviations, fit_base
 from ..force.signatures import Explained
 from ..force.valleys import LEVEL, held, widened
 from ..uncertainty import Profile, profile
@@ -122,7 +122,7 @@ def climb(prepared: Prepared, effects: Sequence[Form], tell: Tell) -> Climbed:
     tell("the base model", 0.0)
     each = 1.0 / (len(effects) + 1)
     with portion(0.0, each, partial(tell, "the base model")):
-        base = widened(fit(prepared.problem, prepared.start), [LEVEL], DISPERSION)
+        base = widened(fit_base(prepared.problem, prepared.start), [LEVEL], DISPERSION)
     first = Rung(("static",), None, static_residual(base), None, None)
     done = Climbed(prepared, (first, Rung.of(("static", "inertia"), "inertia", base)), {})
     for i, (tag, form) in enumerate(effects):

@@ -17,7 +17,7 @@ from ...data.trace import Trace
 from ...errors import InputError
 from ...physics.effects import catalogue
 from ..force.candidates import Candidate, every_form, from_end
-from ..force.fit import Fit, deviations, fit
+from ..force.fit import Fit, deviations, fit, fit_base
 from ..force.heldout import apart
 from ..force.linearised import Array
 from ..force.point import Point
@@ -211,7 +211,7 @@ def diagnose(
     tags = [t for t in tags if prepared.shows(catalogue.get(t))]
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
     tell("fitting the base model", 0.5)
-    base = kept(store, "base", prepared.problem, lambda: fit(prepared.problem, prepared.start))
+    base = kept(store, "base", prepared.problem, lambda: fit_base(prepared.problem, prepared.start))
     ladder = [
         Rung(("static",), None, static_residual(base), None, None),
         Rung.of(("static", "inertia"), "inertia", base),

@@ -10,7 +10,7 @@ from ...data.checks import Finding
 from ...data.segment import Segmentation
 from ...data.trace import Trace
 from ...errors import StickslipError
-from ..force.fit import fit
+from ..force.fit import fit_base
 from ..force.rig import slips_finding, spring_freed
 from .decide import Judge
 from .prepare import prepare
@@ -32,7 +32,7 @@ def spring_finding(campaign: Campaign, traces: Sequence[Trace], found: Sequence[
         return None
     try:
         prepared = prepare(campaign, traces, found)
-        base = fit(prepared.problem, prepared.start)
+        base = fit_base(prepared.problem, prepared.start)
         freed = spring_freed(base)
         if freed is None or not Judge(base, 1).beside(freed, 1).seen:
             return None

@@ -15,7 +15,7 @@ from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
 from .linearised import FARTHEST, Array, Linearised, moved
-from .noise import beyond, by_reading, carrier, known_of, left_out
+from .noise import beyond, by_reading, carrier, known_of, left_out, reading_errors
 from .point import Forces, Point, Slopes
 from .problem import Problem
 from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
@@ -216,6 +216,23 @@ def _arrived(found: Fit) -> Fit:
         other = adapted(refit(found.problem, found.point, replace(found, scatter=found.scatter.larger(LARGER))))
         return replace(min(found, other, key=lambda f: f.cost), evaluations=found.evaluations + other.evaluations)
     return found
+
+
+def fit_base(problem: Problem, point: Point) -> Fit:
+    """The optimum of a base model along the motion that it makes most likely; arguments and errors as of :func:`fit`.
+
+    What the noise of the readings did to the forces tells most of that noise. Without it in the motion derivatives are
+    those of the adjusted observations, as a model with errors in its variables needs them (Pope 1972; Lenzmann &
+    Lenzmann 2004): damping and healing, and laws of the velocity, are biased otherwise.
+    """
+    found = fit(problem, point)
+    rows = by_reading(found.problem, found.around, found.slopes)
+    weighted = np.zeros(found.problem.at.size)
+    there = found.blocks.there
+    weighted[found.blocks.index[there]] = found.white.weighted(found.blocks(found.marginal))[there]
+    errors = reading_errors(found.problem, rows, weighted, found.scatter.named()["white"])
+    other = adapted(refit(found.problem.adjusted(errors, found.point), found.point, found))
+    return replace(other, evaluations=found.evaluations + other.evaluations)
 
 
 def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:

@@ -94,6 +94,23 @@ def noise(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Arr
     return out
 
 
+def reading_errors(problem: Problem, rows: Sequence[csr_array], weighted: Array, white: float) -> list[Array]:
+    """Most likely error of the displacement at the knots of every run by the noise of its samples (m), shape (n,).
+
+    Args:
+        rows: of :func:`by_reading`.
+        weighted: inverse covariance times the residuals (1/N), shape (p,).
+        white: noise of the samples over what is stated of it.
+    """
+    out, first = [], 0
+    for run, row in zip(problem.runs, rows, strict=True):
+        own = slice(first, first + run.at.size)
+        samples = -((white * run.noise) ** 2) * run.reading.count * (row.T @ weighted[own])
+        out.append(run.reading.displacement @ samples)
+        first += run.at.size
+    return out
+
+
 def periodic(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Array:
     """Covariance (N^2) by errors of the reading of 1 m that are periodic within a fringe, shape (E, n, n).
 

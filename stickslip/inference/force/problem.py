@@ -48,6 +48,8 @@ class Problem:
     """All runs of a campaign under one composition.
 
     Errors of the position that are found with the model are ``readings`` (m), shape (p, c), each about ``usual`` times.
+    Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; ``offset`` (N),
+    shape (p,), keeps residuals what they were (:meth:`adjusted`).
     """
 
     def __init__(self, composition: Composition, runs: Sequence[Knots]) -> None:
@@ -79,6 +81,8 @@ class Problem:
         self.readings = np.hstack([alike, self._by_run(at_points)])
         self.usual = np.concatenate([np.full(alike.shape[1], systematic), np.ones(2 * self.hums.size)])
         self.carrier: Array | None = None
+        self.errors = tuple(np.zeros(k.t.size) for k in runs)
+        self.offset = np.zeros(self.at.size)
 
     def _by_run(self, both: Array) -> Array:
         """Sine and cosine, shape (p, 2), apart for every run with hum, shape (p, 2 h)."""
@@ -102,6 +106,30 @@ class Problem:
         """
         other = self.with_composition(self.composition)
         other.carrier = carrier
+        return other
+
+    def adjusted(self, errors: Sequence[Array], point: Point) -> Problem:
+        """The same with errors of the displacement taken off the motion that drives the model.
+
+        Derivatives along a motion with noise go with its errors, and so do the residuals: parameters found from both
+        are off alike however long the record. Residuals at the point stay what they are.
+
+        Args:
+            errors: at the knots of every run (m), shape (n,) each.
+            point: of a fit.
+        """
+        other = self.moved(errors, np.zeros(self.at.size))
+        before, after = self.forces(point), other.forces(point)
+        return other.moved(errors, (before.residual - after.residual) / after.share)
+
+    def moved(self, errors: Sequence[Array], offset: Array) -> Problem:
+        """The same with given ``errors`` and ``offset``."""
+        other = self.with_composition(self.composition)
+        other.errors, other.offset = tuple(errors), offset
+        steps = [old - new for old, new in zip(self.errors, errors, strict=True)]
+        other.runs = tuple(replace(k, x=k.x + step) for k, step in zip(self.runs, steps, strict=True))
+        rooms = (np.pad(step, (0, way.x.size - step.size), "edge") for step, way in zip(steps, self.ways, strict=True))
+        other.ways = tuple(way._replace(x=way.x + room) for way, room in zip(self.ways, rooms, strict=True))
         return other
 
     def recarried(self, slopes: Slopes, point: Point) -> Slopes:
@@ -196,7 +224,8 @@ class Problem:
             read = not run.prescribed  # else a reading is told by itself, and the likelihood is that of the force
             counts = gain * np.where(slow[s], steep / spring, late * mass / c.mass) if read else np.ones(run.at.size)
             share[s] = 1.0 / counts
-            residual[s] = share[s] * (mean @ q[:n] - mass * acceleration - damping * rate - beside * way)
+            force = mean @ q[:n] - mass * acceleration - damping * rate - beside * way + self.offset[s]
+            residual[s] = share[s] * force
             moved = mean @ dq[:, :n].T - acceleration[:, None] * dmass
             if sensed:
                 moved = moved - mass * (second @ dshift[:, :n].T) - damping * (first @ dshift[:, :n].T)

@@ -48,6 +48,8 @@ def fit_arrays(found: Fit) -> dict[str, np.ndarray]:
         "dropped": found.dropped,
         "reach": np.asarray(problem.composition.reach),
         "carrier": np.asarray([] if problem.carrier is None else problem.carrier),
+        "errors": np.concatenate(problem.errors),
+        "offset": problem.offset,
         "valleys": np.array(found.valleys),
         "evaluations": np.array(found.evaluations),
     }
@@ -64,6 +66,9 @@ def fit_of(problem: Problem, kept: Mapping[str, np.ndarray]) -> Fit:
         KeyError, ValueError: the arrays are damaged.
     """
     problem = problem.with_composition(replace(problem.composition, reach=np.asarray(kept["reach"], float)))
+    if "errors" in kept:  # files of before have none
+        ends = np.cumsum([e.size for e in problem.errors])[:-1]
+        problem = problem.moved(np.split(np.asarray(kept["errors"], float), ends), np.asarray(kept["offset"], float))
     if kept["carrier"].size:
         problem = problem.carried_by(np.asarray(kept["carrier"], float))
     found = again(
