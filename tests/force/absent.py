@@ -20,7 +20,7 @@ import stickslip as ss
 from stickslip.data.segment import segment
 from stickslip.inference.diagnose.prepare import prepare
 from stickslip.inference.force.candidates import every_form, try_effect
-from stickslip.inference.force.fit import fit
+from stickslip.inference.force.fit import fit_base
 from stickslip.inference.force.signatures import Explained
 from stickslip.system import process
 from tests.force.counted import COUNT, NOISE, Moved, moved, read
@@ -38,7 +38,7 @@ def gains(runs: list[Moved], seed: int, noise: float, count: float) -> dict[str,
     """What the first form of each effect gains, and how many parameters it has."""
     campaign = read(runs, seed, noise, count)
     prepared = prepare(campaign.description, campaign.traces, [segment(t) for t in campaign.traces])
-    base = fit(prepared.problem, prepared.start)
+    base = fit_base(prepared.problem, prepared.start)
     explained, out = Explained(base), {}
     for tag in TAGS:
         (found,) = try_effect(base, explained, tag, [form for _, form in every_form([tag])][:1])

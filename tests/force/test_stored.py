@@ -9,14 +9,14 @@ import numpy as np
 
 from stickslip.inference.diagnose.checkpoints import kept, load_candidate, save_candidate
 from stickslip.inference.force.candidates import try_effect
-from stickslip.inference.force.fit import fit
+from stickslip.inference.force.fit import fit, fit_base
 from stickslip.inference.force.signatures import Explained
 from stickslip.inference.force.stored import fit_arrays, fit_of
 from stickslip.inference.force.valleys import LEVEL, widened
 
 
 def test_a_kept_fit_is_the_same(begun):
-    found = widened(fit(begun.problem, begun.point), [LEVEL], 3.0)
+    found = widened(fit_base(begun.problem, begun.point), [LEVEL], 3.0)
     assert found.valleys
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, **fit_arrays(found))

@@ -231,7 +231,9 @@ def fit_base(problem: Problem, point: Point) -> Fit:
     there = found.blocks.there
     weighted[found.blocks.index[there]] = found.white.weighted(found.blocks(found.marginal))[there]
     errors = reading_errors(found.problem, rows, weighted, found.scatter.named()["white"])
-    other = adapted(refit(found.problem.adjusted(errors, found.point), found.point, found))
+    problem = found.problem.adjusted(errors, found.point)
+    found = again(problem, found.point, found.scatter, found.dropped, found.around, found.evaluations)
+    other = adapted(refit(problem, found.point, found))
     return replace(other, evaluations=found.evaluations + other.evaluations)
 
 

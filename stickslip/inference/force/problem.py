@@ -48,8 +48,8 @@ class Problem:
     """All runs of a campaign under one composition.
 
     Errors of the position that are found with the model are ``readings`` (m), shape (p, c), each about ``usual`` times.
-    Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; ``offset`` (N),
-    shape (p,), keeps residuals what they were (:meth:`adjusted`).
+    Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
+    the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`).
     """
 
     def __init__(self, composition: Composition, runs: Sequence[Knots]) -> None:
@@ -112,15 +112,17 @@ class Problem:
         """The same with errors of the displacement taken off the motion that drives the model.
 
         Derivatives along a motion with noise go with its errors, and so do the residuals: parameters found from both
-        are off alike however long the record. Residuals at the point stay what they are.
+        are off alike however long the record. What the errors do to the residuals stays in them, but for the part that
+        is even in the errors: in the mean noise makes a path longer and a contact weaker, whatever its sign.
 
         Args:
             errors: at the knots of every run (m), shape (n,) each.
             point: of a fit.
         """
-        other = self.moved(errors, np.zeros(self.at.size))
-        before, after = self.forces(point), other.forces(point)
-        return other.moved(errors, (before.residual - after.residual) / after.share)
+        zero = np.zeros(self.at.size)
+        twice = [2.0 * new - old for new, old in zip(errors, self.errors, strict=True)]
+        before, beyond = self.moved(self.errors, zero).forces(point), self.moved(twice, zero).forces(point)
+        return self.moved(errors, 0.5 * (before.residual / before.share - beyond.residual / beyond.share))
 
     def moved(self, errors: Sequence[Array], offset: Array) -> Problem:
         """The same with given ``errors`` and ``offset``."""
