@@ -179,5 +179,7 @@ def _at(data: Measurement, run: int, cycle: int) -> Any:
 
 
 if __name__ == "__main__":
-    for (tag, form), amplitude in visible((e.tag, f.name) for e in EFFECTS.values() for f in e.forms).items():
-        print(f'    ("{tag}", "{form}"): {amplitude:.2g},')
+    found = visible((e.tag, f.name) for e in EFFECTS.values() for f in e.forms)
+    for tag in EFFECTS:
+        limits = [f'"{form}": {amplitude:.2g}' for (of, form), amplitude in found.items() if of == tag]
+        print(f'    "{tag}": {{{", ".join(limits)}}},')
