@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -38,6 +39,34 @@ class Stage:
             self._began, self._first = now, share
         self._before, done = share, share - self._first
         return (now - self._began) * (1.0 - share) / done if done > LEAST and share < 1.0 else None
+
+
+def paced(
+    show: Callable[[str, float | None, float, float | None], None],
+    least: float = 0.0,
+    every: float = 0.0,
+    clock: Callable[[], float] = time.monotonic,
+) -> Tell:
+    """Tells of long work now and then.
+
+    Args:
+        show: called with the text, the share that is done, the seconds since the beginning and those left of the stage.
+        least: seconds from the beginning to the first word.
+        every: seconds between two.
+        clock: gives the time (s).
+    """
+    began, last = clock(), -math.inf
+    stage = Stage(began)
+
+    def tell(text: str, share: float | None = None) -> None:
+        nonlocal last
+        now = clock()
+        left = None if share is None else stage.left(now, share)
+        if now - began >= least and now - last >= every:
+            last = now
+            show(text, share, now - began, left)
+
+    return tell
 
 
 @contextmanager
@@ -83,26 +112,20 @@ def _cell(title: str) -> Iterator[Tell]:
     """A bar under the cell of a notebook, taken away when the work is done."""
     from IPython.display import HTML, display
 
-    began = last = time.monotonic()
-    stage, shown = Stage(began), None
+    shown = None
 
-    def tell(text: str, share: float | None = None) -> None:
-        nonlocal last, shown
-        now = time.monotonic()
-        seconds = None if share is None else stage.left(now, share)
-        if now - began < PATIENCE or now - last < REFRESH:
-            return
-        last = now
-        left = "" if seconds is None else f", {seconds:.0f} s left"
+    def show(text: str, share: float | None, spent: float, left: float | None) -> None:
+        nonlocal shown
+        rest = "" if left is None else f", {left:.0f} s left"
         done = "" if share is None else f' value="{share:.3f}"'
-        page = HTML(f"{escape(title)} <progress{done}></progress> {escape(text)} ({now - began:.0f} s{left})")
+        page = HTML(f"{escape(title)} <progress{done}></progress> {escape(text)} ({spent:.0f} s{rest})")
         if shown is None:
             shown = display(page, display_id=True)
         else:
             shown.update(page)
 
     try:
-        yield tell
+        yield paced(show, PATIENCE, REFRESH)
     finally:
         if shown is not None:
             shown.update(HTML(""))
@@ -129,23 +152,18 @@ def _bar(title: str) -> Iterator[Tell]:
         transient=True,
     )
     task = bar.add_task(title, total=None, text="", left="")
-    began, shown = time.monotonic(), False
-    stage = Stage(began)
+    shown = False
 
-    def tell(text: str, share: float | None = None) -> None:
+    def show(text: str, share: float | None, spent: float, left: float | None) -> None:
         nonlocal shown
-        now = time.monotonic()
-        spent = now - began
         if not shown and spent > PATIENCE:
             bar.start()
             shown = True
-        seconds = None if share is None else stage.left(now, share)
-        left = "" if seconds is None else f"{seconds:.0f} s left"
-        total = 1.0 if share is not None else None
-        bar.update(task, text=text, total=total, completed=share or 0.0, left=left)
+        rest = "" if left is None else f"{left:.0f} s left"
+        bar.update(task, text=text, total=None if share is None else 1.0, completed=share or 0.0, left=rest)
 
     try:
-        yield tell
+        yield paced(show)
     finally:
         if shown:
             bar.stop()
@@ -153,20 +171,12 @@ def _bar(title: str) -> Iterator[Tell]:
 
 def _lines(title: str) -> Tell:
     """Tells by a line on stderr now and then, for a log."""
-    began = last = time.monotonic()
-    stage = Stage(began)
 
-    def tell(text: str, share: float | None = None) -> None:
-        nonlocal last
-        now = time.monotonic()
-        seconds = None if share is None else stage.left(now, share)
-        if now - last < EVERY:
-            return
-        last, spent = now, now - began
-        left = "" if seconds is None else f", about {seconds:.0f} s left of this stage"
-        print(f"{title}: {text} ({spent:.0f} s{left})", file=sys.stderr, flush=True)
+    def show(text: str, share: float | None, spent: float, left: float | None) -> None:
+        rest = "" if left is None else f", about {left:.0f} s left of this stage"
+        print(f"{title}: {text} ({spent:.0f} s{rest})", file=sys.stderr, flush=True)
 
-    return tell
+    return paced(show, EVERY, EVERY)
 
 
 class Cancelled(StickslipError):
