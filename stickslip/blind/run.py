@@ -108,10 +108,8 @@ def run_challenge(
 def _known(only: Sequence[str], cases: Sequence[str], folder: Path) -> list[str]:
     for name in only:
         if name not in cases:
-            raise InputError(
-                "no such case", file=folder, value=name, allowed=f"{cases[0]} to {cases[-1]}",
-                hint="name the cases as the folder 'cases' does, with commas between them",
-            )  # fmt: skip
+            hint = "name the cases as the folder 'cases' does, with commas between them"
+            raise InputError("no such case", file=folder, value=name, allowed=f"{cases[0]} to {cases[-1]}", hint=hint)
     return list(dict.fromkeys(only))
 
 

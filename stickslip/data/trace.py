@@ -316,10 +316,8 @@ class Trace(Shown, _Rebuilt):
         }
         t = _si_array(time, "s", f"{name}: time")
         if sum(way is not None for way in (drive_velocity, drive_position, drive)) > 1:
-            raise InputError(
-                f"trace '{name}': the drive is given more than once",
-                hint="keep one of drive_velocity, drive_position, drive",
-            )
+            hint = "keep one of drive_velocity, drive_position, drive"
+            raise InputError(f"trace '{name}': the drive is given more than once", hint=hint)
         if not arrays:
             raise InputError(f"trace '{name}' has no signal", allowed="displacement, velocity or spring_force")
         leading = next(key for key in SIGNALS if key in arrays)

@@ -181,10 +181,8 @@ def refuse_existing(target: Path, force: bool) -> None:
         with tempfile.TemporaryFile(dir=home):
             pass
     except OSError as error:
-        raise RunFolderError(
-            f"the run folder cannot be written: nothing can be, into {home} ({error.strerror or error})",
-            file=target, hint="choose another --out",
-        ) from error  # fmt: skip
+        what = f"the run folder cannot be written: nothing can be, into {home} ({error.strerror or error})"
+        raise RunFolderError(what, file=target, hint="choose another --out") from error
     if _lock(target).exists():  # of a run that is at work, or of one that was killed
         with _locked(target):
             pass
@@ -201,11 +199,8 @@ def _refuse_existing(target: Path, force: bool) -> None:
     if not target.is_dir():
         raise RunFolderError("the run folder's name is taken by a file", file=target, hint="choose another --out")
     if not (target / RESULT).is_file():
-        raise RunFolderError(
-            "the folder exists and is no run folder (it holds no result.json), so it is left alone",
-            file=target,
-            hint="choose another --out",
-        )
+        what = "the folder exists and is no run folder (it holds no result.json), so it is left alone"
+        raise RunFolderError(what, file=target, hint="choose another --out")
     if not force:
         raise RunFolderError(
             "the run folder exists already", file=target, hint="choose another --out, or replace it with --force"

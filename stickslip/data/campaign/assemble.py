@@ -189,12 +189,9 @@ class _Assembly:
         if spec.file is None:
             values = self._scaled(columns, path, name, spec)
             if values.size != time.size:
-                raise InputError(
-                    f"column '{spec.column}' has {values.size} samples, time has {time.size}",
-                    file=self.campaign.path,
-                    key=f"{self.place}.{name}",
-                    hint="columns of one trace need one common time",
-                )
+                what = f"column '{spec.column}' has {values.size} samples, time has {time.size}"
+                hint = "columns of one trace need one common time"
+                raise InputError(what, file=self.campaign.path, key=f"{self.place}.{name}", hint=hint)
             return values
         other, beyond = trace_file(
             self.campaign.path, spec.file, outside=self.entry.outside, key=f"{self.place}.{name}.file"
@@ -322,10 +319,8 @@ class _Assembly:
             ends = np.array([piece.until for piece in entry.drive])
             speeds = np.array([piece.velocity for piece in entry.drive])
             if ends[-1] <= time[0]:
-                raise InputError(
-                    f"the drive ends at {ends[-1]:g} s, before the record begins at {time[0]:g} s",
-                    hint="'until' is a time of the record, as in its time column",
-                )
+                what = f"the drive ends at {ends[-1]:g} s, before the record begins at {time[0]:g} s"
+                raise InputError(what, hint="'until' is a time of the record, as in its time column")
             late = ends > time[0]
             return Drive.from_pieces(ends[late], speeds[late], float(time[0]))
         if "drive_position" in data:

@@ -33,16 +33,12 @@ def check_size(time: NDArray[np.float64], data: Mapping[str, NDArray[np.float64]
         if max(-low, high) > most:
             worst = low if -low > high else high
             row = int(np.argmin(values) if -low > high else np.argmax(values)) + 1
-            raise InputError(
-                f"{name} holds an impossible value: {worst:.3g} in SI units",
-                key=f"sample {row}",
-                hint="a mark of an overload? Delete these rows, leave the field empty, or check the unit",
-            )
+            what = f"{name} holds an impossible value: {worst:.3g} in SI units"
+            hint = "a mark of an overload? Delete these rows, leave the field empty, or check the unit"
+            raise InputError(what, key=f"sample {row}", hint=hint)
     if time[-1] - time[0] < 1e-12 * time.size:
-        raise InputError(
-            f"{time.size} samples lie within {time[-1] - time[0]:.3g} s, closer than 1e-12 s",
-            hint="check the unit of time, or the sampling rate",
-        )
+        hint = "check the unit of time, or the sampling rate"
+        raise InputError(f"{time.size} samples lie within {time[-1] - time[0]:.3g} s, closer than 1e-12 s", hint=hint)
 
 
 def doubtful_resolution(channel: str, si: str, stated: float, seen: float | None, noise: float) -> str | None:
@@ -94,12 +90,8 @@ def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str
     allowance = reach if reach is not None else 2 * travel
     ratio = moved / (travel + 2 * allowance)
     if ratio * (1 if reach is not None else 3) > _OUTRUN:
-        raise InputError(
-            f"the block outruns the drive: it moves {own} while the load point moves {drives}",
-            key=key,
-            value=unit,
-            hint=_likely(trace.leading, unit, moved / travel),
-        )
+        what = f"the block outruns the drive: it moves {own} while the load point moves {drives}"
+        raise InputError(what, key=key, value=unit, hint=_likely(trace.leading, unit, moved / travel))
     most = _reach(trace, rig, upper=True)
     if trace.leading != "spring_force" and most is not None and travel - moved > _OUTRUN * most:
         raise InputError(

@@ -50,11 +50,8 @@ def read_toml(path: Path, kind: Kind) -> TomlFile:
         raise InputError("tables and lists are nested too deeply", file=path) from None
     found = _kind(content)
     if found and found != kind:
-        raise InputError(
-            f"this is a {found} file, where a {kind} file is wanted",
-            file=path,
-            hint=f"a {found} file is for {_COMMANDS[found]}; stickslip new {kind} writes a {kind} file to start from",
-        )
+        hint = f"a {found} file is for {_COMMANDS[found]}; stickslip new {kind} writes a {kind} file to start from"
+        raise InputError(f"this is a {found} file, where a {kind} file is wanted", file=path, hint=hint)
     return TomlFile(content, text, hashlib.sha256(raw).hexdigest())
 
 

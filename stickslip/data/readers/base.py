@@ -66,13 +66,8 @@ class Columns:
         if wanted in self.ignored:
             raise InputError(f"column '{wanted}' cannot be used: {self.ignored[str(wanted)]}", file=file, key=key)
         listed = ", ".join(names[:20]) + (" ..." if len(names) > 20 else "")
-        raise InputError(
-            f"there is no column '{wanted}'",
-            file=file,
-            key=key,
-            allowed=listed,
-            hint=nearest(text, names) if names else None,
-        )
+        hint = nearest(text, names) if names else None
+        raise InputError(f"there is no column '{wanted}'", file=file, key=key, allowed=listed, hint=hint)
 
 
 class Reader(Protocol):

@@ -35,11 +35,8 @@ class MatReader:
         try:
             content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
         except Exception as error:  # scipy raises many kinds on a damaged file
-            raise InputError(
-                f"not a readable MATLAB file ({type(error).__name__}: {error})",
-                file=path,
-                hint="save it again with -v7",
-            ) from None
+            what = f"not a readable MATLAB file ({type(error).__name__}: {error})"
+            raise InputError(what, file=path, hint="save it again with -v7") from None
         columns = Columns({})
         for name, value in content.items():
             if not name.startswith("__"):

@@ -180,10 +180,8 @@ def drop_duplicates(time: Array) -> tuple[Mask | None, list[Repair]]:
         return None, []
     count = int(same.sum())
     if count > 0.1 * time.size:
-        raise InputError(
-            f"{count} of {time.size} time stamps are the same as the one before: the clock is rounded too coarsely",
-            hint="export time with more digits, or give 'sampling_rate' in place of 'time'",
-        )
+        what = f"{count} of {time.size} time stamps are the same as the one before: the clock is rounded too coarsely"
+        raise InputError(what, hint="export time with more digits, or give 'sampling_rate' in place of 'time'")
     first = int(np.argmax(same)) + 1
     where = f"time, first at sample {first} ({time[first]:.6g} s)"
     keep = np.concatenate([[True], ~same])

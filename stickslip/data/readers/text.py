@@ -101,13 +101,8 @@ def _layout(path: Path, head: bytes, *, whole: bool) -> _Layout:
         None,
     )
     if first is None:
-        raise InputError(
-            "the file holds no rows of numbers",
-            file=path,
-            key="line 1",
-            value=lines[0][:60],
-            hint="is it the right file?",
-        )
+        hint = "is it the right file?"
+        raise InputError("the file holds no rows of numbers", file=path, key="line 1", value=lines[0][:60], hint=hint)
     rows = [row for line in sample if _is_data(row := _row(line, delimiter, width), width, decimal)]
     ends = [len(_fields(line, delimiter)) for line in sample if delimiter and line.rstrip().endswith(delimiter)]
     numeric = [
@@ -195,10 +190,8 @@ def _thousands(path: Path, rows: list[list[str]], names: list[str], numeric: lis
     marks = [{mark for row in rows for mark in ".," if mark in row[c]} for c in numeric]
     commas = [name for name, found in zip(names, marks, strict=True) if found == {","}]
     if commas and len(commas) < len(names) and {"."} in marks:
-        raise InputError(
-            f"column '{commas[0]}' has commas and another one decimal points", file=path,
-            hint="commas between thousands are to be left out; decimal marks must be the same in all columns",
-        )  # fmt: skip
+        hint = "commas between thousands are to be left out; decimal marks must be the same in all columns"
+        raise InputError(f"column '{commas[0]}' has commas and another one decimal points", file=path, hint=hint)
     said = []
     for name, c in zip(names, numeric, strict=True):
         fields = [row[c] for row in rows if "," in row[c]]
@@ -321,10 +314,5 @@ def _careful(path: Path, layout: _Layout) -> tuple[np.ndarray, list[str]]:
 
 
 def _wrong_length(path: Path, line: int, fields: int, text: str, layout: _Layout) -> InputError:
-    return InputError(
-        f"a row has {fields} fields where {len(layout.names)} are expected",
-        file=path,
-        key=f"line {line}",
-        value=text[:60],
-        hint="delete or complete the line",
-    )
+    what = f"a row has {fields} fields where {len(layout.names)} are expected"
+    return InputError(what, file=path, key=f"line {line}", value=text[:60], hint="delete or complete the line")

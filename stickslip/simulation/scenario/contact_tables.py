@@ -53,14 +53,8 @@ class ContactTable(Table):
             return content
         number = len(content["each"])
         if content.get("contacts", number) != number:
-            raise fault(
-                InputError(
-                    "'contacts' and the number of [[contact.each]] differ",
-                    value=content["contacts"],
-                    allowed=str(number),
-                    hint="remove 'contacts'",
-                )
-            )
+            what = "'contacts' and the number of [[contact.each]] differ"
+            raise fault(InputError(what, value=content["contacts"], allowed=str(number), hint="remove 'contacts'"))
         return {**content, "contacts": number}
 
     def of(self, i: int, key: str) -> Any:

@@ -160,11 +160,8 @@ class SweepTable(Table):
     def _either(self) -> Self:
         span = [self.start is not None, self.stop is not None, self.points is not None]
         if (self.values is None) == (not all(span)) or (self.values is not None and any(span)):
-            raise fault(
-                InputError(
-                    "a series needs start, stop and points, or values", hint='start = "20 um/s"; stop = "1 mm/s"'
-                )
-            )
+            hint = 'start = "20 um/s"; stop = "1 mm/s"'
+            raise fault(InputError("a series needs start, stop and points, or values", hint=hint))
         return self
 
 

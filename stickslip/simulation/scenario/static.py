@@ -111,12 +111,9 @@ def _drive_velocity(scenario: Scenario) -> float:
 
     velocity = abs(load_point(scenario.file.drive, scenario.folder).first_velocity)
     if velocity == 0.0:
-        raise InputError(
-            "the drive stands still at first, so no time belongs to a load",
-            file=scenario.path,
-            key="drive",
-            hint="--set drive.piece.1.velocity=50um/s, or another scenario",
-        )
+        what = "the drive stands still at first, so no time belongs to a load"
+        hint = "--set drive.piece.1.velocity=50um/s, or another scenario"
+        raise InputError(what, file=scenario.path, key="drive", hint=hint)
     return velocity
 
 
