@@ -23,24 +23,6 @@ def silent(text: str, share: float | None = None) -> None:
     """Progress that nobody is told."""
 
 
-class Stage:
-    """How long a stage of long work may still take; a new one begins where the share that is done falls.
-
-    Args:
-        began: time (s) at which the first one did.
-    """
-
-    def __init__(self, began: float) -> None:
-        self._began, self._first, self._before = began, 0.0, 0.0
-
-    def left(self, now: float, share: float) -> float | None:
-        """Seconds from ``now`` until the stage is done of which ``share`` (0 to 1) is; None where too little tells."""
-        if share < self._before:
-            self._began, self._first = now, share
-        self._before, done = share, share - self._first
-        return (now - self._began) * (1.0 - share) / done if done > LEAST and share < 1.0 else None
-
-
 def paced(
     show: Callable[[str, float | None, float, float | None], None],
     least: float = 0.0,
@@ -55,13 +37,18 @@ def paced(
         every: seconds between two.
         clock: gives the time (s).
     """
-    began, last = clock(), -math.inf
-    stage = Stage(began)
+    began = since = clock()  # of the whole work, and of the stage: a new one begins where the share falls
+    first = before = 0.0  # shares of the stage
+    last = -math.inf
 
     def tell(text: str, share: float | None = None) -> None:
-        nonlocal last
-        now = clock()
-        left = None if share is None else stage.left(now, share)
+        nonlocal since, first, before, last
+        now, left = clock(), None
+        if share is not None:
+            if share < before:
+                since, first = now, share
+            before, done = share, share - first
+            left = (now - since) * (1.0 - share) / done if done > LEAST and share < 1.0 else None
         if now - began >= least and now - last >= every:
             last = now
             show(text, share, now - began, left)

@@ -312,11 +312,9 @@ def _plain(value: Any) -> Any:
 def file_record(path: str | Path) -> dict[str, str]:
     """Name and SHA-256 of an input."""
     path = Path(path)
-    digest = hashlib.sha256()
     try:
         with path.open("rb") as stream:
-            while block := stream.read(1 << 20):
-                digest.update(block)
+            digest = hashlib.file_digest(stream, "sha256")
     except OSError as error:
         raise InputError(f"the file cannot be read ({error.strerror})", file=path) from None
     return {"file": str(path), "sha256": digest.hexdigest()}

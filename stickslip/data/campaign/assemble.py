@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...system.runstore import file_record
 from ...system.units import factor_to_si
 from ..readers import Columns, read_columns
 from ..readers.repair import (
@@ -27,11 +27,10 @@ from ..readers.repair import (
 from ..resolution import estimate_resolution, noise_level
 from ..trace import SIGNALS, Drive, Provenance, Repair, Trace
 from .load import Campaign, trace_file
-from .models import Channel, TimeColumn, TraceEntry
+from .models import CHANNELS, Channel, TimeColumn, TraceEntry
 from .plausible import check_size, check_travel, doubtful_resolution
 
 Array = NDArray[np.float64]
-_CHANNELS = (*SIGNALS, "normal_load", "drive_position")
 
 
 def load_traces(campaign: Campaign) -> list[Trace]:
@@ -76,7 +75,7 @@ class _Assembly:
         columns = read_columns(path, entry.reader)
         reader = columns.reader
         self.notes += _noted(columns)
-        channels = {name: getattr(entry, name) for name in _CHANNELS if getattr(entry, name) is not None}
+        channels = {name: getattr(entry, name) for name in CHANNELS if getattr(entry, name) is not None}
         time = self._time(columns, path)
         data = {name: self._values(columns, path, name, spec, time) for name, spec in channels.items()}
         first_line = columns.first_line
@@ -107,7 +106,7 @@ class _Assembly:
             minimum_slip=entry.minimum_slip,
             missing=tuple(float(moment) for moment in gaps),
             repairs=tuple(self.repairs),
-            provenance=Provenance(entry.file, file_sha256(path), reader, self.used, tuple(self.notes)),
+            provenance=Provenance(entry.file, file_record(path)["sha256"], reader, self.used, tuple(self.notes)),
         )
         self.warnings += check_travel(trace, rig, getattr(entry, leading).unit, f"{self.place}.{leading}")
         return from_load_point(trace).replace(warnings=tuple(self.warnings))
@@ -124,14 +123,12 @@ class _Assembly:
         except InputError as error:
             if error.hint is None or "sampling_rate" not in error.hint:
                 hint = f"{error.hint or ''}; or give 'sampling_rate' in place of 'time'".lstrip("; ")
-                raise InputError(
-                    error.what, file=error.file, key=error.key, value=error.value, allowed=error.allowed, hint=hint
-                ) from None
+                raise error.but(hint=hint) from None
             raise
 
     def _size(self, columns: Columns) -> int:
         """Samples of the first channel that is in this file; which other arrays are there does not matter."""
-        for name in _CHANNELS:
+        for name in CHANNELS:
             spec = getattr(self.entry, name)
             if spec is not None and spec.file is None:
                 with suppress(InputError):  # a column that is not there is met with its key later
@@ -144,13 +141,8 @@ class _Assembly:
         try:
             column = columns.find(spec.column)
         except InputError as error:
-            raise InputError(
-                f"{error.what} in {path.name}",
-                file=self.campaign.path,
-                key=f"{key}.column",
-                allowed=error.allowed,
-                hint=error.hint,
-            ) from None
+            what = f"{error.what} in {path.name}"
+            raise error.but(what=what, file=self.campaign.path, key=f"{key}.column") from None
         stated = columns.units.get(column)
         factor = spec.factor
         if factor is None:
@@ -204,7 +196,7 @@ class _Assembly:
         self.notes += [f"{spec.file}: {note}" for note in _noted(further)]
         own = self._scaled(further, other, f"{name}.time", spec.time or self.entry.time)  # type: ignore[arg-type]
         values = self._scaled(further, other, name, spec)
-        self.used[name] += f" of {spec.file} (sha256 {file_sha256(other)})"
+        self.used[name] += f" of {spec.file} (sha256 {file_record(other)['sha256']})"
         return self._onto(time, own, values, name)
 
     def _onto(self, time: Array, own: Array, values: Array, name: str) -> Array:
@@ -333,9 +325,3 @@ def _noted(columns: Columns, most: int = 8) -> list[str]:
     """What the reader guessed or mended, and the columns it left out."""
     left = [f"column '{name}' is left out: {why}" for name, why in columns.ignored.items()]
     return [*columns.notes, *left[:most], *([f"... and {len(left) - most} columns more"] if len(left) > most else [])]
-
-
-def file_sha256(path: Path) -> str:
-    """SHA-256 of a file, read in pieces."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from ...errors import InputError, nearest
 from ..readers import beside
-from .models import CampaignFile, Rig, RigKeys, TraceEntry
+from .models import CHANNELS, CampaignFile, Rig, RigKeys, TraceEntry
 from .place import readable
 from .toml_file import read_toml
 
@@ -141,5 +141,5 @@ def trace_file(campaign: Path, name: str, *, outside: bool, key: str) -> tuple[P
 
 
 def _further(entry: TraceEntry) -> list[tuple[str, str]]:
-    channels = ("displacement", "velocity", "spring_force", "normal_load", "drive_position")
-    return [(f"{c}.file", getattr(entry, c).file) for c in channels if getattr(entry, c) and getattr(entry, c).file]
+    given = ((name, getattr(entry, name)) for name in CHANNELS)
+    return [(f"{name}.file", channel.file) for name, channel in given if channel and channel.file]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 
 from ..trace import Trace
@@ -93,13 +94,6 @@ def campaign_text(
 
 
 def _toml(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-        return f'"{escaped}"'
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in value.items()) + " }"
-    if isinstance(value, int):
-        return str(value)
-    return repr(float(value))  # type: ignore[arg-type]
+    return json.dumps(value, ensure_ascii=False, default=float)  # which writes texts and numbers as TOML does

@@ -115,14 +115,7 @@ def _checked(
         lines = key_lines(text)
         place = tuple(int(p) - 1 if p.isdigit() else p for p in (error.key or "").split("."))
         line = lines.get(place)
-        fault = InputError(
-            error.what,
-            file=shown,
-            key=f"line {line}: {error.key}" if line else error.key,
-            value=error.value,
-            allowed=error.allowed,
-            hint=error.hint,
-        )
+        fault = error.but(file=shown, key=f"line {line}: {error.key}" if line else error.key)
     else:
         return Scenario(file, path, digest, content, tuple(all_changes))
     raise _from_command_line(fault, all_changes)
@@ -133,9 +126,7 @@ def _from_command_line(fault: InputError, changes: Sequence[tuple[str, Any]]) ->
     key = (fault.key or "").split(": ")[-1]
     for name, _ in changes:
         if key in (name, name.partition(".")[0] and _shown(name)):
-            return InputError(
-                fault.what, file="--set", key=name, value=fault.value, allowed=fault.allowed, hint=fault.hint
-            )
+            return fault.but(file="--set", key=name)
     return fault
 
 
