@@ -47,9 +47,8 @@ def effects(
     if picture is not None and tag is None:
         raise InputError("a picture needs a tag", hint="stickslip effects contact-ageing --picture ageing.png")
     if latex and model is None:
-        hint = (
-            "the explanation of an effect holds its LaTeX" if tag else "--model static,inertia,contact-ageing --latex"
-        )
+        hint = "the explanation of an effect holds its LaTeX"
+        hint = hint if tag else "--model static,inertia,contact-ageing --latex"
         raise InputError("--latex belongs to --model", key="--latex", hint=hint)
     if picture is not None:
         _check_picture(picture, force)

@@ -51,9 +51,8 @@ def open(
 
     if campaign is None:
         if effect:
-            raise InputError(
-                "an effect of your own is tried on a campaign", key="--effect", hint="name the campaign too"
-            )
+            what = "an effect of your own is tried on a campaign"
+            raise InputError(what, key="--effect", hint="name the campaign too")
         session = Session(offers=tuple(offered(Path())), home=Path().resolve())
     else:
         session = opened(_simulated(campaign) if _is_scenario(campaign) else campaign, effect)

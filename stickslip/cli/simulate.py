@@ -108,11 +108,8 @@ def outside(scenario: Scenario) -> list[str]:
     """Files that the scenario names and that do not lie in its folder or below: read, but said."""
     home = scenario.folder.resolve()
     files = [part for part in (scenario.file.drive.file, getattr(scenario.file.contact, "file", None)) if part]
-    return [
-        f"{part} lies outside the scenario's folder"
-        for part in files
-        if not (scenario.folder / part).resolve().is_relative_to(home)
-    ]
+    beyond = (part for part in files if not (scenario.folder / part).resolve().is_relative_to(home))
+    return [f"{part} lies outside the scenario's folder" for part in beyond]
 
 
 def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:

@@ -100,11 +100,9 @@ def _remove(path: Path) -> None:
 
 def is_of_the_disk(error: BaseException | None) -> bool:
     """Whether an error is there because a disk is full, read-only or shut, and not because of what was to be done."""
-    while error is not None:
-        if isinstance(error, OSError) and error.errno in _DISK:
-            return True
-        error = error.__cause__
-    return False
+    if error is None:
+        return False
+    return (isinstance(error, OSError) and error.errno in _DISK) or is_of_the_disk(error.__cause__)
 
 
 @contextmanager
@@ -202,9 +200,8 @@ def _refuse_existing(target: Path, force: bool) -> None:
         what = "the folder exists and is no run folder (it holds no result.json), so it is left alone"
         raise RunFolderError(what, file=target, hint="choose another --out")
     if not force:
-        raise RunFolderError(
-            "the run folder exists already", file=target, hint="choose another --out, or replace it with --force"
-        )
+        hint = "choose another --out, or replace it with --force"
+        raise RunFolderError("the run folder exists already", file=target, hint=hint)
 
 
 def _replaced(target: Path) -> Path:
@@ -240,9 +237,8 @@ def _speaking(target: Path) -> Iterator[None]:
         if error.filename is not None and not where.resolve().is_relative_to(home):
             raise
         reason = error.strerror or str(error)
-        raise RunFolderError(
-            f"the run folder cannot be written ({reason})", file=target, hint="choose another --out, or make room"
-        ) from error
+        hint = "choose another --out, or make room"
+        raise RunFolderError(f"the run folder cannot be written ({reason})", file=target, hint=hint) from error
 
 
 def _lock(target: Path) -> Path:
@@ -257,9 +253,8 @@ def _locked(target: Path) -> Iterator[None]:
     stream = path.open("a+", encoding="utf-8")
     try:
         if not _take(stream):
-            raise RunFolderError(
-                "another run is writing this folder", file=target, hint="wait for it, or choose another --out"
-            )
+            hint = "wait for it, or choose another --out"
+            raise RunFolderError("another run is writing this folder", file=target, hint=hint)
         try:
             yield
         finally:
@@ -281,12 +276,9 @@ def _take(stream: TextIO) -> bool:
 
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    # whoever held it before may have removed the file, so that this lock is on nothing
-    try:
+        # whoever held it before may have removed the file, so that this lock is on nothing
         return os.fstat(stream.fileno()).st_ino == Path(stream.name).stat().st_ino
-    except FileNotFoundError:
+    except (BlockingIOError, FileNotFoundError):
         return False
 
 

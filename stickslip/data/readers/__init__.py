@@ -38,16 +38,8 @@ def accept(loaded: object) -> Reader:
 
 READERS: Registry[Reader] = Registry("stickslip.readers", "reader", accept)
 # a file that many could read goes to the first: NetCDF and MATLAB 7.3 are HDF5 too, and text is the last resort
-_BUILT_IN: tuple[Reader, ...] = (
-    NetcdfReader(),
-    MatReader(),
-    HdfReader(),
-    NpyReader(),
-    TdmsReader(),
-    UffReader(),
-    JsonReader(),
-)
-for _reader in _BUILT_IN:
+for _class in (NetcdfReader, MatReader, HdfReader, NpyReader, TdmsReader, UffReader, JsonReader):
+    _reader: Reader = _class()
     READERS.register(_reader.name, _reader)
 _TEXT: Reader = TextReader()
 

@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...system.units import shown
-from ..trace import SIGNALS, Drive, Repair, Trace
+from ..trace import CHANNELS, Drive, Repair, Trace
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_UNITS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
 MOST_COUNTS = 2.0**53  # beyond which whole counts cannot be told from others
 FIRST_SAMPLES = 5  # of a record, which tell where it begins
 
@@ -52,7 +51,7 @@ def unwrap(values: Array, period: float, channel: str, resolution: float | None 
     places = np.flatnonzero(turns)
     count = int(np.abs(turns).sum())
     where = f"{channel}, first at sample {int(valid[places[0] + 1])}"
-    span = shown(period, _UNITS.get(channel, "1"), 6)
+    span = shown(period, CHANNELS.get(channel, "1"), 6)
     return result, [Repair("wrap", count, where, f"the counter ran over its range of {span}")]
 
 

@@ -116,12 +116,10 @@ def _identifier(rest: bytes) -> bytes:
     """
     words = rest.split()
     if len(words) < 2 or not all(word.isdigit() for word in words[:2]):
-        raise InputError(
-            "the line '58b' does not state the byte order and the kind of numbers",
-            value=rest.decode("latin-1").strip() or "nothing",
-            allowed="58b, then 1 (Intel) or 2 (Motorola), then 2 (IEEE)",
-            hint="export the file again, as text or as CSV",
-        )
+        what = "the line '58b' does not state the byte order and the kind of numbers"
+        value = rest.decode("latin-1").strip() or "nothing"
+        allowed = "58b, then 1 (Intel) or 2 (Motorola), then 2 (IEEE)"
+        raise InputError(what, value=value, allowed=allowed, hint="export the file again, as text or as CSV")
     order, kind = (int(word) for word in words[:2])
     return f"{-1:6d}\n{58:6d}b{order:6d}{kind:6d}{_HEADER_LINES:12d}{0:12d}{0:6d}{0:6d}{0:12d}{0:12d}\n".encode()
 
