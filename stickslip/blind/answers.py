@@ -14,10 +14,7 @@ from .one_case import failures, is_done
 KINDS = ("complete", "missing", "ambiguous", "unknown")
 LARGEST_SET = 3
 # what campaigns of several velocities and holds cannot be expected to tell apart
-CLASSES = (
-    ("sensor-drift", "sensor-high-pass"),
-    ("sensor-low-pass", "residual-load"),
-)
+CLASSES = (("sensor-drift", "sensor-high-pass"), ("sensor-low-pass", "residual-load"))
 
 
 @dataclass(frozen=True)
@@ -100,14 +97,9 @@ def is_exact(kind: str, truth: tuple[str, ...], answer: Answer) -> bool:
 
 def is_right(kind: str, truth: tuple[str, ...], answer: Answer) -> bool:
     """Whether the answer is exact, or a set of at most three effects that holds the whole truth."""
-    if is_exact(kind, truth, answer):
-        return True
-    return (
-        kind in ("one", "two")
-        and answer.kind == "ambiguous"
-        and len({*answer.named, *answer.set}) <= LARGEST_SET
-        and set(truth) <= {*answer.named, *answer.set}
-    )
+    told = {*answer.named, *answer.set}
+    in_set = answer.kind == "ambiguous" and len(told) <= LARGEST_SET and set(truth) <= told
+    return is_exact(kind, truth, answer) or (kind in ("one", "two") and in_set)
 
 
 def is_class_right(kind: str, truth: tuple[str, ...], answer: Answer) -> bool:

@@ -47,12 +47,8 @@ def text(result: Mapping[str, Any], variables: Mapping[str, tuple], out: Path | 
     lines = [f"{result['title']}: {len(rows)} trace{'s' * (len(rows) != 1)}", "", *_traces(rows, columns)]
     scales = _scales(rows)
     for i, row in enumerate(rows):
-        lines += [
-            "",
-            *_fold(f"{row['name']}: {row['regime']} ({row['reason']})", columns),
-            *_drawing(variables, i, columns),
-            *_events(row, scales, columns),
-        ]
+        heading = f"{row['name']}: {row['regime']} ({row['reason']})"
+        lines += ["", *_fold(heading, columns), *_drawing(variables, i, columns), *_events(row, scales, columns)]
         said = [*(f"warning: {w}" for w in row["warnings"]), *(f"read: {w}" for w in row["notes"])]
         said += [f"repaired: {w}" for w in row["repairs"]]
         said += [f"left out: {w}" for w in row["dropped"]]

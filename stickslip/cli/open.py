@@ -13,12 +13,7 @@ LOOPBACK = "127.0.0.1"
 
 
 def open(
-    campaign: Path | None = None,
-    *,
-    port: int = 0,
-    browser: bool = True,
-    effect: Files = (),
-    address: str = LOOPBACK,
+    campaign: Path | None = None, *, port: int = 0, browser: bool = True, effect: Files = (), address: str = LOOPBACK
 ) -> int:
     """Open the workbench in the browser: compare, see where the model fails, add an effect, watch the error fall.
 

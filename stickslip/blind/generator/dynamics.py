@@ -156,11 +156,6 @@ def simulate(
     if count < 0:
         raise SolveError(f"the motion diverged with the step {dt:g} s; take a smaller one")
     count = min(count, MOST_EVENTS)
-    return Result(
-        np.arange(samples) / rate,
-        {name: record[:samples, i] for i, name in enumerate(S.COLUMNS)},
-        {name: events[:count, i] for i, name in enumerate(S.EVENT_COLUMNS)},
-        steps,
-        quiet_steps,
-        rig.mass,
-    )
+    columns = {name: record[:samples, i] for i, name in enumerate(S.COLUMNS)}
+    event_columns = {name: events[:count, i] for i, name in enumerate(S.EVENT_COLUMNS)}
+    return Result(np.arange(samples) / rate, columns, event_columns, steps, quiet_steps, rig.mass)

@@ -213,16 +213,12 @@ def _mean_line(table: RoughLineTable, i: int, number: int) -> MeanLine:
 
 
 def _power_law_parts(table: PowerLawTable) -> list[Part]:
-    return [
-        PowerLaw(
-            jnp.asarray(number * table.of(i, "friction_coefficient") * table.of(i, "normal_force")),
-            jnp.asarray(table.of(i, "u_max")),
-            jnp.asarray(table.of(i, "p")),
-            jnp.asarray(table.spread),
-            number,
-        )
-        for i, number in _distinct(table, "u_max", "p")
-    ]
+    parts: list[Part] = []
+    for i, number in _distinct(table, "u_max", "p"):
+        strength = number * table.of(i, "friction_coefficient") * table.of(i, "normal_force")
+        u_max, p = jnp.asarray(table.of(i, "u_max")), jnp.asarray(table.of(i, "p"))
+        parts.append(PowerLaw(jnp.asarray(strength), u_max, p, jnp.asarray(table.spread), number))
+    return parts
 
 
 def _distinct(table: ContactTable, *keys: str) -> list[tuple[int, int]]:
@@ -278,9 +274,8 @@ def _measured(table: HeightsTable, folder: Path) -> Profile:
 
     position = None if table.position is None else column(table.position, "position")
     try:
-        heights, dx = physics.heights_from_scan(
-            position, column(table.height, "height"), spacing=table.spacing, n_springs=table.springs
-        )
+        scan = position, column(table.height, "height")
+        heights, dx = physics.heights_from_scan(*scan, spacing=table.spacing, n_springs=table.springs)
     except InputError as error:
         raise error.at(file=path) from None
     return physics.from_heights(table.scale * heights, dx)

@@ -69,13 +69,8 @@ def record(scenario: Scenario, progress: Tell | None = None) -> Recording:
         trajectory, events, end = _run(scenario, setup, sliding, tell)
     samples = math.floor(end * file.output.sampling_rate) + 1
     if samples > _MOST_SAMPLES:
-        raise InputError(
-            "the output would be too long",
-            file=scenario.path,
-            key="output.sampling_rate",
-            value=f"{samples} samples",
-            allowed=f"at most {_MOST_SAMPLES}",
-        )
+        key, value, allowed = "output.sampling_rate", f"{samples} samples", f"at most {_MOST_SAMPLES}"
+        raise InputError("the output would be too long", file=scenario.path, key=key, value=value, allowed=allowed)
     t = np.arange(samples) / file.output.sampling_rate
     return _recording(scenario, setup, trajectory, events, sliding, t)
 
@@ -136,15 +131,8 @@ def _joined(parts: list[Trajectory]) -> Trajectory:
     rest = [Steps(*(a[1:] for a in s)) for s in steps[1:]]
     whole = Steps(*(np.concatenate(a) for a in zip(steps[0], *rest, strict=True)))
     stats = [part.stats for part in parts]
-    return Trajectory(
-        whole,
-        Stats(
-            sum(s.steps for s in stats),
-            sum(s.rejected for s in stats),
-            energy_error(whole),
-            sum(s.seconds for s in stats),
-        ),
-    )
+    steps_made, rejected, seconds = (sum(getattr(s, key) for s in stats) for key in ("steps", "rejected", "seconds"))
+    return Trajectory(whole, Stats(steps_made, rejected, energy_error(whole), seconds))
 
 
 def _recording(
