@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import Any, Literal
 
@@ -47,8 +48,6 @@ def creep(
         raise InputError("the number of loads is out of range", key="--points", value=points, allowed="2 to 1000000")
     if out is not None:
         refuse_existing(out, force)
-    import warnings
-
     from ..simulation.scenario import load_scenario, static_creep
 
     loaded = load_scenario(path, changes)

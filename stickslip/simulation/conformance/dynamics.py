@@ -33,12 +33,12 @@ def check_null(cls: type[Effect]) -> Iterator[str]:
         try:
             seen = _march_eagerly((cls(**form),), motions)
         except Exception as error:  # whatever a foreign law raises
-            yield f"{_named(form)}raises {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+            yield f"{named(form)}raises {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
             continue
         for what, a, b in zip(("acceleration", "reading", "element forces", "weakening"), seen, plain, strict=True):
             if not np.array_equal(a, b):
                 step = int(np.argmax(np.any(np.atleast_2d((a != b).T).T.reshape(len(a), -1), axis=1)))
-                yield f"{_named(form)}{what}: not that of the base model, first in step {step} of the prescribed motion"
+                yield f"{named(form)}{what}: not that of the base model, first in step {step} of the prescribed motion"
                 break
 
 
@@ -47,7 +47,8 @@ def _plain() -> list[np.ndarray]:
     return _march_eagerly((), prescribed())
 
 
-def _named(form: dict[str, str]) -> str:
+def named(form: dict[str, str]) -> str:
+    """The form of an effect that has several, as a prefix of a message."""
     return f"({', '.join(f'{k} = {v}' for k, v in form.items())}) " if form else ""
 
 
