@@ -22,8 +22,7 @@ def compare(first: Path, second: Path, *, out: Path | None = None, json: Json = 
     out:
         Folder for result.json and the picture compare.png.
     """
-    if out is not None:
-        refuse_existing(out, force)
+    refuse_existing(out, force)
     from ..show.report.compare import comparison
 
     found = comparison(first, second)

@@ -46,8 +46,7 @@ def creep(
     path, changes = scenario_arguments(scenario, more, set)
     if not 2 <= points <= 1_000_000:
         raise InputError("the number of loads is out of range", key="--points", value=points, allowed="2 to 1000000")
-    if out is not None:
-        refuse_existing(out, force)
+    refuse_existing(out, force)
     from ..simulation.scenario import load_scenario, static_creep
 
     loaded = load_scenario(path, changes)

@@ -21,8 +21,7 @@ def inspect(campaign: CampaignFile, *, out: Path | None = None, json: Flag = Fal
     """
     from ..objects.campaign import load_campaign
 
-    if out is not None:
-        refuse_existing(out, force)
+    refuse_existing(out, force)
     began = time.perf_counter()
     found = load_campaign(campaign).inspect()
     seconds = {"seconds": round(time.perf_counter() - began, 3)}

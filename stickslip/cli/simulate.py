@@ -48,8 +48,7 @@ def simulate(
         Of a run folder: drive as this measured run was driven, with its holds.
     """
     path, changes = scenario_arguments(scenario, more, set)
-    if out is not None:
-        refuse_existing(out, force)
+    refuse_existing(out, force)
     from ..show.simulated import head
 
     began = time.perf_counter()

@@ -165,13 +165,15 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
         _rename(partial, target)
 
 
-def refuse_existing(target: Path, force: bool) -> None:
-    """Say early, before long work, that a folder cannot be written.
+def refuse_existing(target: Path | None, force: bool) -> None:
+    """Say early, before long work, that a folder cannot be written (None: that nothing is to be written into one).
 
     Raises:
         RunFolderError: it exists, unless it is an empty folder, or a run folder and ``force``; or nobody can write
             where it would lie.
     """
+    if target is None:
+        return
     target = _itself(target)
     _refuse_existing(target, force)
     home = next((folder for folder in target.absolute().parents if folder.exists()), target)

@@ -13,17 +13,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...system.runstore import file_record
 from ...system.units import factor_to_si
-from ..readers import Columns, read_columns
-from ..readers.repair import (
-    correct_clock,
-    despike,
-    drop_duplicates,
-    drop_nan,
-    find_gaps,
-    from_load_point,
-    join_resets,
-    unwrap,
-)
+from ..readers import Columns, read_columns, repair
 from ..resolution import estimate_resolution, noise_level
 from ..trace import SIGNALS, Drive, Provenance, Repair, Trace
 from .load import Campaign, trace_file
@@ -88,7 +78,7 @@ class _Assembly:
         leading = next(name for name in SIGNALS if name in data)
         rig = self.campaign.rig_of(entry.label)
         stiffness = rig.spring_stiffness if isinstance(rig.spring_stiffness, float) else None
-        gaps, _ = find_gaps(time)
+        gaps, _ = repair.find_gaps(time)
         for array in (time, *data.values()):
             array.flags.writeable = False
         trace = Trace(
@@ -109,7 +99,7 @@ class _Assembly:
             provenance=Provenance(entry.file, file_record(path)["sha256"], reader, self.used, tuple(self.notes)),
         )
         self.warnings += check_travel(trace, rig, getattr(entry, leading).unit, f"{self.place}.{leading}")
-        return from_load_point(trace).replace(warnings=tuple(self.warnings))
+        return repair.from_load_point(trace).replace(warnings=tuple(self.warnings))
 
     def _time(self, columns: Columns, path: Path) -> Array:
         entry = self.entry
@@ -225,16 +215,16 @@ class _Assembly:
     def _rows(self, time: Array, data: dict[str, Array]) -> tuple[Array, dict[str, Array]]:
         """Rows that can be used, in the part that is asked for."""
         entry = self.entry
-        keep, lost = drop_nan(time, data)
+        keep, lost = repair.drop_nan(time, data)
         self.repairs += lost
         twice = "; those left out because they are not a number are among them" if lost else ""
         if keep is not None:
             time, data = time[keep], {name: values[keep] for name, values in data.items()}
         if time.size < 2:
             raise self._empty(data, lost)
-        time, clock = correct_clock(time, entry.clock_error)
+        time, clock = repair.correct_clock(time, entry.clock_error)
         self.repairs += clock
-        keep, double = drop_duplicates(time)
+        keep, double = repair.drop_duplicates(time)
         self.repairs += double
         if keep is not None:
             time, data = time[keep], {name: values[keep] for name, values in data.items()}
@@ -249,7 +239,7 @@ class _Assembly:
             if cut:
                 self.repairs.append(Repair("cut", cut, "all channels", "outside 'start' and 'stop', as asked for"))
             time, data = time[low:high].copy(), {name: values[low:high].copy() for name, values in data.items()}
-        self.repairs += [replace(gap, reason=f"{gap.reason}{twice}") for gap in find_gaps(time)[1]]
+        self.repairs += [replace(gap, reason=f"{gap.reason}{twice}") for gap in repair.find_gaps(time)[1]]
         return time, data
 
     def _empty(self, data: dict[str, Array], lost: list[Repair]) -> InputError:
@@ -279,17 +269,17 @@ class _Assembly:
                 if odd := doubtful_resolution(name, spec.si, spec.resolution, seen, scatter):
                     self.warnings.append(odd)
             if spec.wrap is not None:
-                values, done = unwrap(values, spec.wrap, name, count)
+                values, done = repair.unwrap(values, spec.wrap, name, count)
                 self.repairs += done
                 if not done:
                     self.notes.append(f"{name}: no jump of half of 'wrap', so nothing was unwrapped")
             level = noise_level(values, count)
-            values, done = join_resets(time, values, name, self._within(spec.resets), count, level)
+            values, done = repair.join_resets(time, values, name, self._within(spec.resets), count, level)
             self.repairs += done
             if spec.resets is True and not done:
                 self.notes.append(f"{name}: 'resets' is true, and the counter never jumps to zero")
             if self.entry.spikes:
-                values, done = despike(values, name, time, max(level, count or 0.0))
+                values, done = repair.despike(values, name, time, max(level, count or 0.0))
                 self.repairs += done
             data[name], resolution[name], noise[name] = values, count, level
         return resolution, noise

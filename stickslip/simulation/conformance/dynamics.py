@@ -14,6 +14,7 @@ from ...physics.params import specs
 from .gradients import present
 from .rig import AT_ONCE, STOPPED, TIGHT, Rig, base_model, directions, march_step, prescribed
 from .statics import corners
+from .trial import first_line
 
 ACTIVE = ("sensor", "drive")  # families that are not a passive contact
 GAIN = 1e-5  # energy that may appear by quadrature and in the model's books, as a share of all that is lost
@@ -33,7 +34,7 @@ def check_null(cls: type[Effect]) -> Iterator[str]:
         try:
             seen = _march_eagerly((cls(**form),), motions)
         except Exception as error:  # whatever a foreign law raises
-            yield f"{named(form)}raises {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+            yield f"{named(form)}raises {first_line(error)}"
             continue
         for what, a, b in zip(("acceleration", "reading", "element forces", "weakening"), seen, plain, strict=True):
             if not np.array_equal(a, b):
