@@ -133,7 +133,8 @@ class Drive(_Rebuilt):
         return cls.from_samples(time, values, max(1.5 * resolution, 4 * level, 1e-9 * float(np.ptp(values)), 1e-15))
 
     @property
-    def _velocities(self) -> Array:
+    def velocities(self) -> Array:
+        """Velocity of each piece, m/s, shape (k - 1,)."""
         return np.diff(self.positions) / np.diff(self.times)
 
     def _piece(self, time: ArrayLike) -> NDArray[np.intp]:
@@ -141,7 +142,7 @@ class Drive(_Rebuilt):
 
     def velocity(self, time: ArrayLike) -> Array:
         """Load-point velocity, m/s, same shape as ``time``; at a breakpoint that of the piece it opens."""
-        return self._velocities[self._piece(time)]
+        return self.velocities[self._piece(time)]
 
     def position(self, time: ArrayLike) -> Array:
         """Load-point position, m, same shape as ``time`` (s)."""
@@ -150,7 +151,7 @@ class Drive(_Rebuilt):
             speed = (self.positions[1] - self.positions[0]) / (self.times[1] - self.times[0])
             return np.asarray(self.positions[0] + speed * (t - self.times[0]))
         piece = self._piece(t)
-        return self.positions[piece] + self._velocities[piece] * (t - self.times[piece])
+        return self.positions[piece] + self.velocities[piece] * (t - self.times[piece])
 
     @property
     def breakpoints(self) -> Array:
@@ -160,7 +161,7 @@ class Drive(_Rebuilt):
     @property
     def speed(self) -> float:
         """The speed at which the drive moves when it moves: the median over time of its moving pieces, m/s."""
-        lengths, speeds = np.diff(self.times), np.abs(self._velocities)
+        lengths, speeds = np.diff(self.times), np.abs(self.velocities)
         moving = speeds > 0.05 * speeds.max(initial=0.0)
         if not moving.any():
             return 0.0
@@ -175,7 +176,7 @@ class Drive(_Rebuilt):
             apart: pieces whose speeds are closer than this factor count as one speed, their mean over time.
             share: of the time.
         """
-        lengths, speeds = np.diff(self.times), np.abs(self._velocities)
+        lengths, speeds = np.diff(self.times), np.abs(self.velocities)
         moving = np.flatnonzero(speeds > 0.05 * self.speed)
         moving = moving[np.argsort(speeds[moving])]
         edges = np.flatnonzero(speeds[moving][1:] > apart * speeds[moving][:-1]) + 1
@@ -187,7 +188,7 @@ class Drive(_Rebuilt):
         limit = fraction * self.speed
         if limit == 0:
             return [(start, stop)]
-        slow = np.abs(self._velocities) < limit
+        slow = np.abs(self.velocities) < limit
         edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))
         found = []
         for first, last in edges.reshape(-1, 2):

@@ -38,12 +38,11 @@ def campaign_text(
                 count += "".join(f", {key} = {_toml(value)}" for key, value in slow.items() if value)
             lines.append(f'{name} = {{ column = "{name}", unit = "{unit}"{count} }}')
         if trace.drive is not None:
-            times, positions = trace.drive.times, trace.drive.positions
-            speeds = (positions[1:] - positions[:-1]) / (times[1:] - times[:-1])
+            speeds = trace.drive.velocities
             if len(speeds) == 1:
                 lines.append(f"drive_velocity = {float(speeds[0])!r}")
             else:
-                pieces = zip(times[1:].tolist(), speeds.tolist(), strict=True)
+                pieces = zip(trace.drive.times[1:].tolist(), speeds.tolist(), strict=True)
                 lines.append(f"drive = [{', '.join(f'{{ until = {t!r}, velocity = {v!r} }}' for t, v in pieces)}]")
         lines.append(f"virgin = {_toml(trace.virgin)}")
         if trace.role:

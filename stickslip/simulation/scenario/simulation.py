@@ -64,7 +64,7 @@ def record(scenario: Scenario, progress: Tell | None = None) -> Recording:
     """`simulate` without making a data set of it; arguments and errors as there."""
     setup = build(scenario)
     file = scenario.file
-    sliding = steady_sliding(file.block, file.weakening, setup.contact.strength, setup.motion.speed)
+    sliding = steady_sliding(file.block, file.weakening, setup.contact.strength, setup.motion.fastest)
     with telling("simulating", progress) as tell:
         trajectory, events, end = _run(scenario, setup, sliding, tell)
     samples = math.floor(end * file.output.sampling_rate) + 1
@@ -112,7 +112,7 @@ def _run(scenario: Scenario, setup: Setup, sliding: Sliding, tell: Tell) -> tupl
 def _looks(scenario: Scenario, setup: Setup, sliding: Sliding) -> list[float]:
     """Times at which a run that stops after so many slips is looked at; the last is where it is given up."""
     file = scenario.file
-    speed = setup.motion.speed
+    speed = setup.motion.fastest
     stiffness = file.block.spring_stiffness
     loading = (setup.contact.strength / stiffness + setup.contact.u_max) / speed
     drop = (1.0 - file.weakening.ratio) * setup.contact.strength
@@ -230,7 +230,7 @@ def _verdict(scenario: Scenario, setup: Setup, trajectory: Trajectory, events: E
         return text
     if sliding.stable:
         return f"no slip event, the block slides{beyond}: {sliding.reason}"
-    speed = setup.motion.speed
+    speed = setup.motion.fastest
     if speed > 0:
         loading = (setup.contact.strength / scenario.file.block.spring_stiffness + setup.contact.u_max) / speed
         if end < 1.2 * loading:
