@@ -123,16 +123,17 @@ def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
 
 def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str, Any]:
     from ..show.simulated import series_numbers, write_series
-    from ..simulation.scenario.series import scenarios_of, simulate_series, summary
+    from ..simulation.scenario import simulate as one
+    from ..simulation.scenario.series import scenarios_of, summary
 
     members = scenarios_of(scenario, sweep)
     done: list[xarray.Dataset] = []
     try:
-        for data in simulate_series(members):
-            done.append(data)
+        for value, member in members:
+            done.append(one(member))
             if sys.stderr.isatty():
-                value = f"{sweep.key} = {members[len(done) - 1][0]:.4g}"
-                print(f"{len(done)} of {len(members)}: {value}: {data.attrs['verdict']}", file=sys.stderr)
+                verdict = done[-1].attrs["verdict"]
+                print(f"{len(done)} of {len(members)}: {sweep.key} = {value:.4g}: {verdict}", file=sys.stderr)
     except KeyboardInterrupt:
         if run is None or not done:
             raise

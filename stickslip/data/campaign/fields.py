@@ -80,14 +80,11 @@ def _unmeasured(value: dict[str, Any], single: Callable[[Any], float]) -> Unmeas
             raise InputError(f"unknown key '{key}' of an unmeasured quantity", hint=nearest(str(key), names))
     absent = [name for name in names if name not in value]
     if absent:
-        raise InputError(
-            f"an unmeasured quantity lacks '{absent[0]}'", allowed='{ guess = "...", lower = "...", upper = "..." }'
-        )
+        allowed = '{ guess = "...", lower = "...", upper = "..." }'
+        raise InputError(f"an unmeasured quantity lacks '{absent[0]}'", allowed=allowed)
     guess, lower, upper = (single(value[name]) for name in names)
     if not lower < upper or not lower <= guess <= upper:
-        raise InputError(
-            "the guess of an unmeasured quantity must lie between its bounds",
-            value=f"guess {guess:g}, lower {lower:g}, upper {upper:g}",
-            allowed="lower <= guess <= upper, lower < upper",
-        )
+        what = "the guess of an unmeasured quantity must lie between its bounds"
+        value = f"guess {guess:g}, lower {lower:g}, upper {upper:g}"
+        raise InputError(what, value=value, allowed="lower <= guess <= upper, lower < upper")
     return Unmeasured(guess, lower, upper)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,6 @@ from .events import UNITS
 from .load import Scenario
 from .overrides import is_bare, sweep_values
 from .schema import SweepTable
-from .simulation import simulate
 
 if TYPE_CHECKING:
     import xarray
@@ -55,12 +54,6 @@ def scenarios_of(scenario: Scenario, sweep: SweepTable) -> list[tuple[float, Sce
 
 
 _INTEGERS = {"springs", "bins", "contacts", "seed", "lines", "events", "counter_steps"}
-
-
-def simulate_series(runs: list[tuple[float, Scenario]]) -> Iterator[xarray.Dataset]:
-    """The data set of every run, one after the other."""
-    for _, scenario in runs:
-        yield simulate(scenario)
 
 
 def summary(
