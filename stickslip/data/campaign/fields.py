@@ -85,6 +85,6 @@ def _unmeasured(value: dict[str, Any], single: Callable[[Any], float]) -> Unmeas
     guess, lower, upper = (single(value[name]) for name in names)
     if not lower < upper or not lower <= guess <= upper:
         what = "the guess of an unmeasured quantity must lie between its bounds"
-        value = f"guess {guess:g}, lower {lower:g}, upper {upper:g}"
-        raise InputError(what, value=value, allowed="lower <= guess <= upper, lower < upper")
+        written = f"guess {guess:g}, lower {lower:g}, upper {upper:g}"
+        raise InputError(what, value=written, allowed="lower <= guess <= upper, lower < upper")
     return Unmeasured(guess, lower, upper)
