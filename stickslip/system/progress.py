@@ -6,7 +6,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from html import escape
 
@@ -175,27 +175,25 @@ _shown: ContextVar[Callable[[float], None] | None] = ContextVar("shown", default
 
 
 @contextmanager
-def cancellable(asked: Callable[[], bool]) -> Iterator[None]:
+def _within(variable: ContextVar, value: object) -> Iterator[None]:
+    before = variable.set(value)
+    try:
+        yield
+    finally:
+        variable.reset(before)
+
+
+def cancellable(asked: Callable[[], bool]) -> AbstractContextManager[None]:
     """Within it :func:`breathe` raises :class:`Cancelled` once ``asked`` is true."""
-    before = _asked.set(asked)
-    try:
-        yield
-    finally:
-        _asked.reset(before)
+    return _within(_asked, asked)
 
 
-@contextmanager
-def showing(show: Callable[[float], None]) -> Iterator[None]:
+def showing(show: Callable[[float], None]) -> AbstractContextManager[None]:
     """Within it ``show`` is told which share (0 to 1) of the work is done."""
-    before = _shown.set(show)
-    try:
-        yield
-    finally:
-        _shown.reset(before)
+    return _within(_shown, show)
 
 
-@contextmanager
-def portion(low: float, high: float, tell: Callable[[float], None] | None = None) -> Iterator[None]:
+def portion(low: float, high: float, tell: Callable[[float], None] | None = None) -> AbstractContextManager[None]:
     """Within it shares count from ``low`` to ``high`` of the work around it, whose part this is; ``tell`` hears too."""
     shows = [show for show in (_shown.get(), tell) if show is not None]
 
@@ -203,8 +201,7 @@ def portion(low: float, high: float, tell: Callable[[float], None] | None = None
         for each in shows:
             each(low + (high - low) * share)
 
-    with showing(show):
-        yield
+    return showing(show)
 
 
 def breathe(share: float | None = None) -> None:

@@ -248,12 +248,9 @@ class _Assembly:
         named = ", ".join(f"{name} (column '{getattr(self.entry, name).column}')" for name in blank)
         what = f"{named} holds no number at all" if blank else "fewer than two samples can be used"
         seen = "; ".join(f"{r.count} of {r.where.split(',')[0]} are not a number" for r in lost)
-        return InputError(
-            f"{what} in {self.entry.file}",
-            file=self.campaign.path,
-            key=f"{self.place}.{blank[0]}" if blank else self.place,
-            hint=f"is it the right column? {seen}".strip(),
-        )
+        key = f"{self.place}.{blank[0]}" if blank else self.place
+        hint = f"is it the right column? {seen}".strip()
+        return InputError(f"{what} in {self.entry.file}", file=self.campaign.path, key=key, hint=hint)
 
     def _mend(
         self, time: Array, data: dict[str, Array], channels: dict[str, Channel]
