@@ -45,20 +45,14 @@ def check_gradients(rig: Rig, report: Callable[[int, str], None]) -> None:
             names = [n for n in rig.at(index) if where != "at the null" or n == effect.amplitude]
             exact = []
             for tolerance in (LOOSE, TIGHT):
-                times, count = _sequence(rig, p, tolerance)
-                exact.append(_check_point(rig, index, p, names, (times, count, tolerance), where, report))
+                run = rig.run(p, DRIVE, tolerance)
+                steps = np.append(0.0, np.asarray(run.steps.t)), int(run.accepted), tolerance  # the solver's own
+                exact.append(_check_point(rig, index, p, names, steps, where, report))
             apart = np.abs(exact[0] - exact[1]) - COARSE
             for row, name in enumerate(names):
                 if np.any(apart[row] > BETWEEN * np.max(np.abs(exact[1][row]))):
                     seen = ", ".join(_short(slopes[row]) for slopes in exact)
                     report(index, f"derivative in {name} {where} does not settle as the tolerance is lowered: {seen}")
-
-
-def _sequence(rig: Rig, p: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
-    """The solver's own step times (s) at a parameter vector, padded, and their number."""
-    outcome = rig.run(p, DRIVE, tolerance)
-    count = int(outcome.accepted)
-    return np.append(0.0, np.asarray(outcome.steps.t)), count
 
 
 def _check_point(
@@ -70,7 +64,10 @@ def _check_point(
     where: str,
     report: Callable[[int, str], None],
 ) -> np.ndarray:
-    """Compare at one point; the derivatives per range in units of the scales, shape (names, features)."""
+    """Compare at one point; the derivatives per range in units of the scales, shape (names, features).
+
+    ``steps`` are their times (s), padded, how many there are, and their tolerance.
+    """
     known, places = specs(rig.effects[index]), rig.at(index)
     slopes, agreement = _slopes(rig, p, [places[n] for n in names], steps)
     all_exact = []
