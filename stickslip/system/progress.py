@@ -27,7 +27,7 @@ def paced(
     show: Callable[[str, float | None, float, float | None], None],
     least: float = 0.0,
     every: float = 0.0,
-    clock: Callable[[], float] = time.monotonic,
+    clock: Callable[[], float] | None = None,
 ) -> Tell:
     """Tells of long work now and then.
 
@@ -35,8 +35,9 @@ def paced(
         show: called with the text, the share that is done, the seconds since the beginning and those left of the stage.
         least: seconds from the beginning to the first word.
         every: seconds between two.
-        clock: gives the time (s).
+        clock: gives the time (s); default the one of the system that never goes back.
     """
+    clock = clock or time.monotonic
     began = since = clock()  # of the whole work, and of the stage: a new one begins where the share falls
     first = before = 0.0  # shares of the stage
     last = -math.inf
