@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 _TIED = 0.1  # spellings hardly less alike than the closest are named with it
 
@@ -44,19 +45,17 @@ class InputError(StickslipError):
 
     def at(self, *, file: str | Path | None = None, key: str | None = None) -> InputError:
         """The same error with the place filled in where it was not known yet."""
-        return type(self)(
-            self.what,
-            file=self.file or file,
-            key=self.key or key,
-            value=self.value,
-            allowed=self.allowed,
-            hint=self.hint,
-        )
+        return self.but(file=self.file or file, key=self.key or key)
 
     def with_hint(self, first: str) -> InputError:
         """The same error with a further line on how to fix it, before the others."""
-        hint = "\n  ".join(line for line in (first, self.hint) if line)
-        return type(self)(self.what, file=self.file, key=self.key, value=self.value, allowed=self.allowed, hint=hint)
+        return self.but(hint="\n  ".join(line for line in (first, self.hint) if line))
+
+    def but(self, **parts: Any) -> InputError:
+        """The same error with some of its parts changed."""
+        names = ("what", "file", "key", "value", "allowed", "hint")
+        own = {name: getattr(self, name) for name in names} | parts
+        return type(self)(own.pop("what"), **own)
 
     def __str__(self) -> str:
         where = ": ".join(str(p) for p in (self.file, self.key) if p)

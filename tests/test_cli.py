@@ -255,9 +255,9 @@ def test_interrupting_a_run_leaves_nothing(scenario, capsys, monkeypatch):
 
 
 def test_interrupting_a_series_keeps_what_is_finished(scenario, capsys, monkeypatch):
-    import stickslip.simulation.scenario.series as series
+    from stickslip.simulation import scenario as simulation
 
-    real, calls = series.simulate, []
+    real, calls = simulation.simulate, []
 
     def second_time(*args, **kwargs):
         calls.append(1)
@@ -265,7 +265,7 @@ def test_interrupting_a_series_keeps_what_is_finished(scenario, capsys, monkeypa
             raise KeyboardInterrupt
         return real(*args, **kwargs)
 
-    monkeypatch.setattr(series, "simulate", second_time)
+    monkeypatch.setattr(simulation, "simulate", second_time)
     assert run(["simulate", scenario, "--out", "out", "--sweep", "contact.p=2:4:3"]) == 130
     result = json.loads(Path("out/result.json").read_text())
     assert len(result["runs"]) == 1

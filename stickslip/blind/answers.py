@@ -12,12 +12,8 @@ from ..system.runstore import RESULT
 from .one_case import failures, is_done
 
 KINDS = ("complete", "missing", "ambiguous", "unknown")
-LARGEST_SET = 3
 # what campaigns of several velocities and holds cannot be expected to tell apart
-CLASSES = (
-    ("sensor-drift", "sensor-high-pass"),
-    ("sensor-low-pass", "residual-load"),
-)
+CLASSES = (("sensor-drift", "sensor-high-pass"), ("sensor-low-pass", "residual-load"))
 
 
 @dataclass(frozen=True)
@@ -47,6 +43,11 @@ class Answer:
     seconds: float | None = None
     hashes: frozenset[str] = frozenset()
     forms: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+    @property
+    def told(self) -> frozenset[str]:
+        """All effects that it names or that come into question."""
+        return frozenset((*self.named, *self.set))
 
 
 def read_answer(runs: Path, case: str) -> Answer:
@@ -87,33 +88,3 @@ def parse(result: Mapping[str, Any]) -> Answer:
 def class_of(tag: str) -> str:
     """The class of effects an effect belongs to: itself, or those it is usually confused with."""
     return next((" / ".join(group) for group in CLASSES if tag in group), tag)
-
-
-def is_exact(kind: str, truth: tuple[str, ...], answer: Answer) -> bool:
-    """Whether the answer is the truth: just these effects, nothing missing, or nothing known explains it."""
-    if kind == "nothing":
-        return answer.kind == "complete"
-    if kind == "outside":
-        return answer.kind == "unknown"
-    return answer.kind == "missing" and len(answer.named) == len(truth) and set(answer.named) == set(truth)
-
-
-def is_right(kind: str, truth: tuple[str, ...], answer: Answer) -> bool:
-    """Whether the answer is exact, or a set of at most three effects that holds the whole truth."""
-    if is_exact(kind, truth, answer):
-        return True
-    return (
-        kind in ("one", "two")
-        and answer.kind == "ambiguous"
-        and len({*answer.named, *answer.set}) <= LARGEST_SET
-        and set(truth) <= {*answer.named, *answer.set}
-    )
-
-
-def is_class_right(kind: str, truth: tuple[str, ...], answer: Answer) -> bool:
-    """Whether the answer is right, or names effects of just the classes that are missing."""
-    if is_right(kind, truth, answer):
-        return True
-    if kind not in ("one", "two") or answer.kind not in ("missing", "ambiguous"):
-        return False
-    return {class_of(tag) for tag in (*answer.named, *answer.set)} == {class_of(tag) for tag in truth}

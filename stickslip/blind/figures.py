@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from .answers import KINDS as ANSWERS
 from .marks import CIRCUMSTANCES, Marked, rate
 from .sizes import Size
 
@@ -54,7 +55,7 @@ def figures(marked: Sequence[Marked]) -> dict[str, Any]:
         },
         "heldout": {kind: _heldout(cases) for kind, cases in {**of, "right": _explained(marked)}.items()},
         "calibration": _calibration(marked),
-        "by_amplitude": [_bin(low, high, hidden, of["outside"]) for low, high in _edges()],
+        "by_amplitude": [_bin(low, high, hidden, of["outside"]) for low, high in itertools.pairwise(BINS)],
         "confusion": _confusion(marked),
         "aims": _aims(of["nothing"], hidden, marked),
         "list": [_line(m) for m in marked],
@@ -128,20 +129,13 @@ def _calibration(marked: Sequence[Marked]) -> dict[str, Any]:
         here = [m for c, m in stated if low <= c < high or (high == 1.0 and c == 1.0)]
         reliability.append({"from": low, "to": high, **_confidence(here)})
     return {
-        "by_verdict": {
-            kind: rate(m.right for m in marked if m.answer.kind == kind)
-            for kind in ("complete", "missing", "ambiguous", "unknown")
-        },
+        "by_verdict": {kind: rate(m.right for m in marked if m.answer.kind == kind) for kind in ANSWERS},
         "within_1_std": {"expected": 0.683, **rate(ok for s in sizes if (ok := s.within(1.0)) is not None)},
         "within_2_std": {"expected": 0.954, **rate(ok for s in sizes if (ok := s.within(2.0)) is not None)},
         "brier": _confidence(marked)["brier"],
         "nothing": _confidence([m for m in marked if m.kind == "nothing"]),
         "reliability": reliability,
     }
-
-
-def _edges() -> list[tuple[float, float]]:
-    return list(itertools.pairwise(BINS))
 
 
 def _inside(multiple: float | None, low: float, high: float) -> bool:

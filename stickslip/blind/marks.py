@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from .answers import Answer, is_class_right, is_exact, is_right
+from .answers import Answer, class_of
 from .sizes import Size, compared
 
 LEVEL = 0.95
+LARGEST_SET = 3
 CIRCUMSTANCES = ("spring_known", "virgin", "new_lines")
 
 
@@ -40,15 +41,22 @@ class Marked:
 
     @property
     def exact(self) -> bool:
-        return is_exact(self.kind, self.tags, self.answer)
+        """Whether the answer is the truth: just these effects, nothing missing, or nothing known explains it."""
+        if self.kind in ("nothing", "outside"):
+            return self.answer.kind == {"nothing": "complete", "outside": "unknown"}[self.kind]
+        return self.answer.kind == "missing" and sorted(self.answer.named) == sorted(self.tags)
 
     @property
     def right(self) -> bool:
-        return is_right(self.kind, self.tags, self.answer)
+        """Whether the answer is exact, or a set of at most three effects that holds the whole truth."""
+        in_set = self.answer.kind == "ambiguous" and set(self.tags) <= self.answer.told
+        return self.exact or (self.kind in ("one", "two") and in_set and len(self.answer.told) <= LARGEST_SET)
 
     @property
     def class_right(self) -> bool:
-        return is_class_right(self.kind, self.tags, self.answer)
+        """Whether the answer is right, or names effects of just the classes that are missing."""
+        named = self.kind in ("one", "two") and self.answer.kind in ("missing", "ambiguous")
+        return self.right or (named and set(map(class_of, self.answer.told)) == set(map(class_of, self.tags)))
 
     @property
     def alarm(self) -> bool:
@@ -58,13 +66,13 @@ class Marked:
     @property
     def names(self) -> bool:
         """Whether any effect is named, be it on the way to an ``unknown``."""
-        return bool(self.answer.named or self.answer.set)
+        return bool(self.answer.told)
 
     @property
     def claim_holds(self) -> bool:
         """Whether that is so which a confidence is stated of: of a set, that it and the names hold what is hidden."""
         if self.answer.kind == "ambiguous":
-            return bool(self.tags) and set(self.tags) <= {*self.answer.named, *self.answer.set}
+            return bool(self.tags) and set(self.tags) <= self.answer.told
         return self.right
 
     @property

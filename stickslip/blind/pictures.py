@@ -25,14 +25,8 @@ def confusion_figure(score: Mapping[str, Any]) -> Figure:
     size = 2.6 + 0.27 * len(rows)
     made = Figure(figsize=(4.0 + 0.3 * max(len(columns), 12), 3.4 + size), layout="constrained")
     upper, lower = made.subplots(2, 1, height_ratios=(size, 2.0))
-    _matrix(
-        upper,
-        names,
-        rows,
-        columns,
-        partial(_right_name, _outside(score)),
-        "What was hidden (one effect, or none) and what was named",
-    )
+    is_right = partial(_right_name, _outside(score))
+    _matrix(upper, names, rows, columns, is_right, "What was hidden (one effect, or none) and what was named")
     kinds = score["confusion"]["kinds"]
     _matrix(lower, kinds, list(kinds), list(VERDICTS), _right_kind, "What was hidden and what was answered")
     return made

@@ -96,7 +96,8 @@ def run_challenge(
             with cluster(scheduler, workers) as client:
                 there = Workers(client, note)
                 if note is not None:
-                    note(f"{len(waiting)} of {len(wanted)} cases to do, {_workers(there.number)}")
+                    workers_there = f"{there.number} worker{'' if there.number == 1 else 's'}"
+                    note(f"{len(waiting)} of {len(wanted)} cases to do, {workers_there}")
                 _work(client, there, folder, waiting, len(wanted), diagnosis, tell)
             with suppress(OSError):  # who reads the protocol finds it out as well
                 _keep(runs, codes_of(runs, read_protocol(runs), cases))
@@ -108,15 +109,9 @@ def run_challenge(
 def _known(only: Sequence[str], cases: Sequence[str], folder: Path) -> list[str]:
     for name in only:
         if name not in cases:
-            raise InputError(
-                "no such case", file=folder, value=name, allowed=f"{cases[0]} to {cases[-1]}",
-                hint="name the cases as the folder 'cases' does, with commas between them",
-            )  # fmt: skip
+            hint = "name the cases as the folder 'cases' does, with commas between them"
+            raise InputError("no such case", file=folder, value=name, allowed=f"{cases[0]} to {cases[-1]}", hint=hint)
     return list(dict.fromkeys(only))
-
-
-def _workers(number: int) -> str:
-    return f"{number} worker{'' if number == 1 else 's'}"
 
 
 def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:

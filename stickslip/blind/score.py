@@ -39,10 +39,8 @@ def score_challenge(folder: str | Path, *, expected: str | None = None) -> dict[
     for name in sorted(cases):
         answer = read_answer(folder / RUNS, name)
         if answer.kind not in ("failed", "not run") and answer.hashes != case_hashes(seal, name):
-            raise SealError(
-                "the result is of other files than those that were sealed", file=folder / RUNS / name,
-                hint="remove this folder and run the challenge again",
-            )  # fmt: skip
+            what = "the result is of other files than those that were sealed"
+            raise SealError(what, file=folder / RUNS / name, hint="remove this folder and run the challenge again")
         marked.append(mark(cases[name], answer, len(failures(folder / RUNS, name))))
     protocol["codes"] = codes_of(folder / RUNS, protocol, sorted(cases))
     head = {"schema": 1, "seed": truth["seed"], "seal": digest(folder), "protocol": protocol}

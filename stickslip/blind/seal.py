@@ -77,11 +77,8 @@ def check_seal(folder: Path, *, truth: bool = True, expected: str | None = None)
             broken.append(f"{name} was changed")
     if broken:
         more = f" and {len(broken) - 3} more" if len(broken) > 3 else ""
-        raise SealError(
-            f"the seal is broken: {', '.join(broken[:3])}{more}",
-            file=folder,
-            hint="a score of altered cases means nothing; make the challenge again from its seed",
-        )
+        hint = "a score of altered cases means nothing; make the challenge again from its seed"
+        raise SealError(f"the seal is broken: {', '.join(broken[:3])}{more}", file=folder, hint=hint)
     return seal
 
 

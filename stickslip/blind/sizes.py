@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
 from typing import Any
@@ -99,19 +98,10 @@ def compared(effects: list[dict[str, Any]], answer: Answer) -> list[Size]:
         if answer.kind != "missing" or tag not in answer.named:
             continue
         scale = factor(tag, effect["form"], answer.forms.get(tag, {}).get("form"))
-        found = _parameter(answer.parameters, tag)
+        law = catalogue.get(tag)
+        found = answer.parameters.get(f"{tag}.{law.amplitude}")
         if scale is None or found is None or found.get("value") is None:
             continue
-        out.append(
-            Size(
-                tag, effect["own_form"], effect["multiple"], found["value"], found.get("std"),
-                scale * effect["amplitude"], catalogue.get(tag).periodic is not None,
-            )
-        )  # fmt: skip
+        size = found["value"], found.get("std"), scale * effect["amplitude"]
+        out.append(Size(tag, effect["own_form"], effect["multiple"], *size, phased=law.periodic is not None))
     return out
-
-
-def _parameter(parameters: Mapping[str, Mapping[str, Any]], tag: str) -> Mapping[str, Any] | None:
-    from ..physics.effects import catalogue
-
-    return parameters.get(f"{tag}.{catalogue.get(tag).amplitude}")

@@ -98,10 +98,8 @@ class Reference:
             shift = self._shift(setup, [(tag, size * effect.sign, form)])
             if shift is None:
                 break
-            shift = self.white @ shift
-            left.append(float(np.linalg.norm(shift)))
-            explained, *_ = np.linalg.lstsq(self.free, shift, rcond=None)
-            expected = float(np.linalg.norm(shift - self.free @ explained))
+            left.append(float(np.linalg.norm(self.white @ shift)))
+            explained, expected = self._fitted(shift)
             shares = shares - np.clip(explained, -0.2, 0.2)
         if expected is None:
             return None
@@ -111,11 +109,13 @@ class Reference:
     def hidden(self, shares: Mapping[str, float]) -> float:
         """Standard deviations that remain of another rig (shares by which its parameters differ) when it is fitted."""
         shift = self._shift(self._setup(**shares), [])
-        if shift is None:
-            return float("inf")
+        return float("inf") if shift is None else self._fitted(shift)[1]
+
+    def _fitted(self, shift: np.ndarray) -> tuple[np.ndarray, float]:
+        """Shares of rig and lines that explain most of a change of the features, and what then remains of it."""
         shift = self.white @ shift
         explained, *_ = np.linalg.lstsq(self.free, shift, rcond=None)
-        return float(np.linalg.norm(shift - self.free @ explained))
+        return explained, float(np.linalg.norm(shift - self.free @ explained))
 
     def _setup(self, **shares: float) -> Setup:
         setup = draw_setup(np.random.default_rng(self.seed))
@@ -179,5 +179,7 @@ def _at(data: Measurement, run: int, cycle: int) -> Any:
 
 
 if __name__ == "__main__":
-    for (tag, form), amplitude in visible((e.tag, f.name) for e in EFFECTS.values() for f in e.forms).items():
-        print(f'    ("{tag}", "{form}"): {amplitude:.2g},')
+    found = visible((e.tag, f.name) for e in EFFECTS.values() for f in e.forms)
+    for tag in EFFECTS:
+        limits = [f'"{form}": {amplitude:.2g}' for (of, form), amplitude in found.items() if of == tag]
+        print(f'    "{tag}": {{{", ".join(limits)}}},')

@@ -57,12 +57,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted.
     """
-    if arguments is None:
-        keep_interrupts()
-        if isinstance(sys.stdout, io.TextIOWrapper):
-            sys.stdout.reconfigure(errors="replace")  # a terminal that knows no µ
     if arguments is not None:
         return run(arguments)
+    keep_interrupts()
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that knows no µ
     try:
         sys.exit(run(sys.argv[1:]))
     finally:

@@ -47,7 +47,8 @@ def text(result: Mapping[str, Any], variables: Mapping[str, tuple], out: Path | 
     lines = [f"{result['title']}: {len(rows)} trace{'s' * (len(rows) != 1)}", "", *_traces(rows, columns)]
     scales = _scales(rows)
     for i, row in enumerate(rows):
-        lines += ["", *_fold(_heading(row), columns), *_drawing(variables, i, columns), *_events(row, scales, columns)]
+        heading = f"{row['name']}: {row['regime']} ({row['reason']})"
+        lines += ["", *_fold(heading, columns), *_drawing(variables, i, columns), *_events(row, scales, columns)]
         said = [*(f"warning: {w}" for w in row["warnings"]), *(f"read: {w}" for w in row["notes"])]
         said += [f"repaired: {w}" for w in row["repairs"]]
         said += [f"left out: {w}" for w in row["dropped"]]
@@ -68,16 +69,10 @@ def text(result: Mapping[str, Any], variables: Mapping[str, tuple], out: Path | 
             lines.append(heading)
             for line in told:
                 lines += _fold(f"- {line}", columns, "  ")
-    if out is None:
-        lines += [
-            "",
-            *_fold("With --out FOLDER: pictures of every trace, report.html, and all events in result.json.", columns),
-        ]
-    else:
-        lines += [
-            "",
-            *_fold(f"written to {out}: report.html, result.json, arrays.nc and a picture of every trace", columns),
-        ]
+    last = "With --out FOLDER: pictures of every trace, report.html, and all events in result.json."
+    if out is not None:
+        last = f"written to {out}: report.html, result.json, arrays.nc and a picture of every trace"
+    lines += ["", *_fold(last, columns)]
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -85,10 +80,6 @@ def _fold(line: str, columns: int, indent: str = "  ") -> list[str]:
     return textwrap.wrap(
         line, max(columns, 20), subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
     )
-
-
-def _heading(row: Mapping[str, Any]) -> str:
-    return f"{row['name']}: {row['regime']} ({row['reason']})"
 
 
 def _traces(rows: Sequence[Mapping[str, Any]], columns: int) -> list[str]:
@@ -107,13 +98,9 @@ def _traces(rows: Sequence[Mapping[str, Any]], columns: int) -> list[str]:
         ]
         for row in rows
     ]
-    while len(header) > 2 and _wide(header, cells) > columns:
+    while len(header) > 2 and len(_left(header, cells)[0]) > columns:
         header, cells = header[:-1], [row[:-1] for row in cells]
     return _left(header, cells)
-
-
-def _wide(header: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
-    return sum(max(len(r[i]) for r in [header, *rows]) + 2 for i in range(len(header))) - 2
 
 
 def _left(header: list[str], rows: list[list[str]]) -> list[str]:
@@ -197,14 +184,9 @@ def _events(row: Mapping[str, Any], scales_of: Scales, columns: int) -> list[str
     header = [["event", *(head for _, head in shown)], ["", *(scales[key][1] for key, _ in shown)]]
     lines = _right([*header, *body], columns)
     if len(events) > len(kept):
-        at = 2 + len(kept)
-        lines.insert(at, f"... {len(events) - len(kept)} more: --json, or the report of --out")
-    missing = [
-        f"no {name}: {facts['missing']}"
-        for name, facts in (("5-97 % time", features["rise_time"]), ("overshoot", features["overshoot"]),
-                            ("ring-down", features["ring_frequency"]), ("decay", features["decay_time"]))
-        if facts["missing"]
-    ]  # fmt: skip
+        lines.insert(2 + len(kept), f"... {len(events) - len(kept)} more: --json, or the report of --out")
+    names = {"rise_time": "5-97 % time", "overshoot": "overshoot", "ring_frequency": "ring-down", "decay_time": "decay"}
+    missing = [f"no {name}: {why}" for key, name in names.items() if (why := features[key]["missing"])]
     if row["decay_law"]:
         lines += _fold(f"decay of the ring-downs: {row['decay_law']}", columns)
     if "ring" in " ".join(missing):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,7 +88,7 @@ def run(
             only=some,
             retry=retry,
             tell=_tell,
-            note=_note,
+            note=partial(print, file=sys.stderr, flush=True),
         )
     except KeyboardInterrupt:
         raise KeyboardInterrupt("finished cases are kept; repeat the command to resume") from None
@@ -102,10 +103,6 @@ def _tell(p: Progress) -> None:
     left = f", about {_time(p.left)} left" if p.done < p.total else ""
     message = p.message.splitlines()[0] if p.message else ""
     print(f"{p.done}/{p.total} {p.case} {p.state}: {message} ({p.seconds:.0f} s{left})", file=sys.stderr, flush=True)
-
-
-def _note(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
 
 
 def _time(seconds: float) -> str:

@@ -10,14 +10,7 @@ from . import show
 from .parameters import Force, Json
 
 
-def compare(
-    first: Path,
-    second: Path,
-    *,
-    out: Path | None = None,
-    json: Json = False,
-    force: Force = False,
-) -> int:
+def compare(first: Path, second: Path, *, out: Path | None = None, json: Json = False, force: Force = False) -> int:
     """Two runs side by side: models, verdicts, errors by phase, parameters and their differences.
 
     Parameters
@@ -29,8 +22,7 @@ def compare(
     out:
         Folder for result.json and the picture compare.png.
     """
-    if out is not None:
-        refuse_existing(out, force)
+    refuse_existing(out, force)
     from ..show.report.compare import comparison
 
     found = comparison(first, second)

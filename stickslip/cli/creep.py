@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import Any, Literal
 
 from ..errors import InputError
-from ..system.runstore import open_run, refuse_existing, versions
+from ..system.runstore import open_run, refuse_existing
 from . import show
 from .parameters import Changes, Force, MoreChanges
 
@@ -39,16 +40,13 @@ def creep(
     time:
         Virtual time with the block's own motion (exact) or without it (paper).
     """
-    from ..show.simulated import input_records
+    from ..show.simulated import head
     from .simulate import outside, scenario_arguments
 
     path, changes = scenario_arguments(scenario, more, set)
     if not 2 <= points <= 1_000_000:
         raise InputError("the number of loads is out of range", key="--points", value=points, allowed="2 to 1000000")
-    if out is not None:
-        refuse_existing(out, force)
-    import warnings
-
+    refuse_existing(out, force)
     from ..simulation.scenario import load_scenario, static_creep
 
     loaded = load_scenario(path, changes)
@@ -68,13 +66,8 @@ def creep(
         return 0
     table = loaded.file.contact
     result: dict[str, Any] = {
-        "schema": 1,
+        **head(loaded),
         "kind": "creep",
-        "title": loaded.title,
-        "scenario": loaded.file.model_dump(by_alias=True, exclude_none=True),
-        "changes": [f"{key}={value}" for key, value in loaded.changes],
-        "inputs": input_records(loaded),
-        "versions": versions(),
         "seeds": {"lines": getattr(table, "seed", None)},
         "N": getattr(table, "springs", None),
         "L": getattr(table, "line_length", None),

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..system.progress import EVERY, Stage
+from ..system.progress import EVERY, paced
 from ..system.runstore import json_text
 from .parameters import Candidates, Files, Flag, Force, Jobs, MaxEffects, Several, names
 
@@ -80,21 +80,12 @@ def _teller(clock: Callable[[], float] = time.perf_counter) -> Callable[[str, fl
 
     A stage begins where the share falls. How long it will take follows from the ``clock`` (s) and the share since then.
     """
-    began = clock()
-    last = began - EVERY  # the first word at once
-    stage = Stage(began)
 
-    def tell(text: str, share: float) -> None:
-        nonlocal last
-        now = clock()
-        seconds = stage.left(now, share)
-        if not sys.stderr.isatty() and now - last < EVERY:
-            return
-        last = now
-        left = "" if seconds is None else f", about {seconds:.0f} s left of this stage"
-        print(f"{now - began:6.0f} s  {text} ({100 * share:.0f} %{left})", file=sys.stderr, flush=True)
+    def show(text: str, share: float | None, spent: float, left: float | None) -> None:
+        rest = "" if left is None else f", about {left:.0f} s left of this stage"
+        print(f"{spent:6.0f} s  {text} ({100 * (share or 0.0):.0f} %{rest})", file=sys.stderr, flush=True)
 
-    return tell
+    return paced(show, every=0.0 if sys.stderr.isatty() else EVERY, clock=clock)
 
 
 def _free_table(ladder: list[dict[str, Any]]) -> Any:

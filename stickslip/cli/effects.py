@@ -47,9 +47,8 @@ def effects(
     if picture is not None and tag is None:
         raise InputError("a picture needs a tag", hint="stickslip effects contact-ageing --picture ageing.png")
     if latex and model is None:
-        hint = (
-            "the explanation of an effect holds its LaTeX" if tag else "--model static,inertia,contact-ageing --latex"
-        )
+        hint = "the explanation of an effect holds its LaTeX"
+        hint = hint if tag else "--model static,inertia,contact-ageing --latex"
         raise InputError("--latex belongs to --model", key="--latex", hint=hint)
     if picture is not None:
         _check_picture(picture, force)
@@ -157,19 +156,12 @@ def _check_picture(path: Path, force: bool) -> None:
         raise RunFolderError("the picture exists already", file=path, hint="choose another name, or use --force")
 
 
-def _traces(cls: type[Effect]) -> tuple[xarray.Dataset, xarray.Dataset, dict[str, float]]:
-    """Traces without and with an effect, and the amplitude it was given."""
-    from ..simulation.scenario.demonstration import with_and_without
-
-    return with_and_without(cls)
-
-
 def _sketched(cls: type[Effect]) -> list[str]:
     """Lines that show the spring's force without and with an effect, from just before the first slip, on one scale.
 
     It is the one that the sensor's reading tells, so that an error of the sensor shows as well.
     """
-    from ..simulation.scenario.demonstration import RIG
+    from ..simulation.scenario.demonstration import RIG, with_and_without
     from ._sketch import sketch
 
     def told(data: xarray.Dataset) -> np.ndarray:
@@ -177,7 +169,7 @@ def _sketched(cls: type[Effect]) -> list[str]:
         return (data["spring_force"] + RIG["block"]["spring_stiffness"] * off).values
 
     try:
-        *both, values = _traces(cls)
+        *both, values = with_and_without(cls)
     except StickslipError as error:
         return [f"no picture of it: {error}"]
     begin = 0.95 * min((float(d["onset"][0]) for d in both if d["onset"].size), default=0.0)
@@ -202,8 +194,9 @@ def _given(cls: type[Effect], values: Mapping[str, float]) -> str:
 
 def _draw(cls: type[Effect], path: Path) -> None:
     from ..show.plots import effect_figure, save
+    from ..simulation.scenario.demonstration import with_and_without
 
-    without, with_it, values = _traces(cls)
+    without, with_it, values = with_and_without(cls)
     try:
         save(effect_figure(without, with_it, cls.tag, _given(cls, values)), path)
     except OSError as error:

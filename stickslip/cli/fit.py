@@ -73,8 +73,7 @@ def fit(
     speed = to_si(v_lim, "m/s", key="--v-lim")
     dynamic = {"--add": add, "--profile": profile, "--holdout": holdout}
     _check(model, dynamic, speed)
-    if out is not None:
-        refuse_existing(out, force)
+    refuse_existing(out, force)
     began = clock.perf_counter()
     loaded = load_campaign(campaign, effect)
     if model == "static":

@@ -36,8 +36,7 @@ def forecast(
     """
     from ..objects.campaign import load_campaign
 
-    if out is not None:
-        refuse_existing(out, force)
+    refuse_existing(out, force)
     began = time.perf_counter()
     loaded = load_campaign(campaign)
     with working("forecasting") as tell:

@@ -9,13 +9,7 @@ from ..system.runstore import json_text, refuse_existing
 from .parameters import CampaignFile, Flag, Force
 
 
-def inspect(
-    campaign: CampaignFile,
-    *,
-    out: Path | None = None,
-    json: Flag = False,
-    force: Force = False,
-) -> int:
+def inspect(campaign: CampaignFile, *, out: Path | None = None, json: Flag = False, force: Force = False) -> int:
     """Traces of a campaign, their events, repairs, omissions, and what the data can tell.
 
     Parameters
@@ -27,8 +21,7 @@ def inspect(
     """
     from ..objects.campaign import load_campaign
 
-    if out is not None:
-        refuse_existing(out, force)
+    refuse_existing(out, force)
     began = time.perf_counter()
     found = load_campaign(campaign).inspect()
     seconds = {"seconds": round(time.perf_counter() - began, 3)}

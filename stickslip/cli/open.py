@@ -13,12 +13,7 @@ LOOPBACK = "127.0.0.1"
 
 
 def open(
-    campaign: Path | None = None,
-    *,
-    port: int = 0,
-    browser: bool = True,
-    effect: Files = (),
-    address: str = LOOPBACK,
+    campaign: Path | None = None, *, port: int = 0, browser: bool = True, effect: Files = (), address: str = LOOPBACK
 ) -> int:
     """Open the workbench in the browser: compare, see where the model fails, add an effect, watch the error fall.
 
@@ -51,9 +46,8 @@ def open(
 
     if campaign is None:
         if effect:
-            raise InputError(
-                "an effect of your own is tried on a campaign", key="--effect", hint="name the campaign too"
-            )
+            what = "an effect of your own is tried on a campaign"
+            raise InputError(what, key="--effect", hint="name the campaign too")
         session = Session(offers=tuple(offered(Path())), home=Path().resolve())
     else:
         session = opened(_simulated(campaign) if _is_scenario(campaign) else campaign, effect)

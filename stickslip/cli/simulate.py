@@ -48,8 +48,7 @@ def simulate(
         Of a run folder: drive as this measured run was driven, with its holds.
     """
     path, changes = scenario_arguments(scenario, more, set)
-    if out is not None:
-        refuse_existing(out, force)
+    refuse_existing(out, force)
     from ..show.simulated import head
 
     began = time.perf_counter()
@@ -108,11 +107,8 @@ def outside(scenario: Scenario) -> list[str]:
     """Files that the scenario names and that do not lie in its folder or below: read, but said."""
     home = scenario.folder.resolve()
     files = [part for part in (scenario.file.drive.file, getattr(scenario.file.contact, "file", None)) if part]
-    return [
-        f"{part} lies outside the scenario's folder"
-        for part in files
-        if not (scenario.folder / part).resolve().is_relative_to(home)
-    ]
+    beyond = (part for part in files if not (scenario.folder / part).resolve().is_relative_to(home))
+    return [f"{part} lies outside the scenario's folder" for part in beyond]
 
 
 def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
@@ -127,16 +123,17 @@ def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
 
 def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str, Any]:
     from ..show.simulated import series_numbers, write_series
-    from ..simulation.scenario.series import scenarios_of, simulate_series, summary
+    from ..simulation.scenario import simulate as one
+    from ..simulation.scenario.series import scenarios_of, summary
 
     members = scenarios_of(scenario, sweep)
     done: list[xarray.Dataset] = []
     try:
-        for data in simulate_series(members):
-            done.append(data)
+        for value, member in members:
+            done.append(one(member))
             if sys.stderr.isatty():
-                value = f"{sweep.key} = {members[len(done) - 1][0]:.4g}"
-                print(f"{len(done)} of {len(members)}: {value}: {data.attrs['verdict']}", file=sys.stderr)
+                verdict = done[-1].attrs["verdict"]
+                print(f"{len(done)} of {len(members)}: {sweep.key} = {value:.4g}: {verdict}", file=sys.stderr)
     except KeyboardInterrupt:
         if run is None or not done:
             raise

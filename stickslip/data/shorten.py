@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .segment import Segmentation
-from .trace import SIGNALS, Trace
+from .trace import Trace
 
 
 def first_cycles(trace: Trace, found: Segmentation, most: int) -> tuple[Trace, Segmentation]:
@@ -17,9 +17,8 @@ def first_cycles(trace: Trace, found: Segmentation, most: int) -> tuple[Trace, S
     if len(events) <= most:
         return trace, found
     end = int(np.searchsorted(trace.time, 0.5 * (events[most - 1].t_arrest + events[most].t_onset)))
-    columns = {name: getattr(trace, name) for name in ("time", *SIGNALS, "drive_position", "normal_load")}
-    short = {name: values[:end] for name, values in columns.items() if values is not None}
-    return trace.replace(**short), replace(found, events=events[:most])
+    short = {name: values[:end] for name, values in trace.channels.items()}
+    return trace.replace(time=trace.time[:end], **short), replace(found, events=events[:most])
 
 
 def shares(counts: Sequence[int], most: int) -> list[int]:

@@ -18,6 +18,7 @@ from .resolution import estimate_resolution, noise_level
 
 Array = NDArray[np.float64]
 SIGNALS = {"displacement": "m", "velocity": "m/s", "spring_force": "N"}
+CHANNELS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,8 @@ class Drive(_Rebuilt):
     def __post_init__(self) -> None:
         times, positions = _frozen(self.times, "drive times"), _frozen(self.positions, "drive positions")
         if times.size < 2 or times.shape != positions.shape:
-            raise InputError(
-                "a drive needs at least two times and as many positions", value=(times.size, positions.size)
-            )
+            what = "a drive needs at least two times and as many positions"
+            raise InputError(what, value=(times.size, positions.size))
         if not (np.all(np.isfinite(times)) and np.all(np.isfinite(positions)) and np.all(np.diff(times) > 0)):
             raise InputError("the times of a drive must be finite and increase", hint="check the drive's 'until' times")
         object.__setattr__(self, "times", times)
@@ -132,13 +132,17 @@ class Drive(_Rebuilt):
         level = noise_level(values, resolution or None) if noise is None else noise
         return cls.from_samples(time, values, max(1.5 * resolution, 4 * level, 1e-9 * float(np.ptp(values)), 1e-15))
 
+    @property
+    def velocities(self) -> Array:
+        """Velocity of each piece, m/s, shape (k - 1,)."""
+        return np.diff(self.positions) / np.diff(self.times)
+
     def _piece(self, time: ArrayLike) -> NDArray[np.intp]:
         return np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, self.times.size - 2)
 
     def velocity(self, time: ArrayLike) -> Array:
         """Load-point velocity, m/s, same shape as ``time``; at a breakpoint that of the piece it opens."""
-        speeds = np.diff(self.positions) / np.diff(self.times)
-        return speeds[self._piece(time)]
+        return self.velocities[self._piece(time)]
 
     def position(self, time: ArrayLike) -> Array:
         """Load-point position, m, same shape as ``time`` (s)."""
@@ -147,8 +151,7 @@ class Drive(_Rebuilt):
             speed = (self.positions[1] - self.positions[0]) / (self.times[1] - self.times[0])
             return np.asarray(self.positions[0] + speed * (t - self.times[0]))
         piece = self._piece(t)
-        speeds = np.diff(self.positions) / np.diff(self.times)
-        return self.positions[piece] + speeds[piece] * (t - self.times[piece])
+        return self.positions[piece] + self.velocities[piece] * (t - self.times[piece])
 
     @property
     def breakpoints(self) -> Array:
@@ -158,8 +161,7 @@ class Drive(_Rebuilt):
     @property
     def speed(self) -> float:
         """The speed at which the drive moves when it moves: the median over time of its moving pieces, m/s."""
-        lengths = np.diff(self.times)
-        speeds = np.abs(np.diff(self.positions) / lengths)
+        lengths, speeds = np.diff(self.times), np.abs(self.velocities)
         moving = speeds > 0.05 * speeds.max(initial=0.0)
         if not moving.any():
             return 0.0
@@ -174,8 +176,7 @@ class Drive(_Rebuilt):
             apart: pieces whose speeds are closer than this factor count as one speed, their mean over time.
             share: of the time.
         """
-        lengths = np.diff(self.times)
-        speeds = np.abs(np.diff(self.positions) / lengths)
+        lengths, speeds = np.diff(self.times), np.abs(self.velocities)
         moving = np.flatnonzero(speeds > 0.05 * self.speed)
         moving = moving[np.argsort(speeds[moving])]
         edges = np.flatnonzero(speeds[moving][1:] > apart * speeds[moving][:-1]) + 1
@@ -187,7 +188,7 @@ class Drive(_Rebuilt):
         limit = fraction * self.speed
         if limit == 0:
             return [(start, stop)]
-        slow = np.abs(np.diff(self.positions) / np.diff(self.times)) < limit
+        slow = np.abs(self.velocities) < limit
         edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))
         found = []
         for first, last in edges.reshape(-1, 2):
@@ -271,10 +272,7 @@ class Trace(Shown, _Rebuilt):
         object.__setattr__(self, "time", time)
         if all(getattr(self, name) is None for name in SIGNALS):
             raise InputError(f"trace '{self.name}' has no signal", allowed="displacement, velocity or spring_force")
-        for name in (*SIGNALS, "drive_position", "normal_load"):
-            values = getattr(self, name)
-            if values is None:
-                continue
+        for name, values in self.channels.items():
             array = _frozen(values, f"{self.name}: {name}")
             if array.shape != time.shape:
                 raise InputError(f"trace '{self.name}': {name} has {array.size} samples, time has {time.size}")
@@ -310,16 +308,13 @@ class Trace(Shown, _Rebuilt):
                 ways of giving the drive, a unit that cannot be read.
         """
         given = {"displacement": displacement, "velocity": velocity, "spring_force": spring_force}
-        si = {**SIGNALS, "drive_position": "m"}
         arrays: dict[str, Any] = {
-            key: _si_array(v, si[key], f"{name}: {key}") for key, v in given.items() if v is not None
+            key: _si_array(v, SIGNALS[key], f"{name}: {key}") for key, v in given.items() if v is not None
         }
         t = _si_array(time, "s", f"{name}: time")
         if sum(way is not None for way in (drive_velocity, drive_position, drive)) > 1:
-            raise InputError(
-                f"trace '{name}': the drive is given more than once",
-                hint="keep one of drive_velocity, drive_position, drive",
-            )
+            hint = "keep one of drive_velocity, drive_position, drive"
+            raise InputError(f"trace '{name}': the drive is given more than once", hint=hint)
         if not arrays:
             raise InputError(f"trace '{name}' has no signal", allowed="displacement, velocity or spring_force")
         leading = next(key for key in SIGNALS if key in arrays)
@@ -352,6 +347,11 @@ class Trace(Shown, _Rebuilt):
     def leading(self) -> str:
         """Name of the signal that is measured best known to tell events: displacement, else velocity, else force."""
         return next(name for name in SIGNALS if getattr(self, name) is not None)
+
+    @property
+    def channels(self) -> dict[str, Array]:
+        """Every channel that is there, by name, SI, each of shape (n,)."""
+        return {name: values for name in CHANNELS if (values := getattr(self, name)) is not None}
 
     @property
     def signal(self) -> Array:
@@ -389,11 +389,10 @@ class Trace(Shown, _Rebuilt):
             "contact": "virgin" if self.virgin else None,
             "role": self.role,
         }
-        ranges = {}
-        for name, unit in (*SIGNALS.items(), ("drive_position", "m"), ("normal_load", "N")):
-            values = getattr(self, name)
-            if values is not None:
-                ranges[name] = f"{shown(float(values.min()), unit)} to {shown(float(values.max()), unit)}"
+        ranges = {
+            name: " to ".join(shown(float(end), CHANNELS[name]) for end in (values.min(), values.max()))
+            for name, values in self.channels.items()
+        }
         return [facts(what), facts(ranges), *map(str, self.repairs), *self.warnings]
 
 

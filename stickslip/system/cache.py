@@ -15,11 +15,6 @@ from typing import Any
 
 OFF = "STICKSLIP_NO_CACHE"
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"
-_SETTINGS = {
-    "JAX_COMPILATION_CACHE_DIR": "",
-    "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
-    "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
-}
 
 
 def keep_compiled() -> Path | None:
@@ -40,15 +35,15 @@ def keep_compiled() -> Path | None:
     folder = _folder()
     if folder is None:
         return None
-    settings = {**_SETTINGS, "JAX_COMPILATION_CACHE_DIR": str(folder)}
+    settings = {
+        "jax_compilation_cache_dir": str(folder),
+        "jax_persistent_cache_min_compile_time_secs": 0.0,
+        "jax_persistent_cache_min_entry_size_bytes": -1,
+    }
     for name, value in settings.items():
-        os.environ.setdefault(name, value)
-    if "jax" in sys.modules:
-        import jax
-
-        jax.config.update("jax_compilation_cache_dir", str(folder))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-        jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+        os.environ.setdefault(name.upper(), str(value))
+        if "jax" in sys.modules:
+            sys.modules["jax"].config.update(name, value)
     heal(folder)
     return folder
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from html import escape
 
@@ -22,22 +23,38 @@ def silent(text: str, share: float | None = None) -> None:
     """Progress that nobody is told."""
 
 
-class Stage:
-    """How long a stage of long work may still take; a new one begins where the share that is done falls.
+def paced(
+    show: Callable[[str, float | None, float, float | None], None],
+    least: float = 0.0,
+    every: float = 0.0,
+    clock: Callable[[], float] | None = None,
+) -> Tell:
+    """Tells of long work now and then.
 
     Args:
-        began: time (s) at which the first one did.
+        show: called with the text, the share that is done, the seconds since the beginning and those left of the stage.
+        least: seconds from the beginning to the first word.
+        every: seconds between two.
+        clock: gives the time (s); default the one of the system that never goes back.
     """
+    clock = clock or time.monotonic
+    began = since = clock()  # of the whole work, and of the stage: a new one begins where the share falls
+    first = before = 0.0  # shares of the stage
+    last = -math.inf
 
-    def __init__(self, began: float) -> None:
-        self._began, self._first, self._before = began, 0.0, 0.0
+    def tell(text: str, share: float | None = None) -> None:
+        nonlocal since, first, before, last
+        now, left = clock(), None
+        if share is not None:
+            if share < before:
+                since, first = now, share
+            before, done = share, share - first
+            left = (now - since) * (1.0 - share) / done if done > LEAST and share < 1.0 else None
+        if now - began >= least and now - last >= every:
+            last = now
+            show(text, share, now - began, left)
 
-    def left(self, now: float, share: float) -> float | None:
-        """Seconds from ``now`` until the stage is done of which ``share`` (0 to 1) is; None where too little tells."""
-        if share < self._before:
-            self._began, self._first = now, share
-        self._before, done = share, share - self._first
-        return (now - self._began) * (1.0 - share) / done if done > LEAST and share < 1.0 else None
+    return tell
 
 
 @contextmanager
@@ -83,26 +100,20 @@ def _cell(title: str) -> Iterator[Tell]:
     """A bar under the cell of a notebook, taken away when the work is done."""
     from IPython.display import HTML, display
 
-    began = last = time.monotonic()
-    stage, shown = Stage(began), None
+    shown = None
 
-    def tell(text: str, share: float | None = None) -> None:
-        nonlocal last, shown
-        now = time.monotonic()
-        seconds = None if share is None else stage.left(now, share)
-        if now - began < PATIENCE or now - last < REFRESH:
-            return
-        last = now
-        left = "" if seconds is None else f", {seconds:.0f} s left"
+    def show(text: str, share: float | None, spent: float, left: float | None) -> None:
+        nonlocal shown
+        rest = "" if left is None else f", {left:.0f} s left"
         done = "" if share is None else f' value="{share:.3f}"'
-        page = HTML(f"{escape(title)} <progress{done}></progress> {escape(text)} ({now - began:.0f} s{left})")
+        page = HTML(f"{escape(title)} <progress{done}></progress> {escape(text)} ({spent:.0f} s{rest})")
         if shown is None:
             shown = display(page, display_id=True)
         else:
             shown.update(page)
 
     try:
-        yield tell
+        yield paced(show, PATIENCE, REFRESH)
     finally:
         if shown is not None:
             shown.update(HTML(""))
@@ -129,23 +140,18 @@ def _bar(title: str) -> Iterator[Tell]:
         transient=True,
     )
     task = bar.add_task(title, total=None, text="", left="")
-    began, shown = time.monotonic(), False
-    stage = Stage(began)
+    shown = False
 
-    def tell(text: str, share: float | None = None) -> None:
+    def show(text: str, share: float | None, spent: float, left: float | None) -> None:
         nonlocal shown
-        now = time.monotonic()
-        spent = now - began
         if not shown and spent > PATIENCE:
             bar.start()
             shown = True
-        seconds = None if share is None else stage.left(now, share)
-        left = "" if seconds is None else f"{seconds:.0f} s left"
-        total = 1.0 if share is not None else None
-        bar.update(task, text=text, total=total, completed=share or 0.0, left=left)
+        rest = "" if left is None else f"{left:.0f} s left"
+        bar.update(task, text=text, total=None if share is None else 1.0, completed=share or 0.0, left=rest)
 
     try:
-        yield tell
+        yield paced(show)
     finally:
         if shown:
             bar.stop()
@@ -153,20 +159,12 @@ def _bar(title: str) -> Iterator[Tell]:
 
 def _lines(title: str) -> Tell:
     """Tells by a line on stderr now and then, for a log."""
-    began = last = time.monotonic()
-    stage = Stage(began)
 
-    def tell(text: str, share: float | None = None) -> None:
-        nonlocal last
-        now = time.monotonic()
-        seconds = None if share is None else stage.left(now, share)
-        if now - last < EVERY:
-            return
-        last, spent = now, now - began
-        left = "" if seconds is None else f", about {seconds:.0f} s left of this stage"
-        print(f"{title}: {text} ({spent:.0f} s{left})", file=sys.stderr, flush=True)
+    def show(text: str, share: float | None, spent: float, left: float | None) -> None:
+        rest = "" if left is None else f", about {left:.0f} s left of this stage"
+        print(f"{title}: {text} ({spent:.0f} s{rest})", file=sys.stderr, flush=True)
 
-    return tell
+    return paced(show, EVERY, EVERY)
 
 
 class Cancelled(StickslipError):
@@ -178,27 +176,25 @@ _shown: ContextVar[Callable[[float], None] | None] = ContextVar("shown", default
 
 
 @contextmanager
-def cancellable(asked: Callable[[], bool]) -> Iterator[None]:
+def _within(variable: ContextVar, value: object) -> Iterator[None]:
+    before = variable.set(value)
+    try:
+        yield
+    finally:
+        variable.reset(before)
+
+
+def cancellable(asked: Callable[[], bool]) -> AbstractContextManager[None]:
     """Within it :func:`breathe` raises :class:`Cancelled` once ``asked`` is true."""
-    before = _asked.set(asked)
-    try:
-        yield
-    finally:
-        _asked.reset(before)
+    return _within(_asked, asked)
 
 
-@contextmanager
-def showing(show: Callable[[float], None]) -> Iterator[None]:
+def showing(show: Callable[[float], None]) -> AbstractContextManager[None]:
     """Within it ``show`` is told which share (0 to 1) of the work is done."""
-    before = _shown.set(show)
-    try:
-        yield
-    finally:
-        _shown.reset(before)
+    return _within(_shown, show)
 
 
-@contextmanager
-def portion(low: float, high: float, tell: Callable[[float], None] | None = None) -> Iterator[None]:
+def portion(low: float, high: float, tell: Callable[[float], None] | None = None) -> AbstractContextManager[None]:
     """Within it shares count from ``low`` to ``high`` of the work around it, whose part this is; ``tell`` hears too."""
     shows = [show for show in (_shown.get(), tell) if show is not None]
 
@@ -206,8 +202,7 @@ def portion(low: float, high: float, tell: Callable[[float], None] | None = None
         for each in shows:
             each(low + (high - low) * share)
 
-    with showing(show):
-        yield
+    return showing(show)
 
 
 def breathe(share: float | None = None) -> None:

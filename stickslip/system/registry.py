@@ -51,10 +51,6 @@ class Registry(Generic[T]):
             raise InputError(f"there is no {self.what} '{name}'", hint=nearest(name, everything))
         return everything[name]
 
-    def names(self) -> list[str]:
-        """All names, own ones first."""
-        return [name for name, _ in self.items()]
-
     def items(self) -> Iterator[tuple[str, T]]:
         """Name and thing, own ones first; an own name wins over a plug-in's."""
         if self._plugged is None:
@@ -62,9 +58,11 @@ class Registry(Generic[T]):
         yield from self._own.items()
         yield from ((name, thing) for name, thing in self._plugged.items() if name not in self._own)
 
-    def keys(self) -> list[str]:
-        """The same as `names`, so that ``dict(registry)`` works."""
-        return self.names()
+    def names(self) -> list[str]:
+        """All names, own ones first."""
+        return [name for name, _ in self.items()]
+
+    keys = names  # so that ``dict(registry)`` works
 
     def __getitem__(self, name: str) -> T:
         return self._own[name] if name in self._own else (self._plugged or {})[name]

@@ -100,11 +100,9 @@ def _remove(path: Path) -> None:
 
 def is_of_the_disk(error: BaseException | None) -> bool:
     """Whether an error is there because a disk is full, read-only or shut, and not because of what was to be done."""
-    while error is not None:
-        if isinstance(error, OSError) and error.errno in _DISK:
-            return True
-        error = error.__cause__
-    return False
+    if error is None:
+        return False
+    return (isinstance(error, OSError) and error.errno in _DISK) or is_of_the_disk(error.__cause__)
 
 
 @contextmanager
@@ -167,13 +165,15 @@ def open_run(target: str | Path, *, force: bool = False, resume: bool = False) -
         _rename(partial, target)
 
 
-def refuse_existing(target: Path, force: bool) -> None:
-    """Say early, before long work, that a folder cannot be written.
+def refuse_existing(target: Path | None, force: bool) -> None:
+    """Say early, before long work, that a folder cannot be written (None: that nothing is to be written into one).
 
     Raises:
         RunFolderError: it exists, unless it is an empty folder, or a run folder and ``force``; or nobody can write
             where it would lie.
     """
+    if target is None:
+        return
     target = _itself(target)
     _refuse_existing(target, force)
     home = next((folder for folder in target.absolute().parents if folder.exists()), target)
@@ -181,10 +181,8 @@ def refuse_existing(target: Path, force: bool) -> None:
         with tempfile.TemporaryFile(dir=home):
             pass
     except OSError as error:
-        raise RunFolderError(
-            f"the run folder cannot be written: nothing can be, into {home} ({error.strerror or error})",
-            file=target, hint="choose another --out",
-        ) from error  # fmt: skip
+        what = f"the run folder cannot be written: nothing can be, into {home} ({error.strerror or error})"
+        raise RunFolderError(what, file=target, hint="choose another --out") from error
     if _lock(target).exists():  # of a run that is at work, or of one that was killed
         with _locked(target):
             pass
@@ -201,15 +199,11 @@ def _refuse_existing(target: Path, force: bool) -> None:
     if not target.is_dir():
         raise RunFolderError("the run folder's name is taken by a file", file=target, hint="choose another --out")
     if not (target / RESULT).is_file():
-        raise RunFolderError(
-            "the folder exists and is no run folder (it holds no result.json), so it is left alone",
-            file=target,
-            hint="choose another --out",
-        )
+        what = "the folder exists and is no run folder (it holds no result.json), so it is left alone"
+        raise RunFolderError(what, file=target, hint="choose another --out")
     if not force:
-        raise RunFolderError(
-            "the run folder exists already", file=target, hint="choose another --out, or replace it with --force"
-        )
+        hint = "choose another --out, or replace it with --force"
+        raise RunFolderError("the run folder exists already", file=target, hint=hint)
 
 
 def _replaced(target: Path) -> Path:
@@ -245,9 +239,8 @@ def _speaking(target: Path) -> Iterator[None]:
         if error.filename is not None and not where.resolve().is_relative_to(home):
             raise
         reason = error.strerror or str(error)
-        raise RunFolderError(
-            f"the run folder cannot be written ({reason})", file=target, hint="choose another --out, or make room"
-        ) from error
+        hint = "choose another --out, or make room"
+        raise RunFolderError(f"the run folder cannot be written ({reason})", file=target, hint=hint) from error
 
 
 def _lock(target: Path) -> Path:
@@ -262,9 +255,8 @@ def _locked(target: Path) -> Iterator[None]:
     stream = path.open("a+", encoding="utf-8")
     try:
         if not _take(stream):
-            raise RunFolderError(
-                "another run is writing this folder", file=target, hint="wait for it, or choose another --out"
-            )
+            hint = "wait for it, or choose another --out"
+            raise RunFolderError("another run is writing this folder", file=target, hint=hint)
         try:
             yield
         finally:
@@ -286,12 +278,9 @@ def _take(stream: TextIO) -> bool:
 
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    # whoever held it before may have removed the file, so that this lock is on nothing
-    try:
+        # whoever held it before may have removed the file, so that this lock is on nothing
         return os.fstat(stream.fileno()).st_ino == Path(stream.name).stat().st_ino
-    except FileNotFoundError:
+    except (BlockingIOError, FileNotFoundError):
         return False
 
 
@@ -317,11 +306,9 @@ def _plain(value: Any) -> Any:
 def file_record(path: str | Path) -> dict[str, str]:
     """Name and SHA-256 of an input."""
     path = Path(path)
-    digest = hashlib.sha256()
     try:
         with path.open("rb") as stream:
-            while block := stream.read(1 << 20):
-                digest.update(block)
+            digest = hashlib.file_digest(stream, "sha256")
     except OSError as error:
         raise InputError(f"the file cannot be read ({error.strerror})", file=path) from None
     return {"file": str(path), "sha256": digest.hexdigest()}

@@ -65,16 +65,11 @@ class Program:
         return self._ready[kinds](*leaves)
 
     def _made(self, kinds: Any, leaves: list[Any], structure: Any) -> Callable[..., Any]:
-        """The function of its arguments' leaves."""
+        """The function of its arguments' leaves; by its trace on disk, which is made where it is not there."""
         folder = None if self.name is None else _folder()
         if folder is None:
             return lambda *leaves: self._traced(*jax.tree.unflatten(structure, leaves))
-        return self._restored(
-            leaves, structure, folder / hashlib.sha256(f"{self.name} {kinds}".encode()).hexdigest()
-        )  # fmt: skip
-
-    def _restored(self, leaves: list[Any], structure: Any, path: Path) -> Callable[..., Any]:
-        """The function of its arguments' leaves, from its trace on disk; that is made where it is not there."""
+        path = folder / hashlib.sha256(f"{self.name} {kinds}".encode()).hexdigest()
 
         def flat(*leaves: Any) -> Any:
             return self.function(*jax.tree.unflatten(structure, leaves))

@@ -102,8 +102,10 @@ def test_amplitudes_are_log_uniform_over_the_multiples_of_detection() -> None:
 
 
 def test_every_effect_has_a_detection_and_what_is_dealt_can_be_seen() -> None:
-    assert set(DETECTION) == {(tag, form.name) for tag, effect in EFFECTS.items() for form in effect.forms}
-    assert all(0 < limit < np.inf for limit in DETECTION.values())
+    assert {tag: set(forms) for tag, forms in DETECTION.items()} == {
+        tag: {form.name for form in effect.forms} for tag, effect in EFFECTS.items()
+    }
+    assert all(0 < limit < np.inf for forms in DETECTION.values() for limit in forms.values())
     dealt = {(hidden.tag, hidden.form) for seed in range(6) for case in plan(100, seed) for hidden in case.hidden}
     assert all(detection(EFFECTS[tag], form) <= EFFECTS[tag].high for tag, form in dealt)
 

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.blind.floors import floors, scatter_factor
 from stickslip.blind.generator import draw_setup, make_campaign
 from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.segment import segment
 from stickslip.inference.features.measurement import measure
 from stickslip.inference.fit.start import ring_period
+
+from .scatter_floors import floors, scatter_factor
 
 pytestmark = pytest.mark.slow  # eight campaigns
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.blind.floors import floors
 from stickslip.inference.features.measurement import MAINS, Measurement
 
 from . import synthetic
+from .scatter_floors import floors
 
 TRIALS = 40
 

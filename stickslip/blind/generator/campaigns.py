@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 
-from .bank import Bank, make_bank
+from .bank import make_bank
 from .dynamics import Drive, Result, simulate
 from .forms import Setup, hide
 from .recorder import record
@@ -90,8 +91,10 @@ def make_campaign(
     if spring_known is None:
         spring_known = bool(rng.random() < 0.5)
     guess = 10 ** rng.uniform(-0.15, 0.15)
-    base_stiffness = setup.rig.spring_stiffness
-    base_mass = setup.rig.mass
+    shown: dict[str, Any] = {"mass": setup.rig.mass, "spring": setup.rig.spring_stiffness}
+    if not spring_known:
+        guess = setup.rig.spring_stiffness * guess
+        shown["spring"] = (guess, guess / 3, guess * 3)
     seeds = rng.integers(2**31, size=3)  # lines and noise do not change with what is hidden
     hidden = [hide(setup, tag, amplitude, rng, *form) for tag, amplitude, *form in effects]
     if not grouped:
@@ -111,10 +114,6 @@ def make_campaign(
         columns = {key: [float(x) for x in col] for key, col in events.items()}
         listed.append({"name": run.name, "start": start, **columns, **recorded.truth})
     folder.mkdir(parents=True, exist_ok=True)
-    shown_spring: float | tuple[float, float, float] = base_stiffness
-    if not spring_known:
-        shown_spring = (base_stiffness * guess, base_stiffness * guess / 3, base_stiffness * guess * 3)
-    shown = {"mass": base_mass, "spring": shown_spring}
     write_campaign(folder, title, setup, shown, traces, rate, virgin)
     truth = {
         "seed": seed,
@@ -144,20 +143,21 @@ def _run(
             setup.surface, np.asarray(setup.rig.loads), lines,
             pool=pool, groups=setup.groups, roughness_spread=setup.roughness_spread,
         )  # fmt: skip
-        made = _with(bank, setup, run, new_lines, virgin, dt, rate, quiet, seed)
+        simulated = partial(
+            simulate, setup.rig, bank=bank, effects=setup.effects, dt=dt, quiet=quiet, new_lines=new_lines,
+            relaxation=setup.relaxation, seed=seed,
+        )  # fmt: skip
+        made = _with(simulated, run, virgin, rate)
         if not new_lines or made[0].event_columns["onset"].size < pool:
             return made
         pool *= 2  # no line comes twice
 
 
 def _with(
-    bank: Bank, setup: Setup, run: Run, new_lines: bool, virgin: bool, dt: float, rate: float, quiet: bool, seed: int
+    simulated: Callable[..., Result], run: Run, virgin: bool, rate: float
 ) -> tuple[Result, float, list[tuple[float, float]]]:
     def go(pieces: list[tuple[float, float]], duration: float, sampling: float, stop: tuple[int, float]) -> Result:
-        return simulate(
-            setup.rig, Drive.pieces(pieces), bank, setup.effects, duration=duration, dt=dt, rate=sampling, quiet=quiet,
-            new_lines=new_lines, relaxation=setup.relaxation, seed=seed, stop=stop,
-        )  # fmt: skip
+        return simulated(drive=Drive.pieces(pieces), duration=duration, rate=sampling, stop=stop)
 
     fine = OVERSAMPLING * rate
     steady = [(1.0, run.velocity)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -83,7 +83,6 @@ class Result:
     event_columns: dict[str, Array]
     steps: int
     quiet_steps: int
-    mass: float = field(repr=False, default=0.0)
 
     def __getattr__(self, name: str) -> Array:
         columns = self.__dict__.get("columns", {})
@@ -156,11 +155,6 @@ def simulate(
     if count < 0:
         raise SolveError(f"the motion diverged with the step {dt:g} s; take a smaller one")
     count = min(count, MOST_EVENTS)
-    return Result(
-        np.arange(samples) / rate,
-        {name: record[:samples, i] for i, name in enumerate(S.COLUMNS)},
-        {name: events[:count, i] for i, name in enumerate(S.EVENT_COLUMNS)},
-        steps,
-        quiet_steps,
-        rig.mass,
-    )
+    columns = {name: record[:samples, i] for i, name in enumerate(S.COLUMNS)}
+    event_columns = {name: events[:count, i] for i, name in enumerate(S.EVENT_COLUMNS)}
+    return Result(np.arange(samples) / rate, columns, event_columns, steps, quiet_steps)

@@ -113,12 +113,8 @@ def press(surface: Surface, heights: Array, load: float) -> Array:
         force = c_n * np.maximum(depth - gap, 0.0)
     touching = int(np.searchsorted(gap, depth, side="left"))
     if touching > 0.9 * gap.size:
-        raise InputError(
-            "the rough line saturates under its load",
-            key="h_rms",
-            value=surface.h_rms,
-            hint="raise h_rms or lower the load",
-        )
+        hint = "raise h_rms or lower the load"
+        raise InputError("the rough line saturates under its load", key="h_rms", value=surface.h_rms, hint=hint)
     if surface.adhesion > 0:
         reach = touching
         if surface.adhesion_form == "range":

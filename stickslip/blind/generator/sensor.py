@@ -80,7 +80,7 @@ def _filter(x: Array, order: int, corner: float, kind: str, rate: float) -> Arra
         sections = signal.butter(order, corner, kind, fs=rate, output="sos")
     else:
         sections = signal.bessel(order, corner, kind, norm="mag", fs=rate, output="sos")
-    return signal.sosfilt(sections, x - x[0])[0:] + (x[0] if kind == "lowpass" else 0.0)
+    return signal.sosfilt(sections, x - x[0]) + (x[0] if kind == "lowpass" else 0.0)
 
 
 def noise(sensor: Sensor, y: Array, rate: float, rng: np.random.Generator) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -12,26 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...system.runstore import file_record
 from ...system.units import factor_to_si
-from ..readers import Columns, read_columns
-from ..readers.repair import (
-    correct_clock,
-    despike,
-    drop_duplicates,
-    drop_nan,
-    find_gaps,
-    from_load_point,
-    join_resets,
-    unwrap,
-)
+from ..readers import Columns, read_columns, repair
 from ..resolution import estimate_resolution, noise_level
 from ..trace import SIGNALS, Drive, Provenance, Repair, Trace
 from .load import Campaign, trace_file
-from .models import Channel, TimeColumn, TraceEntry
+from .models import CHANNELS, Channel, TimeColumn, TraceEntry
 from .plausible import check_size, check_travel, doubtful_resolution
 
 Array = NDArray[np.float64]
-_CHANNELS = (*SIGNALS, "normal_load", "drive_position")
 
 
 def load_traces(campaign: Campaign) -> list[Trace]:
@@ -76,7 +65,7 @@ class _Assembly:
         columns = read_columns(path, entry.reader)
         reader = columns.reader
         self.notes += _noted(columns)
-        channels = {name: getattr(entry, name) for name in _CHANNELS if getattr(entry, name) is not None}
+        channels = {name: getattr(entry, name) for name in CHANNELS if getattr(entry, name) is not None}
         time = self._time(columns, path)
         data = {name: self._values(columns, path, name, spec, time) for name, spec in channels.items()}
         first_line = columns.first_line
@@ -89,7 +78,7 @@ class _Assembly:
         leading = next(name for name in SIGNALS if name in data)
         rig = self.campaign.rig_of(entry.label)
         stiffness = rig.spring_stiffness if isinstance(rig.spring_stiffness, float) else None
-        gaps, _ = find_gaps(time)
+        gaps, _ = repair.find_gaps(time)
         for array in (time, *data.values()):
             array.flags.writeable = False
         trace = Trace(
@@ -107,10 +96,10 @@ class _Assembly:
             minimum_slip=entry.minimum_slip,
             missing=tuple(float(moment) for moment in gaps),
             repairs=tuple(self.repairs),
-            provenance=Provenance(entry.file, file_sha256(path), reader, self.used, tuple(self.notes)),
+            provenance=Provenance(entry.file, file_record(path)["sha256"], reader, self.used, tuple(self.notes)),
         )
         self.warnings += check_travel(trace, rig, getattr(entry, leading).unit, f"{self.place}.{leading}")
-        return from_load_point(trace).replace(warnings=tuple(self.warnings))
+        return repair.from_load_point(trace).replace(warnings=tuple(self.warnings))
 
     def _time(self, columns: Columns, path: Path) -> Array:
         entry = self.entry
@@ -124,14 +113,12 @@ class _Assembly:
         except InputError as error:
             if error.hint is None or "sampling_rate" not in error.hint:
                 hint = f"{error.hint or ''}; or give 'sampling_rate' in place of 'time'".lstrip("; ")
-                raise InputError(
-                    error.what, file=error.file, key=error.key, value=error.value, allowed=error.allowed, hint=hint
-                ) from None
+                raise error.but(hint=hint) from None
             raise
 
     def _size(self, columns: Columns) -> int:
         """Samples of the first channel that is in this file; which other arrays are there does not matter."""
-        for name in _CHANNELS:
+        for name in CHANNELS:
             spec = getattr(self.entry, name)
             if spec is not None and spec.file is None:
                 with suppress(InputError):  # a column that is not there is met with its key later
@@ -144,13 +131,8 @@ class _Assembly:
         try:
             column = columns.find(spec.column)
         except InputError as error:
-            raise InputError(
-                f"{error.what} in {path.name}",
-                file=self.campaign.path,
-                key=f"{key}.column",
-                allowed=error.allowed,
-                hint=error.hint,
-            ) from None
+            what = f"{error.what} in {path.name}"
+            raise error.but(what=what, file=self.campaign.path, key=f"{key}.column") from None
         stated = columns.units.get(column)
         factor = spec.factor
         if factor is None:
@@ -189,12 +171,9 @@ class _Assembly:
         if spec.file is None:
             values = self._scaled(columns, path, name, spec)
             if values.size != time.size:
-                raise InputError(
-                    f"column '{spec.column}' has {values.size} samples, time has {time.size}",
-                    file=self.campaign.path,
-                    key=f"{self.place}.{name}",
-                    hint="columns of one trace need one common time",
-                )
+                what = f"column '{spec.column}' has {values.size} samples, time has {time.size}"
+                hint = "columns of one trace need one common time"
+                raise InputError(what, file=self.campaign.path, key=f"{self.place}.{name}", hint=hint)
             return values
         other, beyond = trace_file(
             self.campaign.path, spec.file, outside=self.entry.outside, key=f"{self.place}.{name}.file"
@@ -207,7 +186,7 @@ class _Assembly:
         self.notes += [f"{spec.file}: {note}" for note in _noted(further)]
         own = self._scaled(further, other, f"{name}.time", spec.time or self.entry.time)  # type: ignore[arg-type]
         values = self._scaled(further, other, name, spec)
-        self.used[name] += f" of {spec.file} (sha256 {file_sha256(other)})"
+        self.used[name] += f" of {spec.file} (sha256 {file_record(other)['sha256']})"
         return self._onto(time, own, values, name)
 
     def _onto(self, time: Array, own: Array, values: Array, name: str) -> Array:
@@ -236,16 +215,16 @@ class _Assembly:
     def _rows(self, time: Array, data: dict[str, Array]) -> tuple[Array, dict[str, Array]]:
         """Rows that can be used, in the part that is asked for."""
         entry = self.entry
-        keep, lost = drop_nan(time, data)
+        keep, lost = repair.drop_nan(time, data)
         self.repairs += lost
         twice = "; those left out because they are not a number are among them" if lost else ""
         if keep is not None:
             time, data = time[keep], {name: values[keep] for name, values in data.items()}
         if time.size < 2:
             raise self._empty(data, lost)
-        time, clock = correct_clock(time, entry.clock_error)
+        time, clock = repair.correct_clock(time, entry.clock_error)
         self.repairs += clock
-        keep, double = drop_duplicates(time)
+        keep, double = repair.drop_duplicates(time)
         self.repairs += double
         if keep is not None:
             time, data = time[keep], {name: values[keep] for name, values in data.items()}
@@ -260,7 +239,7 @@ class _Assembly:
             if cut:
                 self.repairs.append(Repair("cut", cut, "all channels", "outside 'start' and 'stop', as asked for"))
             time, data = time[low:high].copy(), {name: values[low:high].copy() for name, values in data.items()}
-        self.repairs += [replace(gap, reason=f"{gap.reason}{twice}") for gap in find_gaps(time)[1]]
+        self.repairs += [replace(gap, reason=f"{gap.reason}{twice}") for gap in repair.find_gaps(time)[1]]
         return time, data
 
     def _empty(self, data: dict[str, Array], lost: list[Repair]) -> InputError:
@@ -269,12 +248,9 @@ class _Assembly:
         named = ", ".join(f"{name} (column '{getattr(self.entry, name).column}')" for name in blank)
         what = f"{named} holds no number at all" if blank else "fewer than two samples can be used"
         seen = "; ".join(f"{r.count} of {r.where.split(',')[0]} are not a number" for r in lost)
-        return InputError(
-            f"{what} in {self.entry.file}",
-            file=self.campaign.path,
-            key=f"{self.place}.{blank[0]}" if blank else self.place,
-            hint=f"is it the right column? {seen}".strip(),
-        )
+        key = f"{self.place}.{blank[0]}" if blank else self.place
+        hint = f"is it the right column? {seen}".strip()
+        return InputError(f"{what} in {self.entry.file}", file=self.campaign.path, key=key, hint=hint)
 
     def _mend(
         self, time: Array, data: dict[str, Array], channels: dict[str, Channel]
@@ -290,17 +266,17 @@ class _Assembly:
                 if odd := doubtful_resolution(name, spec.si, spec.resolution, seen, scatter):
                     self.warnings.append(odd)
             if spec.wrap is not None:
-                values, done = unwrap(values, spec.wrap, name, count)
+                values, done = repair.unwrap(values, spec.wrap, name, count)
                 self.repairs += done
                 if not done:
                     self.notes.append(f"{name}: no jump of half of 'wrap', so nothing was unwrapped")
             level = noise_level(values, count)
-            values, done = join_resets(time, values, name, self._within(spec.resets), count, level)
+            values, done = repair.join_resets(time, values, name, self._within(spec.resets), count, level)
             self.repairs += done
             if spec.resets is True and not done:
                 self.notes.append(f"{name}: 'resets' is true, and the counter never jumps to zero")
             if self.entry.spikes:
-                values, done = despike(values, name, time, max(level, count or 0.0))
+                values, done = repair.despike(values, name, time, max(level, count or 0.0))
                 self.repairs += done
             data[name], resolution[name], noise[name] = values, count, level
         return resolution, noise
@@ -322,10 +298,8 @@ class _Assembly:
             ends = np.array([piece.until for piece in entry.drive])
             speeds = np.array([piece.velocity for piece in entry.drive])
             if ends[-1] <= time[0]:
-                raise InputError(
-                    f"the drive ends at {ends[-1]:g} s, before the record begins at {time[0]:g} s",
-                    hint="'until' is a time of the record, as in its time column",
-                )
+                what = f"the drive ends at {ends[-1]:g} s, before the record begins at {time[0]:g} s"
+                raise InputError(what, hint="'until' is a time of the record, as in its time column")
             late = ends > time[0]
             return Drive.from_pieces(ends[late], speeds[late], float(time[0]))
         if "drive_position" in data:
@@ -338,9 +312,3 @@ def _noted(columns: Columns, most: int = 8) -> list[str]:
     """What the reader guessed or mended, and the columns it left out."""
     left = [f"column '{name}' is left out: {why}" for name, why in columns.ignored.items()]
     return [*columns.notes, *left[:most], *([f"... and {len(left) - most} columns more"] if len(left) > most else [])]
-
-
-def file_sha256(path: Path) -> str:
-    """SHA-256 of a file, read in pieces."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,9 +23,13 @@ class Unmeasured:
     upper: float
 
 
-def fault(error: InputError) -> PydanticCustomError:
-    """An `InputError` as pydantic wants it, so that the loader can put the place to it."""
-    return PydanticCustomError("input", "{text}", {"text": error.what, "error": error})
+@contextmanager
+def faults() -> Iterator[None]:
+    """For a validator: its `InputError` as pydantic wants it, so that the loader can put the place to it."""
+    try:
+        yield
+    except InputError as error:
+        raise PydanticCustomError("input", "{text}", {"text": error.what, "error": error}) from None
 
 
 def quantity(
@@ -41,13 +46,9 @@ def quantity(
     With ``unmeasured`` a table of guess and bounds is read too.
     """
 
+    @faults()
     def read(value: Any) -> float | Unmeasured:
-        try:
-            if unmeasured and isinstance(value, dict):
-                return _unmeasured(value, single)
-            return single(value)
-        except InputError as error:
-            raise fault(error) from None
+        return _unmeasured(value, single) if unmeasured and isinstance(value, dict) else single(value)
 
     def single(value: Any) -> float:
         number = to_si(value, unit)
@@ -68,11 +69,8 @@ def quantity(
 
 def _range(unit: str, above: float | None, least: float | None, most: float | None, below: float | None) -> str:
     shown = "" if unit == "1" else f" {unit}"
-    parts = []
-    for word, bound in (("above", above), ("at least", least), ("at most", most), ("below", below)):
-        if bound is not None:
-            parts.append(f"{word} {bound:g}{shown}")
-    return ", ".join(parts)
+    bounds = {"above": above, "at least": least, "at most": most, "below": below}
+    return ", ".join(f"{word} {bound:g}{shown}" for word, bound in bounds.items() if bound is not None)
 
 
 def _unmeasured(value: dict[str, Any], single: Callable[[Any], float]) -> Unmeasured:
@@ -82,14 +80,11 @@ def _unmeasured(value: dict[str, Any], single: Callable[[Any], float]) -> Unmeas
             raise InputError(f"unknown key '{key}' of an unmeasured quantity", hint=nearest(str(key), names))
     absent = [name for name in names if name not in value]
     if absent:
-        raise InputError(
-            f"an unmeasured quantity lacks '{absent[0]}'", allowed='{ guess = "...", lower = "...", upper = "..." }'
-        )
+        allowed = '{ guess = "...", lower = "...", upper = "..." }'
+        raise InputError(f"an unmeasured quantity lacks '{absent[0]}'", allowed=allowed)
     guess, lower, upper = (single(value[name]) for name in names)
     if not lower < upper or not lower <= guess <= upper:
-        raise InputError(
-            "the guess of an unmeasured quantity must lie between its bounds",
-            value=f"guess {guess:g}, lower {lower:g}, upper {upper:g}",
-            allowed="lower <= guess <= upper, lower < upper",
-        )
+        what = "the guess of an unmeasured quantity must lie between its bounds"
+        written = f"guess {guess:g}, lower {lower:g}, upper {upper:g}"
+        raise InputError(what, value=written, allowed="lower <= guess <= upper, lower < upper")
     return Unmeasured(guess, lower, upper)

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from ...errors import InputError, nearest
 from ..readers import beside
-from .models import CampaignFile, Rig, RigKeys, TraceEntry
+from .models import CHANNELS, CampaignFile, Rig, RigKeys, TraceEntry
 from .place import readable
 from .toml_file import read_toml
 
@@ -87,12 +87,8 @@ def load_campaign(path: str | Path) -> Campaign:
     repeated = [name for name, count in Counter(entry.label for entry in entries).items() if count > 1]
     if repeated:
         numbers = [i for i, entry in enumerate(entries, start=1) if entry.label == repeated[0]]
-        raise InputError(
-            f"traces {', '.join(map(str, numbers))} have the same name '{repeated[0]}'",
-            file=path,
-            key=f"trace[{numbers[1]}].name",
-            hint='give one of them another name = "..."',
-        )
+        what = f"traces {', '.join(map(str, numbers))} have the same name '{repeated[0]}'"
+        raise InputError(what, file=path, key=f"trace[{numbers[1]}].name", hint='give one of them another name = "..."')
     for number, entry in enumerate(entries, start=1):
         for key, name in (("file", entry.file), *_further(entry)):
             trace_file(path, name, outside=entry.outside, key=f"trace[{number}].{key}")
@@ -133,13 +129,8 @@ def trace_file(campaign: Path, name: str, *, outside: bool, key: str) -> tuple[P
         raise InputError(f"the file's name cannot be used ({error})", file=campaign, key=key, value=name) from None
     beyond = not real.is_relative_to(home)
     if beyond and not outside:
-        raise InputError(
-            "the file lies outside the campaign's folder",
-            file=campaign,
-            key=key,
-            value=name,
-            hint="move it beside the campaign, or write  outside = true  in this trace",
-        )
+        hint = "move it beside the campaign, or write  outside = true  in this trace"
+        raise InputError("the file lies outside the campaign's folder", file=campaign, key=key, value=name, hint=hint)
     if not real.exists():
         others = beside(where)
         hint = nearest(where.name, others) if others else "names are relative to the campaign file's folder"
@@ -150,5 +141,5 @@ def trace_file(campaign: Path, name: str, *, outside: bool, key: str) -> tuple[P
 
 
 def _further(entry: TraceEntry) -> list[tuple[str, str]]:
-    channels = ("displacement", "velocity", "spring_force", "normal_load", "drive_position")
-    return [(f"{c}.file", getattr(entry, c).file) for c in channels if getattr(entry, c) and getattr(entry, c).file]
+    given = ((name, getattr(entry, name)) for name in CHANNELS)
+    return [(f"{name}.file", channel.file) for name, channel in given if channel and channel.file]

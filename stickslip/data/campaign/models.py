@@ -10,14 +10,17 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationIn
 
 from ...errors import InputError
 from ...system.units import factor_to_si, to_si
-from .fields import Unmeasured, fault, quantity
+from ..trace import SIGNALS
+from .fields import Unmeasured, faults, quantity
 
 Measured = float | Unmeasured
+CHANNELS = (*SIGNALS, "normal_load", "drive_position")  # keys of a trace that are channels
 
 
+@faults()
 def _column(value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, (str, int)) or value == "":
-        raise fault(InputError("not a column", value=value, allowed="its name in the file, or its number from 1"))
+        raise InputError("not a column", value=value, allowed="its name in the file, or its number from 1")
     return value
 
 
@@ -69,12 +72,10 @@ class _Scaled(Model):
 
     @field_validator("unit")
     @classmethod
+    @faults()
     def _known(cls, value: str | None) -> str | None:
         if value is not None:
-            try:
-                factor_to_si(value, cls.si)
-            except InputError as error:
-                raise fault(error) from None
+            factor_to_si(value, cls.si)
         return value
 
     @property
@@ -105,28 +106,22 @@ class Channel(_Scaled):
 
     @field_validator("resolution", "wrap", mode="before")
     @classmethod
+    @faults()
     def _size(cls, value: Any) -> float | None:
-        if value is None:
-            return None
-        try:
-            number = to_si(value, cls.si)
-            if number < LEAST_SIZE:
-                raise InputError("out of range", value=value, allowed=f"at least {LEAST_SIZE:g} {cls.si}")
-        except InputError as error:
-            raise fault(error) from None
+        number = None if value is None else to_si(value, cls.si)
+        if number is not None and number < LEAST_SIZE:
+            raise InputError("out of range", value=value, allowed=f"at least {LEAST_SIZE:g} {cls.si}")
         return number
 
     @field_validator("resets", mode="before")
     @classmethod
+    @faults()
     def _times(cls, value: Any) -> Any:
+        if isinstance(value, bool):
+            return value
         if not isinstance(value, list):
-            if isinstance(value, bool):
-                return value
-            raise fault(InputError("not a list of times", value=value, allowed='true, or such as ["2.3 s", "5.1 s"]'))
-        try:
-            return [to_si(moment, "s") for moment in value]
-        except InputError as error:
-            raise fault(error) from None
+            raise InputError("not a list of times", value=value, allowed='true, or such as ["2.3 s", "5.1 s"]')
+        return [to_si(moment, "s") for moment in value]
 
 
 class DisplacementChannel(Channel):
@@ -142,13 +137,11 @@ class DisplacementChannel(Channel):
 
     @field_validator("walk", "hum", mode="before")
     @classmethod
+    @faults()
     def _slow(cls, value: Any, info: ValidationInfo) -> float:
-        try:
-            number = to_si(value, "m/s**0.5" if info.field_name == "walk" else "m")
-            if not 0.0 <= number < MOST_SLOW:
-                raise InputError("out of range", value=value, allowed=f"0 to {MOST_SLOW:g}, SI")
-        except InputError as error:
-            raise fault(error) from None
+        number = to_si(value, "m/s**0.5" if info.field_name == "walk" else "m")
+        if not 0.0 <= number < MOST_SLOW:
+            raise InputError("out of range", value=value, allowed=f"0 to {MOST_SLOW:g}, SI")
         return number
 
 
@@ -196,42 +189,30 @@ class TraceEntry(RigKeys):
     minimum_slip: Annotated[float | None, quantity("m", above=0)] = None
 
     @model_validator(mode="after")
+    @faults()
     def _complete(self) -> TraceEntry:
-        problem = self._problem()
-        if problem is not None:
-            raise fault(problem)
-        return self
-
-    def _problem(self) -> InputError | None:
         if (self.time is None) == (self.sampling_rate is None):
-            what = (
-                "neither 'time' nor 'sampling_rate' is given"
-                if self.time is None
-                else "both 'time' and 'sampling_rate' are given"
-            )
-            return InputError(what, hint='write  time = { column = "...", unit = "s" }  or  sampling_rate = "10 kHz"')
+            given = "neither {} nor {} is given" if self.time is None else "both {} and {} are given"
+            what = given.format("'time'", "'sampling_rate'")
+            raise InputError(what, hint='write  time = { column = "...", unit = "s" }  or  sampling_rate = "10 kHz"')
         if self.displacement is None and self.velocity is None and self.spring_force is None:
-            return InputError(
-                "no signal is given",
-                allowed="at least one of displacement, velocity, spring_force",
-                hint='write such as  displacement = { column = "x", unit = "um" }',
-            )
+            allowed = "at least one of displacement, velocity, spring_force"
+            hint = 'write such as  displacement = { column = "x", unit = "um" }'
+            raise InputError("no signal is given", allowed=allowed, hint=hint)
         drives = [key for key in ("drive_velocity", "drive_position", "drive") if getattr(self, key) is not None]
         if len(drives) > 1:
-            return InputError(f"the drive is given more than once: {', '.join(drives)}", hint="keep one of them")
+            raise InputError(f"the drive is given more than once: {', '.join(drives)}", hint="keep one of them")
         if not drives and self.spring_force is None:
-            return InputError(
-                "the drive is not given",
-                allowed="drive_velocity, drive_position or drive (may be left out only where spring_force is measured)",
-                hint='write such as  drive_velocity = "0.05 mm/s"',
-            )
+            allowed = "drive_velocity, drive_position or drive (may be left out only where spring_force is measured)"
+            hint = 'write such as  drive_velocity = "0.05 mm/s"'
+            raise InputError("the drive is not given", allowed=allowed, hint=hint)
         if self.drive is not None:
             ends = [piece.until for piece in self.drive]
             if any(b <= a for a, b in pairwise(ends)):
-                return InputError("the 'until' times of the drive do not increase", value=ends, hint="sort the pieces")
+                raise InputError("the 'until' times of the drive do not increase", value=ends, hint="sort the pieces")
         if self.start is not None and self.stop is not None and self.stop <= self.start:
-            return InputError("'stop' is not after 'start'", value=f"start {self.start:g} s, stop {self.stop:g} s")
-        return None
+            raise InputError("'stop' is not after 'start'", value=f"start {self.start:g} s, stop {self.stop:g} s")
+        return self
 
     @property
     def label(self) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import types
 import typing
 from collections.abc import Sequence
 from pathlib import Path
@@ -47,7 +46,7 @@ def readable(error: ValidationError, model: type[BaseModel], text: str, file: Pa
     faults.sort(key=lambda fault: fault["type"] != "extra_forbidden")
     fault = faults[0]
     place = tuple(part for part in fault["loc"] if not _is_tag(part))
-    shown = _shown(place)
+    shown = shown_place(place)
     lines = key_lines(text)
     line = next((lines[place[:n]] for n in range(len(place), 0, -1) if place[:n] in lines), None)
     key = f"line {line}: {shown}" if line and shown else shown or (f"line {line}" if line else None)
@@ -81,7 +80,8 @@ def _is_tag(part: str | int) -> bool:
     return isinstance(part, str) and ("[" in part or part in {"float", "int", "str", "bool"})
 
 
-def _shown(place: Sequence[str | int]) -> str:
+def shown_place(place: Sequence[str | int]) -> str:
+    """A place as messages show it: ``("effect", 0, "beta")`` as ``effect[1].beta``."""
     text = ""
     for part in place:
         text += f"[{part + 1}]" if isinstance(part, int) else (f".{part}" if text else part)
@@ -103,13 +103,6 @@ def _keys(model: Any, place: Sequence[str | int]) -> list[str]:
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:
-    if (
-        isinstance(annotation, type)
-        and not isinstance(annotation, types.GenericAlias)
-        and issubclass(annotation, BaseModel)
-    ):
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    for argument in typing.get_args(annotation):
-        if (found := _model_in(argument)) is not None:
-            return found
-    return None
+    return next(filter(None, map(_model_in, typing.get_args(annotation))), None)

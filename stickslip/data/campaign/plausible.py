@@ -33,16 +33,12 @@ def check_size(time: NDArray[np.float64], data: Mapping[str, NDArray[np.float64]
         if max(-low, high) > most:
             worst = low if -low > high else high
             row = int(np.argmin(values) if -low > high else np.argmax(values)) + 1
-            raise InputError(
-                f"{name} holds an impossible value: {worst:.3g} in SI units",
-                key=f"sample {row}",
-                hint="a mark of an overload? Delete these rows, leave the field empty, or check the unit",
-            )
+            what = f"{name} holds an impossible value: {worst:.3g} in SI units"
+            hint = "a mark of an overload? Delete these rows, leave the field empty, or check the unit"
+            raise InputError(what, key=f"sample {row}", hint=hint)
     if time[-1] - time[0] < 1e-12 * time.size:
-        raise InputError(
-            f"{time.size} samples lie within {time[-1] - time[0]:.3g} s, closer than 1e-12 s",
-            hint="check the unit of time, or the sampling rate",
-        )
+        hint = "check the unit of time, or the sampling rate"
+        raise InputError(f"{time.size} samples lie within {time[-1] - time[0]:.3g} s, closer than 1e-12 s", hint=hint)
 
 
 def doubtful_resolution(channel: str, si: str, stated: float, seen: float | None, noise: float) -> str | None:
@@ -90,36 +86,23 @@ def check_travel(trace: Trace, rig: Rig, unit: str | None, key: str) -> list[str
     moved = _moved(trace)
     if moved is None or travel <= 0:
         return [] if travel > 0 else ["the drive does not move during this run"]
-    own, drives = shown(moved, "m", 3), shown(travel, "m", 3)
-    allowance = reach if reach is not None else 2 * travel
-    ratio = moved / (travel + 2 * allowance)
-    if ratio * (1 if reach is not None else 3) > _OUTRUN:
-        raise InputError(
-            f"the block outruns the drive: it moves {own} while the load point moves {drives}",
-            key=key,
-            value=unit,
-            hint=_likely(trace.leading, unit, moved / travel),
-        )
+    moves = f"moves {shown(moved, 'm', 3)} while the load point moves {shown(travel, 'm', 3)}"
+    outruns = moved / (travel + 2 * reach) if reach is not None else 3 * moved / (5 * travel)
+    if outruns > _OUTRUN:
+        what = f"the block outruns the drive: it {moves}"
+        raise InputError(what, key=key, value=unit, hint=_likely(trace.leading, unit, moved / travel))
     most = _reach(trace, rig, upper=True)
     if trace.leading != "spring_force" and most is not None and travel - moved > _OUTRUN * most:
-        raise InputError(
-            f"the block stays behind the drive: it moves {own} while the load point moves {drives}, and "
-            f"the spring can pull no further than {shown(most, 'm', 3)} before the block slips",
-            key=key,
-            value=unit,
-            hint=_likely(trace.leading, unit, moved / travel) if moved > 0 else "is it the right column?",
-        )
+        held = f"the spring can pull no further than {shown(most, 'm', 3)} before the block slips"
+        hint = _likely(trace.leading, unit, moved / travel) if moved > 0 else "is it the right column?"
+        raise InputError(f"the block stays behind the drive: it {moves}, and {held}", key=key, value=unit, hint=hint)
     behind = trace.leading != "spring_force" and most is not None and travel - moved > _ODD * most
-    if ratio * (1 if reach is not None else 3) > _ODD or behind:
-        return [
-            f"the block moves {own} while the load point moves {drives}, which no spring allows: is the "
-            "velocity of the drive that of another run, or a unit wrong?"
-        ]
+    if outruns > _ODD or behind:
+        why = "is the velocity of the drive that of another run, or a unit wrong?"
+        return [f"the block {moves}, which no spring allows: {why}"]
     if trace.leading == "displacement" and moved < travel / _OUTRUN and (reach is None or travel > 10 * reach):
-        return [
-            f"the block moves {own} while the load point moves {drives}: a wrong unit, a counter that "
-            "wraps or is cleared ('wrap', 'resets'), or a block that is not pulled?"
-        ]
+        why = "a wrong unit, a counter that wraps or is cleared ('wrap', 'resets'), or a block that is not pulled?"
+        return [f"the block {moves}: {why}"]
     return []
 
 

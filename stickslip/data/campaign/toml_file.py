@@ -50,11 +50,8 @@ def read_toml(path: Path, kind: Kind) -> TomlFile:
         raise InputError("tables and lists are nested too deeply", file=path) from None
     found = _kind(content)
     if found and found != kind:
-        raise InputError(
-            f"this is a {found} file, where a {kind} file is wanted",
-            file=path,
-            hint=f"a {found} file is for {_COMMANDS[found]}; stickslip new {kind} writes a {kind} file to start from",
-        )
+        hint = f"a {found} file is for {_COMMANDS[found]}; stickslip new {kind} writes a {kind} file to start from"
+        raise InputError(f"this is a {found} file, where a {kind} file is wanted", file=path, hint=hint)
     return TomlFile(content, text, hashlib.sha256(raw).hexdigest())
 
 
@@ -89,9 +86,7 @@ def _bytes(path: Path, kind: Kind) -> bytes:
     try:
         if path.is_dir():
             raise InputError(f"not a {kind} file but a folder", file=path, hint="name the .toml file in it")
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"too large for a {kind} file", file=path, hint=_wanted(path, kind))
-        with path.open("rb") as stream:  # of a device, too, no more is read than a file may have
+        with path.open("rb") as stream:  # no more is read than a file may have
             raw = stream.read(_MOST_BYTES + 1)
         if len(raw) > _MOST_BYTES:
             raise InputError(f"too large for a {kind} file", file=path, hint=_wanted(path, kind))

@@ -99,8 +99,7 @@ def _common(agreed: Sequence[tuple[Trace, Travel]], runs: int) -> list[Finding]:
     where = _listed([t.name for t, _ in agreed])
     trace, seen = agreed[0]
     pair = (
-        f"{where}: from slip to slip the block moves {shown(seen.block, 'm/s', 3)}, the drive "
-        f"{shown(seen.drive, 'm/s', 3)}; the spring would stretch without limit"
+        _parting(where, seen)
         if len(agreed) == 1
         else f"{where}: over whole cycles the block moves {factor:.3f} (+-{std:.3f}) times as far as the drive is "
         "stated to, and the spring would stretch without limit"
@@ -116,13 +115,16 @@ def _common(agreed: Sequence[tuple[Trace, Travel]], runs: int) -> list[Finding]:
 
 
 def _impossible(trace: Trace, seen: Travel) -> Finding:
-    block, drive = shown(seen.block, "m/s", 3), shown(seen.drive, "m/s", 3)
-    text = (
-        f"{trace.name}: from slip to slip the block moves {block}, the drive {drive}; the spring would "
-        "stretch without limit"
-    )
     what = f"{_VELOCITY} or {trace.leading} {_SCALE} or {_CLOCKED}"
+    text = _parting(trace.name, seen)
     return Finding(what, trace.name, 1.0, seen.slope, seen.std, "1", text, impossible=True)
+
+
+def _parting(where: str, seen: Travel) -> str:
+    block, drive = shown(seen.block, "m/s", 3), shown(seen.drive, "m/s", 3)
+    return (
+        f"{where}: from slip to slip the block moves {block}, the drive {drive}; the spring would stretch without limit"
+    )
 
 
 def _clock_std(seen: Travel) -> float:
@@ -181,8 +183,8 @@ def _explained(seen: Travel, factor: float, others: Sequence[Travel]) -> tuple[l
         return every, "Slips cannot be compared with those of other runs."
     wanted = {_VELOCITY: (1.0, 1.0), _SCALE: (factor, 1.0), _CLOCKED: (1.0, 1.0 / factor)}
     away = {
-        k: (np.log(size / wanted[k][0]) / size_std) ** 2 + (np.log(lasts / wanted[k][1]) / lasts_std) ** 2
-        for k in every
+        k: (np.log(size / large) / size_std) ** 2 + (np.log(lasts / long) / lasts_std) ** 2
+        for k, (large, long) in wanted.items()
     }
     order = sorted(every, key=lambda k: away[k])
     likely = [k for k in order if away[k] < away[order[0]] + _ALIKE]

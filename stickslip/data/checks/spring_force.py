@@ -37,11 +37,8 @@ def stick_gain(trace: Trace, found: Segmentation) -> dict[str, float] | None:
     if len(slopes) < _FEWEST:
         return None
     spread = 1.4826 * float(np.median(np.abs(slopes - np.median(slopes))))
-    return {
-        "value": float(np.median(slopes)),
-        "std": 1.2533 * spread / float(np.sqrt(len(slopes))),
-        "sticks": float(len(slopes)),
-    }
+    std = 1.2533 * spread / float(np.sqrt(len(slopes)))
+    return {"value": float(np.median(slopes)), "std": std, "sticks": float(len(slopes))}
 
 
 def gain_is_wrong(gain: Mapping[str, float]) -> bool:
@@ -73,16 +70,6 @@ def force_findings(traces: Sequence[Trace], found: Sequence[Segmentation]) -> li
                 f"{rises}: the block creeps along at {-share:.0f} % of the drive's velocity, or {scale} Force alone "
                 "cannot separate the two: measure the block's position as well."
             )
-        out.append(
-            Finding(
-                "spring force scale",
-                trace.name,
-                1.0,
-                1.0 / gain["value"],
-                gain["std"] / gain["value"] ** 2,
-                "1",
-                text,
-                stops=False,
-            )
-        )
+        factor, std = 1.0 / gain["value"], gain["std"] / gain["value"] ** 2
+        out.append(Finding("spring force scale", trace.name, 1.0, factor, std, "1", text, stops=False))
     return out

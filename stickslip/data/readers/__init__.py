@@ -38,16 +38,8 @@ def accept(loaded: object) -> Reader:
 
 READERS: Registry[Reader] = Registry("stickslip.readers", "reader", accept)
 # a file that many could read goes to the first: NetCDF and MATLAB 7.3 are HDF5 too, and text is the last resort
-_BUILT_IN: tuple[Reader, ...] = (
-    NetcdfReader(),
-    MatReader(),
-    HdfReader(),
-    NpyReader(),
-    TdmsReader(),
-    UffReader(),
-    JsonReader(),
-)
-for _reader in _BUILT_IN:
+for _class in (NetcdfReader, MatReader, HdfReader, NpyReader, TdmsReader, UffReader, JsonReader):
+    _reader: Reader = _class()
     READERS.register(_reader.name, _reader)
 _TEXT: Reader = TextReader()
 
@@ -103,16 +95,10 @@ def find_reader(path: str | Path, name: str | None = None) -> Reader:
     if _TEXT.sniff(path, head):
         return _TEXT
     if path.suffix.lower() in _TEXT.suffixes:
-        raise InputError(
-            "it has the ending of a text table but holds binary data",
-            file=path,
-            allowed=supported(),
-            hint="give it its right ending, or export it as text",
-        )
-    raise InputError(
-        "the format of the file is not known", file=path, allowed=supported(),
-        hint="export it in one of these, as CSV for one, or add a reader for it (see the documentation)",
-    )  # fmt: skip
+        what = "it has the ending of a text table but holds binary data"
+        raise InputError(what, file=path, allowed=supported(), hint="give it its right ending, or export it as text")
+    hint = "export it in one of these, as CSV for one, or add a reader for it (see the documentation)"
+    raise InputError("the format of the file is not known", file=path, allowed=supported(), hint=hint)
 
 
 def read_columns(path: str | Path, name: str | None = None) -> Columns:

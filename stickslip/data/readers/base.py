@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -55,24 +56,15 @@ class Columns:
             wanted = order[wanted - 1]
         text = str(wanted).strip()
         bare = split_unit(text)[0]
-        for test in (
-            lambda name: name == text,
-            lambda name: name == bare,
-            lambda name: name.casefold() == bare.casefold(),
-        ):
-            hits = [name for name in names if test(name)]
+        folded = [name for name in names if name.casefold() == bare.casefold()]
+        for hits in ([n for n in names if n == text], [n for n in names if n == bare], folded):
             if len(hits) == 1:
                 return hits[0]
         if wanted in self.ignored:
             raise InputError(f"column '{wanted}' cannot be used: {self.ignored[str(wanted)]}", file=file, key=key)
         listed = ", ".join(names[:20]) + (" ..." if len(names) > 20 else "")
-        raise InputError(
-            f"there is no column '{wanted}'",
-            file=file,
-            key=key,
-            allowed=listed,
-            hint=nearest(text, names) if names else None,
-        )
+        hint = nearest(text, names) if names else None
+        raise InputError(f"there is no column '{wanted}'", file=file, key=key, allowed=listed, hint=hint)
 
 
 class Reader(Protocol):
@@ -92,13 +84,30 @@ class Reader(Protocol):
 PARTS = (*Reader.__annotations__, "sniff", "read")  # what every reader has
 
 
+@contextmanager
+def reading(kind: str, path: Path, hint: str | None = None) -> Iterator[None]:
+    """Libraries raise many kinds of exceptions on a damaged file: all become one `InputError`."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        what = f"not a readable {kind} file ({type(error).__name__}: {error})"
+        raise InputError(what, file=path, hint=hint) from None
+
+
+def plain_unit(text: str) -> str:
+    """A unit in letters that are on every keyboard."""
+    return text.replace("µ", "u").replace("μ", "u")
+
+
 def split_unit(header: str) -> tuple[str, str | None]:
     """``"displacement [um]"`` -> ``("displacement", "um")``; ``(None)`` where no unit is given."""
     match = _UNIT.match(header.strip())
     if not match or not match["name"]:
         return header.strip(), None
     unit = (match["square"] or match["round"] or "").strip()
-    return match["name"].strip(), unit.replace("µ", "u").replace("μ", "u") or None
+    return match["name"].strip(), plain_unit(unit) or None
 
 
 def unique(names: Iterable[str]) -> list[str]:
@@ -127,7 +136,7 @@ def add_array(columns: Columns, name: str, values: object, unit: str | None = No
     elif array.ndim == 1:
         columns.data[name] = np.asarray(array, np.float64)
         if unit and unit.strip() not in ("", "-"):
-            columns.units[name] = unit.strip().strip("[]()").replace("µ", "u").replace("μ", "u")
+            columns.units[name] = plain_unit(unit.strip().strip("[]()"))
     elif array.ndim == 2:
         series = array.T if array.shape[0] >= array.shape[1] else array  # samples run along the longer side
         for number, row in enumerate(series, start=1):

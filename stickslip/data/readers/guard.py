@@ -76,9 +76,6 @@ def guard(path: Path, library: str) -> None:
     except OSError:  # no other process can be had: then without this precaution
         return
     if fault:
-        raise InputError(
-            f"the file is damaged: the library that reads this format {fault} on it",
-            file=path,
-            hint="export it again, or as CSV",
-        )
+        hint = "export it again, or as CSV"
+        raise InputError(f"the file is damaged: the library that reads this format {fault} on it", file=path, hint=hint)
     _sound.add(key)

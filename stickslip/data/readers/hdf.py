@@ -46,9 +46,8 @@ def read_hdf(path: Path, skip: tuple[str, ...] = ()) -> Columns:
         with h5py.File(path, "r") as file:
             file.visititems(take)
     except Exception as error:  # a damaged file makes h5py raise many kinds, and numpy where a size is absurd
-        raise InputError(
-            f"not a readable HDF5 file ({error})", file=path, hint="was the file closed when written?"
-        ) from None
+        hint = "was the file closed when written?"
+        raise InputError(f"not a readable HDF5 file ({error})", file=path, hint=hint) from None
     return need_columns(columns, path)
 
 

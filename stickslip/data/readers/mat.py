@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import InputError
-from .base import Columns, add_array, need_columns
+from .base import Columns, add_array, need_columns, reading
 from .guard import guard
 from .hdf import read_hdf
 
@@ -32,14 +31,8 @@ class MatReader:
         import scipy.io
 
         guard(path, "mat")
-        try:
+        with reading("MATLAB", path, hint="save it again with -v7"):
             content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
-        except Exception as error:  # scipy raises many kinds on a damaged file
-            raise InputError(
-                f"not a readable MATLAB file ({type(error).__name__}: {error})",
-                file=path,
-                hint="save it again with -v7",
-            ) from None
         columns = Columns({})
         for name, value in content.items():
             if not name.startswith("__"):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...errors import InputError
-from .base import Columns, add_array, need_columns
+from .base import Columns, add_array, need_columns, reading
 from .guard import guard
 
 _MOST_LINKS = 8  # one to the next
@@ -31,7 +30,7 @@ class NetcdfReader:
         columns = Columns({})
         if not classic:
             guard(path, "hdf5")
-        try:
+        with reading("NetCDF", path):
             # decode_times=False: "seconds since ..." stays a number
             elsewhere = [] if classic else _elsewhere(path)
             columns.ignored.update(dict.fromkeys(elsewhere, "its numbers lie in another file"))
@@ -43,10 +42,6 @@ class NetcdfReader:
                     if isinstance(unit, str):
                         unit = unit.split(" since ")[0]
                     add_array(columns, str(name), variable.values, unit if isinstance(unit, str) else None)
-        except InputError:
-            raise
-        except Exception as error:  # the engines raise many kinds on a damaged file
-            raise InputError(f"not a readable NetCDF file ({type(error).__name__}: {error})", file=path) from None
         return need_columns(columns, path)
 
 

@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...system.units import shown
-from ..trace import SIGNALS, Drive, Repair, Trace
+from ..trace import CHANNELS, Drive, Repair, Trace
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_UNITS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
 MOST_COUNTS = 2.0**53  # beyond which whole counts cannot be told from others
 FIRST_SAMPLES = 5  # of a record, which tell where it begins
 
@@ -52,7 +51,7 @@ def unwrap(values: Array, period: float, channel: str, resolution: float | None 
     places = np.flatnonzero(turns)
     count = int(np.abs(turns).sum())
     where = f"{channel}, first at sample {int(valid[places[0] + 1])}"
-    span = shown(period, _UNITS.get(channel, "1"), 6)
+    span = shown(period, CHANNELS.get(channel, "1"), 6)
     return result, [Repair("wrap", count, where, f"the counter ran over its range of {span}")]
 
 
@@ -180,10 +179,8 @@ def drop_duplicates(time: Array) -> tuple[Mask | None, list[Repair]]:
         return None, []
     count = int(same.sum())
     if count > 0.1 * time.size:
-        raise InputError(
-            f"{count} of {time.size} time stamps are the same as the one before: the clock is rounded too coarsely",
-            hint="export time with more digits, or give 'sampling_rate' in place of 'time'",
-        )
+        what = f"{count} of {time.size} time stamps are the same as the one before: the clock is rounded too coarsely"
+        raise InputError(what, hint="export time with more digits, or give 'sampling_rate' in place of 'time'")
     first = int(np.argmax(same)) + 1
     where = f"time, first at sample {first} ({time[first]:.6g} s)"
     keep = np.concatenate([[True], ~same])

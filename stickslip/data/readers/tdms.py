@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import InputError
 from ...system.extras import need
-from .base import Columns, add_array, need_columns
+from .base import Columns, add_array, need_columns, reading
 
 
 class TdmsReader:
@@ -28,17 +27,12 @@ class TdmsReader:
 
         columns = Columns({})
         nptdms.log.log_manager.set_level(logging.ERROR)  # what it tells of a file cut short is told below
-        try:
-            with nptdms.TdmsFile.open(path) as file:
-                for group in file.groups():
-                    for channel in group.channels():
-                        _add(columns, group.name, channel)
-                if file.file_status.incomplete_final_segment:
-                    columns.notes.append("the file is cut short; what is there was read")
-        except InputError:
-            raise
-        except Exception as error:  # nptdms raises many kinds on a damaged file
-            raise InputError(f"not a readable TDMS file ({type(error).__name__}: {error})", file=path) from None
+        with reading("TDMS", path), nptdms.TdmsFile.open(path) as file:
+            for group in file.groups():
+                for channel in group.channels():
+                    _add(columns, group.name, channel)
+            if file.file_status.incomplete_final_segment:
+                columns.notes.append("the file is cut short; what is there was read")
         return need_columns(columns, path)
 
 

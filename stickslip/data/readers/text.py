@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from .base import HEAD_BYTES, Columns, need_columns, split_unit, unique
+from .base import HEAD_BYTES, Columns, need_columns, plain_unit, split_unit, unique
 
 _COMMENTS = ("#", "%", "//", "!")
 _NOTHING = {"", "nan", "na", "n/a", "null", "none", "-", "--", "---", "#n/a", "overflow", "ovl"}
@@ -91,29 +91,21 @@ def _layout(path: Path, head: bytes, *, whole: bool) -> _Layout:
         raise InputError("the file holds no rows of numbers", file=path, hint="is it the right file?")
     delimiter, decimal = _separators(sample)
     rows = [_split(line, delimiter) for line in sample]
-    width = _commonest([len(row) for row in rows])
-    first = next(
-        (
-            i
-            for i, line in enumerate(lines)
-            if not line.lstrip().startswith(_COMMENTS) and _is_data(_row(line, delimiter, width), width, decimal)
-        ),
-        None,
-    )
+    widths = [len(row) for row in rows]
+    width = max(set(widths), key=widths.count)
+    told = ((i, line) for i, line in enumerate(lines) if not line.lstrip().startswith(_COMMENTS))
+    first = next((i for i, line in told if _is_data(_row(line, delimiter, width), width, decimal)), None)
     if first is None:
-        raise InputError(
-            "the file holds no rows of numbers",
-            file=path,
-            key="line 1",
-            value=lines[0][:60],
-            hint="is it the right file?",
-        )
+        hint = "is it the right file?"
+        raise InputError("the file holds no rows of numbers", file=path, key="line 1", value=lines[0][:60], hint=hint)
     rows = [row for line in sample if _is_data(row := _row(line, delimiter, width), width, decimal)]
     ends = [len(_fields(line, delimiter)) for line in sample if delimiter and line.rstrip().endswith(delimiter)]
     numeric = [
-        c for c in range(width) if sum(_number(row[c], decimal) or _empty(row[c]) for row in rows) > len(rows) / 2
+        c
+        for c, column in enumerate(zip(*rows, strict=True))
+        if any(_number(field, decimal) for field in column)
+        and sum(_number(field, decimal) or _empty(field) for field in column) > len(rows) / 2
     ]
-    numeric = [c for c in numeric if any(_number(row[c], decimal) for row in rows)]
     names, units = _header(lines[:first], delimiter, width)
     doubts = _thousands(path, rows, [names[c] for c in numeric], numeric) if decimal == "," else []
     ignored = {names[c]: f"it holds text such as '{rows[0][c]}'" for c in range(width) if c not in numeric}
@@ -179,11 +171,9 @@ def _empty(field: str) -> bool:
 
 
 def _is_data(row: list[str], width: int, decimal: str) -> bool:
-    return len(row) == width and any(_number(field, decimal) for field in row) and _mostly(row, decimal)
-
-
-def _mostly(row: list[str], decimal: str) -> bool:
-    return 2 * sum(_number(f, decimal) or _empty(f) for f in row) >= len(row)
+    """Whether a line of fields has a number, and little else."""
+    known = [field for field in row if _number(field, decimal) or _empty(field)]
+    return len(row) == width and any(_number(field, decimal) for field in known) and 2 * len(known) >= width
 
 
 def _thousands(path: Path, rows: list[list[str]], names: list[str], numeric: list[int]) -> list[str]:
@@ -195,10 +185,8 @@ def _thousands(path: Path, rows: list[list[str]], names: list[str], numeric: lis
     marks = [{mark for row in rows for mark in ".," if mark in row[c]} for c in numeric]
     commas = [name for name, found in zip(names, marks, strict=True) if found == {","}]
     if commas and len(commas) < len(names) and {"."} in marks:
-        raise InputError(
-            f"column '{commas[0]}' has commas and another one decimal points", file=path,
-            hint="commas between thousands are to be left out; decimal marks must be the same in all columns",
-        )  # fmt: skip
+        hint = "commas between thousands are to be left out; decimal marks must be the same in all columns"
+        raise InputError(f"column '{commas[0]}' has commas and another one decimal points", file=path, hint=hint)
     said = []
     for name, c in zip(names, numeric, strict=True):
         fields = [row[c] for row in rows if "," in row[c]]
@@ -208,10 +196,6 @@ def _thousands(path: Path, rows: list[list[str]], names: list[str], numeric: lis
                 "commas between thousands are to be left out"
             )
     return said
-
-
-def _commonest(values: list[int]) -> int:
-    return max(set(values), key=values.count)
 
 
 def _header(before: list[str], delimiter: str | None, width: int) -> tuple[list[str], dict[str, str]]:
@@ -237,7 +221,7 @@ def _header(before: list[str], delimiter: str | None, width: int) -> tuple[list[
     units = {name: unit for name, (_, unit) in zip(names, split, strict=True) if unit}
     if unit_row:
         for name, text in zip(names, unit_row, strict=True):
-            unit = text.strip("[]() ").replace("µ", "u").replace("μ", "u")
+            unit = plain_unit(text.strip("[]() "))
             if unit and unit != "-":
                 units.setdefault(name, unit)
     return names, units
@@ -245,7 +229,7 @@ def _header(before: list[str], delimiter: str | None, width: int) -> tuple[list[
 
 def _are_units(row: list[str]) -> bool:
     bracketed = all(field.startswith(("[", "(")) for field in row if field)
-    known = all(field.strip("[]() ").replace("µ", "u").replace("μ", "u").lower() in _UNITS for field in row if field)
+    known = all(plain_unit(field.strip("[]() ")).lower() in _UNITS for field in row if field)
     return any(row) and (bracketed or known) and all(_UNIT_WORD.match(field) for field in row if field and field != "1")
 
 
@@ -303,13 +287,10 @@ def _careful(path: Path, layout: _Layout) -> tuple[np.ndarray, list[str]]:
                 values.append(float(row[c] if "_" not in row[c] else "no number"))
             except ValueError:
                 if not _empty(row[c]):
-                    raise InputError(
-                        "a field is not a number",
-                        file=path,
-                        key=f"line {number}, column '{layout.names[c]}'",
-                        value=row[c][:40],
-                        hint="correct or delete the line; a missing value is left empty or written NaN",
-                    ) from None
+                    key = f"line {number}, column '{layout.names[c]}'"
+                    hint = "correct or delete the line; a missing value is left empty or written NaN"
+                    what = "a field is not a number"
+                    raise InputError(what, file=path, key=key, value=row[c][:40], hint=hint) from None
                 values.append(np.nan)
                 empties += 1
     notes = [f"{empties} empty fields read as NaN"] if empties else []
@@ -321,10 +302,5 @@ def _careful(path: Path, layout: _Layout) -> tuple[np.ndarray, list[str]]:
 
 
 def _wrong_length(path: Path, line: int, fields: int, text: str, layout: _Layout) -> InputError:
-    return InputError(
-        f"a row has {fields} fields where {len(layout.names)} are expected",
-        file=path,
-        key=f"line {line}",
-        value=text[:60],
-        hint="delete or complete the line",
-    )
+    what = f"a row has {fields} fields where {len(layout.names)} are expected"
+    return InputError(what, file=path, key=f"line {line}", value=text[:60], hint="delete or complete the line")

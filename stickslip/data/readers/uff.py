@@ -95,12 +95,9 @@ def _sets(path: Path) -> Iterator[_Set]:
         except InputError as error:
             raise error.at(file=path, key=f"data set {number}") from None
         except Exception as error:  # pyuff raises bare exceptions
-            raise InputError(
-                f"data set 58{'b' if binary else ''} cannot be read ({error})",
-                file=path,
-                key=f"data set {number}",
-                hint="export it again, as text or as CSV",
-            ) from None
+            what = f"data set 58{'b' if binary else ''} cannot be read ({error})"
+            hint = "export it again, as text or as CSV"
+            raise InputError(what, file=path, key=f"data set {number}", hint=hint) from None
         if int(header["abscissa_spacing"]) == 1:
             notes.append(f"time step {header['abscissa_inc']:g}, which this format rounds to 6 digits")
         yield _Set(header, np.asarray(x), np.asarray(y), notes)
@@ -119,12 +116,10 @@ def _identifier(rest: bytes) -> bytes:
     """
     words = rest.split()
     if len(words) < 2 or not all(word.isdigit() for word in words[:2]):
-        raise InputError(
-            "the line '58b' does not state the byte order and the kind of numbers",
-            value=rest.decode("latin-1").strip() or "nothing",
-            allowed="58b, then 1 (Intel) or 2 (Motorola), then 2 (IEEE)",
-            hint="export the file again, as text or as CSV",
-        )
+        what = "the line '58b' does not state the byte order and the kind of numbers"
+        value = rest.decode("latin-1").strip() or "nothing"
+        allowed = "58b, then 1 (Intel) or 2 (Motorola), then 2 (IEEE)"
+        raise InputError(what, value=value, allowed=allowed, hint="export the file again, as text or as CSV")
     order, kind = (int(word) for word in words[:2])
     return f"{-1:6d}\n{58:6d}b{order:6d}{kind:6d}{_HEADER_LINES:12d}{0:12d}{0:6d}{0:6d}{0:12d}{0:12d}\n".encode()
 
@@ -186,10 +181,8 @@ def _binary(raw: bytes, start: int, header: dict[str, Any]) -> tuple[np.ndarray,
             notes.append("the abscissas have 8 bytes, the ordinates 4")
         readings.append((table, notes, close.end()))
     if not readings:
-        raise InputError(
-            f"the binary data do not end where {count} values end",
-            hint="the file is cut short or was transferred as text",
-        )
+        hint = "the file is cut short or was transferred as text"
+        raise InputError(f"the binary data do not end where {count} values end", hint=hint)
     # 12 bytes a value are a single and a double in either order: the one that makes sense, else the one declared
     table, notes, position = next((r for r in readings if len(readings) == 1 or _sensible(r[0])), readings[0])
     y = table["re"].astype(float)

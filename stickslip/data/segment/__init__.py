@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from ...system.units import shown
-from ..resolution import estimate_resolution, noise_level
+from ..resolution import noise_level
 from ..trace import Drive, Trace
 from .choose import choose_settings
 from .kinematics import Array, block_motion, position_at, velocity
 from .phases import divide
 from .pick import directions, half_of, pick
-from .records import PHASES, Dropped, Event, Phase, Segmentation, Settings
+from .records import PHASES, Dropped, Event, Segmentation, Settings
 from .reduce import reduce_trace, thin
-from .ringing import LAWS, Ringing
+from .ringing import LAWS
 from .shape import LEVELS, Shape, Shapes, crept, event_shapes
 
 __all__ = [
@@ -25,8 +25,6 @@ __all__ = [
     "PHASES",
     "Dropped",
     "Event",
-    "Phase",
-    "Ringing",
     "Segmentation",
     "Settings",
     "Shape",
@@ -34,9 +32,7 @@ __all__ = [
     "block_motion",
     "choose_settings",
     "crept",
-    "estimate_resolution",
     "event_shapes",
-    "noise_level",
     "position_at",
     "reduce_trace",
     "segment",
@@ -91,9 +87,9 @@ def segment(
 
     result = run(choose(False))
     moved = _path(position, result.settings.noise)
-    if drive is not None and _slipped(result) < _COMPLETE * moved:
+    if drive is not None and _slipped(result.events) < _COMPLETE * moved:
         other = run(choose(True))  # the threshold for fast slips finds only part of the motion, if any
-        if _slipped(other) > _slipped(result) + 0.1 * moved:
+        if _slipped(other.events) > _slipped(result.events) + 0.1 * moved:
             result = other
     stopless = sum(event.arrest == "drive" for event in result.events)
     if stopless > _STOPLESS * len(result.events):
@@ -103,8 +99,8 @@ def segment(
     return replace(result, settings=replace(result.settings, relative=0.0))
 
 
-def _slipped(segmentation: Segmentation) -> float:
-    return sum(event.slip for event in segmentation.events)
+def _slipped(events: Sequence[Event]) -> float:
+    return sum(event.slip for event in events)
 
 
 def segment_motion(
@@ -136,9 +132,8 @@ def segment_motion(
         events = []
     idle = "continuous sliding" if regime == "continuous sliding" else "stick"
     phases = divide(time, speed, drive, settings, events, virgin=virgin, idle=idle)
-    return Segmentation(
-        name, tuple(events), tuple(phases), tuple(dropped), regime, reason, settings, _warnings(events, virgin)
-    )
+    kept = tuple(events), tuple(phases), tuple(dropped)
+    return Segmentation(name, *kept, regime, reason, settings, _warnings(events, virgin))
 
 
 def _regime(
@@ -146,11 +141,10 @@ def _regime(
 ) -> tuple[str, str]:
     """What kind of motion it is, and the numbers that say so."""
     moved = _path(position, settings.noise)
-    slipped = sum(event.slip for event in events)
+    slipped = _slipped(events)
     middle = float(np.median([event.slip for event in events])) if events else 0.0
-    if events and not any(
-        slipped < share * moved and middle < levels * settings.noise for share, levels in _ACCIDENTAL
-    ):
+    chance = any(slipped < share * moved and middle < levels * settings.noise for share, levels in _ACCIDENTAL)
+    if events and not chance:
         rests = [event.stick_time / max(event.duration, 1e-300) for event in events[1:]]
         text = f"{len(events)} slip{'s' if len(events) > 1 else ''}, median {shown(middle, settings.unit, 3)}"
         if rests and float(np.median(rests)) < 1.0:

@@ -46,8 +46,12 @@ def choose_settings(
     relative = 0.1 if minimum_slip is None else 0.0
     smallest = 10 * spread if minimum_slip is None else minimum_slip
     most = max(1, min(time.size // 20, 20_000))
+
+    def settings(half: int, threshold: float, usual: float) -> Settings:
+        return Settings(half * step, threshold, usual, smallest, spread, gain=gain, unit=unit, relative=relative)
+
     if drive is None:
-        return _undriven(time, position, step, spread, smallest, most, relative, gain, unit)
+        return settings(*_undriven(time, position, step, spread, most))
     if unit == "m" and not slow:
         threshold = _RIG_FACTOR * speed + _RIG_FLOOR
         half = half_window(spread, step, threshold / 5, most)
@@ -55,10 +59,9 @@ def choose_settings(
         if fastest > 2 * threshold and velocity_noise(spread, half, step) <= threshold / 4:
             allowance = 4 * velocity_noise(spread, half, step)
             half = _widen(time, position, half, half_window(spread, step, threshold / 20, most), allowance)
-            return Settings(half * step, threshold, speed, smallest, spread, gain=gain, unit=unit, relative=relative)
+            return settings(half, threshold, speed)
     half = half_window(spread, step, speed / 4 if speed > 0 else np.inf, most)
-    threshold = max(1.5 * speed, speed + 5 * velocity_noise(spread, half, step))
-    return Settings(half * step, threshold, speed, smallest, spread, gain=gain, unit=unit, relative=relative)
+    return settings(half, max(1.5 * speed, speed + 5 * velocity_noise(spread, half, step)), speed)
 
 
 def _widen(time: Array, position: Array, half: int, wanted: int, noise: float) -> int:
@@ -76,24 +79,17 @@ def _widen(time: Array, position: Array, half: int, wanted: int, noise: float) -
     return half
 
 
-def _undriven(
-    time: Array,
-    position: Array,
-    step: float,
-    noise: float,
-    smallest: float,
-    most: int,
-    relative: float,
-    gain: float | None,
-    unit: str,
-) -> Settings:
-    """Where the block is loaded by a force and there is no drive: ten times its usual speed, or half the greatest."""
+def _undriven(time: Array, position: Array, step: float, noise: float, most: int) -> tuple[int, float, float]:
+    """Half window, threshold and speed where the block is loaded by a force and there is no drive.
+
+    The threshold is ten times the usual speed of the block, or half its greatest.
+    """
     half = half_window(noise, step, abs(float(np.ptp(position))) / float(time[-1] - time[0]), most)
     speeds = np.abs(velocity(time, position, half))
     usual, greatest = float(np.median(speeds)), float(speeds.max())
     lowest = usual + 5 * velocity_noise(noise, half, step)
     threshold = max(lowest, min(10 * usual, 0.5 * greatest))
-    return Settings(half * step, threshold, 0.5 * threshold, smallest, noise, gain=gain, unit=unit, relative=relative)
+    return half, threshold, 0.5 * threshold
 
 
 def _speed(time: Array, drive: Drive | None) -> float:

@@ -109,11 +109,8 @@ def block_motion(
     gain = gain or stiffness or trace.spring_stiffness
     if drive is None or drive.speed == 0:
         rate = loading_rate(trace.time, trace.spring_force, level)
-        drive, unit = (
-            Drive.constant(math.copysign(1.0, rate), float(trace.time[0]), float(trace.time[-1])),
-            "s of loading",
-        )
-        gain = abs(rate) or 1.0
+        drive = Drive.constant(math.copysign(1.0, rate), float(trace.time[0]), float(trace.time[-1]))
+        gain, unit = abs(rate) or 1.0, "s of loading"
     if gain is None:
         gain = abs(loading_rate(trace.time, trace.spring_force, level, drive)) or 1.0
     position = np.asarray(drive.position(trace.time))

@@ -43,10 +43,8 @@ def divide(
             pieces.append(("ring-down", before.t_arrest, calm, before.index))
             at = calm
         pieces += _with_holds(rest, at, awake, holds, event.index)
-        pieces += [
-            ("nucleation", awake, event.t_onset, event.index),
-            ("slip", event.t_onset, event.t_arrest, event.index),
-        ]
+        pieces.append(("nucleation", awake, event.t_onset, event.index))
+        pieces.append(("slip", event.t_onset, event.t_arrest, event.index))
         at, rest = event.t_arrest, "stick"
     if events:
         calm = _ring_down(time, speed, settings, events[-1], 0.5 * (at + stop), quiet)

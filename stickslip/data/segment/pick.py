@@ -122,9 +122,7 @@ def pick(
             )
         )
     events, settings = _drop_small(events, settings, drop)
-    left_out = [
-        Dropped("slips", count, f"first at {first_at[reason]:.6g} s", reason) for reason, count in dropped.items()
-    ]
+    left_out = [Dropped("slips", n, f"first at {first_at[reason]:.6g} s", reason) for reason, n in dropped.items()]
     return _chain(events, time, drive), left_out, settings
 
 
@@ -158,15 +156,11 @@ def _chain(events: list[Event], time: Array, drive: Drive | None) -> list[Event]
         before = events[index - 1] if index else None
         since = before.t_arrest if before else float(time[0])
         inside = tuple((max(a, since), min(b, event.t_onset)) for a, b in holds if b > since and a < event.t_onset)
-        result.append(
-            replace(
-                event,
-                index=index,
-                recurrence=event.t_onset - before.t_onset if before else float("nan"),
-                stick_time=event.t_onset - before.t_arrest if before else float("nan"),
-                holds=inside,
-            )
-        )
+        event = replace(event, index=index, holds=inside)
+        if before:
+            waited, stuck = event.t_onset - before.t_onset, event.t_onset - before.t_arrest
+            event = replace(event, recurrence=waited, stick_time=stuck)
+        result.append(event)
     return result
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..trace import SIGNALS, Repair, Trace
+from ..trace import Repair, Trace
 from .records import Segmentation
 
 Array = NDArray[np.float64]
@@ -44,14 +44,10 @@ def reduce_trace(trace: Trace, segmentation: Segmentation, *, points: int = 400,
     def mean(values: Array) -> Array:
         return np.add.reduceat(values - values[0], first) / sizes + values[0]
 
-    changed = {name: mean(getattr(trace, name)) for name in _channels(trace)}
+    changed = {name: mean(values) for name, values in trace.channels.items()}
     reason = "stretches without events are means over log-spaced windows"
     note = Repair("reduced", time.size - first.size, f"{time.size} samples to {first.size}", reason)
     return trace.replace(time=mean(time), **changed, repairs=(*trace.repairs, note))
-
-
-def _channels(trace: Trace) -> list[str]:
-    return [name for name in (*SIGNALS, "drive_position", "normal_load") if getattr(trace, name) is not None]
 
 
 def _log_starts(start: int, stop: int, points: int) -> NDArray[np.intp]:

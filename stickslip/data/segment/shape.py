@@ -161,22 +161,24 @@ def _creep(time: Array, position: Array, found: Segmentation, event: Event, befo
         moment, width = event.t_onset - ahead, 0.12 * ahead
         if not moment - width / 2 >= since:
             continue
-        low, high = np.searchsorted(time, [moment - width / 2, moment + width / 2])
-        there = float(np.mean(position[low:high])) if high > low else float(np.interp(moment, time, position))
+        there = _mean(time, position, moment - width / 2, moment + width / 2, moment)
         out[k] = event.direction * (event.x_onset - there)
     return out
 
 
 def _hold_motion(time: Array, position: Array, event: Event) -> tuple[float, ...]:
-    def mean(a: float, b: float) -> float:
-        low, high = np.searchsorted(time, [a, b])
-        return float(np.mean(position[low:high])) if high > low else float(np.interp(a, time, position))
-
     out = []
     for start, stop in event.holds:
         edge = EDGE * (stop - start)
-        out.append(event.direction * (mean(stop - edge, stop) - mean(start, start + edge)))
+        first = _mean(time, position, start, start + edge, start)
+        out.append(event.direction * (_mean(time, position, stop - edge, stop, stop - edge) - first))
     return tuple(out)
+
+
+def _mean(time: Array, position: Array, start: float, stop: float, moment: float) -> float:
+    """Mean position between two times, or that at a ``moment`` where no sample lies between them."""
+    low, high = np.searchsorted(time, [start, stop])
+    return float(np.mean(position[low:high])) if high > low else float(np.interp(moment, time, position))
 
 
 def _noise(found: Segmentation, shapes: list[Shape], duration: float, rate: float) -> dict[str, float]:

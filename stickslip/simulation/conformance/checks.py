@@ -116,4 +116,4 @@ def _together(effects: tuple[Effect, ...]) -> list[Finding]:
 def describe(effect: Effect) -> str:
     """The form of an effect that has several, as a prefix of a message."""
     own = [f for f in forms(type(effect)) if f and all(getattr(effect, k) == v for k, v in f.items())]
-    return f"({', '.join(f'{k} = {v}' for k, v in own[0].items())}) " if own else ""
+    return dynamics.named(own[0]) if own else ""

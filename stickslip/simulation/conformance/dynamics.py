@@ -12,8 +12,9 @@ from ...physics.effects.base import Effect, Motion
 from ...physics.effects.catalogue import forms
 from ...physics.params import specs
 from .gradients import present
-from .rig import AT_ONCE, STOPPED, TIGHT, Rig, base_model, march_step, prescribed
+from .rig import AT_ONCE, STOPPED, TIGHT, Rig, base_model, directions, march_step, prescribed
 from .statics import corners
+from .trial import first_line
 
 ACTIVE = ("sensor", "drive")  # families that are not a passive contact
 GAIN = 1e-5  # energy that may appear by quadrature and in the model's books, as a share of all that is lost
@@ -33,12 +34,12 @@ def check_null(cls: type[Effect]) -> Iterator[str]:
         try:
             seen = _march_eagerly((cls(**form),), motions)
         except Exception as error:  # whatever a foreign law raises
-            yield f"{_named(form)}raises {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+            yield f"{named(form)}raises {first_line(error)}"
             continue
         for what, a, b in zip(("acceleration", "reading", "element forces", "weakening"), seen, plain, strict=True):
             if not np.array_equal(a, b):
                 step = int(np.argmax(np.any(np.atleast_2d((a != b).T).T.reshape(len(a), -1), axis=1)))
-                yield f"{_named(form)}{what}: not that of the base model, first in step {step} of the prescribed motion"
+                yield f"{named(form)}{what}: not that of the base model, first in step {step} of the prescribed motion"
                 break
 
 
@@ -47,7 +48,8 @@ def _plain() -> list[np.ndarray]:
     return _march_eagerly((), prescribed())
 
 
-def _named(form: dict[str, str]) -> str:
+def named(form: dict[str, str]) -> str:
+    """The form of an effect that has several, as a prefix of a message."""
     return f"({', '.join(f'{k} = {v}' for k, v in form.items())}) " if form else ""
 
 
@@ -65,14 +67,9 @@ def check_finite(rig: Rig, report: Callable[[int, str], None]) -> None:
     """States, forces and their derivatives in every corner of the ranges, over steps without time, way or velocity."""
     motions = prescribed()
     for index, effect in enumerate(rig.effects):
-        places = rig.at(index)
-        directions = np.zeros((AT_ONCE, rig.defaults.size))
-        directions[np.arange(len(places))[:AT_ONCE], list(places.values())[:AT_ONCE]] = 1.0
+        along = directions(list(rig.at(index).values())[:AT_ONCE], rig.defaults.size)
         for values in corners(effect):
-            p = rig.defaults.copy()
-            for name, value in values.items():
-                p[places[name]] = value
-            leaves, slopes = rig.march_derivatives(p, directions, motions)
+            leaves, slopes = rig.march_derivatives(rig.with_values(index, values), along, motions)
             at = ", ".join(f"{k} = {v:g}" for k, v in values.items()) or "the defaults"
             if not all(np.all(np.isfinite(leaf)) for leaf in leaves):
                 report(index, f"not a finite number at {at}")
@@ -90,9 +87,7 @@ def check_energy(rig: Rig, report: Callable[[int, str], None]) -> None:
             value = present(spec, share)
             if not spec.lower <= value <= spec.upper:
                 continue
-            p = rig.defaults.copy()
-            p[rig.at(index)[effect.amplitude]] = value
-            outcome = rig.run(p, STOPPED, TIGHT)
+            outcome = rig.run(rig.with_values(index, {effect.amplitude: value}), STOPPED, TIGHT)
             n = int(outcome.accepted)
             steps = jax.tree.map(lambda a, n=n: np.asarray(a[:n]), outcome.steps)
             if not np.all(np.isfinite(steps.x)):
@@ -102,8 +97,6 @@ def check_energy(rig: Rig, report: Callable[[int, str], None]) -> None:
             rise = np.max(energy - np.minimum.accumulate(energy))
             if effect.family not in ACTIVE and rise > GAIN * np.ptp(energy):
                 at = steps.t[np.argmax(energy - np.minimum.accumulate(energy))]
-                report(
-                    index,
-                    f"energy grows by {rise / np.ptp(energy):.2g} of what is lost, with the drive stopped, at "
-                    f"{effect.amplitude} = {value:g}, t = {at:.3g} s",
-                )
+                where = f"{effect.amplitude} = {value:g}, t = {at:.3g} s"
+                share = rise / np.ptp(energy)
+                report(index, f"energy grows by {share:.2g} of what is lost, with the drive stopped, at {where}")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...physics.effects.base import Effect
 from ...physics.params import Spec, specs
-from .rig import AT_ONCE, DRIVE, LOOSE, TIGHT, Rig, feature_scales
+from .rig import AT_ONCE, DRIVE, LOOSE, TIGHT, Rig, directions, feature_scales
 
 LADDER = 10.0 ** np.arange(-7.0, -1.0)  # steps as shares of a parameter's range
 AGREEMENT = 0.02  # on a plateau, of the largest change of a feature over the range
@@ -40,30 +40,19 @@ def present(spec: Spec, share: float) -> float:
 def check_gradients(rig: Rig, report: Callable[[int, str], None]) -> None:
     """Try every parameter of every effect of the rig; ``report(index of the effect, text)`` takes the faults."""
     for index, effect in enumerate(rig.effects):
-        places = rig.at(index)
         for where, values in test_points(effect):
-            p = rig.defaults.copy()
-            for name, value in values.items():
-                p[places[name]] = value
-            names = [n for n in places if where != "at the null" or n == effect.amplitude]
+            p = rig.with_values(index, values)
+            names = [n for n in rig.at(index) if where != "at the null" or n == effect.amplitude]
             exact = []
             for tolerance in (LOOSE, TIGHT):
-                times, count = _sequence(rig, p, tolerance)
-                exact.append(_check_point(rig, index, p, names, (times, count, tolerance), where, report))
+                run = rig.run(p, DRIVE, tolerance)
+                steps = np.append(0.0, np.asarray(run.steps.t)), int(run.accepted), tolerance  # the solver's own
+                exact.append(_check_point(rig, index, p, names, steps, where, report))
             apart = np.abs(exact[0] - exact[1]) - COARSE
             for row, name in enumerate(names):
                 if np.any(apart[row] > BETWEEN * np.max(np.abs(exact[1][row]))):
-                    text = (
-                        f"does not settle as the tolerance is lowered: {_short(exact[0][row])}, {_short(exact[1][row])}"
-                    )
-                    report(index, f"derivative in {name} {where} {text}")
-
-
-def _sequence(rig: Rig, p: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
-    """The solver's own step times (s) at a parameter vector, padded, and their number."""
-    outcome = rig.run(p, DRIVE, tolerance)
-    count = int(outcome.accepted)
-    return np.append(0.0, np.asarray(outcome.steps.t)), count
+                    seen = ", ".join(_short(slopes[row]) for slopes in exact)
+                    report(index, f"derivative in {name} {where} does not settle as the tolerance is lowered: {seen}")
 
 
 def _check_point(
@@ -75,7 +64,10 @@ def _check_point(
     where: str,
     report: Callable[[int, str], None],
 ) -> np.ndarray:
-    """Compare at one point; the derivatives per range in units of the scales, shape (names, features)."""
+    """Compare at one point; the derivatives per range in units of the scales, shape (names, features).
+
+    ``steps`` are their times (s), padded, how many there are, and their tolerance.
+    """
     known, places = specs(rig.effects[index]), rig.at(index)
     slopes, agreement = _slopes(rig, p, [places[n] for n in names], steps)
     all_exact = []
@@ -93,12 +85,9 @@ def _check_point(
         good = worst <= agreement * size + NOISE
         jumps = worst[-1] > SECANT * size + JUMP and worst[-2] < 1e-3 * worst[-1]  # curvature alone: a tenth or less
         if not np.any(good[:-1] & good[1:]) or worst[LADDER >= WIDE].min() > SECANT * size + NOISE or jumps:
-            report(
-                index,
-                f"derivative in {name} {where} (tolerance {steps[2]:g}) agrees with no finite difference: per range "
-                f"{_short(exact)}, gaps {_short(worst)} for steps of 1e-7 "
-                f"... 1e-2 of the range",
-            )
+            text = f"derivative in {name} {where} (tolerance {steps[2]:g}) agrees with no finite difference: per range "
+            text += f"{_short(exact)}, gaps {_short(worst)} for steps of 1e-7 ... 1e-2 of the range"
+            report(index, text)
     return np.array(all_exact)
 
 
@@ -107,9 +96,7 @@ def _slopes(rig: Rig, p: np.ndarray, places: list[int], steps: tuple) -> tuple[n
     rows, failed = [], 0.0
     for first in range(0, len(places), AT_ONCE):
         some = places[first : first + AT_ONCE]
-        directions = np.zeros((AT_ONCE, p.size))
-        directions[np.arange(len(some)), some] = 1.0
-        (_, failed), (slopes, _) = rig.replay_derivatives(p, directions, *steps)
+        (_, failed), (slopes, _) = rig.replay_derivatives(p, directions(some, p.size), *steps)
         rows.append(np.asarray(slopes)[: len(some)])
     return np.concatenate(rows), ROUGH if failed else AGREEMENT
 

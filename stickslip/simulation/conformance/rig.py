@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import diffrax
@@ -87,11 +87,15 @@ class Rig:
         """The model with the parameters in it."""
         if not self.names:
             return self._model
-        return eqx.tree_at(
-            lambda m: [getattr(m.effects[i], name) for i, name in self.names],
-            self._model,
-            [p[k] for k in range(len(p))],
-        )
+        places = [p[k] for k in range(len(p))]
+        return eqx.tree_at(lambda m: [getattr(m.effects[i], name) for i, name in self.names], self._model, places)
+
+    def with_values(self, index: int, values: Mapping[str, float]) -> np.ndarray:
+        """The vector with parameters of one effect set."""
+        p, places = self.defaults.copy(), self.at(index)
+        for name, value in values.items():
+            p[places[name]] = value
+        return p
 
     def _run(self, p: Array, drive: Array, tolerance: Array) -> Outcome:
         self.traces += 1
@@ -174,17 +178,8 @@ def prescribed() -> Motion:
     dt, v = np.array(parts).T
     before = np.append(0.0, v[:-1])
     dx = 0.5 * dt * (before + v)
-    fields = (
-        np.cumsum(dt),
-        dt,
-        np.cumsum(dx),
-        v,
-        0.5 * dt * (before - v),
-        dx,
-        0.0 * dt,
-        0.0 * dt,
-        1.0 + 0.05 * np.sin(np.arange(dt.size)),
-    )
+    load = 1.0 + 0.05 * np.sin(np.arange(dt.size))
+    fields = (np.cumsum(dt), dt, np.cumsum(dx), v, 0.5 * dt * (before - v), dx, 0.0 * dt, 0.0 * dt, load)
     return Motion(*(jnp.asarray(f) for f in fields))
 
 
@@ -203,6 +198,13 @@ def _passes(t: Array, reading: Array, v: Array, level: float) -> Array:
     s = (level - reading[before]) / way
     slow0, slow1 = way / v[before], way / v[after]
     return t[before] + s * s * (3 - 2 * s) * dt + s * (1 - s) * ((1 - s) * slow0 - s * slow1)
+
+
+def directions(places: Sequence[int], size: int) -> np.ndarray:
+    """One derivative along each of the places of a vector, at most AT_ONCE, shape (AT_ONCE, size)."""
+    out = np.zeros((AT_ONCE, size))
+    out[np.arange(len(places)), list(places)] = 1.0
+    return out
 
 
 def _derivatives(function: Callable) -> Callable:

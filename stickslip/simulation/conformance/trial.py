@@ -70,10 +70,8 @@ def _increment(model: Model) -> tuple[State, State]:
     bank, before = model.shaped(), model.rest()
     motion = Motion(t, dt, step, jnp.asarray(1e-4), jnp.zeros(()), step, model.lead(t))
     after, forces = model.advance(before, bank, model.contact(before, bank, t), motion)
-    speed = after.v + 0.0 * (
-        forces.net / model.mass() + model.read(after, motion, forces.contact) + model.rising(after)
-    )
-    return before, eqx.tree_at(lambda y: y.v, after, speed)
+    seen = forces.net / model.mass() + model.read(after, motion, forces.contact) + model.rising(after)
+    return before, eqx.tree_at(lambda y: y.v, after, after.v + 0.0 * seen)
 
 
 def _shapes(state: State) -> list[tuple]:
@@ -93,11 +91,9 @@ def _line(error: Exception, cls: type[Effect]) -> str | None:
 
 
 def _refusal(cls: type[Effect], what: str, key: str | None = None) -> InputError:
-    return InputError(
-        f"the law of '{cls.tag}' cannot be compiled: {what}",
-        file=_file(cls),
-        key=key,
-        hint="a law is written with jax.numpy and without 'if' on a value (jnp.tanh(v / v_r) for a sign, "
+    hint = (
+        "a law is written with jax.numpy and without 'if' on a value (jnp.tanh(v / v_r) for a sign, "
         "jnp.maximum(x, 0.0) for a part); what it returns has the shape that its role asks for (documentation, "
-        "'Writing an effect')",
+        "'Writing an effect')"
     )
+    return InputError(f"the law of '{cls.tag}' cannot be compiled: {what}", file=_file(cls), key=key, hint=hint)

@@ -73,11 +73,5 @@ def build(scenario: Scenario) -> Setup:
         k = file.block.spring_stiffness
         start = eqx.tree_at(lambda s: s.v, start, jnp.asarray(k * motion.first_velocity / (k + built.stiffness)))
     solver = file.solver
-    return Setup(
-        model,
-        start,
-        motion,
-        built,
-        Tolerance(*map(jnp.asarray, (solver.relative, solver.displacement, solver.velocity))),
-        offset,
-    )
+    tolerance = Tolerance(*map(jnp.asarray, (solver.relative, solver.displacement, solver.velocity)))
+    return Setup(model, start, motion, built, tolerance, offset)

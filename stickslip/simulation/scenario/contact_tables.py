@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ...data.campaign.fields import fault, quantity
+from ...data.campaign.fields import faults, quantity
 from ...errors import InputError
 
 FORCE = quantity("N", above=0)
@@ -18,9 +18,9 @@ SLOPE = quantity("1", above=0)
 
 
 class Table(BaseModel):
-    """Base: unknown keys are errors, nothing changes after loading."""
+    """Base of all tables: unknown keys are errors, nothing changes after loading."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
 
 class Each(Table):
@@ -47,20 +47,15 @@ class ContactTable(Table):
 
     @model_validator(mode="before")
     @classmethod
+    @faults()
     def _count(cls, content: Any) -> Any:
         """The number of contacts follows from ``each`` where that is given."""
         if not isinstance(content, dict) or not isinstance(content.get("each"), list):
             return content
         number = len(content["each"])
         if content.get("contacts", number) != number:
-            raise fault(
-                InputError(
-                    "'contacts' and the number of [[contact.each]] differ",
-                    value=content["contacts"],
-                    allowed=str(number),
-                    hint="remove 'contacts'",
-                )
-            )
+            what = "'contacts' and the number of [[contact.each]] differ"
+            raise InputError(what, value=content["contacts"], allowed=str(number), hint="remove 'contacts'")
         return {**content, "contacts": number}
 
     def of(self, i: int, key: str) -> Any:
@@ -182,11 +177,11 @@ class HeightsTable(ElasticTable):
     each: list[Each] | None = None
 
     @model_validator(mode="after")
+    @faults()
     def _spaced(self) -> Self:
         if (self.position is None) == (self.spacing is None):
-            raise fault(
-                InputError("give either 'position' or 'spacing'", hint='spacing = "0.1 um"  where there is no position')
-            )
+            hint = 'spacing = "0.1 um"  where there is no position'
+            raise InputError("give either 'position' or 'spacing'", hint=hint)
         return self
 
 

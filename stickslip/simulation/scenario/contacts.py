@@ -19,16 +19,7 @@ from ...errors import InputError
 from ...physics import contact as physics
 from ...physics.contact import Bank, Profile, StaticContact
 from ...system.units import factor_to_si
-from .contact_tables import (
-    ConeTable,
-    ContactTable,
-    ElasticTable,
-    FlatPunchTable,
-    HeightsTable,
-    PowerLawTable,
-    RoughLineTable,
-    SphereTable,
-)
+from . import contact_tables as tables
 
 
 class Elastic(eqx.Module):
@@ -112,7 +103,7 @@ class Built:
     warnings: tuple[str, ...]
 
 
-def build_contact(table: ContactTable, folder: Path = Path()) -> Built:
+def build_contact(table: tables.ContactTable, folder: Path = Path()) -> Built:
     """Make the bank of a scenario's contacts.
 
     Args:
@@ -126,7 +117,7 @@ def build_contact(table: ContactTable, folder: Path = Path()) -> Built:
     bank, facts, found = _make_bank(parts, table.bins)
     shares = np.asarray(found)
     notes: list[str] = []
-    if shares.size and not isinstance(table, FlatPunchTable):
+    if shares.size and not isinstance(table, tables.FlatPunchTable):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             physics.check_saturation(shares, key="contact")
@@ -152,23 +143,23 @@ def _make_bank(parts: tuple[Part, ...], n: int) -> tuple[Bank, Array, Array]:
     return bank, facts, jnp.concatenate([jnp.zeros(0), *shares])
 
 
-def _parts(table: ContactTable, folder: Path) -> list[Part]:
+def _parts(table: tables.ContactTable, folder: Path) -> list[Part]:
     match table:
-        case RoughLineTable():
+        case tables.RoughLineTable():
             return _rough_parts(table)
-        case PowerLawTable():
+        case tables.PowerLawTable():
             return _power_law_parts(table)
-        case ElasticTable():
+        case tables.ElasticTable():
             return [_elastic(profile, table, i, number) for i, number, profile in _profiles(table, folder)]
     raise InputError("unknown kind of contact", key="contact.kind", value=table.kind)
 
 
-def moduli(table: ElasticTable) -> physics.Moduli:
+def moduli(table: tables.ElasticTable) -> physics.Moduli:
     """E* and G* of two bodies of the table's material."""
     return physics.equal_bodies(table.youngs_modulus, table.poisson_ratio)
 
 
-def _rough_parts(table: RoughLineTable) -> list[Part]:
+def _rough_parts(table: tables.RoughLineTable) -> list[Part]:
     if table.realisation == "mean":
         return [_mean_line(table, i, number) for i, number in _distinct(table, "H", "h_rms")]
     exponents = [table.of(i, "H") for i in range(table.contacts)]
@@ -184,7 +175,7 @@ def _rough_parts(table: RoughLineTable) -> list[Part]:
 
 
 def rough_indentation(
-    table: RoughLineTable, H: float, heights: Any, lines: int, rows: np.ndarray | None = None
+    table: tables.RoughLineTable, H: float, heights: Any, lines: int, rows: np.ndarray | None = None
 ) -> physics.Indentation:
     """The table of a scenario's rough lines: ``lines`` of them, of which ``rows`` are kept."""
     waves = {
@@ -203,7 +194,7 @@ def rough_indentation(
     return physics.indentation(physics.from_heights(curved, dx))
 
 
-def _mean_line(table: RoughLineTable, i: int, number: int) -> MeanLine:
+def _mean_line(table: tables.RoughLineTable, i: int, number: int) -> MeanLine:
     friction, load = table.of(i, "friction_coefficient"), table.of(i, "normal_force")
     lines = rough_indentation(table, table.of(i, "H"), table.of(i, "h_rms"), table.lines)
     contact = physics.static_contact(lines, load, friction, moduli(table))
@@ -212,20 +203,16 @@ def _mean_line(table: RoughLineTable, i: int, number: int) -> MeanLine:
     return MeanLine(u, tau * friction * load * number)
 
 
-def _power_law_parts(table: PowerLawTable) -> list[Part]:
-    return [
-        PowerLaw(
-            jnp.asarray(number * table.of(i, "friction_coefficient") * table.of(i, "normal_force")),
-            jnp.asarray(table.of(i, "u_max")),
-            jnp.asarray(table.of(i, "p")),
-            jnp.asarray(table.spread),
-            number,
-        )
-        for i, number in _distinct(table, "u_max", "p")
-    ]
+def _power_law_parts(table: tables.PowerLawTable) -> list[Part]:
+    parts: list[Part] = []
+    for i, number in _distinct(table, "u_max", "p"):
+        strength = number * table.of(i, "friction_coefficient") * table.of(i, "normal_force")
+        u_max, p = jnp.asarray(table.of(i, "u_max")), jnp.asarray(table.of(i, "p"))
+        parts.append(PowerLaw(jnp.asarray(strength), u_max, p, jnp.asarray(table.spread), number))
+    return parts
 
 
-def _distinct(table: ContactTable, *keys: str) -> list[tuple[int, int]]:
+def _distinct(table: tables.ContactTable, *keys: str) -> list[tuple[int, int]]:
     """Index of the first contact of every sort, and how many there are of it."""
     names = ("normal_force", "friction_coefficient", *keys)
     found: dict[tuple, list[int]] = {}
@@ -236,39 +223,39 @@ def _distinct(table: ContactTable, *keys: str) -> list[tuple[int, int]]:
     return [(rows[0], len(rows)) for rows in found.values()]
 
 
-def _elastic(profile: Profile, table: ElasticTable, i: int, number: int) -> Elastic:
+def _elastic(profile: Profile, table: tables.ElasticTable, i: int, number: int) -> Elastic:
     load, friction = table.of(i, "normal_force"), table.of(i, "friction_coefficient")
     contact = physics.static_contact(physics.indentation(profile), load, friction, moduli(table))
     return Elastic(contact, float(number))
 
 
-def _profiles(table: ElasticTable, folder: Path) -> list[tuple[int, int, Profile]]:
+def _profiles(table: tables.ElasticTable, folder: Path) -> list[tuple[int, int, Profile]]:
     """Every sort of contact: index of its first, how many, and its profile."""
-    keys = {SphereTable: ("radius",), ConeTable: ("slope",)}.get(type(table), ())
+    keys = {tables.SphereTable: ("radius",), tables.ConeTable: ("slope",)}.get(type(table), ())
     return [(i, number, profile_of(table, i, folder)) for i, number in _distinct(table, *keys)]
 
 
-def profile_of(table: ElasticTable, i: int, folder: Path) -> Profile:
+def profile_of(table: tables.ElasticTable, i: int, folder: Path) -> Profile:
     """The profile of the i-th contact of a kind that is not a rough line."""
     normal = float(np.asarray(moduli(table).normal))
     load = table.of(i, "normal_force")
     match table:
-        case SphereTable():
+        case tables.SphereTable():
             radius = table.of(i, "radius")
             touching = (0.75 * load * radius / normal) ** (1 / 3)
             return physics.sphere(table.reach * touching, table.springs, radius)
-        case ConeTable():
+        case tables.ConeTable():
             slope = table.of(i, "slope")
             touching = (2.0 * load / (np.pi * normal * slope)) ** 0.5
             return physics.cone(table.reach * touching, table.springs, slope)
-        case FlatPunchTable():
+        case tables.FlatPunchTable():
             return physics.flat_punch(table.half_width, 16)
-        case HeightsTable():
+        case tables.HeightsTable():
             return _measured(table, folder)
     raise InputError("unknown kind of contact", key="contact.kind", value=table.kind)
 
 
-def _measured(table: HeightsTable, folder: Path) -> Profile:
+def _measured(table: tables.HeightsTable, folder: Path) -> Profile:
     path = folder / table.file
     columns = read_columns(path)
 
@@ -278,9 +265,8 @@ def _measured(table: HeightsTable, folder: Path) -> Profile:
 
     position = None if table.position is None else column(table.position, "position")
     try:
-        heights, dx = physics.heights_from_scan(
-            position, column(table.height, "height"), spacing=table.spacing, n_springs=table.springs
-        )
+        scan = position, column(table.height, "height")
+        heights, dx = physics.heights_from_scan(*scan, spacing=table.spacing, n_springs=table.springs)
     except InputError as error:
         raise error.at(file=path) from None
     return physics.from_heights(table.scale * heights, dx)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...physics.effects.base import Effect
 from ...physics.params import specs
+from ..conformance.gradients import present
 from .load import make_scenario
 from .simulation import simulate
 
@@ -38,10 +39,7 @@ RIG: dict[str, Any] = {
 
 def typical_amplitude(cls: type[Effect]) -> float:
     """A fifth of the way from absent to the end of the plausible range that is further off."""
-    spec = specs(cls)[cls.amplitude]
-    null = spec.null or 0.0
-    end = spec.upper if spec.upper - null >= null - spec.lower else spec.lower
-    return null + 0.2 * (end - null)
+    return present(specs(cls)[cls.amplitude], 0.2)
 
 
 def with_and_without(cls: type[Effect]) -> tuple[xarray.Dataset, xarray.Dataset, dict[str, float]]:

@@ -16,38 +16,27 @@ from .schema import DriveTable
 _MOST_STOPS = 10_000
 
 
-@dataclass(frozen=True)
-class Motion:
+@dataclass(frozen=True, eq=False)
+class Motion(Drive):
     """The load point's motion.
 
     Attributes:
-        times, positions: nodes of the load point (s, m), shape (n,), n >= 2.
         duration: length of the run (s), or None where it ends after so many events.
         stops: times at which the integrator lands (s).
     """
 
-    times: np.ndarray
-    positions: np.ndarray
-    duration: float | None
-    stops: tuple[float, ...]
+    duration: float | None = None
+    stops: tuple[float, ...] = ()
 
     @property
     def first_velocity(self) -> float:
         """Velocity at the start (m/s)."""
-        return float((self.positions[1] - self.positions[0]) / (self.times[1] - self.times[0]))
+        return float(self.velocities[0])
 
     @property
-    def speed(self) -> float:
+    def fastest(self) -> float:
         """The largest speed (m/s)."""
-        return float(np.max(np.abs(np.diff(self.positions) / np.diff(self.times))))
-
-    def position(self, t: np.ndarray) -> np.ndarray:
-        """Position (m) at times (s); it goes on at its last velocity."""
-        return Drive(self.times, self.positions).position(t)
-
-    def velocity(self, t: np.ndarray) -> np.ndarray:
-        """Velocity (m/s) at times (s)."""
-        return Drive(self.times, self.positions).velocity(t)
+        return float(np.max(np.abs(self.velocities)))
 
 
 def load_point(table: DriveTable, folder: Path = Path()) -> Motion:

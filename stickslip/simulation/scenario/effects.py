@@ -21,8 +21,7 @@ def make_effects(file: ScenarioFile) -> tuple[Effect, ...]:
             made.append(make(entry.type, **entry.parameters))
         except InputError as error:
             name = (error.key or "").partition(".")[2]
-            key = f"{place}.{name}" if name else f"{place}.type"
-            raise InputError(error.what, key=key, value=error.value, allowed=error.allowed, hint=error.hint) from None
+            raise error.but(key=f"{place}.{name or 'type'}") from None
         except TypeError as error:  # a parameter that is a table or a list
             raise InputError(f"not a parameter of effect '{entry.type}' ({error})", key=place) from None
     return tuple(made)

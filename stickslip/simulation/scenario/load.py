@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ...data.campaign.place import key_lines, readable
+from ...data.campaign.place import Place, key_lines, readable, shown_place
 from ...data.campaign.toml_file import read_toml
 from ...errors import InputError
 from ...system.shown import Shown, facts
@@ -108,21 +108,15 @@ def _checked(
     try:
         model = file_model(content)
         file = model.model_validate(content)
-        _check_effects(file)
+        if file.effect:  # made once, so that faults are found before anything runs
+            from .effects import make_effects
+
+            make_effects(file)
     except ValidationError as error:
         fault = readable(error, model, text, shown)
     except InputError as error:
-        lines = key_lines(text)
-        place = tuple(int(p) - 1 if p.isdigit() else p for p in (error.key or "").split("."))
-        line = lines.get(place)
-        fault = InputError(
-            error.what,
-            file=shown,
-            key=f"line {line}: {error.key}" if line else error.key,
-            value=error.value,
-            allowed=error.allowed,
-            hint=error.hint,
-        )
+        line = key_lines(text).get(_place(error.key or ""))
+        fault = error.but(file=shown, key=f"line {line}: {error.key}" if line else error.key)
     else:
         return Scenario(file, path, digest, content, tuple(all_changes))
     raise _from_command_line(fault, all_changes)
@@ -132,25 +126,11 @@ def _from_command_line(fault: InputError, changes: Sequence[tuple[str, Any]]) ->
     """The same fault, placed on the command line where the value came from there."""
     key = (fault.key or "").split(": ")[-1]
     for name, _ in changes:
-        if key in (name, name.partition(".")[0] and _shown(name)):
-            return InputError(
-                fault.what, file="--set", key=name, value=fault.value, allowed=fault.allowed, hint=fault.hint
-            )
+        if key in (name, shown_place(_place(name))):
+            return fault.but(file="--set", key=name)
     return fault
 
 
-def _shown(name: str) -> str:
-    """``effect.1.beta`` as messages show it, ``effect[1].beta``."""
-    text = ""
-    for part in name.split("."):
-        text += f"[{part}]" if part.isdigit() else (f".{part}" if text else part)
-    return text
-
-
-def _check_effects(file: ScenarioFile) -> None:
-    """Make every effect once, so that faults are found before anything runs."""
-    if not file.effect:
-        return
-    from .effects import make_effects
-
-    make_effects(file)
+def _place(key: str) -> Place:
+    """``effect.1.beta`` as ``("effect", 0, "beta")``."""
+    return tuple(int(part) - 1 if part.isdecimal() else part for part in key.split("."))

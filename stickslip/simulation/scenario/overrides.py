@@ -20,9 +20,8 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     key, value = key.strip(), value.strip()
     if not equals or not key or not value or not all(key.split(".")):
-        raise InputError(
-            "not an assignment", file="--set", value=text, allowed="table.key=value, such as contact.H=0.5"
-        )
+        allowed = "table.key=value, such as contact.H=0.5"
+        raise InputError("not an assignment", file="--set", value=text, allowed=allowed)
     try:
         return key, tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
@@ -62,9 +61,8 @@ def _step(place: Any, part: str, key: str) -> Any:
 def _entry(entries: list[Any], part: str, key: str) -> Any:
     if part.isdigit():
         if not 1 <= int(part) <= len(entries):
-            raise InputError(
-                "there is no such entry", file="--set", key=key, value=part, allowed=f"1 to {len(entries)}"
-            )
+            allowed = f"1 to {len(entries)}"
+            raise InputError("there is no such entry", file="--set", key=key, value=part, allowed=allowed)
         return entries[int(part) - 1]
     for entry in entries:
         if isinstance(entry, dict) and entry.get("type") == part:
@@ -135,6 +133,3 @@ def is_bare(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-__all__ = ["is_bare", "parse_assignment", "parse_sweep", "series", "si_value", "sweep_values", "with_overrides"]

@@ -7,15 +7,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
-from ...data.campaign.fields import fault, quantity
+from ...data.campaign.fields import faults, quantity
 from ...errors import InputError, nearest
-from .contact_tables import CONTACTS, ContactTable
-
-
-class Table(BaseModel):
-    """Base of all tables: unknown keys are errors, nothing changes after loading."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+from .contact_tables import CONTACTS, ContactTable, Table
 
 
 class BlockTable(Table):
@@ -54,22 +48,23 @@ class DriveTable(Table):
     start: Literal["rest", "steady"] = "rest"
 
     @model_validator(mode="after")
+    @faults()
     def _one_kind(self) -> Self:
         given = [key for key in ("velocity", "piece", "file") if getattr(self, key) is not None]
         if len(given) != 1:
             what = "the drive is not given" if not given else f"the drive is given more than once: {', '.join(given)}"
-            raise fault(InputError(what, allowed="one of velocity, piece, file", hint='velocity = "50 um/s"'))
+            raise InputError(what, allowed="one of velocity, piece, file", hint='velocity = "50 um/s"')
         if self.velocity is None and self.events is not None:
-            raise fault(InputError("'events' needs a drive of one velocity", hint="remove 'events'"))
+            raise InputError("'events' needs a drive of one velocity", hint="remove 'events'")
         if self.velocity is not None and (self.duration is None) == (self.events is None):
             what = "neither 'duration' nor 'events' is given" if self.events is None else "both 'duration' and 'events'"
-            raise fault(InputError(what, hint='write  duration = "14 s"  or  events = 5'))
+            raise InputError(what, hint='write  duration = "14 s"  or  events = 5')
         if self.velocity == 0.0 and self.events is not None:
-            raise fault(InputError("without drive motion there is no slip", hint="give 'duration' instead"))
+            raise InputError("without drive motion there is no slip", hint="give 'duration' instead")
         if self.piece is not None and self.duration is not None:
-            raise fault(InputError("every piece has its own duration", hint="remove 'duration' of [drive]"))
+            raise InputError("every piece has its own duration", hint="remove 'duration' of [drive]")
         if self.file is not None and self.position is None:
-            raise fault(InputError("'position' is missing", hint='position = { column = "drive", unit = "um" }'))
+            raise InputError("'position' is missing", hint='position = { column = "drive", unit = "um" }')
         return self
 
 
@@ -131,19 +126,19 @@ class OutputTable(Table):
     channels: Annotated[list[Channel], Field(min_length=1)] = ["displacement"]
 
     @model_validator(mode="after")
+    @faults()
     def _plain_name(self) -> Self:
         if self.trace is None:
             return self
         if "/" in self.trace or "\\" in self.trace or self.trace.startswith("."):
-            raise fault(InputError("'trace' is a file name in the run folder, without folders", value=self.trace))
+            raise InputError("'trace' is a file name in the run folder, without folders", value=self.trace)
         if not self.trace.isprintable():
-            raise fault(InputError("'trace' is no name of a file", value=self.trace))
+            raise InputError("'trace' is no name of a file", value=self.trace)
         if not self.trace.lower().endswith(ENDINGS) or self.trace.lower() == "arrays.nc":
-            raise fault(
-                InputError("unknown ending of the trace", value=self.trace, allowed=f"a name with {' '.join(ENDINGS)}")
-            )
+            allowed = f"a name with {' '.join(ENDINGS)}"
+            raise InputError("unknown ending of the trace", value=self.trace, allowed=allowed)
         if set(self.channels) == {"drive_position"}:
-            raise fault(InputError("a trace needs a signal besides the drive", value=self.channels))
+            raise InputError("a trace needs a signal besides the drive", value=self.channels)
         return self
 
 
@@ -157,14 +152,12 @@ class SweepTable(Table):
     values: Annotated[list[float | str], Field(min_length=1)] | None = None
 
     @model_validator(mode="after")
+    @faults()
     def _either(self) -> Self:
         span = [self.start is not None, self.stop is not None, self.points is not None]
         if (self.values is None) == (not all(span)) or (self.values is not None and any(span)):
-            raise fault(
-                InputError(
-                    "a series needs start, stop and points, or values", hint='start = "20 um/s"; stop = "1 mm/s"'
-                )
-            )
+            hint = 'start = "20 um/s"; stop = "1 mm/s"'
+            raise InputError("a series needs start, stop and points, or values", hint=hint)
         return self
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,6 @@ from .events import UNITS
 from .load import Scenario
 from .overrides import is_bare, sweep_values
 from .schema import SweepTable
-from .simulation import simulate
 
 if TYPE_CHECKING:
     import xarray
@@ -41,9 +40,8 @@ def scenarios_of(scenario: Scenario, sweep: SweepTable) -> list[tuple[float, Sce
     """
     table, _, name = sweep.key.rpartition(".")
     if not table:
-        raise InputError(
-            "the key of a series is that of a table", key="sweep.key", value=sweep.key, allowed="table.key"
-        )
+        what = "the key of a series is that of a table"
+        raise InputError(what, key="sweep.key", value=sweep.key, allowed="table.key")
     for written in (sweep.start, sweep.stop, *(sweep.values or ())):
         if isinstance(written, str) and not is_bare(written):
             scenario.with_changes([(sweep.key, written)])  # the schema knows the unit; what follows is plain numbers
@@ -56,12 +54,6 @@ def scenarios_of(scenario: Scenario, sweep: SweepTable) -> list[tuple[float, Sce
 
 
 _INTEGERS = {"springs", "bins", "contacts", "seed", "lines", "events", "counter_steps"}
-
-
-def simulate_series(runs: list[tuple[float, Scenario]]) -> Iterator[xarray.Dataset]:
-    """The data set of every run, one after the other."""
-    for _, scenario in runs:
-        yield simulate(scenario)
 
 
 def summary(
@@ -82,12 +74,9 @@ def summary(
     }
     for name in SUMMED:
         later = [_later(run[name].values) for run in runs]
-        columns[name] = ("run", np.array([a.mean() if a.size else np.nan for a in later]), {"units": UNITS[name]})
-        columns[f"{name}_std"] = (
-            "run",
-            np.array([a.std() if a.size else np.nan for a in later]),
-            {"units": UNITS[name]},
-        )
+        for end, number in (("", np.mean), ("_std", np.std)):
+            found = np.array([number(a) if a.size else np.nan for a in later])
+            columns[f"{name}{end}"] = ("run", found, {"units": UNITS[name]})
     return xarray.Dataset(columns, attrs={"key": key, "title": scenario.title})
 
 

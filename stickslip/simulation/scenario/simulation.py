@@ -64,18 +64,13 @@ def record(scenario: Scenario, progress: Tell | None = None) -> Recording:
     """`simulate` without making a data set of it; arguments and errors as there."""
     setup = build(scenario)
     file = scenario.file
-    sliding = steady_sliding(file.block, file.weakening, setup.contact.strength, setup.motion.speed)
+    sliding = steady_sliding(file.block, file.weakening, setup.contact.strength, setup.motion.fastest)
     with telling("simulating", progress) as tell:
         trajectory, events, end = _run(scenario, setup, sliding, tell)
     samples = math.floor(end * file.output.sampling_rate) + 1
     if samples > _MOST_SAMPLES:
-        raise InputError(
-            "the output would be too long",
-            file=scenario.path,
-            key="output.sampling_rate",
-            value=f"{samples} samples",
-            allowed=f"at most {_MOST_SAMPLES}",
-        )
+        key, value, allowed = "output.sampling_rate", f"{samples} samples", f"at most {_MOST_SAMPLES}"
+        raise InputError("the output would be too long", file=scenario.path, key=key, value=value, allowed=allowed)
     t = np.arange(samples) / file.output.sampling_rate
     return _recording(scenario, setup, trajectory, events, sliding, t)
 
@@ -117,7 +112,7 @@ def _run(scenario: Scenario, setup: Setup, sliding: Sliding, tell: Tell) -> tupl
 def _looks(scenario: Scenario, setup: Setup, sliding: Sliding) -> list[float]:
     """Times at which a run that stops after so many slips is looked at; the last is where it is given up."""
     file = scenario.file
-    speed = setup.motion.speed
+    speed = setup.motion.fastest
     stiffness = file.block.spring_stiffness
     loading = (setup.contact.strength / stiffness + setup.contact.u_max) / speed
     drop = (1.0 - file.weakening.ratio) * setup.contact.strength
@@ -136,15 +131,8 @@ def _joined(parts: list[Trajectory]) -> Trajectory:
     rest = [Steps(*(a[1:] for a in s)) for s in steps[1:]]
     whole = Steps(*(np.concatenate(a) for a in zip(steps[0], *rest, strict=True)))
     stats = [part.stats for part in parts]
-    return Trajectory(
-        whole,
-        Stats(
-            sum(s.steps for s in stats),
-            sum(s.rejected for s in stats),
-            energy_error(whole),
-            sum(s.seconds for s in stats),
-        ),
-    )
+    steps_made, rejected, seconds = (sum(getattr(s, key) for s in stats) for key in ("steps", "rejected", "seconds"))
+    return Trajectory(whole, Stats(steps_made, rejected, energy_error(whole), seconds))
 
 
 def _recording(
@@ -242,7 +230,7 @@ def _verdict(scenario: Scenario, setup: Setup, trajectory: Trajectory, events: E
         return text
     if sliding.stable:
         return f"no slip event, the block slides{beyond}: {sliding.reason}"
-    speed = setup.motion.speed
+    speed = setup.motion.fastest
     if speed > 0:
         loading = (setup.contact.strength / scenario.file.block.spring_stiffness + setup.contact.u_max) / speed
         if end < 1.2 * loading:

@@ -13,6 +13,7 @@ from ...physics.contact.creep import Average, TimeForm
 from .build import Setup
 from .contact_tables import ElasticTable, RoughLineTable
 from .contacts import build_contact, moduli, profile_of
+from .drive import load_point
 from .load import Scenario
 
 _loading = jax.jit(physics.loading_displacement)
@@ -51,37 +52,17 @@ def static_creep(
     velocity = _drive_velocity(scenario)
     tau = physics.default_loads(points)
     drive: dict[str, Any] = {"spring_stiffness": file.block.spring_stiffness, "velocity": velocity}
-    equal = getattr(table, "each", None) is None
+    equal = getattr(table, "each", None) is None and not getattr(table, "curvature", 0.0)
     if isinstance(table, ElasticTable) and equal:
-        common: dict[str, Any] = {
-            "tau": tau,
-            "average": average,
-            "time": time,
-            "moduli": moduli(table),
-            "contacts": table.contacts,
-        }
-        if isinstance(table, RoughLineTable) and not table.curvature:
-            curve = physics.creep_curve(
-                table.H,
-                table.h_rms,
-                table.normal_force,
-                table.friction_coefficient,
-                length=table.line_length,
-                n_springs=table.springs,
-                lines=table.lines,
-                seed=table.seed,
-                roll_off=table.roll_off,
-                cut_off=table.cut_off,
-                **drive,
-                **common,
-            )
-            return StaticCreep(*(np.asarray(a) for a in (curve.tau, curve.u, curve.t)))
-        if not isinstance(table, RoughLineTable):
-            profile = profile_of(table, 0, scenario.folder)
-            curve = physics.creep_curve(
-                normal_force=table.normal_force, friction=table.friction_coefficient, profile=profile, **drive, **common
-            )
-            return StaticCreep(*(np.asarray(a) for a in (curve.tau, curve.u, curve.t)))
+        if isinstance(table, RoughLineTable):
+            keys = ("H", "h_rms", "lines", "seed", "roll_off", "cut_off")
+            held: dict[str, Any] = {key: getattr(table, key) for key in keys}
+            held |= {"length": table.line_length, "n_springs": table.springs}
+        else:
+            held = {"profile": profile_of(table, 0, scenario.folder)}
+        held |= {"normal_force": table.normal_force, "friction": table.friction_coefficient, "contacts": table.contacts}
+        curve = physics.creep_curve(**held, **drive, moduli=moduli(table), tau=tau, average=average, time=time)
+        return StaticCreep(*(np.asarray(a) for a in (curve.tau, curve.u, curve.t)))
     built = build_contact(table.model_copy(update={"bins": max(table.bins, 4096)}), scenario.folder)
     u = np.asarray(_loading(built.bank.stiffness, built.bank.strength, tau * built.strength))
     t = physics.virtual_time(tau * built.strength, u, form=time, **drive)
@@ -107,17 +88,9 @@ def first_stick(setup: Setup, points: int = 400) -> tuple[np.ndarray, np.ndarray
 
 
 def _drive_velocity(scenario: Scenario) -> float:
-    from .drive import load_point
-
     velocity = abs(load_point(scenario.file.drive, scenario.folder).first_velocity)
     if velocity == 0.0:
-        raise InputError(
-            "the drive stands still at first, so no time belongs to a load",
-            file=scenario.path,
-            key="drive",
-            hint="--set drive.piece.1.velocity=50um/s, or another scenario",
-        )
+        what = "the drive stands still at first, so no time belongs to a load"
+        hint = "--set drive.piece.1.velocity=50um/s, or another scenario"
+        raise InputError(what, file=scenario.path, key="drive", hint=hint)
     return velocity
-
-
-__all__ = ["StaticCreep", "first_stick", "static_creep"]

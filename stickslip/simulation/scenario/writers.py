@@ -135,10 +135,9 @@ def _drive(scenario: Scenario) -> str:
     from .drive import load_point
 
     motion = load_point(drive, scenario.folder)
-    speeds = np.diff(motion.positions) / np.diff(motion.times)
     pieces = (
         f"{{ until = {_text(f'{t:.12g} s')}, velocity = {_quantity(v, 'm/s')} }}"
-        for t, v in zip(motion.times[1:].tolist(), speeds.tolist(), strict=True)
+        for t, v in zip(motion.times[1:].tolist(), motion.velocities.tolist(), strict=True)
     )
     return f"drive = [{', '.join(pieces)}]"
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,10 @@ class Setup:
         self.sensor = replace(self.sensor, **changes)
 
 
-Apply = Callable[[Setup, float, np.random.Generator], dict[str, Any]]
+Rng = np.random.Generator
+Apply = Callable[[Setup, float, Rng], dict[str, Any]]
+FormApply = Callable[..., dict[str, Any]]  # takes the ``form`` as well
+Draw = Callable[[Rng], float]
 
 
 @dataclass(frozen=True)
@@ -96,5 +100,31 @@ class Effect:
         raise InputError(f"'{self.tag}' has no form '{name}'", hint=nearest(name, [form.name for form in self.forms]))
 
 
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+def forms(apply: FormApply, textbook: Mapping[str, Any], own: Mapping[str, Any]) -> tuple[Form, ...]:
+    """The forms of an effect, name -> the ``form`` that ``apply`` takes; those of textbooks first."""
+    every = [(False, *item) for item in textbook.items()] + [(True, *item) for item in own.items()]
+    return tuple(Form(name, is_own, partial(apply, form=form)) for is_own, name, form in every)
+
+
+def slots(amplitude: str, form: str | None = None, **drawn: Draw) -> FormApply:
+    """Puts the amplitude, what is drawn and the number of the form into slots of the kernel, drawn in this order."""
+
+    def apply(setup: Setup, size: float, rng: Rng, **chosen: float) -> dict[str, Any]:
+        inner = {name: draw(rng) for name, draw in drawn.items()}
+        return setup.put(**{amplitude: size}, **inner, **({} if form is None else {form: chosen["form"]}))
+
+    return apply
+
+
+def between(low: float, high: float) -> Draw:
+    """Draws log-uniformly."""
+    return lambda rng: log_uniform(rng, low, high)
+
+
+def phase(rng: Rng) -> float:
+    """Draws a share of a period."""
+    return rng.random()
+
+
+def log_uniform(rng: Rng, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))

@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from .base import Effect, Form, Setup, log_uniform
-
-Rng = np.random.Generator
+from .base import Effect, Form, FormApply, Rng, Setup, between, forms, log_uniform, slots
 
 
-def _creep(setup: Setup, a: float, rng: Rng, *, form: float) -> dict[str, Any]:
-    return setup.put(CREEP_V=a, CREEP_ALPHA=log_uniform(rng, 0.015, 0.08), CREEP_FORM=form)
-
-
-def _visco(setup: Setup, a: float, rng: Rng, *, renew: float, spread: float) -> dict[str, Any]:
+def _visco(setup: Setup, a: float, rng: Rng, *, form: tuple[float, float]) -> dict[str, Any]:
+    renew, spread = form
     setup.relaxation = (log_uniform(rng, 0.03, 2.0), spread)
-    time, width = setup.relaxation
-    return {**setup.put(VISCO_G=a, VISCO_RENEW=renew), "time": time, "spread": width}
-
-
-def _kelvin(setup: Setup, a: float, rng: Rng, *, form: float) -> dict[str, Any]:
-    return setup.put(KELVIN_ETA=a, KELVIN_FORM=form)
-
-
-def _residual(setup: Setup, a: float, rng: Rng, *, form: float) -> dict[str, Any]:
-    return setup.put(RESIDUAL_EPS=a, RESIDUAL_FORM=form)
+    return {**setup.put(VISCO_G=a, VISCO_RENEW=renew), "time": setup.relaxation[0], "spread": spread}
 
 
 def _renewal(setup: Setup, a: float, rng: Rng, *, form: float) -> dict[str, Any]:
@@ -35,19 +20,14 @@ def _renewal(setup: Setup, a: float, rng: Rng, *, form: float) -> dict[str, Any]
     return setup.put(RENEW_RATE=a, RENEW_FORM=form)
 
 
-def _plastic(setup: Setup, a: float, rng: Rng, *, form: str) -> dict[str, Any]:
-    setup.with_surface(softening=a, softening_form=form)
-    return {"softening": a}
+def _surface(name: str) -> FormApply:
+    """Sets a field of the surface and the form of it."""
 
+    def apply(setup: Setup, a: float, rng: Rng, *, form: str) -> dict[str, Any]:
+        setup.with_surface(**{name: a, f"{name}_form": form})
+        return {name: a}
 
-def _adhesion(setup: Setup, a: float, rng: Rng, *, form: str) -> dict[str, Any]:
-    setup.with_surface(adhesion=a, adhesion_form=form)
-    return {"adhesion": a}
-
-
-def _curvature(setup: Setup, a: float, rng: Rng, *, form: str) -> dict[str, Any]:
-    setup.with_surface(curvature=a, curvature_form=form)
-    return {"curvature": a}
+    return apply
 
 
 def _roll_off(setup: Setup, a: float, rng: Rng, *, form: str) -> dict[str, Any]:
@@ -56,10 +36,10 @@ def _roll_off(setup: Setup, a: float, rng: Rng, *, form: str) -> dict[str, Any]:
     return {"roll_off": 1 + a}
 
 
-def _unequal(setup: Setup, a: float, rng: Rng, *, what: str) -> dict[str, Any]:
+def _unequal(setup: Setup, a: float, rng: Rng, *, form: str) -> dict[str, Any]:
     spread = rng.standard_normal(len(setup.rig.loads))
     spread = (spread - spread.mean()) / spread.std()
-    if what == "load":
+    if form == "load":
         loads = np.asarray(setup.rig.loads) * np.exp(a * spread)
         loads *= sum(setup.rig.loads) / loads.sum()
         if a != 0.0:
@@ -69,65 +49,26 @@ def _unequal(setup: Setup, a: float, rng: Rng, *, what: str) -> dict[str, Any]:
     return {"roughness": [float(r) for r in setup.roughness_spread]}
 
 
+def _named(apply: FormApply, textbook: str, own: str) -> tuple[Form, ...]:
+    """Two forms that are told by their names."""
+    return forms(apply, {textbook: textbook}, {own: own})
+
+
+_creep = slots("CREEP_V", "CREEP_FORM", CREEP_ALPHA=between(0.015, 0.08))
+_kelvin = slots("KELVIN_ETA", "KELVIN_FORM")
+_residual = slots("RESIDUAL_EPS", "RESIDUAL_FORM")
 EFFECTS = (
-    Effect(
-        "thermal-creep", "m/s", 2e-9, 1e-7,
-        (Form("Eyring", False, partial(_creep, form=0.0)), Form("power", True, partial(_creep, form=1.0))),
-        detect=8e-10,
-    ),
+    Effect("thermal-creep", "m/s", 2e-9, 1e-7, forms(_creep, {"Eyring": 0.0}, {"power": 1.0}), detect=8e-10),
     Effect(
         "viscoelastic-contact", "1", 0.005, 0.06,
-        (
-            Form("single", False, partial(_visco, renew=0.0, spread=0.0)),
-            Form("renewed", False, partial(_visco, renew=1.0, spread=0.0)),
-            Form("stretched", True, partial(_visco, renew=1.0, spread=1.3)),
-        ),
-        detect=2.5e-5,
+        forms(_visco, {"single": (0.0, 0.0), "renewed": (1.0, 0.0)}, {"stretched": (1.0, 1.3)}), detect=2.5e-5,
     ),
-    Effect(
-        "contact-damping", "s", 2e-6, 3e-5,
-        (Form("sticking", False, partial(_kelvin, form=0.0)), Form("fading", True, partial(_kelvin, form=1.0))),
-        detect=4e-7,
-    ),
-    Effect(
-        "plasticity", "1", 0.1, 0.7,
-        (Form("cap", False, partial(_plastic, form="cap")), Form("soft", True, partial(_plastic, form="soft"))),
-        detect=8e-3,
-    ),
-    Effect(
-        "adhesion", "1", 0.005, 0.1,
-        (
-            Form("contact", False, partial(_adhesion, form="contact")),
-            Form("range", True, partial(_adhesion, form="range")),
-        ),
-        detect=5e-3,
-    ),
-    Effect(
-        "residual-load", "1", 0.03, 0.6,
-        (Form("scaled", False, partial(_residual, form=0.0)), Form("some springs", True, partial(_residual, form=1.0))),
-        detect=1e-3,
-    ),
-    Effect(
-        "contact-renewal", "1/m", 2e4, 2e5,
-        (Form("Poisson", False, partial(_renewal, form=0.0)), Form("fixed life", True, partial(_renewal, form=1.0))),
-    ),
-    Effect(
-        "unequal-contacts", "1", 0.1, 0.5,
-        (
-            Form("load", False, partial(_unequal, what="load")),
-            Form("roughness", True, partial(_unequal, what="roughness")),
-        ),
-        detect=2e-2,
-    ),
-    Effect(
-        "curvature", "1/m", 2e3, 2e4,
-        (
-            Form("parabola", False, partial(_curvature, form="parabola")),
-            Form("quartic", True, partial(_curvature, form="quartic")),
-        ),
-    ),
-    Effect(
-        "roll-off", "1", 0.5, 6.0,
-        (Form("flat", False, partial(_roll_off, form="flat")), Form("smooth", True, partial(_roll_off, form="smooth"))),
-    ),
+    Effect("contact-damping", "s", 2e-6, 3e-5, forms(_kelvin, {"sticking": 0.0}, {"fading": 1.0}), detect=4e-7),
+    Effect("plasticity", "1", 0.1, 0.7, _named(_surface("softening"), "cap", "soft"), detect=8e-3),
+    Effect("adhesion", "1", 0.005, 0.1, _named(_surface("adhesion"), "contact", "range"), detect=5e-3),
+    Effect("residual-load", "1", 0.03, 0.6, forms(_residual, {"scaled": 0.0}, {"some springs": 1.0}), detect=1e-3),
+    Effect("contact-renewal", "1/m", 2e4, 2e5, forms(_renewal, {"Poisson": 0.0}, {"fixed life": 1.0})),
+    Effect("unequal-contacts", "1", 0.1, 0.5, _named(_unequal, "load", "roughness"), detect=2e-2),
+    Effect("curvature", "1/m", 2e3, 2e4, _named(_surface("curvature"), "parabola", "quartic")),
+    Effect("roll-off", "1", 0.5, 6.0, _named(_roll_off, "flat", "smooth")),
 )  # fmt: skip
