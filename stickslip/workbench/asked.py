@@ -11,20 +11,13 @@ from ..errors import InputError
 from ..objects.experiments import Setting
 from ..objects.fit import Fit
 from ..system.units import shown
-from .controls import BUTTON
+from .controls import button, field
 from .parts import head
-from .picked import chosen
 from .remembering import Remembered
+from .selection import chosen
 from .session import Session, watch
 
-FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
-WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
-
-
-def press(name: str, call: Any, width: int = 150) -> pn.widgets.Button:
-    made = pn.widgets.Button(name=name, width=width, stylesheets=[BUTTON], margin=(22, 8, 0, 0), **FIXED)
-    made.on_click(lambda event: call())
-    return made
+press = partial(button, width=150, margin=(22, 8, 0, 0))
 
 
 class Asked:
@@ -32,33 +25,24 @@ class Asked:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        text: Any = partial(pn.widgets.TextInput, width=150, margin=(0, 10, 0, 0), **FIXED)
-        self.run: Any = pn.widgets.Select(name="beside the run", options=[], width=170, margin=(0, 10, 0, 0), **FIXED)
+        text: Any = partial(field, pn.widgets.TextInput, width=150)
+        self.run = field(pn.widgets.Select, "beside the run", 170, options=[])
         self.velocity = text(name="velocity of the drive")
         self.hold = text(name="a hold of", placeholder="such as 10 s")
         self.step = text(name="a step to the velocity", placeholder="such as 1 mm/s")
         self.spring, self.mass = text(name="spring"), text(name="mass")
-        self.events = pn.widgets.IntInput(
-            name="number of slips",
+        self.events = field(
+            pn.widgets.IntInput, "number of slips", 150, value=7, start=1, end=100,
             description="At a velocity written here, and in the sweep",
-            value=7,
-            start=1,
-            end=100,
-            width=150,
-            margin=(0, 10, 0, 0),
-            **FIXED,
-        )
+        )  # fmt: skip
         self.load = text(name="normal load, times", placeholder="such as 0.5 or 2")
-        self.back: Any = pn.widgets.Checkbox(
-            name="and back over the same track", value=False, width=210, margin=(24, 10, 0, 0), **FIXED
-        )
+        self.back = field(pn.widgets.Checkbox, "and back over the same track", 210, margin=(24, 10, 0, 0))
         self.fields: dict[str, Any] = {
             "run": self.run, "velocity": self.velocity, "hold": self.hold, "step": self.step, "spring": self.spring,
             "mass": self.mass, "load": self.load, "events": self.events, "back": self.back,
         }  # fmt: skip
-        asked = self.fields.values()
-        self.row = pn.FlexBox(*asked, gap="6px 0")
-        self.view = pn.Column(head("What is left empty is as in the measured run."), self.row, **WIDE)
+        self.row = pn.FlexBox(*self.fields.values(), gap="6px 0")
+        self.view = pn.Column(head("What is left empty is as in the measured run."), self.row)
         self._kept = Remembered(session, "simulate", self.fields)
         self.run.param.watch(lambda event: self._placeholders(), "value")
         watch(session, ["campaign", "run"], self._runs)

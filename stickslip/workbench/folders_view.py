@@ -10,15 +10,13 @@ import panel as pn
 from ..errors import StickslipError
 from . import kept, kept_simulations
 from .beside import Show, Tell, beside
-from .controls import BUTTON, Message, Words
+from .controls import Message, Words, button, field
 from .history import SIMULATIONS, told, when
 from .parts import Table, head, progress, row_of
 from .session import Session, watch
 
 MODEL, DIAGNOSIS = "the model as it stands", "the diagnosis"
 SIMULATED = dict(zip(("the simulation", "the sweep", "the experiments"), SIMULATIONS, strict=True))
-FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
-WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
 
 CLOSED = (
     '<meta http-equiv="Content-Security-Policy" '
@@ -47,37 +45,25 @@ class Folders:
         self._session = session
         self._work = beside(session, "saving")
         self._listed: list[kept.Kept] = []
-        self.what: Any = pn.widgets.Select(
-            name="what is saved", options=[MODEL, DIAGNOSIS, *SIMULATED], value=MODEL, width=210, margin=(0, 10, 0, 0),
-            **FIXED,
-        )  # fmt: skip
-        self.name: Any = pn.widgets.TextInput(
-            name="name of the run folder", placeholder="first", width=160, margin=(0, 10, 0, 0), **FIXED
-        )
-        self._save = pn.widgets.Button(name="Save", width=80, stylesheets=[BUTTON], margin=(18, 0, 0, 0), **FIXED)
-        self._save.on_click(lambda event: self.save())
-        self._table = Table(
-            columns=["run folder", "of", "verdict or error", "when"], heard=self._heard, tall=360, **WIDE
-        )
-        self._said = Words(**WIDE)
-        self._frame = pn.pane.HTML("", **WIDE)
-        self._tab = pn.widgets.Button(
-            name="Open it in a tab of its own", width=220, visible=False, stylesheets=[BUTTON], **FIXED
-        )
+        self.what = field(pn.widgets.Select, "what is saved", 210, options=[MODEL, DIAGNOSIS, *SIMULATED], value=MODEL)
+        self.name = field(pn.widgets.TextInput, "name of the run folder", 160, placeholder="first")
+        self._save = button("Save", self.save, 80, margin=(18, 0, 0, 0))
+        self._table = Table(columns=["run folder", "of", "verdict or error", "when"], heard=self._heard, tall=360)
+        self._said = Words()
+        self._frame = pn.pane.HTML("")
+        self._tab = button("Open it in a tab of its own", lambda: None, 220, visible=False)
         self._tab.js_on_click(args={"pane": self._frame}, code=_OPEN)
-        again = pn.widgets.Button(name="Look again", width=110, stylesheets=[BUTTON], **FIXED)
-        again.on_click(lambda event: self.update())
+        again = button("Look again", self.update, 110)
         filed = session.campaign is not None and session.campaign.description.filed
         self.view = pn.Column(
             head("Save as a run folder beside the campaign, as the command writes it"),
             pn.FlexBox(self.what, self.name, self._save), progress(self._work),
-            pn.Row(head("Run folders there; a click shows the report"), again, **WIDE),
-            self._table, self._said, visible=filed, **WIDE,
+            pn.Row(head("Run folders there; a click shows the report"), again),
+            self._table, self._said, visible=filed,
         )  # fmt: skip
-        self.shown = pn.Column(self._tab, self._frame, **WIDE)
+        self.shown = pn.Column(self._tab, self._frame)
         watch(self._work, ["doing"], self.update)
-        watch(session, ["campaign", "steps", "diagnosis"], self.update)
-        self.update()
+        watch(session, ["campaign", "steps", "diagnosis"], self.update, now=True)
 
     def save(self) -> None:
         """Save what is chosen."""

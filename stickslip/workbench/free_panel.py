@@ -9,7 +9,7 @@ import numpy as np
 from ..objects.fit import Fit
 from ..system.units import shown
 from .controls import Words
-from .figures import FEW, figure, label, legend, look, source, unit_of
+from .figures import FEW, compared, figure, label, legend, source, unit_of
 from .overview import reduced
 from .selection import selected
 from .session import Session, watch
@@ -26,20 +26,14 @@ class Free:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        theme = look()
         self._measured, self._model = source(t=[], x=[]), source(t=[], x=[])
         self._model.name = "free"
         self.figure = figure("free simulation of the slip from the arrest before", height=300, output_backend=FEW)
-        self.figure.line("t", "x", source=self._measured, color=theme.measured, line_width=2.5, legend_label="measured")
-        self.figure.line(
-            "t", "x", source=self._model, color=theme.model, line_width=2, line_dash="dashed",
-            legend_label="model, to its arrest",
-        )  # fmt: skip
+        compared(self.figure, self._measured, self._model, ("x", "x"), "model, to its arrest")
         legend(self.figure, steady=True)
-        self.words = Words(sizing_mode="stretch_width", margin=(0, 0, 8, 70))
-        watch(session, ["steps", "at", "run", "event"], self.ask)
+        self.words = Words(margin=(0, 0, 8, 70))
         watch(session, ["free"], self.update)
-        self.ask()
+        watch(session, ["steps", "at", "run", "event"], self.ask, now=True)
 
     def ask(self) -> None:
         """Have it run again where model or run are others; draw what is there."""

@@ -49,9 +49,7 @@ class Sentences(JSComponent):
 
 def head(text: str) -> Sentences:
     """The heading of a part of a page."""
-    return Sentences(
-        groups=[{"head": text, "items": [], "mark": ""}], sizing_mode="stretch_width", margin=(16, 0, 4, 0)
-    )
+    return Sentences(groups=[{"head": text, "items": [], "mark": ""}], margin=(16, 0, 4, 0))
 
 
 class Progress(Spoken):
@@ -82,13 +80,12 @@ def progress(work: Beside, stopping: bool = True) -> Progress:
         if message.get("kind") == "cancel":
             work.cancel()
 
-    made = Progress(heard=heard, stopping=stopping, sizing_mode="stretch_width")
+    made = Progress(heard=heard, stopping=stopping)
 
     def update() -> None:
         made.param.update(doing=work.doing, share=work.share, said=work.said)
 
-    watch(work, ["doing", "share", "said"], update)
-    update()
+    watch(work, ["doing", "share", "said"], update, now=True)
     return made
 
 

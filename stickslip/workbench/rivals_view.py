@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import panel as pn
 
@@ -13,9 +11,9 @@ from ..objects.diagnosis import Diagnosis
 from ..objects.experiments import MEASURES, Telling
 from ..physics.effects import catalogue
 from ..system.units import to_si
-from .asked import FIXED, WIDE, Asked, needed, press
+from .asked import Asked, needed, press
 from .beside import Show, Tell, beside
-from .controls import Message, Words
+from .controls import Message, Words, field
 from .evidence import LEAST, best_forms
 from .figures import figure, label, legend, of_run, unit_of
 from .measures import cells, thinned
@@ -47,21 +45,18 @@ class Rivals:
         self._sets: list[tuple[tuple[str, ...], str]] = []
         self._drawn: Telling | None = None
         self._offered: list[str] = []
-        self.which = pn.widgets.Select(
-            name="effects that these data cannot distinguish", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
-        )
-        self.effects: Any = pn.widgets.MultiChoice(
-            name="effects to compare, each in the model in place of the others", options=[], value=[],
-            max_items=RIVALS, width=420, margin=(0, 10, 0, 0), **FIXED,
+        self.which = field(pn.widgets.Select, "effects that these data cannot distinguish", 420, options=[])
+        self.effects = field(
+            pn.widgets.MultiChoice, "effects to compare, each in the model in place of the others", 420,
+            options=[], value=[], max_items=RIVALS,
         )  # fmt: skip
         self._button = press("Simulate each", self.start)
-        self._said = Words(**WIDE)
-        self._table = Table(heard=self._heard, columns=[], rows=[], **WIDE)
-        self._place = pn.Column(**WIDE)
+        self._said, self._place = Words(), pn.Column()
+        self._table = Table(heard=self._heard)
         self.view = pn.Column(
             head("The experiment that would separate candidates"), self._said,
             pn.FlexBox(self.which, self.effects, self._button, gap="6px 10px"), progress(self._work), self._table,
-            self._place, **WIDE,
+            self._place,
         )  # fmt: skip
         self._kept = Remembered(session, "rivals", {"effects": self.effects})
         self.which.param.watch(lambda event: self._propose(), "value")
@@ -134,12 +129,7 @@ class Rivals:
         found: list[Telling] | None = self._work.found
         if not found:
             return
-        columns = [
-            "experiment: a click draws it",
-            "the true one becomes",
-            "they differ most in",
-            "by",
-        ]
+        columns = ["experiment: a click draws it", "the true one becomes", "they differ most in", "by"]
         rows = [
             [t.words, t.note] if t.note else
             [t.words, t.tells, experiments.where(t.measure, t.slip), f"{100 * t.share:.2g} %"] if t.measure else
@@ -173,9 +163,8 @@ class Rivals:
         columns = [
             f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
         ]  # fmt: skip
-        table = Table(columns=columns, rows=rows, choosing=False, **WIDE)
-        words = Words(text=_difference(telling), **WIDE)
-        self._place[:] = [words, pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in made), **WIDE), table]
+        table = Table(columns=columns, rows=rows, choosing=False)
+        self._place[:] = [Words(text=_difference(telling)), pn.Row(*made), table]
 
 
 def _difference(telling: Telling) -> str:

@@ -23,7 +23,7 @@ from .shipped import to_work_in
 from .steps import Step, complete, fewer, first, moved
 from .telling import Long, Note
 from .watching import watch
-from .work import Worker, at_once
+from .work import AtOnce
 
 if TYPE_CHECKING:
     from ..objects.fit import Fit
@@ -76,8 +76,8 @@ class Session(param.Parameterized):
     listed = param.Number(1.0)
     effects = param.Parameter(())
     loaded = param.Integer(0)
-    worker = param.Parameter(at_once)
-    aside = param.Parameter(at_once)
+    worker = param.Parameter(AtOnce())
+    aside = param.Parameter(AtOnce())
     free = param.Parameter((None, "", None))
     rough = param.Parameter((None, None))
     view = param.Dict({})
@@ -203,7 +203,7 @@ class Session(param.Parameterized):
     def show(self, at: int) -> None:
         """Show a step of the history, by its number."""
         self.at = max(min(at, len(self.steps) - 1), min(0, len(self.steps) - 1))
-        self.worker("keep", self.keep, STILL)
+        self.later()
 
     def first(self, fit: Fit) -> None:
         """Begin the history with the base model."""
@@ -232,7 +232,7 @@ class Session(param.Parameterized):
         with Long(self):
             self.take(moved(fit, values, self.taken[-1].changed if over else {}), over)
             self.said = ""
-        self.worker("keep", self.keep, STILL)
+        self.later()
 
     def refit(self) -> None:
         """Fitted anew, locked parameters as they are; the base model, where that was cancelled."""
@@ -317,8 +317,7 @@ class Session(param.Parameterized):
 
     def cancel(self) -> None:
         """End the fit that is going on."""
-        if isinstance(self.worker, Worker):
-            self.worker.cancel()
+        self.worker.cancel()
 
     def shown(self, path: Path) -> str:
         """A path as it is written from the campaign's folder."""

@@ -14,7 +14,7 @@ from ..objects.campaign import Campaign
 from ..system.units import shown
 from .figures import crosshair, figure, label, look, source, unit_of
 from .overview import DISPLACEMENT, FORCE, GAP, Levels, Record, Window, record
-from .picked import chosen, select
+from .selection import chosen, select
 from .session import Session, watch
 
 CURVES = (DISPLACEMENT, FORCE, GAP)

@@ -7,8 +7,9 @@ from typing import Any
 import panel as pn
 
 from . import synthetic
-from .asked import FIXED, WIDE, Asked, needed, press
+from .asked import Asked, needed, press
 from .beside import Show, Tell, beside
+from .controls import field
 from .parts import head, progress
 from .rivals_view import Rivals
 from .session import Session, watch
@@ -21,7 +22,7 @@ def page(session: Session) -> Any:
     asked = Asked(session)
     return pn.Column(
         asked.view, SimulatedView(session, asked).view, SweepView(session, asked).view, Rivals(session, asked).view,
-        _Synthetic(session, asked).view, margin=(8, 0, 24, 0), **WIDE,
+        _Synthetic(session, asked).view, margin=(8, 0, 24, 0),
     )  # fmt: skip
 
 
@@ -31,15 +32,12 @@ class _Synthetic:
     def __init__(self, session: Session, asked: Asked) -> None:
         self._session, self._asked = session, asked
         self._work = beside(session, "synthetic")
-        self.name: Any = pn.widgets.TextInput(
-            name="folder beside the campaign", value="synthetic", width=240, margin=(0, 10, 0, 0), **FIXED
-        )
+        self.name = field(pn.widgets.TextInput, "folder beside the campaign", 240, value="synthetic")
         self._button = press("Write a record", self.start)
         filed = session.campaign is not None and session.campaign.description.filed
         words = "What is set above as a vibrometer would record it: record.csv and campaign.toml in a new folder"
         self.view = pn.Column(
             head(words), pn.FlexBox(self.name, self._button, gap="6px 10px"), progress(self._work), visible=filed,
-            **WIDE,
         )  # fmt: skip
         watch(self._work, ["doing"], self.update)
 
