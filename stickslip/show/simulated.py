@@ -15,9 +15,7 @@ from ..system.units import shown
 if TYPE_CHECKING:
     import xarray
 
-    from ..simulation.scenario.recording import Recording
-
-    Recorded = xarray.Dataset | Recording
+    from .plots.style import Run as Recorded
 
 
 def head(scenario: Scenario) -> dict[str, Any]:

@@ -82,13 +82,6 @@ def of_run(number: int) -> dict[str, Any]:
     return {"color": runs[number % len(runs)], "line_dash": DASHES[number % len(DASHES)]}
 
 
-def label(text: str, unit: str = "") -> str:
-    """Text of an axis: quantity over unit."""
-    if unit in ("", "1"):
-        return text
-    return f"{text} / ({unit})" if "/" in unit else f"{text} / {unit}"
-
-
 def figure(title: str = "", x: str = "", y: str = "", height: int = 260, **more: Any) -> Any:
     """A figure of this window's look, as wide as its place.
 

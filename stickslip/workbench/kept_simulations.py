@@ -11,11 +11,12 @@ from ..errors import InputError
 from ..inference.fit.serialised import KEY
 from ..inference.fit.serialised import record as model_record
 from ..objects.campaign import Campaign
-from ..objects.experiments.events import Simulated, Tell
+from ..objects.experiments.events import Simulated
 from ..objects.experiments.setting import Setting, scenario
 from ..objects.experiments.sweeps import Swept
 from ..objects.experiments.telling import Telling
 from ..objects.fit import Fit
+from ..objects.run import Tell
 from ..show.simulated import head, numbers, series_numbers, write_series, write_single
 from ..simulation.scenario import Scenario
 from ..simulation.scenario.recording import Recording

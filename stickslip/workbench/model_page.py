@@ -9,7 +9,7 @@ import numpy as np
 import panel as pn
 
 from ..objects.fit import Fit
-from ..objects.picture import balanced
+from ..objects.picture import balanced, one_cycle
 from .controls import Knobs, Message, Words, button, field
 from .figures import FEW, compared, crosshair, figure, label, legend, look, source, unit_of
 from .free_panel import Free
@@ -135,10 +135,7 @@ class _Cycle:
         counts = cycles(self._session)
         self._run.param.update(options=list(counts), value=name)
         self._where.text = f"cycle {event + 1} of {counts[name]}   (keys: ← → cycles, ↑ ↓ runs)"
-        data = fit.force
-        own = np.flatnonzero((data.run.values == name) & (data.event.values == event))
-        own = own[np.argsort(data.time.values[own])]
-        part = data.isel(point=own)
+        part = one_cycle(fit.force, name, event)
         t = part.time.values - part.time.values[0]
         k, force = unit_of(part.measured.values, "N")
         r, small = unit_of(np.concatenate([part.residual.values, 2 * part.floor.values]), "N")

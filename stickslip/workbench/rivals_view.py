@@ -112,9 +112,8 @@ class Rivals:
             options = experiments.practicable(asked, abs(velocity), block.spring_stiffness, block.mass)
             if not asked.as_measured:
                 options = {"as set above": asked, **options}
-            fits = experiments.rivals(fit, tags, told, lambda text, share: tell(text, 0.5 * share))
-            after = lambda text, share: tell(text, 0.5 + 0.5 * share)  # noqa: E731
-            return experiments.tell_apart(fit, fits, options, after, show, code)
+            fits = experiments.rivals(fit, tags, told, experiments.part(tell, 0, 2))
+            return experiments.tell_apart(fit, fits, options, experiments.part(tell, 1, 2), show, code)
 
         self._work.do("fitting each of them", make)
 

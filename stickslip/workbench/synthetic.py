@@ -7,9 +7,10 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..objects.campaign import Campaign
-from ..objects.experiments.events import Tell, run
+from ..objects.experiments.events import run
 from ..objects.experiments.setting import Setting, scenario
 from ..objects.fit import Fit
+from ..objects.run import Tell
 from ..simulation.scenario.writers import write_campaign
 from .places import new_place
 

@@ -16,9 +16,9 @@ from typing import Any
 from cloudpickle import dumps, loads
 
 from ..errors import StickslipError
+from ..objects.run import Tell
 from ..system.progress import cancellable
 
-Tell = Callable[[str, float], None]
 PATIENCE = 3.0  # s that a process has to end after it gave its answer; its own workers may wait for more work
 STEP = 10.0  # s that a step of a fit may take, the compilation of a program in it
 QUIET = "ignore::UserWarning:joblib.externals.loky.backend.resource_tracker"  # of workers that were ended

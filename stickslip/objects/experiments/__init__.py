@@ -1,6 +1,6 @@
 """What the model as it stands foretells: one run under another drive or rig, a sweep, and rivals in one experiment."""
 
-from .events import MEASURES, Simulated, measured, run, simulated, spread, steady_runs
+from .events import MEASURES, Simulated, measured, part, run, simulated, spread, steady_runs
 from .practicable import practicable
 from .setting import Setting, changes, scenario
 from .sweeps import Swept, sweep
@@ -14,6 +14,7 @@ __all__ = [
     "Telling",
     "changes",
     "measured",
+    "part",
     "practicable",
     "rivals",
     "run",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +15,9 @@ from ...simulation.scenario.simulation import record
 from ...system.progress import breathe
 from ..campaign import Campaign
 from ..fit import Fit
+from ..run import Tell
 from .setting import Setting
 
-Tell = Callable[[str, float], None]
 Spread = tuple[float, float, int]  # mean, deviation, number
 MEASURES = {"recurrence": "s", "slip": "m", "peak_velocity": "m/s", "creep_before_slip": "m"}
 
@@ -36,6 +35,11 @@ class Simulated:
     setting: Setting
     recording: Recording
     code: str = ""
+
+
+def part(tell: Tell, number: int, of: int, words: str = "") -> Tell:
+    """Tells the progress of one of so many parts, its number from 0, after ``words``, as that of the whole."""
+    return lambda text, share: tell(f"{words}{text}", (number + share) / of)
 
 
 def run(made: Scenario, tell: Tell | None = None, text: str = "simulating") -> Recording:

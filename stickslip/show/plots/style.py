@@ -15,8 +15,13 @@ from ...system.runstore import write_aside
 from ...system.units import PREFIXES, power_for, takes_prefix
 
 if TYPE_CHECKING:  # what only takes colours from here need not wait for matplotlib
+    import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from ...simulation.scenario.recording import Recording
+
+    Run = xarray.Dataset | Recording
 
 P = ParamSpec("P")
 # dark, middle and light, so that a grey print keeps them apart; the line styles differ as well
@@ -103,6 +108,30 @@ def scaled(values: np.ndarray, unit: str) -> tuple[float, str]:
         return 1.0, unit
     power = power_for(top, 12, 0)
     return 10.0**-power, PREFIXES[power] + unit
+
+
+def label(text: str, unit: str = "") -> str:
+    """Text of an axis: quantity over unit."""
+    if unit in ("", "1"):
+        return text
+    return f"{text} / ({unit})" if "/" in unit else f"{text} / {unit}"
+
+
+def medians(axes: Axes, x: np.ndarray, z: np.ndarray, number: int, name: str, parts: int = 15) -> None:
+    """Points of a run as faint dots, and the medians of as many parts of them, each with as many points.
+
+    Args:
+        axes: drawn in.
+        x, z: the points, shape (n,).
+        number: of the run, by which it has its colour.
+        name: of the run, for the legend.
+        parts: of the range of ``x``.
+    """
+    curve = of_run(number)
+    axes.plot(x, np.clip(z, -6, 6), ".", ms=1.8, color=curve["color"], alpha=0.28)
+    pieces = [p for p in np.array_split(np.argsort(x), parts) if p.size]
+    middle = [[np.median(v[p]) for p in pieces] for v in (x, z)]
+    axes.plot(*middle, color=curve["color"], ls=curve["ls"], lw=1.4, label=name)
 
 
 def logarithmic(axes: Axes, which: str) -> None:

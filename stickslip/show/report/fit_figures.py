@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, label, plain, scaled, styled
 from .figures import series
 
 if TYPE_CHECKING:
@@ -98,13 +98,13 @@ def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
     phases = list(dict.fromkeys(p for step in ladder for key in kinds for p in (step.get(key) or {})))
     for phase in phases:
         mark, colour = _MARKS.get(phase, ("x", DARK))
-        label = plain(phase, 30)
+        name = plain(phase, 30)
         for key, style in zip(kinds, ("-", "--"), strict=True):
             found = [(step.get(key) or {}).get(phase) for step in ladder]
             y = np.array([np.nan if v is None else v for v in found], float)
             if np.isfinite(y).any():
-                axes[0, 1].plot(x, y, style, marker=mark, color=colour, label=label)
-                label = "_unseen"  # once in the legend
+                axes[0, 1].plot(x, y, style, marker=mark, color=colour, label=name)
+                name = "_unseen"  # once in the legend
     axes[0, 0].set_title("all phases", fontsize=9, loc="left")
     axes[0, 1].set_title("by phase (dashed: unseen runs)", fontsize=9, loc="left")
     for ax in axes.flat:
@@ -125,6 +125,6 @@ def profile_picture(profile: Mapping[str, Any]) -> Figure:
     value, unit = scaled(np.array(profile["value"], float), profile.get("unit") or "1")
     ax.plot(np.array(profile["value"]) * value, profile["rise"], "o-", color=DARK)
     ax.axhline(3.84, color=MIDDLE, ls="--", lw=1.0, label="95 %")
-    ax.set(xlabel=plain(f"{profile['name']}" + (f" / {unit}" if unit != "1" else "")), ylabel="rise of chi-square")
+    ax.set(xlabel=plain(label(profile["name"], unit)), ylabel="rise of chi-square")
     ax.legend()
     return made
