@@ -13,13 +13,13 @@ from bokeh.models import CustomJS
 from panel.theme.base import Inherit
 from panel.theme.native import Native
 
+from ..objects.example import copied
 from ..system.units import shown_with
 from .adding_form import FirstRun
 from .controls import Frame, Message, Words, button
 from .figures import dark, look
 from .selection import follow
 from .session import Note, Session, watch
-from .shipped import copied
 from .watching import Place, placed
 
 TITLES = {

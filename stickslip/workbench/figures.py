@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from bokeh.models import (
     BoxZoomTool,
     ColumnDataSource,
@@ -19,7 +18,9 @@ from bokeh.models import (
 from bokeh.models.annotations import Legend, Span
 from bokeh.plotting import figure as bokeh_figure
 
-from ..show.plots.style import RUNS, scaled
+from ..show.plots.style import RUNS
+from ..show.plots.style import label as label
+from ..show.plots.style import scaled as unit_of  # noqa: F401
 
 FEW = "canvas"  # what draws some hundred points quickest
 DASHES = ("solid", "dashed", "dotdash", "dotted")  # as many as have no factor in common with the number of colours
@@ -187,8 +188,3 @@ def _while_drawn(item: Any) -> None:
 def source(**columns: Any) -> ColumnDataSource:
     """A source of columns, empty unless given."""
     return ColumnDataSource({name: list(values) for name, values in columns.items()})
-
-
-def unit_of(values: Any, unit: str) -> tuple[float, str]:
-    """Factor and unit that show values (SI) as numbers that can be read."""
-    return scaled(np.asarray(values, float), unit)

@@ -29,42 +29,38 @@ class Looking:
         self._session = session
         self._search: Search | None = None
         self._listing: Search | None = None
-        self._at: tuple[Fit | None, int] = (None, 0)
-        self._known: list[tuple[Fit, int, tuple[Promise, ...]]] = []
+        self._at: tuple[Fit, int] | None = None
+        self._known: dict[tuple[Fit, int], tuple[Promise, ...]] = {}
 
     def promises(self) -> None:
         """Look at every effect on top of the model as it stands, unless that goes on or is known already."""
         from . import searches
 
-        session, fit, loaded = self._session, self._session.fitted, self._session.loaded
-        if fit is None or (session.listed < 1.0 and self._at == (fit, loaded)):
+        session, fit = self._session, self._session.fitted
+        if fit is None or (session.listed < 1.0 and self._at == (fit, session.loaded)):
             return
-        self._at = (fit, loaded)
+        self._at = at = (fit, session.loaded)
         if self._listing is not None:
             self._listing.cancel()
             self._listing = None
-        for known, when, found_before in self._known:
-            if known is fit and when == loaded:
-                session.param.update(promises=found_before, listed=1.0)
-                return
+        if at in self._known:
+            session.param.update(promises=self._known[at], listed=1.0)
+            return
         session.param.update(promises=(), listed=0.0)
-        own: list[Search] = []
-
-        def current() -> bool:
-            return bool(own) and self._listing is own[0]
+        begun: list[Search] = []
 
         def found(part: Sequence[Promise], share: float) -> None:
-            if current():
+            if begun and self._listing is begun[0]:
                 session.param.update(promises=(*session.promises, *part), listed=share)
                 if share >= 1.0:
-                    self._known = [*self._known[1 - KEPT :], (fit, loaded, session.promises)]
+                    self._known = dict([*self._known.items()][1 - KEPT :]) | {at: session.promises}
 
         def failed(text: str) -> None:
-            if current():
+            if begun and self._listing is begun[0]:
                 session.listed, session.said = 1.0, f"the effects could not be looked at: {text}"
 
-        own.append(searches.promises(fit, session.effects, found, failed))
-        self._listing = own[0]
+        self._listing = searches.promises(fit, session.effects, found, failed)
+        begun.append(self._listing)
 
     def diagnose(self, out: Path | None) -> None:
         """The whole search, with ``out`` for its run folder; finished pieces are kept and used again."""

@@ -16,12 +16,12 @@ import param
 
 from ..errors import RunFolderError, StickslipError
 from ..objects.campaign import Campaign, load_campaign
+from ..objects.example import to_work_in
 from . import again
 from .keeper import Keeper
 from .looking import Looking
-from .shipped import to_work_in
 from .steps import Step, complete, fewer, first, moved
-from .telling import Long, Note
+from .telling import Note, long
 from .watching import watch
 from .work import AtOnce
 
@@ -112,7 +112,7 @@ class Session(param.Parameterized):
         """Open one of what is offered."""
 
         def job() -> None:
-            with Long(self, f"reading {self.offers[number]}"):
+            with long(self, f"reading {self.offers[number]}"):
                 try:
                     path = to_work_in(self.offers[number], self.home)
                 except OSError as error:
@@ -150,7 +150,7 @@ class Session(param.Parameterized):
         self.begin(keep=keep)
 
     def _begin(self, campaign: Campaign) -> None:
-        with Long(self, LOOKING):
+        with long(self, LOOKING):
             if self._keeper.journal is None or not again.history(self, self._keeper.journal):
                 self.busy = "fitting the base model"
                 self.first(complete(campaign.fit()))
@@ -229,7 +229,7 @@ class Session(param.Parameterized):
         if fit is None or not values:
             return
         over = over and bool(self.taken) and bool(self.taken[-1].changed)
-        with Long(self):
+        with long(self):
             self.take(moved(fit, values, self.taken[-1].changed if over else {}), over)
             self.said = ""
         self.later()
@@ -272,7 +272,7 @@ class Session(param.Parameterized):
             fit = self.fit
             if fit is None:
                 return
-            with Long(self, busy):
+            with long(self, busy):
                 made = make(fit)
                 complete(made)
                 if self.campaign is not fit.campaign:  # another was opened meanwhile
@@ -366,7 +366,7 @@ class Session(param.Parameterized):
         from ..simulation.conformance import load_effects
 
         def job() -> None:
-            with Long(self):
+            with long(self):
                 classes = load_effects([path])
                 tags = [cls.tag for cls in classes]
                 self.said = Note(f"{path.name} was reloaded: {', '.join(tags)}")
@@ -374,7 +374,7 @@ class Session(param.Parameterized):
                 forms = {} if fit is None else dict(zip(fit.effects, fit.effect_forms, strict=True))
                 for tag in tags:
                     if fit is not None and tag in forms:
-                        with Long(self, f"fitting with the new {tag}"):
+                        with long(self, f"fitting with the new {tag}"):
                             fit = fit.remove(tag).add(forms[tag])
                             self.take(Step(f"new {tag}", fit, f"fit = fit.remove({tag!r}).add({forms[tag]!r})"))
                 gone = [tag for tag in forms if tag not in catalogue.tags()]

@@ -1,8 +1,7 @@
 """What the model as it stands foretells: one run under another drive or rig, a sweep, and rivals in one experiment."""
 
 from .events import MEASURES, Simulated, measured, part, run, simulated, spread, steady_runs
-from .practicable import practicable
-from .setting import Setting, changes, scenario
+from .setting import Setting, changes, practicable, scenario
 from .sweeps import Swept, sweep
 from .telling import Telling, rivals, tell_apart, where
 
