@@ -229,15 +229,11 @@ class Form:
         return ()
 
     def _check(self, name: str) -> None:
-        campaign = self._session.campaign
-        assert campaign is not None
-        new_place(campaign.description.folder, name, "stored as")
+        new_place(self._session.data.description.folder, name, "stored as")
 
     def _store(self, name: str, content: bytes, text: str) -> Campaign:
         """Store the file and put its table into the campaign."""
-        campaign = self._session.campaign
-        assert campaign is not None
-        made = add(campaign, name, content, text)
+        made = add(self._session.data, name, content, text)
         self._session.reopen(made)
         self._work.said = f"{name} is stored beside the campaign, which has {len(made)} runs now"
         return made
@@ -278,7 +274,6 @@ class FirstRun(Form):
 
 def adding(session: Session) -> Any:
     """The form of a session; a line of words where the campaign has no file."""
-    campaign = session.campaign
-    if campaign is None or not campaign.description.filed:
+    if not session.data.description.filed:
         return Words(text="Runs can be added to a campaign that has a file.")
     return Form(session).view

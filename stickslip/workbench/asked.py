@@ -11,13 +11,11 @@ from ..errors import InputError
 from ..objects.experiments import Setting
 from ..objects.fit import Fit
 from ..system.units import shown
-from .controls import button, field
+from .controls import field
 from .parts import head
 from .remembering import Remembered
 from .selection import chosen
 from .session import Session, watch
-
-press = partial(button, width=150, margin=(22, 8, 0, 0))
 
 
 class Asked:
@@ -51,9 +49,7 @@ class Asked:
         self._kept.restore()
 
     def _runs(self) -> None:
-        campaign, fit = self._session.campaign, self._session.fit
-        if campaign is None:
-            return
+        campaign, fit = self._session.data, self._session.fit
         names = campaign.names if fit is None else [k.name for k in fit.climbed.prepared.runs]
         run = chosen(self._session)[0]
         with self._kept.aside():
@@ -62,8 +58,8 @@ class Asked:
 
     def _placeholders(self) -> None:
         """What it is in the measured run."""
-        campaign, fit = self._session.campaign, self._session.fit
-        if campaign is None or self.run.value not in campaign.names:
+        campaign, fit = self._session.data, self._session.fit
+        if self.run.value not in campaign.names:
             return
         trace = campaign[self.run.value]
         holds = trace.drive is not None and trace.drive.breakpoints.size > 0

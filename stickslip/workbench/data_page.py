@@ -54,9 +54,9 @@ def page(session: Session) -> Any:
     bar = progress(work, stopping=False)
 
     def look_at() -> None:
-        campaign = session.campaign
+        campaign = session.data
         known = work.found is not None and work.found.campaign is campaign
-        if campaign is not None and not known and not session.busy:
+        if not known and not session.busy:
             work.do("looking at the data", lambda tell, show: looked(campaign, tell, show))
 
     watch(session, ["campaign", "busy"], look_at)
@@ -158,22 +158,19 @@ def _told(session: Session, work: Beside) -> Any:
 
 def _runs(session: Session) -> Table:
     def heard(message: Message) -> None:
-        campaign = session.campaign
-        number = row_of(message, len(campaign) if campaign is not None else 0)
-        if campaign is not None and number is not None:
-            select(session, campaign.names[number], session.event)
+        number = row_of(message, len(session.data))
+        if number is not None:
+            select(session, session.data.names[number], session.event)
 
     made = Table(heard=heard, tall=230)
 
     def update() -> None:
-        if session.campaign is not None:
-            columns, rows = run_rows(session.campaign)
-            made.param.update(columns=columns, rows=rows)
-            mark()
+        columns, rows = run_rows(session.data)
+        made.param.update(columns=columns, rows=rows)
+        mark()
 
     def mark() -> None:
-        if session.campaign is not None:
-            made.chosen = session.campaign.names.index(chosen(session)[0])
+        made.chosen = session.data.names.index(chosen(session)[0])
 
     watch(session, ["campaign"], update, now=True)
     watch(session, ["run"], mark)
@@ -189,13 +186,10 @@ def _events(session: Session, work: Beside) -> Table:
     made = Table(heard=heard, tall=260, margin=(8, 0, 0, 0))
 
     def update() -> None:
-        campaign = session.campaign
-        if campaign is None:
-            return
         run, event = chosen(session)
         found = work.found
-        if found is None or found.campaign is not campaign:
-            found = Looked(campaign, campaign.events)
+        if found is None or found.campaign is not session.data:
+            found = Looked(session.data, session.data.events)
         columns, rows = event_rows(found, run)
         made.param.update(columns=columns, rows=rows, chosen=event if rows else -1)
 

@@ -51,9 +51,7 @@ class EventView:
 
     def update(self) -> None:
         """Show the chosen event."""
-        campaign = self._session.campaign
-        if campaign is None:
-            return
+        campaign = self._session.data
         run, event = chosen(self._session)
         number = campaign.names.index(run)
         found = campaign.events[number]

@@ -88,9 +88,8 @@ class Heat:
 
     def _speeds(self, runs: list[str]) -> dict[str, float]:
         """Run -> velocity of its drive (m/s), for those that have one."""
-        campaign = self._session.campaign
-        known = set() if campaign is None else set(campaign.names) & set(runs)
-        speeds = {run: campaign[run].drive_velocity for run in runs if run in known}  # type: ignore[index]
+        campaign = self._session.data
+        speeds = {run: campaign[run].drive_velocity for run in runs if run in campaign}
         return {run: abs(speed) for run, speed in speeds.items() if speed}
 
 

@@ -42,8 +42,7 @@ def _lines(session: Session) -> list[Any]:
     python, shell = Copy(), Copy()
 
     def update() -> None:
-        if session.campaign is not None:
-            python.text, shell.text = history.python(session), history.commands(session)
+        python.text, shell.text = history.python(session), history.commands(session)
 
     for name in history.SIMULATIONS:
         watch(beside(session, name), ["doing"], update)

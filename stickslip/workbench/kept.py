@@ -18,7 +18,7 @@ from ..objects.fit import Fit
 from ..show.report.html import REPORT
 from ..system.runstore import RESULT, read_result
 from ..system.units import shown_with
-from .places import new_place
+from .places import new_folder
 
 MOST = 100  # run folders that are listed
 LARGEST = 64 << 20  # bytes of a report that is shown
@@ -112,9 +112,7 @@ def save(
     Raises:
         InputError: the name cannot be used or is there already; the campaign has no folder; it cannot be written.
     """
-    if not campaign.description.filed:
-        raise InputError("this campaign has no folder", hint="only a campaign of a file has one")
-    folder = new_place(campaign.description.folder, name, "name of the run folder")
+    folder = new_folder(campaign, name, "name of the run folder")
     if isinstance(found, Diagnosis) and found.folder is not None:
         return _copied(found.folder, folder)
     if isinstance(found, Fit):

@@ -67,7 +67,7 @@ class Looking:
         from . import searches
 
         session = self._session
-        if session.searching or session.campaign is None:
+        if session.searching:
             return
         session.searching, session.searched = "beginning", 0.0
 
@@ -85,7 +85,7 @@ class Looking:
             with param.parameterized.batch_call_watchers(session):
                 session.searching, session.said = "", f"the diagnosis ended: {text}"
 
-        self._search = searches.diagnosis(session.campaign, session.effects, out, tell, done, failed)
+        self._search = searches.diagnosis(session.data, session.effects, out, tell, done, failed)
 
     def stop(self) -> None:
         """End the diagnosis; what it has finished is used when it is begun again."""

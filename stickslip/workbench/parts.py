@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+import panel as pn
 import param
 from panel.custom import JSComponent
 
 from .beside import Beside
-from .controls import Message, Spoken, static
+from .controls import Message, Spoken, button, static
 from .watching import watch
 
 _STYLE = [static("table.css")]
@@ -71,6 +75,17 @@ class Copy(JSComponent):
 
     _esm = static("copy.js")
     _stylesheets = _STYLE
+
+
+def starter(work: Beside, name: str, call: Callable[[], None], width: int = 150, **more: Any) -> pn.widgets.Button:
+    """A button that begins a piece of work, and cannot be pressed while that goes on."""
+    made = button(name, call, width, **{"margin": (22, 8, 0, 0), **more})
+
+    def update() -> None:
+        made.disabled = bool(work.doing)
+
+    watch(work, ["doing"], update, now=True)
+    return made
 
 
 def progress(work: Beside, stopping: bool = True) -> Progress:

@@ -86,7 +86,7 @@ class Residual:
 
     def _draw_runs(self) -> None:
         """A colour and a dash for every run that has none yet, under the two curves of all runs."""
-        for name in self._session.campaign.names if self._session.campaign is not None else ():
+        for name in self._session.data.names:
             if name not in self._points:
                 more = {**of_run(len(self._points)), "legend_label": name[:24]}
                 self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])

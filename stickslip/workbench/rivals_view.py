@@ -11,13 +11,13 @@ from ..objects.diagnosis import Diagnosis
 from ..objects.experiments import MEASURES, Telling
 from ..physics.effects import catalogue
 from ..system.units import to_si
-from .asked import Asked, needed, press
+from .asked import Asked, needed
 from .beside import Show, Tell, beside
 from .controls import Message, Words, field
 from .evidence import LEAST, best_forms
 from .figures import figure, label, legend, of_run, unit_of
 from .measures import cells, thinned
-from .parts import Table, head, progress, row_of
+from .parts import Table, head, progress, row_of, starter
 from .remembering import Remembered
 from .session import Session, watch
 
@@ -50,12 +50,12 @@ class Rivals:
             pn.widgets.MultiChoice, "effects to compare, each in the model in place of the others", 420,
             options=[], value=[], max_items=RIVALS,
         )  # fmt: skip
-        self._button = press("Simulate each", self.start)
+        begin = starter(self._work, "Simulate each", self.start)
         self._said, self._place = Words(), pn.Column()
         self._table = Table(heard=self._heard)
         self.view = pn.Column(
             head("The experiment that would separate candidates"), self._said,
-            pn.FlexBox(self.which, self.effects, self._button, gap="6px 10px"), progress(self._work), self._table,
+            pn.FlexBox(self.which, self.effects, begin, gap="6px 10px"), progress(self._work), self._table,
             self._place,
         )  # fmt: skip
         self._kept = Remembered(session, "rivals", {"effects": self.effects})
@@ -95,9 +95,7 @@ class Rivals:
 
     def start(self) -> None:
         """Fit the model with each effect and simulate every experiment."""
-        campaign, tags, asked = self._session.campaign, list(self.effects.value), self._asked.setting()
-        if campaign is None:
-            return
+        campaign, tags, asked = self._session.data, list(self.effects.value), self._asked.setting()
         if len(tags) < 2:
             self._work.said = "choose two effects at least"
             return
@@ -124,7 +122,6 @@ class Rivals:
 
     def update(self) -> None:
         """List the experiments, and draw the one in which they differ most."""
-        self._button.disabled = bool(self._work.doing)
         found: list[Telling] | None = self._work.found
         if not found:
             return
@@ -141,9 +138,8 @@ class Rivals:
     def _draw(self, telling: Telling) -> None:
         """The models side by side in one experiment."""
         found: list[Telling] = self._work.found
-        campaign = self._session.campaign
         self._table.chosen = next((i for i, t in enumerate(found) if t is telling), -1)
-        if telling is self._drawn or not telling.recordings or campaign is None:
+        if telling is self._drawn or not telling.recordings:
             return
         self._drawn = telling
         made = [figure(name, height=280, output_backend="canvas") for name in ("displacement", "load point - block")]
@@ -157,7 +153,7 @@ class Rivals:
             own.xaxis.axis_label, own.yaxis.axis_label = label("time from the start", "s"), label(name, unit)
             legend(own)
         made[1].x_range = made[0].x_range
-        trace = campaign[telling.setting.run]
+        trace = self._session.data[telling.setting.run]
         rows = [[tag, *cells(experiments.simulated(r, trace))] for tag, r in telling.recordings.items()]
         columns = [
             f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)

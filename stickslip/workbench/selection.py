@@ -28,9 +28,7 @@ def follow(session: Session, key: str) -> None:
 
 def slips(session: Session) -> dict[str, int]:
     """Run -> number of its events in the data, whether there is a model yet or not."""
-    if session.campaign is None:
-        return {}
-    return {t.name: len(s.events) for t, s in zip(session.campaign.traces, session.campaign.events, strict=True)}
+    return {t.name: len(s.events) for t, s in zip(session.data.traces, session.data.events, strict=True)}
 
 
 def cycles(session: Session) -> dict[str, int]:

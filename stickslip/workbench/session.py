@@ -92,6 +92,12 @@ class Session(param.Parameterized):
         self._anew = False
 
     @property
+    def data(self) -> Campaign:
+        """The campaign that is open; pages are made only where one is."""
+        assert self.campaign is not None
+        return self.campaign
+
+    @property
     def fit(self) -> Fit | None:
         """The model as it stands; None before the first fit."""
         return self.steps[self.at].fit if 0 <= self.at < len(self.steps) else None
@@ -134,11 +140,9 @@ class Session(param.Parameterized):
         Args:
             keep: keep the history beside the campaign's file.
         """
-        campaign = self.campaign
-        assert campaign is not None
-        if keep and campaign.description.filed:
-            self._keeper.begin(campaign)
-        self.worker("", partial(self._begin, campaign))
+        if keep and self.data.description.filed:
+            self._keeper.begin(self.data)
+        self.worker("", partial(self._begin, self.data))
 
     def reopen(self, campaign: Campaign) -> None:
         """Another campaign in place of the open one, such as the same with a run more; the history begins anew."""
@@ -240,44 +244,41 @@ class Session(param.Parameterized):
             self.worker("", partial(self._begin, self.campaign))
             return
         locked = sorted(self.locked)
-        self._change(
-            "fitting", lambda fit: fit.refit([n for n in locked if n in fit.values]), "fit",
-            f"fit = fit.refit({locked!r})",
-        )  # fmt: skip
+
+        def make(fit: Fit) -> Step:
+            return Step("fit", fit.refit([n for n in locked if n in fit.values]), f"fit = fit.refit({locked!r})")
+
+        self._change("fitting", make)
 
     def add(self, effect: str) -> None:
         """An effect more, fitted."""
 
-        def command(fit: Fit) -> str:
-            every = (*fit.effect_forms, effect)
-            return "stickslip fit campaign.toml " + " ".join(f"--add {e}" for e in every)
+        def make(fit: Fit) -> Step:
+            added = " ".join(f"--add {e}" for e in (*fit.effect_forms, effect))
+            code = f"fit = fit.add({effect!r})"
+            return Step(f"with {effect}", fit.add(effect), code, f"stickslip fit campaign.toml {added}")
 
-        self._change(
-            f"fitting with {effect}", lambda fit: fit.add(effect), f"with {effect}", f"fit = fit.add({effect!r})",
-            command,
-        )  # fmt: skip
+        self._change(f"fitting with {effect}", make)
 
     def remove(self, effect: str) -> None:
         """An effect less, fitted anew."""
-        self._change(
-            f"fitting without {effect}", lambda fit: fit.remove(effect), f"without {effect}",
-            f"fit = fit.remove({effect!r})",
-        )  # fmt: skip
 
-    def _change(
-        self, busy: str, make: Callable[[Fit], Fit], text: str, code: str,
-        command: Callable[[Fit], str] = lambda fit: "",
-    ) -> None:  # fmt: skip
+        def make(fit: Fit) -> Step:
+            return Step(f"without {effect}", fit.remove(effect), f"fit = fit.remove({effect!r})")
+
+        self._change(f"fitting without {effect}", make)
+
+    def _change(self, busy: str, make: Callable[[Fit], Step]) -> None:
         def job() -> None:
             fit = self.fit
             if fit is None:
                 return
             with long(self, busy):
-                made = make(fit)
-                complete(made)
+                step = make(fit)
+                complete(step.fit)
                 if self.campaign is not fit.campaign:  # another was opened meanwhile
                     return
-                self.take(Step(text, made, code, command(fit)))
+                self.take(step)
                 self.said = ""
             self.keep()
 
@@ -321,8 +322,7 @@ class Session(param.Parameterized):
 
     def shown(self, path: Path) -> str:
         """A path as it is written from the campaign's folder."""
-        assert self.campaign is not None
-        home = self.campaign.description.folder.resolve()
+        home = self.data.description.folder.resolve()
         own = path.resolve()
         return str(own.relative_to(home) if own.is_relative_to(home) else own)
 
@@ -332,8 +332,7 @@ class Session(param.Parameterized):
 
     def code(self) -> str:
         """The lines of Python that lead to the model as it stands."""
-        assert self.campaign is not None
-        path = self.campaign.description.path.name
+        path = self.data.description.path.name
         own = f", effects={[self.shown(p) for p in self.effects]!r}" if self.effects else ""
         first: Sequence[str] = ("import stickslip as ss", f"campaign = ss.load_campaign({path!r}{own})")
         return "\n".join([*first, *(s.code for s in self.taken)])

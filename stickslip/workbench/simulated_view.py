@@ -10,12 +10,12 @@ from bokeh.core.properties import value
 
 from ..objects import experiments
 from ..objects.experiments import Simulated
-from .asked import Asked, named, needed, press
+from .asked import Asked, named, needed
 from .beside import Show, Tell, beside
 from .figures import compared, crosshair, figure, label, legend, source, unit_of
 from .measures import event_rows, thinned
 from .overview import record
-from .parts import Table, progress
+from .parts import Table, progress, starter
 from .session import Session, watch
 
 LEFT = 76
@@ -43,8 +43,7 @@ class SimulatedView:
         self.figures["gap"].legend.visible = False
         crosshair(*self.figures.values())
         self._table = Table(choosing=False)
-        self._button = press("Simulate", self.start)
-        asked.row.append(self._button)
+        asked.row.append(starter(self._work, "Simulate", self.start))
         self.view = pn.Column(progress(self._work), *self.figures.values(), self._table)
         asked.run.param.watch(lambda event: self.update(), "value")
         watch(self._work, ["found", "doing"], self.update)
@@ -63,9 +62,8 @@ class SimulatedView:
 
     def update(self) -> None:
         """Draw both."""
-        self._button.disabled = bool(self._work.doing)
-        campaign, run = self._session.campaign, self._asked.run.value
-        if campaign is None or run not in campaign.names:
+        campaign, run = self._session.data, self._asked.run.value
+        if run not in campaign.names:
             return
         trace = campaign[run]
         found: Simulated | None = self._work.found

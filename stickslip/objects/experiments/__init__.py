@@ -6,22 +6,6 @@ from .sweeps import Swept, sweep
 from .telling import Telling, rivals, tell_apart, where
 
 __all__ = [
-    "MEASURES",
-    "Setting",
-    "Simulated",
-    "Swept",
-    "Telling",
-    "changes",
-    "measured",
-    "part",
-    "practicable",
-    "rivals",
-    "run",
-    "scenario",
-    "simulated",
-    "spread",
-    "steady_runs",
-    "sweep",
-    "tell_apart",
-    "where",
-]
+    "MEASURES", "Setting", "Simulated", "Swept", "Telling", "changes", "measured", "part", "practicable", "rivals",
+    "run", "scenario", "simulated", "spread", "steady_runs", "sweep", "tell_apart", "where",
+]  # fmt: skip
