@@ -113,7 +113,7 @@ class Form:
         self.virgin = field(pn.widgets.Checkbox, "the contact was freshly set down", 210, margin=BESIDE)
         self.add = button("Add the run", self.send, 140, margin=(12, 0))
         self.said = Words()
-        self._first = Table(choosing=False)
+        self._first = Table()
         fixed = {"sizing_mode": "fixed"}
         rows = [pn.Row(self.columns[n], self.units[n], **fixed) for n in CHANNELS]
         more = (self.rate, self.velocity, self.resolution, self.virgin)

@@ -14,10 +14,9 @@ from ..objects.campaign import Campaign
 from ..system.units import shown
 from .adding_form import adding
 from .beside import Beside, Show, Tell, beside
-from .controls import Message
 from .event_view import EventView
 from .figures import label, unit_of
-from .parts import Sentences, Table, progress, row_of
+from .parts import Sentences, Table, progress
 from .selection import chosen, select
 from .session import Session, watch
 from .signals import Signals
@@ -157,12 +156,7 @@ def _told(session: Session, work: Beside) -> Any:
 
 
 def _runs(session: Session) -> Table:
-    def heard(message: Message) -> None:
-        number = row_of(message, len(session.data))
-        if number is not None:
-            select(session, session.data.names[number], session.event)
-
-    made = Table(heard=heard, tall=230)
+    made = Table(lambda number: select(session, session.data.names[number], session.event), tall=230)
 
     def update() -> None:
         columns, rows = run_rows(session.data)
@@ -178,12 +172,7 @@ def _runs(session: Session) -> Table:
 
 
 def _events(session: Session, work: Beside) -> Table:
-    def heard(message: Message) -> None:
-        number = row_of(message, len(made.rows))
-        if number is not None:
-            select(session, chosen(session)[0], number)
-
-    made = Table(heard=heard, tall=260, margin=(8, 0, 0, 0))
+    made = Table(lambda number: select(session, chosen(session)[0], number), tall=260, margin=(8, 0, 0, 0))
 
     def update() -> None:
         run, event = chosen(session)

@@ -10,9 +10,9 @@ import panel as pn
 from ..errors import StickslipError
 from . import kept, kept_simulations
 from .beside import Show, Tell, beside
-from .controls import Message, Words, button, field
+from .controls import Words, button, field
 from .history import SIMULATIONS, told, when
-from .parts import Table, head, progress, row_of, starter
+from .parts import Table, head, progress, starter
 from .session import Session, watch
 
 MODEL, DIAGNOSIS = "the model as it stands", "the diagnosis"
@@ -47,7 +47,7 @@ class Folders:
         self._listed: list[kept.Kept] = []
         self.what = field(pn.widgets.Select, "what is saved", 210, options=[MODEL, DIAGNOSIS, *SIMULATED], value=MODEL)
         self.name = field(pn.widgets.TextInput, "name of the run folder", 160, placeholder="first")
-        self._table = Table(columns=["run folder", "of", "verdict or error", "when"], heard=self._heard, tall=360)
+        self._table = Table(self._choose, columns=["run folder", "of", "verdict or error", "when"], tall=360)
         self._said = Words()
         self._frame = pn.pane.HTML("")
         self._tab = button("Open it in a tab of its own", lambda: None, 220, visible=False)
@@ -95,10 +95,7 @@ class Folders:
         rows = [[k.name, k.kind, k.words, when(k.when)] for k in self._listed]
         self._table.param.update(rows=rows, chosen=-1)
 
-    def _heard(self, message: Message) -> None:
-        number = row_of(message, len(self._listed))
-        if number is None:
-            return
+    def _choose(self, number: int) -> None:
         try:
             self._frame.object = framed(kept.report(self._listed[number]))
             self._said.text, self._tab.visible, self._table.chosen = "", True, number

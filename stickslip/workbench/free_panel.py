@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..objects.fit import Fit
 from ..system.units import shown
 from .controls import Words
 from .figures import FEW, compared, figure, label, legend, source, unit_of
 from .overview import reduced
 from .selection import selected
 from .session import Session, watch
-
-if TYPE_CHECKING:
-    import xarray
 
 AROUND = (2.0, 3.0)  # durations of the slip that are shown before and after it
 POINTS = 800
@@ -43,8 +37,7 @@ class Free:
 
     def update(self) -> None:
         """Draw the selected cycle."""
-        free: tuple[Fit, str, xarray.Dataset | None] = self._session.free
-        fit, run, found = free
+        fit, run, found = self._session.free
         name, number = selected(self._session)
         if fit is not self._session.fit or run != name:  # not yet
             self.words.text = "simulated when the sliders are at rest"
@@ -56,7 +49,7 @@ class Free:
             self.words.text = "this cycle cannot be simulated freely"
             return
         cycle = found.sel(cycle=number)
-        trace = next(t for t in fit.campaign.displaced[0] if t.name == name)
+        trace = next(t for t in self._session.data.displaced[0] if t.name == name)
         duration, half = float(cycle.measured_arrest - cycle.measured_onset), float(cycle.measured_half)
         place = float(cycle.measured_place)
         late = float(cycle.half) - half

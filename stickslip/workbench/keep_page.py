@@ -8,9 +8,9 @@ import panel as pn
 
 from . import history
 from .beside import beside
-from .controls import Message, Words
+from .controls import Words
 from .folders_view import Folders
-from .parts import Copy, Table, head, row_of
+from .parts import Copy, Table, head
 from .session import Session, watch
 
 
@@ -22,13 +22,8 @@ def page(session: Session) -> Any:
 
 
 def _history(session: Session) -> list[Any]:
-    def heard(message: Message) -> None:
-        number = row_of(message, len(session.steps))
-        if number is not None:
-            session.show(number)
-
     columns = ["step", "what was done", "when", "error / floors", "on unseen runs", ""]
-    made = Table(columns=columns, heard=heard, tall=360)
+    made = Table(session.show, columns=columns, tall=360)
 
     def update() -> None:
         made.param.update(rows=history.rows(session), chosen=session.at)

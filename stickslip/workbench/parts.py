@@ -22,18 +22,32 @@ class Table(Spoken):
     Attributes:
         columns, rows: texts.
         chosen: number of the row that is marked, -1 for none.
-        choosing: whether a row can be chosen; it is told as ``{"kind": "row", "row": number}``.
+        choosing: whether a row can be chosen.
         tall: pixels after which it scrolls, 0 for never.
+
+    Args:
+        choose: is told the number of a row that was chosen; None where none can be.
+        given: as above.
     """
 
     columns = param.List([])
     rows = param.List([])
     chosen = param.Integer(-1)
-    choosing = param.Boolean(True)
+    choosing = param.Boolean(False)
     tall = param.Integer(0)
 
     _esm = static("table.js")
     _stylesheets = _STYLE
+
+    def __init__(self, choose: Callable[[int], None] | None = None, **given: Any) -> None:
+        super().__init__(heard=self._heard, choosing=choose is not None, **given)
+        self._choose = choose
+
+    def _heard(self, message: Message) -> None:
+        number: Any = message.get("row")
+        whole = isinstance(number, int) and not isinstance(number, bool)
+        if self._choose is not None and message.get("kind") == "row" and whole and 0 <= number < len(self.rows):
+            self._choose(number)
 
 
 class Sentences(JSComponent):
@@ -102,10 +116,3 @@ def progress(work: Beside, stopping: bool = True) -> Progress:
 
     watch(work, ["doing", "share", "said"], update, now=True)
     return made
-
-
-def row_of(message: Message, rows: int) -> int | None:
-    """Number of the row that was chosen, or None where the message is none."""
-    number = message.get("row")
-    whole = isinstance(number, int) and not isinstance(number, bool)
-    return int(number) if message.get("kind") == "row" and whole and 0 <= int(number) < rows else None  # type: ignore[arg-type]

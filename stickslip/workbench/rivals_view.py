@@ -13,11 +13,11 @@ from ..physics.effects import catalogue
 from ..system.units import to_si
 from .asked import Asked, needed
 from .beside import Show, Tell, beside
-from .controls import Message, Words, field
+from .controls import Words, field
 from .evidence import LEAST, best_forms
 from .figures import figure, label, legend, of_run, unit_of
 from .measures import cells, thinned
-from .parts import Table, head, progress, row_of, starter
+from .parts import Table, head, progress, starter
 from .remembering import Remembered
 from .session import Session, watch
 
@@ -52,7 +52,7 @@ class Rivals:
         )  # fmt: skip
         begin = starter(self._work, "Simulate each", self.start)
         self._said, self._place = Words(), pn.Column()
-        self._table = Table(heard=self._heard)
+        self._table = Table(self._choose)
         self.view = pn.Column(
             head("The experiment that would separate candidates"), self._said,
             pn.FlexBox(self.which, self.effects, begin, gap="6px 10px"), progress(self._work), self._table,
@@ -115,9 +115,8 @@ class Rivals:
 
         self._work.do("fitting each of them", make)
 
-    def _heard(self, message: Message) -> None:
-        number = row_of(message, len(self._work.found or ()))
-        if number is not None:
+    def _choose(self, number: int) -> None:
+        if number < len(self._work.found or ()):  # of a search that has begun anew
             self._draw(self._work.found[number])
 
     def update(self) -> None:
@@ -158,7 +157,7 @@ class Rivals:
         columns = [
             f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
         ]  # fmt: skip
-        table = Table(columns=columns, rows=rows, choosing=False)
+        table = Table(columns=columns, rows=rows)
         self._place[:] = [Words(text=_difference(telling)), pn.Row(*made), table]
 
 

@@ -42,7 +42,7 @@ class SimulatedView:
         self._name = self.figures["x"].legend[0].items[1]
         self.figures["gap"].legend.visible = False
         crosshair(*self.figures.values())
-        self._table = Table(choosing=False)
+        self._table = Table()
         asked.row.append(starter(self._work, "Simulate", self.start))
         self.view = pn.Column(progress(self._work), *self.figures.values(), self._table)
         asked.run.param.watch(lambda event: self.update(), "value")

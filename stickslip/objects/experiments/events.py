@@ -72,14 +72,25 @@ def simulated(recording: Recording, trace: Trace) -> dict[str, Spread]:
 
     The recorder's own slips begin earlier, where the block outruns the load point; the creep between is no error.
     """
-    own = trace.leading == "displacement"
-    t, drive = recording["time"].values, recording["drive_position"].values
-    seen = Trace(
-        trace.name, t, displacement=recording["displacement"].values, drive=Drive.sampled(t, drive),
-        resolution=trace.resolution if own else None, noise=trace.noise if own else None, virgin=trace.virgin,
-        minimum_slip=trace.minimum_slip,
-    )  # fmt: skip
+    t, x, drive = (recording[name].values for name in ("time", "displacement", "drive_position"))
+    seen = sensed(trace, t, x, drive, virgin=trace.virgin)
     return measured(seen, segment(seen))
+
+
+def sensed(like: Trace, t: np.ndarray, x: np.ndarray, drive: np.ndarray, **more: Any) -> Trace:
+    """A motion with the sensor of a measured run, its noise and its smallest slip.
+
+    Args:
+        like: the measured run.
+        t: s, shape (n,).
+        x, drive: of the block and of the load point (m), shape (n,).
+        more: of the :class:`Trace` besides.
+    """
+    own = like.leading == "displacement"
+    return Trace(
+        like.name, t, displacement=x, drive=Drive.sampled(t, drive), resolution=like.resolution if own else None,
+        noise=like.noise if own else None, minimum_slip=like.minimum_slip, **more,
+    )  # fmt: skip
 
 
 def steady_runs(campaign: Campaign) -> dict[str, tuple[float, dict[str, Spread]]]:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ...data.segment import segment
-from ...data.trace import Drive, Trace
 from ...errors import InputError, StickslipError
 from ...inference.diagnose.prepare import Prepared
 from ...inference.diagnose.telling import information, margins
@@ -21,7 +20,7 @@ from ...simulation.scenario.recording import Recording
 from ...system.progress import Cancelled
 from ..fit import Fit
 from ..run import Tell
-from .events import MEASURES, part, run
+from .events import MEASURES, part, run, sensed
 from .setting import Setting, changed, scenario, settled
 
 READ, CREEP, SWING = "slip as read", "creep in the hold", "swing in the hold"
@@ -153,13 +152,8 @@ def seen_as(recording: Recording, prepared: Prepared, run: str, spring: float | 
     t = recording["time"].values
     rate = min(like.sampling_rate, (t.size - 1) / (t[-1] - t[0]))
     at = np.arange(t[0], t[-1], 1.0 / rate)
-    own = like.leading == "displacement"
-    trace = Trace(
-        run, at, displacement=np.interp(at, t, recording["reading"].values),
-        drive=Drive.sampled(at, np.interp(at, t, recording["drive_position"].values)),
-        resolution=like.resolution if own else None, noise=like.noise if own else None, virgin=True,
-        spring_stiffness=like.spring_stiffness if spring is None else spring, minimum_slip=like.minimum_slip,
-    )  # fmt: skip
+    read, drive = (np.interp(at, t, recording[name].values) for name in ("reading", "drive_position"))
+    trace = sensed(like, at, read, drive, virgin=True, spring_stiffness=spring or like.spring_stiffness)
     found = segment(trace)
     if not found.events:
         raise InputError("no slip")
