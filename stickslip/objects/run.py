@@ -28,13 +28,7 @@ def several(names: Name | Sequence[Name]) -> tuple[Name, ...]:
 
 def head(campaign: Campaign, kind: str) -> dict[str, Any]:
     """What every ``result.json`` made from a campaign begins with."""
-    return {
-        "schema": 1,
-        "kind": kind,
-        "title": campaign.title,
-        "inputs": campaign.inputs(),
-        "versions": versions(),
-    }
+    return {"schema": 1, "kind": kind, "title": campaign.title, "inputs": campaign.inputs(), "versions": versions()}
 
 
 def dataset(variables: Mapping[str, Any], title: str) -> xarray.Dataset:

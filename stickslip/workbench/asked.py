@@ -35,10 +35,8 @@ class Asked:
         )  # fmt: skip
         self.load = text(name="normal load, times", placeholder="such as 0.5 or 2")
         self.back = field(pn.widgets.Checkbox, "and back over the same track", 210, margin=(24, 10, 0, 0))
-        self.fields: dict[str, Any] = {
-            "run": self.run, "velocity": self.velocity, "hold": self.hold, "step": self.step, "spring": self.spring,
-            "mass": self.mass, "load": self.load, "events": self.events, "back": self.back,
-        }  # fmt: skip
+        names = ("run", "velocity", "hold", "step", "spring", "mass", "load", "events", "back")
+        self.fields: dict[str, Any] = {name: getattr(self, name) for name in names}
         self.row = pn.FlexBox(*self.fields.values(), gap="6px 0")
         self.view = pn.Column(head("What is left empty is as in the measured run."), self.row)
         self._kept = Remembered(session, "simulate", self.fields)
@@ -73,10 +71,8 @@ class Asked:
 
     def setting(self) -> Setting:
         """As it is written now."""
-        return Setting(
-            str(self.run.value), self.velocity.value, self.hold.value, self.spring.value, self.mass.value,
-            int(self.events.value or 1), self.step.value, self.load.value, bool(self.back.value),
-        )  # fmt: skip
+        written = {name: each.value for name, each in self.fields.items()}
+        return Setting(**{**written, "run": str(self.run.value), "events": int(self.events.value or 1)})
 
 
 def needed(session: Session) -> Fit:

@@ -117,14 +117,7 @@ def figure(title: str = "", x: str = "", y: str = "", height: int = 260, **more:
 
 
 def compared(made: Any, measured: Any, model: Any, columns: tuple[str, str], name: str, width: float = 2.5) -> None:
-    """Two curves over ``t``: what was measured, and dashed the model's, which is called ``name``.
-
-    Args:
-        made: the figure.
-        measured, model: sources; ``columns`` of them are drawn.
-        name: of the model in the legend.
-        width: of the measured line, in pixels.
-    """
+    """Two curves over ``t``, ``columns`` of two sources: what was measured, and dashed the model's, by its ``name``."""
     theme, (own, other) = look(), columns
     made.line("t", own, source=measured, color=theme.measured, line_width=width, legend_label="measured")
     made.line("t", other, source=model, color=theme.model, line_width=2, line_dash="dashed", legend_label=name)

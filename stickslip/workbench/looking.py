@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import param
-
 if TYPE_CHECKING:
     from ..inference.force.first_order import Promise
     from ..objects.diagnosis import Diagnosis
@@ -69,21 +67,18 @@ class Looking:
         session = self._session
         if session.searching:
             return
-        session.searching, session.searched = "beginning", 0.0
+        session.param.update(searching="beginning", searched=0.0)
 
         def tell(text: str, share: float) -> None:
-            with param.parameterized.batch_call_watchers(session):
-                session.searching, session.searched = text.splitlines()[0], share
+            session.param.update(searching=text.splitlines()[0], searched=share)
 
         def done(found: Diagnosis) -> None:
             self._search = None
-            with param.parameterized.batch_call_watchers(session):
-                session.diagnosis, session.searching = found, ""
+            session.param.update(diagnosis=found, searching="")
 
         def failed(text: str) -> None:
             self._search = None
-            with param.parameterized.batch_call_watchers(session):
-                session.searching, session.said = "", f"the diagnosis ended: {text}"
+            session.param.update(searching="", said=f"the diagnosis ended: {text}")
 
         self._search = searches.diagnosis(session.data, session.effects, out, tell, done, failed)
 

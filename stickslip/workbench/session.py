@@ -149,8 +149,7 @@ class Session(param.Parameterized):
         self.stop()
         self.cancel()
         keep = self._keeper.journal is not None
-        with param.parameterized.batch_call_watchers(self):
-            self.param.update(campaign=campaign, steps=(), at=-1, diagnosis=None, locked=frozenset(), run="", event=0)
+        self.param.update(campaign=campaign, steps=(), at=-1, diagnosis=None, locked=frozenset(), run="", event=0)
         self.begin(keep=keep)
 
     def _begin(self, campaign: Campaign) -> None:

@@ -65,11 +65,11 @@ class SimulatedView:
         campaign, run = self._session.data, self._asked.run.value
         if run not in campaign.names:
             return
-        trace = campaign[run]
+        trace, events = campaign[run], campaign.events[campaign.names.index(run)]
         found: Simulated | None = self._work.found
         if found is not None and (found.setting.run != run or found.fit.campaign is not campaign):
             found = None
-        t, x, gap = _motion(trace, campaign.events[campaign.names.index(run)])
+        t, x, gap = _motion(trace, events)
         k, unit = unit_of(x, "m")
         g, small = unit_of(gap, "m")
         self._measured.data = thinned(t, x * k, gap * g)
@@ -83,7 +83,7 @@ class SimulatedView:
             r = found.recording
             moved = r["displacement"].values
             self._model.data = thinned(r["time"].values, moved * k, (r["drive_position"].values - moved) * g)
-        own = experiments.measured(trace, campaign.events[campaign.names.index(run)])
+        own = experiments.measured(trace, events)
         columns, rows = event_rows(own, found, trace, self._session.fit)
         self._table.param.update(columns=columns, rows=rows)
 

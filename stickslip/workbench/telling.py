@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
-import param
-
 from ..errors import StickslipError
 from ..system.progress import Cancelled, showing
 
@@ -27,8 +25,7 @@ def long(session: Session, text: str = "") -> Iterator[None]:
         session.share = max(share, session.share)
 
     if text:
-        with param.parameterized.batch_call_watchers(session):
-            session.busy, session.share = text, 0.0
+        session.param.update(busy=text, share=0.0)
     try:
         with showing(show) if text else nullcontext():
             yield

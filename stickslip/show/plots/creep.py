@@ -11,10 +11,7 @@ from ...data.segment import thin
 from .style import DARK, MIDDLE, figure, plain, remark, scaled, styled
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from .style import Run
+    from .style import Axes, Figure, Run
 
 
 @styled
