@@ -28,7 +28,6 @@ AGAINST = {
     "event": "event",
 }
 NAMED = {"age": "time in contact", "place": "displacement", "event": "number of the event"}
-PARTS = 15  # of a variable's range, each with as many points, whose medians are drawn
 WIDEST = 4.0  # floors that are shown
 
 
@@ -123,7 +122,7 @@ class FitPlots:
         k, unit = (1.0, "") if name == "event" else scaled(x, str(kept[name].attrs["units"]))
         for i, run in enumerate(dict.fromkeys(kept.run.values)):
             own = kept.run.values == run
-            medians(ax, x[own] * k, z[own], i, plain(run, 24), PARTS)
+            medians(ax, x[own] * k, z[own], i, plain(run, 24), bold=True)
         if name in ("velocity", "time_in_contact"):
             signed_log(ax, x * k)
         ax.axhline(0.0, color=LIGHT, lw=0.8)

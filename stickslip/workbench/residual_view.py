@@ -11,7 +11,8 @@ from bokeh.models.annotations import Span
 
 from ..errors import InputError
 from ..objects.fit import Fit
-from ..objects.picture import AGAINST, PARTS, WIDEST
+from ..objects.picture import AGAINST, WIDEST
+from ..show.plots.style import PARTS
 from ..system.units import shown
 from . import folding
 from .controls import field
