@@ -28,7 +28,7 @@ def compare(first: Path, second: Path, *, out: Path | None = None, json: Json = 
     found = comparison(first, second)
     if out is not None:
         from ..show.plots import save
-        from ..show.report.compare_figure import comparison_figure
+        from ..show.report.compare import comparison_figure
 
         with open_run(out, force=force) as run:
             inputs = [file_record(folder / "result.json") for folder in (first, second)]

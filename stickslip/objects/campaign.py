@@ -45,10 +45,7 @@ class Campaign(Shown, Mapping[str, Trace]):
     """
 
     def __init__(
-        self,
-        description: files.Campaign,
-        traces: Sequence[Trace],
-        effects: str | Path | Sequence[str | Path] = (),
+        self, description: files.Campaign, traces: Sequence[Trace], effects: str | Path | Sequence[str | Path] = ()
     ) -> None:
         self.description, self.traces, self.effects = description, tuple(traces), tuple(map(Path, several(effects)))
 

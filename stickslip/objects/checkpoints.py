@@ -13,6 +13,7 @@ import numpy as np
 
 from ..physics.effects import catalogue
 from ..system.runstore import Run, json_text
+from .run import write_arrays
 
 
 def code_digest(effect_files: Sequence[str | Path] = ()) -> str:
@@ -56,8 +57,4 @@ class Pieces:
 
     def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
         """Keep a finished piece."""
-        path = self._path(key)
-        aside = path.with_suffix(".part")
-        with aside.open("wb") as stream:
-            np.savez(stream, allow_pickle=False, inputs=np.array(self._inputs), **piece)
-        aside.replace(path)
+        write_arrays(self._path(key), {"inputs": np.array(self._inputs), **piece})

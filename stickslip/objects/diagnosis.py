@@ -19,10 +19,10 @@ from ..inference.diagnose.engine import diagnose as search
 from ..inference.diagnose.summary import summary
 from ..physics.effects import catalogue
 from ..show.report import abilities
-from ..show.report.diagnosis_result import trace_sections
+from ..show.report.excerpts import trace_sections
 from ..simulation.conformance import try_laws
 from ..system.progress import telling
-from ..system.runstore import json_text, open_run, refuse_existing, versions
+from ..system.runstore import Run, json_text, open_run, refuse_existing, versions
 from ..system.shown import facts, table
 from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
@@ -127,9 +127,8 @@ class Diagnosis(Savable):
         """As in ``arrays.nc``."""
         return dataset(self.variables, self.campaign.title)
 
-    @property
-    def _models(self) -> Fit | None:
-        return None if self.found is None and self.folder is None else self.best
+    def _finish(self, run: Run) -> None:
+        finish(run, None if self.found is None and self.folder is None else self.best)
 
     def _parts(self) -> list[Any]:
         told = self.verdict
@@ -172,8 +171,7 @@ def diagnose(
         InputError: a tag or number that cannot be used, no run that can take part, a rig that cannot be.
         RunFolderError: the folder cannot be written.
     """
-    check_counts(max_effects, jobs)
-    check_time(time_limit)
+    check_counts(max_effects, jobs, time_limit)
     holdout = several(holdout)
     began = time.perf_counter()
     if candidates is not None:
@@ -289,36 +287,26 @@ def diagnose_campaign(
         InputError: the campaign, a trace, a tag or a number cannot be used.
         RunFolderError: the folder cannot be written.
     """
-    check_counts(options.get("max_effects", 1), options.get("jobs"))
-    check_time(options.get("time_limit"))
+    check_counts(options.get("max_effects", 1), options.get("jobs"), options.get("time_limit"))
     refuse_existing(Path(out), force)  # before traces are read
     return diagnose(load_campaign(campaign, effect_files), out=out, force=force, **options).result
 
 
-def check_counts(max_effects: int, jobs: int | None = None) -> None:
+def check_counts(max_effects: int, jobs: int | None = None, time_limit: float | None = None) -> None:
     """Refuse numbers that a diagnosis could only fail on after its first fit.
 
     Raises:
-        InputError: fewer than one effect or process.
+        InputError: fewer than one effect or process, or no time (s).
     """
-    for key, value, hint in (
-        ("--max-effects", max_effects, "leave it out for up to 4; stickslip fit fits the base model alone"),
-        ("--jobs", jobs, "leave it out for one process a core"),
-    ):
-        if value is not None and value < 1:
-            raise InputError("out of range", key=key, value=value, allowed="1 or more", hint=hint)
-
-
-def check_time(limit: float | None) -> None:
-    """Refuse a time limit that is none.
-
-    Raises:
-        InputError: it is not positive.
-    """
-    if limit is not None and not limit > 0.0:
-        raise InputError(
-            "out of range", key="--time-limit", value=limit, allowed="more than 0 s", hint="leave it out for no limit"
-        )
+    for key, value, wrong, allowed, hint in (
+        ("--max-effects", max_effects, max_effects < 1, "1 or more",
+         "leave it out for up to 4; stickslip fit fits the base model alone"),
+        ("--jobs", jobs, jobs is not None and jobs < 1, "1 or more", "leave it out for one process a core"),
+        ("--time-limit", time_limit, time_limit is not None and not time_limit > 0.0, "more than 0 s",
+         "leave it out for no limit"),
+    ):  # fmt: skip
+        if wrong:
+            raise InputError("out of range", key=key, value=value, allowed=allowed, hint=hint)
 
 
 def _check_candidates(tags: Sequence[str]) -> None:

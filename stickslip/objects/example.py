@@ -1,7 +1,8 @@
-"""The campaign that is shipped: of a clone, or of an installed package."""
+"""The campaign that is shipped: of a clone, or of an installed package, and a copy of it to work in."""
 
 from __future__ import annotations
 
+import shutil
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
@@ -36,3 +37,24 @@ def load_example() -> Campaign:
     if found is None:
         raise InputError("the example is not installed", hint="take scenarios/hidden-effect from the repository")
     return load_campaign(found)
+
+
+def copied(path: Path, home: Path | None) -> bool:
+    """Whether a campaign is the shipped one and does not lie below ``home``."""
+    shipped = example()
+    own = shipped is not None and path.resolve() == shipped.resolve()
+    return own and home is not None and not path.resolve().is_relative_to(home)
+
+
+def to_work_in(path: Path, home: Path | None) -> Path:
+    """A campaign as it is; of the shipped one a copy below ``home``, for its own folder may go with an upgrade.
+
+    Raises:
+        OSError: the copy cannot be written.
+    """
+    if home is None or not copied(path, home):
+        return path
+    copy = home / EXAMPLE
+    if not copy.is_file():
+        shutil.copytree(path.parent, copy.parent, ignore=shutil.ignore_patterns(".*"), dirs_exist_ok=True)
+    return copy

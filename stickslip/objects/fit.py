@@ -28,6 +28,7 @@ from ..physics.effects import catalogue
 from ..physics.effects.named import with_form
 from ..simulation.conformance import try_laws
 from ..system.progress import portion, telling
+from ..system.runstore import Run
 from ..system.shown import facts
 from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rough_lines
 from .fit_result import fit_result
@@ -35,7 +36,7 @@ from .fit_tables import STRENGTH, correlation_table, error_table, ladder_table, 
 from .free_cycles import free_run_errors, freely
 from .parameters_by_hand import moved, profile, refitted
 from .picture import FitPlots
-from .run import Savable, Tell, dataset, several
+from .run import Savable, Tell, dataset, finish, several
 
 if TYPE_CHECKING:
     import arviz
@@ -97,29 +98,31 @@ class Fit(Savable):
     @property
     def effects(self) -> tuple[str, ...]:
         """Tags of the effects that were added to the base."""
-        return tuple(e.tag for e in self._fit.problem.composition.effects)
+        return tuple(e.tag for e in self.force_fit.problem.composition.effects)
 
     @property
     def effect_forms(self) -> tuple[str, ...]:
         """The same with the form of each law where it is not the usual one, as :meth:`add` takes them."""
-        return tuple(with_form(e) for e in self._fit.problem.composition.effects)
+        return tuple(with_form(e) for e in self.force_fit.problem.composition.effects)
 
     @property
     def free(self) -> tuple[Free, ...]:
         """Free parameters that all runs share, with bounds and priors."""
-        return self._fit.free
+        return self.force_fit.free
 
     @property
     def values(self) -> dict[str, float]:
         """Name -> value (SI) of every parameter that all runs share, and the contact's strength."""
-        return {STRENGTH: self._fit.strength, **self._fit.values}
+        return {STRENGTH: self.force_fit.strength, **self.force_fit.values}
 
     @cached_property
     def std(self) -> dict[str, float]:
         """Name -> standard deviation (SI) of every free one."""
-        weights = slice(self._first_weight, self._first_weight + self._fit.point.weights.size)
-        whole = float(self._fit.covariance[weights, weights].sum())
-        return {STRENGTH: float(np.sqrt(max(whole, 0.0))), **self._fit.std()}
+        point = self.force_fit.point
+        first = len(self.free) + point.phases.size
+        weights = slice(first, first + point.weights.size)
+        whole = float(self.force_fit.covariance[weights, weights].sum())
+        return {STRENGTH: float(np.sqrt(max(whole, 0.0))), **self.force_fit.std()}
 
     @cached_property
     def parameters(self) -> pandas.DataFrame:
@@ -156,7 +159,7 @@ class Fit(Savable):
     @cached_property
     def errors(self) -> pandas.DataFrame:
         """Root mean square of the residual force over its floor: a row for each phase of the cycle, a column a run."""
-        return self._errors(self._fit.marginal, error)
+        return self._errors(self.force_fit.marginal, error)
 
     @cached_property
     def unseen_errors(self) -> pandas.DataFrame:
@@ -166,7 +169,7 @@ class Fit(Savable):
     @cached_property
     def error_deviations(self) -> pandas.DataFrame:
         """Standard deviations of :attr:`errors`, by how much events differ, for residuals within one go together."""
-        return self._errors(self._fit.marginal, deviation)
+        return self._errors(self.force_fit.marginal, deviation)
 
     @cached_property
     def unseen_error_deviations(self) -> pandas.DataFrame:
@@ -207,7 +210,7 @@ class Fit(Savable):
 
         Attributes ``u_max`` (m), ``p`` and their standard deviations, ``spread`` and ``misfit`` are of the law.
         """
-        curve = backbone(self._fit)
+        curve = backbone(self.force_fit)
         return backbone_curve(curve, power_law(curve, self._contacts))
 
     @cached_property
@@ -303,13 +306,13 @@ class Fit(Savable):
         Raises:
             InputError: no run of that name whose cycles can be run.
         """
-        return freely(self._climbed.prepared, self._fit, run)
+        return freely(self._climbed.prepared, self.force_fit, run)
 
     @cached_property
     def fitted(self) -> Fitted:
         """The model as a family that can be simulated; the contact by the law fitted to its backbone."""
-        law = power_law(backbone(self._fit), self._contacts)
-        return fitted_model(self._fit, law, self.climbed.prepared.traces, self._contacts, self.campaign.rig)
+        law = power_law(backbone(self.force_fit), self._contacts)
+        return fitted_model(self.force_fit, law, self.climbed.prepared.traces, self._contacts, self.campaign.rig)
 
     def scenario(
         self, changes: str | Sequence[str] = (), run: str | None = None, events: int = 5, drive: Moves | None = None
@@ -400,42 +403,33 @@ class Fit(Savable):
     @property
     def force_fit(self) -> ForceFit:
         """The numbers behind it: an optimum, or where parameters were set by hand."""
-        return self._fit
-
-    @property
-    def _fit(self) -> ForceFit:
         return self._climbed.fit if self._moved is None else self._moved
 
     @property
     def _contacts(self) -> int:
         return int(self.campaign.rig.contacts or 1)
 
-    @property
-    def _first_weight(self) -> int:
-        return len(self.free) + self._fit.point.phases.size
-
     @cached_property
     def _where(self) -> dict[str, np.ndarray]:
-        return coordinates(self._fit)
+        return coordinates(self.force_fit)
 
     @cached_property
     def _unseen(self) -> np.ndarray:
         """Residual force on runs that are left out (N), shape (p,)."""
-        return apart(self._fit)
+        return apart(self.force_fit)
 
     @cached_property
     def _floor(self) -> np.ndarray:
-        return deviations(self._fit)
+        return deviations(self.force_fit)
 
     def _summed(self, residual: np.ndarray) -> Sums:
-        return sums(self._fit, residual, self._floor)
+        return sums(self.force_fit, residual, self._floor)
 
     def _errors(self, residual: np.ndarray, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:
-        return error_table(self._fit, self._summed(residual), measure)
+        return error_table(self.force_fit, self._summed(residual), measure)
 
-    @property
-    def _models(self) -> Fit:
-        return self
+    def _finish(self, run: Run) -> None:
+        finish(run, self)
 
     def _parts(self) -> list[Any]:
         what = {

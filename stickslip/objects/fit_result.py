@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..inference.diagnose.confirm import Confirmation
 from ..inference.diagnose.summary import fitted_sections
-from ..show.report.diagnosis_result import trace_sections
+from ..show.report.excerpts import trace_sections
 from ..show.report.identifiability import identifiability
 from .run import head
 

@@ -160,7 +160,7 @@ def _forecast(campaign: Campaign, number: int, train: float, at: float | None, t
         "train": {"share": train, "until": past.split, "slips": training_slips(past), "of": len(past.events)},
         "at": at,
         "level_unit": past.scale.unit,
-        "levels": _ties(campaign, number),
+        "levels": dict(vars(wandering(levels(trace, campaign.scaled[0][number])))),
         "laws": [_law(c) for c in laws],
         "chosen": {"law": str(law), "rise": rise},
         "coordinate": told(laws, goes_back(past.arrays["direction"][: training_slips(past)]), steps(past.arrays)),
@@ -182,12 +182,6 @@ def _chosen(campaign: Campaign, run: str | None) -> int:
     if run not in campaign.names:
         raise InputError(f"there is no trace '{run}'", key="run", hint=nearest(run, campaign.names))
     return campaign.names.index(run)
-
-
-def _ties(campaign: Campaign, number: int) -> dict[str, Any]:
-    """How levels of the whole run hang together."""
-    found = wandering(levels(campaign.traces[number], campaign.scaled[0][number]))
-    return dict(vars(found))
 
 
 def _law(compared: Compared) -> dict[str, Any]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..system.progress import telling
-from ..system.runstore import open_run
-from ..system.shown import Shown, facts, table
-from .run import Tell, dataset, head
+from ..system.runstore import Run
+from ..system.shown import facts, table
+from .run import Savable, Tell, dataset, head
 
 if TYPE_CHECKING:
     import pandas
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from .campaign import Campaign
 
 
-class Inspection(Shown):
+class Inspection(Savable):
     """The outcome of :meth:`Campaign.inspect`.
 
     Attributes:
@@ -68,19 +67,14 @@ class Inspection(Shown):
             more |= reduced_record(trace, found, i)
         return dataset(self.variables | more, self.result["title"])
 
-    def save(self, folder: str | Path, force: bool = False, **more: Any) -> Path:
-        """Keep it as a run folder, with a picture of every trace; as :meth:`Fit.save`."""
+    def _finish(self, run: Run) -> None:
+        """The pictures of all traces, and the report."""
         from ..show.plots import save
-        from ..show.report import write_report
         from ..show.report.figures import trace_picture
 
-        with open_run(folder, force=force) as run:
-            run.arrays(self.arrays)
-            run.json({**self.result, **more})
-            for i, row in enumerate(self.result["traces"]):
-                save(trace_picture(self.arrays, i, row), run.path(f"trace{i + 1}.png"))
-            write_report(run.folder)
-        return Path(folder)
+        for i, row in enumerate(self.result["traces"]):
+            save(trace_picture(self.arrays, i, row), run.path(f"trace{i + 1}.png"))
+        super()._finish(run)
 
     def _parts(self) -> list[Any]:
         said = [("contradicted by the motion", self.findings), ("can tell", self.can), ("cannot", self.cannot)]

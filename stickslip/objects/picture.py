@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, nearest
-from ..show.plots.style import DARK, LIGHT, MIDDLE, of_run, panels, plain, scaled, signed_log, styled
+from ..show.plots.style import DARK, LIGHT, MIDDLE, label, medians, panels, plain, scaled, signed_log, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -28,7 +28,6 @@ AGAINST = {
     "event": "event",
 }
 NAMED = {"age": "time in contact", "place": "displacement", "event": "number of the event"}
-PARTS = 15  # of a variable's range, each with as many points, whose medians are drawn
 WIDEST = 4.0  # floors that are shown
 
 
@@ -75,8 +74,8 @@ class FitPlots:
         t = own.time.values - own.time.values[0]
         k, unit = scaled(own.measured.values, "N")
         top.plot(t, own.measured.values * k, color=DARK, lw=1.6, label="measured")
-        label = plain(" + ".join(self._fit.parts))
-        top.plot(t, own.model.values * k, color=MIDDLE, ls="--", lw=1.2, label=label)
+        model = plain(" + ".join(self._fit.parts))
+        top.plot(t, own.model.values * k, color=MIDDLE, ls="--", lw=1.2, label=model)
         top.set(ylabel=f"force of the contact / {unit}", title=plain(f"{name}, cycle {number + 1}"))
         top.legend(loc="lower right")
         k, unit = scaled(own.residual.values, "N")
@@ -123,19 +122,11 @@ class FitPlots:
         k, unit = (1.0, "") if name == "event" else scaled(x, str(kept[name].attrs["units"]))
         for i, run in enumerate(dict.fromkeys(kept.run.values)):
             own = kept.run.values == run
-            curve = of_run(i)
-            order = np.flatnonzero(own)[np.argsort(x[own])]
-            ax.plot(x[order] * k, np.clip(z[order], -6, 6), ".", ms=2.0, color=curve["color"], alpha=0.3)
-            pieces = [p for p in np.array_split(order, PARTS) if p.size]
-            middle = [np.median(x[p]) * k for p in pieces]
-            medians = [np.median(z[p]) for p in pieces]
-            ax.plot(middle, medians, color=curve["color"], ls=curve["ls"], lw=1.5, label=plain(run, 24))
+            medians(ax, x[own] * k, z[own], i, plain(run, 24), bold=True)
         if name in ("velocity", "time_in_contact"):
             signed_log(ax, x * k)
         ax.axhline(0.0, color=LIGHT, lw=0.8)
-        label = NAMED.get(against, against)
-        label = f"{label} / {unit}" if unit else label
-        ax.set(xlabel=label, ylabel="residual force / floor", ylim=(-WIDEST, WIDEST))
+        ax.set(xlabel=label(NAMED.get(against, against), unit), ylabel="residual force / floor", ylim=(-WIDEST, WIDEST))
         if own_figure:
             made.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
         else:
@@ -152,8 +143,8 @@ class FitPlots:
         k, unit = scaled(f, "N")
         ax.fill_between(u * m, (f - 2 * std) * k, (f + 2 * std) * k, color=LIGHT, alpha=0.5, lw=0)
         ax.plot(u * m, f * k, color=DARK, lw=1.6, label="measured, two standard deviations")
-        label = "rough contact: 1 - (1 - u/u_max)^p"
-        ax.plot(u * m, data.law.values * k, color=MIDDLE, ls="--", lw=1.2, label=label)
+        law = "rough contact: 1 - (1 - u/u_max)^p"
+        ax.plot(u * m, data.law.values * k, color=MIDDLE, ls="--", lw=1.2, label=law)
         ax.set(xlabel=f"displacement from the force-free contact / {length}", ylabel=f"force / {unit}")
         ax.set_xlim(0.0, 1.6 * data.attrs["u_max"] * m)
         ax.legend(loc="lower right")
@@ -188,13 +179,17 @@ class FitPlots:
     def _cycle(self, run: str | None, event: int | None) -> tuple[xarray.Dataset, str, int]:
         name = self._run(run)
         data = self._fit.force
-        own = data.isel(point=np.flatnonzero(data.run.values == name))
-        numbers = np.unique(own.event.values)
+        numbers = np.unique(data.event.values[data.run.values == name])
         chosen = int(np.median(numbers)) if event is None else event
         if chosen not in numbers:
             raise InputError("no such cycle", key="event", value=event, allowed=f"0 to {numbers.max()}")
-        own = own.isel(point=np.flatnonzero(own.event.values == chosen))
-        return own.isel(point=np.argsort(own.time.values)), name, chosen
+        return one_cycle(data, name, chosen), name, chosen
+
+
+def one_cycle(data: xarray.Dataset, run: str, event: int) -> xarray.Dataset:
+    """The points of one cycle in :attr:`stickslip.Fit.force`, in their order of time."""
+    own = np.flatnonzero((data.run.values == run) & (data.event.values == event))
+    return data.isel(point=own[np.argsort(data.time.values[own])])
 
 
 def balanced(own: xarray.Dataset, spring: float) -> np.ndarray:

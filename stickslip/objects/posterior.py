@@ -33,7 +33,7 @@ def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int, tell: Tell) 
     import nutpie
     from nutpie.compiled_pyfunc import from_pyfunc
 
-    way, names = walked(fit._fit), [f.name for f in fit.free]
+    way, names = walked(fit.force_fit), [f.name for f in fit.free]
     done, total = itertools.count(1), chains * (draws + tune)
 
     def drawn(x: np.ndarray) -> dict[str, Any]:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+import numpy as np
+
 from ..system.runstore import Run, open_run, versions
 from ..system.shown import Shown
 
@@ -26,13 +28,7 @@ def several(names: Name | Sequence[Name]) -> tuple[Name, ...]:
 
 def head(campaign: Campaign, kind: str) -> dict[str, Any]:
     """What every ``result.json`` made from a campaign begins with."""
-    return {
-        "schema": 1,
-        "kind": kind,
-        "title": campaign.title,
-        "inputs": campaign.inputs(),
-        "versions": versions(),
-    }
+    return {"schema": 1, "kind": kind, "title": campaign.title, "inputs": campaign.inputs(), "versions": versions()}
 
 
 def dataset(variables: Mapping[str, Any], title: str) -> xarray.Dataset:
@@ -54,17 +50,12 @@ class Result(Protocol):
     def arrays(self) -> xarray.Dataset:
         """As in ``arrays.nc``."""
 
-    @property
-    def _models(self) -> Fit | None:
-        """To go on from, if any."""
+    def _finish(self, run: Run) -> None:
+        """Write what else a run folder holds."""
 
 
 class Savable(Shown):
     """What a campaign gave, which can be kept as a run folder."""
-
-    @property
-    def _models(self) -> Fit | None:
-        return None
 
     def save(self: Result, folder: str | Path, force: bool = False, **more: Any) -> Path:
         """Keep it as a run folder: ``result.json``, ``arrays.nc``, ``report.html``, and models to go on from.
@@ -81,11 +72,14 @@ class Savable(Shown):
         with open_run(folder, force=force) as run:
             run.arrays(arrays)
             run.json(result)
-            finish(run, self._models)
+            self._finish(run)
         return Path(folder)
 
+    def _finish(self, run: Run) -> None:
+        finish(run)
 
-def finish(run: Run, fit: Fit | None) -> None:
+
+def finish(run: Run, fit: Fit | None = None) -> None:
     """Write what a run folder holds besides its numbers: the models to go on from, and the report."""
     from ..show.report import write_report
     from .stored import write_models
@@ -93,3 +87,11 @@ def finish(run: Run, fit: Fit | None) -> None:
     if fit is not None:
         write_models(run, fit)
     write_report(run.folder)
+
+
+def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write plain arrays as an ``.npz`` file, aside and renamed, so that it is there whole or not at all."""
+    aside = path.with_suffix(".part")
+    with aside.open("wb") as stream:
+        np.savez(stream, allow_pickle=False, **arrays)
+    aside.replace(path)

@@ -60,7 +60,7 @@ def fit_static(
     """
     from ..data.trace import Trace
     from ..inference.fit.static_table import StaticRig
-    from ..show.report import describe_trace, trace_pieces
+    from ..show.report.excerpts import trace_sections
     from ..show.report.static_result import static_result
 
     file = campaign.description.path
@@ -89,15 +89,14 @@ def fit_static(
         notes.append(
             f"creep of held-out runs ({', '.join(kept)}) is fitted as well: every creep process is fitted by itself"
         )
-    for i, (t, s) in enumerate(zip(traces, found, strict=True)):
-        variables |= trace_pieces(t, s, i)
+    described, pictured = trace_sections(traces, found)
     whole = {
         **head(campaign, "fit"),
         "model": "static",
         **result,
-        "traces": [describe_trace(t, s) for t, s in zip(traces, found, strict=True)],
+        **described,
         "rig": [finding.plain() for finding in campaign.findings],
         "notes": notes,
         "dropped": [*campaign.lost, *result["dropped"]],
     }
-    return StaticFit(campaign, whole, variables)
+    return StaticFit(campaign, whole, variables | pictured)

@@ -24,6 +24,7 @@ from ..physics.params import specs, variants
 from ..system.runstore import Run, digests, read_result
 from .campaign import Campaign, load_campaign
 from .fit import Fit
+from .run import write_arrays
 
 Arrays = dict[str, np.ndarray]
 MODELS = "models.npz"
@@ -93,8 +94,7 @@ def write_models(run: Run, fit: Fit) -> None:
         return name
 
     record = json.dumps(packed(fit, keep))
-    with run.path(MODELS).open("wb") as stream:
-        np.savez(stream, allow_pickle=False, record=np.array(record), **arrays)
+    write_arrays(run.path(MODELS), {"record": np.array(record), **arrays})
 
 
 def load_fit(folder: str | Path, campaign: Campaign | str | Path) -> Fit:

@@ -15,9 +15,7 @@ from ..system.units import shown
 if TYPE_CHECKING:
     import xarray
 
-    from ..simulation.scenario.recording import Recording
-
-    Recorded = xarray.Dataset | Recording
+    from .plots.style import Run as Recorded
 
 
 def head(scenario: Scenario) -> dict[str, Any]:
@@ -31,10 +29,7 @@ def head(scenario: Scenario) -> dict[str, Any]:
         "changes": [f"{key}={value}" for key, value in scenario.changes],
         "inputs": input_records(scenario),
         "versions": versions(),
-        "seeds": {
-            "lines": getattr(file.contact, "seed", None),
-            "sensor": file.sensor.seed if file.sensor else None,
-        },
+        "seeds": {"lines": getattr(file.contact, "seed", None), "sensor": file.sensor.seed if file.sensor else None},
     }
 
 

@@ -74,9 +74,12 @@ def look(name: str, content: bytes) -> Columns:
         try:
             return read_columns(path)
         except InputError as error:
-            raise InputError(
-                error.what, file=name, key=error.key, value=error.value, allowed=error.allowed, hint=error.hint
-            ) from None
+            raise _of(error, name) from None
+
+
+def _of(error: InputError, file: str) -> InputError:
+    """The same error in another file: in place of one that was written aside, the one that somebody knows."""
+    return type(error)(error.what, file=file, key=error.key, value=error.value, allowed=error.allowed, hint=error.hint)
 
 
 def guess(columns: Columns, campaign: Campaign | None = None) -> Choice:
@@ -249,9 +252,7 @@ def create(home: Path, folder: str, name: str, content: bytes, text: str, rig: M
             described = files.load_campaign(made / CAMPAIGN)
             files.load_trace(described, described.entries[-1])
         except InputError as error:
-            raise type(error)(
-                error.what, file=CAMPAIGN, key=error.key, value=error.value, allowed=error.allowed, hint=error.hint
-            ) from None
+            raise _of(error, CAMPAIGN) from None
         made.rename(place)
     return load_campaign(place / CAMPAIGN)
 
@@ -300,9 +301,7 @@ def add(campaign: Campaign, name: str, content: bytes, text: str) -> Campaign:
         except BaseException as error:
             stored.unlink(missing_ok=True)
             if isinstance(error, InputError) and error.file is not None:
-                raise type(error)(
-                    error.what, file=toml.name, key=error.key, value=error.value, allowed=error.allowed, hint=error.hint
-                ) from None
+                raise _of(error, toml.name) from None
             raise
         finally:
             trial.unlink(missing_ok=True)

@@ -15,7 +15,7 @@ from ..objects.campaign import Campaign
 from ..system.units import to_si
 from .adding import CHANNELS, FOLDER, NONE, VELOCITY, Choice, add, create, entry_text, guess, look
 from .beside import Show, Tell, beside
-from .controls import BUTTON, Words
+from .controls import Words, button, field
 from .parts import Table, head, progress
 from .places import new_place
 from .session import Session, watch
@@ -33,7 +33,8 @@ WORDS = {
 }  # fmt: skip
 
 
-_field: Any = partial(pn.widgets.TextInput, width=210, sizing_mode="fixed")
+BESIDE = (5, 10)  # pixels around a field
+_text: Any = partial(field, pn.widgets.TextInput, width=210, margin=BESIDE)
 
 
 class Dropper(pn.widgets.FileDropper):
@@ -99,42 +100,34 @@ class Form:
         self._given = b""
         self._found: Read | None = None
         self._columns: Columns | None = None
+        self.drop = Dropper(self._refuse, height=90, margin=(4, 0), stylesheets=[DROP])
+        self.columns = {
+            name: field(pn.widgets.Select, words, 190, options=[NONE], margin=BESIDE) for name, words in WORDS.items()
+        }
+        self.units = {name: _text(name="unit", placeholder=si, width=80) for name, si in CHANNELS.items()}
+        self.rate = _text(name="sampling rate, without a column of times", placeholder="10 kHz")
+        self.velocity = _text(name=VELOCITY, placeholder="50 um/s, or 50 um/s until 5 s, ...")
+        self.resolution = _text(name="one count of the displacement, if known", placeholder="8 nm")
+        self.stored = _text(name="stored beside the campaign as")
+        self.run = _text(name="name of the run, if another")
+        self.virgin = field(pn.widgets.Checkbox, "the contact was freshly set down", 210, margin=BESIDE)
+        self.add = button("Add the run", self.send, 140, margin=(12, 0))
+        self.said = Words()
+        self._first = Table()
         fixed = {"sizing_mode": "fixed"}
-        self.drop = Dropper(self._refuse, height=90, sizing_mode="stretch_width", margin=(4, 0), stylesheets=[DROP])
-        self.columns: dict[str, Any] = {
-            name: pn.widgets.Select(name=words, options=[NONE], width=190, **fixed) for name, words in WORDS.items()
-        }
-        self.units: dict[str, Any] = {
-            name: pn.widgets.TextInput(name="unit", placeholder=si, width=80, **fixed) for name, si in CHANNELS.items()
-        }
-        self.rate = _field(name="sampling rate, without a column of times", placeholder="10 kHz")
-        self.velocity = _field(name=VELOCITY, placeholder="50 um/s, or 50 um/s until 5 s, ...")
-        self.resolution = _field(name="one count of the displacement, if known", placeholder="8 nm")
-        self.stored = _field(name="stored beside the campaign as")
-        self.run = _field(name="name of the run, if another")
-        self.virgin = pn.widgets.Checkbox(name="the contact was freshly set down", width=210, **fixed)
-        self.add = pn.widgets.Button(name="Add the run", width=140, stylesheets=[BUTTON], margin=(12, 0), **fixed)
-        self.said = Words(sizing_mode="stretch_width")
-        self._first = Table(choosing=False, sizing_mode="stretch_width")
         rows = [pn.Row(self.columns[n], self.units[n], **fixed) for n in CHANNELS]
         more = (self.rate, self.velocity, self.resolution, self.virgin)
         last = (*self._asked_besides(), self.stored, self.run, self.add)
         self._asked = pn.Column(
             self._first,
             pn.FlexBox(*(pn.Column(*part, **fixed) for part in (rows[:3], rows[3:], more, last)), gap="0 12px"),
-            sizing_mode="stretch_width", visible=False,
+            visible=False,
         )  # fmt: skip
         self.view = pn.Column(
-            head(self.asking),
-            self.drop,
-            self.said,
-            self._asked,
-            progress(self._reading),
+            head(self.asking), self.drop, self.said, self._asked, progress(self._reading),
             progress(self._work, stopping=False),
-            sizing_mode="stretch_width",
-        )
+        )  # fmt: skip
         self.drop.param.watch(self._dropped, "value")
-        self.add.on_click(lambda event: self.send())
         watch(self._work, ["doing", "found"], self._update)
         watch(self._reading, ["found"], self._read)
 
@@ -236,15 +229,11 @@ class Form:
         return ()
 
     def _check(self, name: str) -> None:
-        campaign = self._session.campaign
-        assert campaign is not None
-        new_place(campaign.description.folder, name, "stored as")
+        new_place(self._session.data.description.folder, name, "stored as")
 
     def _store(self, name: str, content: bytes, text: str) -> Campaign:
         """Store the file and put its table into the campaign."""
-        campaign = self._session.campaign
-        assert campaign is not None
-        made = add(campaign, name, content, text)
+        made = add(self._session.data, name, content, text)
         self._session.reopen(made)
         self._work.said = f"{name} is stored beside the campaign, which has {len(made)} runs now"
         return made
@@ -262,18 +251,18 @@ class FirstRun(Form):
     doing = "making the campaign"
 
     def _asked_besides(self) -> tuple[Any, ...]:
-        self.folder = _field(name=FOLDER, placeholder="my-rig")
-        self.mass = _field(name="mass of the block", placeholder="89.4 g")
-        self.spring = _field(name="stiffness of the spring", placeholder="980 N/m")
+        self.folder = _text(name=FOLDER, placeholder="my-rig")
+        self.mass = _text(name="mass of the block", placeholder="89.4 g")
+        self.spring = _text(name="stiffness of the spring", placeholder="980 N/m")
         self.add.name, self.stored.name = "Make the campaign", "name of the file in it"
         return self.folder, self.mass, self.spring
 
     def _check(self, name: str) -> None:
         assert self._session.home is not None
         new_place(self._session.home, self.folder.value, FOLDER)
-        for field, unit in ((self.mass, "kg"), (self.spring, "N/m")):
-            if field.value.strip():
-                to_si(field.value, unit, key=field.name)
+        for asked, unit in ((self.mass, "kg"), (self.spring, "N/m")):
+            if asked.value.strip():
+                to_si(asked.value, unit, key=asked.name)
 
     def _store(self, name: str, content: bytes, text: str) -> Campaign:
         assert self._session.home is not None
@@ -285,11 +274,6 @@ class FirstRun(Form):
 
 def adding(session: Session) -> Any:
     """The form of a session; a line of words where the campaign has no file."""
-    campaign = session.campaign
-    if campaign is None or not campaign.description.filed:
-        return Words(text="Runs can be added to a campaign that has a file.", sizing_mode="stretch_width")
-    made = Form(session)
-    return made.view
-
-
-__all__ = ["FirstRun", "Form", "adding"]
+    if not session.data.description.filed:
+        return Words(text="Runs can be added to a campaign that has a file.")
+    return Form(session).view

@@ -39,13 +39,13 @@ def history(session: Session, journal: Journal) -> bool:
 def model(session: Session, saved: FittedRun) -> None:
     """Fit a saved model anew, and set what was set by hand in it, as steps; none where it stands already."""
     fit, forms, name = session.fit, list(saved.effect_forms), saved.folder.name
-    assert fit is not None and session.campaign is not None
+    assert fit is not None
     aside = list(saved.result.get("kept_aside", ()))
     runs = {run.name for run in fit.force_fit.problem.runs}
     if sorted(fit.effect_forms) != sorted(forms) or runs & set(aside):
         session.busy = f"fitting the model of {name}"
         options: dict[str, Any] = {"holdout": aside} if aside else {}
-        fit = complete(session.campaign.fit(forms, **options))
+        fit = complete(session.data.fit(forms, **options))
         asked = [f"--add {form}" for form in forms] + [f"--holdout {run}" for run in aside]
         code = f"fit = campaign.fit({forms!r}{f', holdout={aside!r}' if aside else ''})"
         session.take(Step(f"the model of {name}", fit, code, " ".join(["stickslip fit campaign.toml", *asked])))

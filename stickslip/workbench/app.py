@@ -13,13 +13,13 @@ from bokeh.models import CustomJS
 from panel.theme.base import Inherit
 from panel.theme.native import Native
 
+from ..objects.example import copied
 from ..system.units import shown_with
 from .adding_form import FirstRun
-from .controls import BUTTON, Frame, Message, Words
+from .controls import Frame, Message, Words, button
 from .figures import dark, look
 from .selection import follow
 from .session import Note, Session, watch
-from .shipped import copied
 from .watching import Place, placed
 
 TITLES = {
@@ -69,7 +69,10 @@ class Plain(Native):
 
 
 def ready() -> None:
-    """Panel as the workbench needs it: one design; not by its extension, which loads from the network in a notebook."""
+    """Panel as the workbench needs it: one design, all without a width of its own as wide as its place.
+
+    Not by Panel's extension, which loads from the network in a notebook.
+    """
     importlib.import_module("panel.models.file_dropper")  # its script is then in every window, also where none drops
     pn.config.param.update(design=Plain, notifications=False, sizing_mode="stretch_width", raw_css=[STYLE])
 
@@ -81,7 +84,7 @@ def module(name: str) -> ModuleType:
 
 def view(session: Session) -> Any:
     """The whole window of a session."""
-    head, body = frame(session), pn.Column(sizing_mode="stretch_width")
+    head, body = frame(session), pn.Column()
 
     def show() -> None:
         if session.campaign is None:
@@ -101,7 +104,7 @@ def view(session: Session) -> Any:
     if pn.state.curdoc is not None:
         pn.state.curdoc.js_on_event("connection_lost", CustomJS(code=GONE))
         pn.state.curdoc.js_on_event("client_reconnected", CustomJS(code=BACK))
-    return pn.Column(head, body, sizing_mode="stretch_width")
+    return pn.Column(head, body)
 
 
 def offers(session: Session) -> Any:
@@ -114,27 +117,17 @@ def offers(session: Session) -> Any:
         ))  # fmt: skip
     for i, path in enumerate(session.offers):
         words = "the shipped example, in a copy below this folder" if copied(path, session.home) else str(path)
-        button = pn.widgets.Button(name=f"Open {words}", width=560, sizing_mode="fixed", stylesheets=[BUTTON])
-        button.on_click(partial(_opened, session, i))
-        made.append(button)
+        made.append(button(f"Open {words}", partial(session.open, i), 560))
     if session.home is not None:
         made.append(FirstRun(session).view)
-    return pn.Column(*made, margin=(16, 0), sizing_mode="stretch_width")
-
-
-def _opened(session: Session, number: int, event: Any) -> None:
-    session.open(number)
+    return pn.Column(*made, margin=(16, 0))
 
 
 def tabs(session: Session) -> pn.Tabs:
     """The pages, each made when it is first looked at."""
-    wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
-    places = [pn.Column(Words(text=DRAWN, margin=(24, 0), **wide), min_height=500, **wide) for _ in PAGES]
+    places = [pn.Column(Words(text=DRAWN, margin=(24, 0)), min_height=500) for _ in PAGES]
     made_at: set[int] = set()
-    made = pn.Tabs(
-        *zip(TITLES.values(), places, strict=True),
-        sizing_mode="stretch_width", stylesheets=[TABS],
-    )  # fmt: skip
+    made = pn.Tabs(*zip(TITLES.values(), places, strict=True), stylesheets=[TABS])
     asked = pn.state.location is not None and "page=" in str(pn.state.location.search)
 
     def restore() -> None:
@@ -188,8 +181,10 @@ def frame(session: Session) -> Frame:
             follow(session, str(message.get("key")))
 
     theme = look()
-    colours = {name: getattr(theme, name) for name in ("text", "soft", "line", "surface", "page", "band", "model")}
-    made = Frame(heard=heard, dark=dark(), colours={**colours, "accent": theme.accent}, sizing_mode="stretch_width")
+    colours = {
+        name: getattr(theme, name) for name in ("text", "soft", "line", "surface", "page", "band", "model", "accent")
+    }
+    made = Frame(heard=heard, dark=dark(), colours=colours)
 
     def update() -> None:
         fit, campaign = session.fit, session.campaign
@@ -217,10 +212,8 @@ def frame(session: Session) -> Frame:
         own = shown_with(fit.error, fit.error_std)
         made.errors = f"error {own} by hand (before: {told})" if fit.by_hand else f"error {told}"
 
-    watch(session, ["campaign", "steps", "at", "busy", "share", "searching", "searched", "said"], update)
-    watch(session, ["steps", "at"], errors)
-    update()
-    errors()
+    watch(session, ["campaign", "steps", "at", "busy", "share", "searching", "searched", "said"], update, now=True)
+    watch(session, ["steps", "at"], errors, now=True)
     return made
 
 

@@ -11,20 +11,11 @@ from ..errors import InputError
 from ..objects.experiments import Setting
 from ..objects.fit import Fit
 from ..system.units import shown
-from .controls import BUTTON
+from .controls import field
 from .parts import head
-from .picked import chosen
 from .remembering import Remembered
+from .selection import chosen
 from .session import Session, watch
-
-FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
-WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
-
-
-def press(name: str, call: Any, width: int = 150) -> pn.widgets.Button:
-    made = pn.widgets.Button(name=name, width=width, stylesheets=[BUTTON], margin=(22, 8, 0, 0), **FIXED)
-    made.on_click(lambda event: call())
-    return made
 
 
 class Asked:
@@ -32,33 +23,22 @@ class Asked:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        text: Any = partial(pn.widgets.TextInput, width=150, margin=(0, 10, 0, 0), **FIXED)
-        self.run: Any = pn.widgets.Select(name="beside the run", options=[], width=170, margin=(0, 10, 0, 0), **FIXED)
+        text: Any = partial(field, pn.widgets.TextInput, width=150)
+        self.run = field(pn.widgets.Select, "beside the run", 170, options=[])
         self.velocity = text(name="velocity of the drive")
         self.hold = text(name="a hold of", placeholder="such as 10 s")
         self.step = text(name="a step to the velocity", placeholder="such as 1 mm/s")
         self.spring, self.mass = text(name="spring"), text(name="mass")
-        self.events = pn.widgets.IntInput(
-            name="number of slips",
+        self.events = field(
+            pn.widgets.IntInput, "number of slips", 150, value=7, start=1, end=100,
             description="At a velocity written here, and in the sweep",
-            value=7,
-            start=1,
-            end=100,
-            width=150,
-            margin=(0, 10, 0, 0),
-            **FIXED,
-        )
+        )  # fmt: skip
         self.load = text(name="normal load, times", placeholder="such as 0.5 or 2")
-        self.back: Any = pn.widgets.Checkbox(
-            name="and back over the same track", value=False, width=210, margin=(24, 10, 0, 0), **FIXED
-        )
-        self.fields: dict[str, Any] = {
-            "run": self.run, "velocity": self.velocity, "hold": self.hold, "step": self.step, "spring": self.spring,
-            "mass": self.mass, "load": self.load, "events": self.events, "back": self.back,
-        }  # fmt: skip
-        asked = self.fields.values()
-        self.row = pn.FlexBox(*asked, gap="6px 0")
-        self.view = pn.Column(head("What is left empty is as in the measured run."), self.row, **WIDE)
+        self.back = field(pn.widgets.Checkbox, "and back over the same track", 210, margin=(24, 10, 0, 0))
+        names = ("run", "velocity", "hold", "step", "spring", "mass", "load", "events", "back")
+        self.fields: dict[str, Any] = {name: getattr(self, name) for name in names}
+        self.row = pn.FlexBox(*self.fields.values(), gap="6px 0")
+        self.view = pn.Column(head("What is left empty is as in the measured run."), self.row)
         self._kept = Remembered(session, "simulate", self.fields)
         self.run.param.watch(lambda event: self._placeholders(), "value")
         watch(session, ["campaign", "run"], self._runs)
@@ -67,9 +47,7 @@ class Asked:
         self._kept.restore()
 
     def _runs(self) -> None:
-        campaign, fit = self._session.campaign, self._session.fit
-        if campaign is None:
-            return
+        campaign, fit = self._session.data, self._session.fit
         names = campaign.names if fit is None else [k.name for k in fit.climbed.prepared.runs]
         run = chosen(self._session)[0]
         with self._kept.aside():
@@ -78,8 +56,8 @@ class Asked:
 
     def _placeholders(self) -> None:
         """What it is in the measured run."""
-        campaign, fit = self._session.campaign, self._session.fit
-        if campaign is None or self.run.value not in campaign.names:
+        campaign, fit = self._session.data, self._session.fit
+        if self.run.value not in campaign.names:
             return
         trace = campaign[self.run.value]
         holds = trace.drive is not None and trace.drive.breakpoints.size > 0
@@ -93,10 +71,8 @@ class Asked:
 
     def setting(self) -> Setting:
         """As it is written now."""
-        return Setting(
-            str(self.run.value), self.velocity.value, self.hold.value, self.spring.value, self.mass.value,
-            int(self.events.value or 1), self.step.value, self.load.value, bool(self.back.value),
-        )  # fmt: skip
+        written = {name: each.value for name, each in self.fields.items()}
+        return Setting(**{**written, "run": str(self.run.value), "events": int(self.events.value or 1)})
 
 
 def needed(session: Session) -> Fit:

@@ -24,14 +24,9 @@ class Backbone:
         self._scale, self._told, self._widest = (1.0, 1.0), "", 0.0
         self.figure = figure("backbone of the contact", height=260, output_backend="canvas")
         self.figure.varea(
-            "u",
-            "low",
-            "high",
-            source=self._data,
-            color=theme.band,
-            fill_alpha=0.45,
+            "u", "low", "high", source=self._data, color=theme.band, fill_alpha=0.45,
             legend_label="two standard deviations",
-        )
+        )  # fmt: skip
         self.figure.line("u", "force", source=self._data, color=theme.measured, line_width=2.5, legend_label="measured")
         self.figure.line(
             "u", "law", source=self._data, color=theme.model, line_width=2, line_dash="dashed",
@@ -44,10 +39,9 @@ class Backbone:
             legend_label="nearest rough lines",
         )  # fmt: skip
         legend(self.figure, ncols=2)
-        self.words = Words(sizing_mode="stretch_width", margin=(0, 0, 0, 12))
-        watch(session, ["steps", "at"], self.update)
+        self.words = Words(margin=(0, 0, 0, 12))
         watch(session, ["rough"], self.draw_line)
-        self.update()
+        watch(session, ["steps", "at"], self.update, now=True)
 
     def update(self) -> None:
         """Draw that of the last model that was fitted."""

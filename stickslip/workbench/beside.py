@@ -11,9 +11,8 @@ import param
 from ..errors import StickslipError
 from ..system.progress import Cancelled, breathe
 from .session import Session
-from .work import Worker, at_once
+from .work import Tell
 
-Tell = Callable[[str, float], None]
 Show = Callable[[Any], None]
 
 
@@ -31,9 +30,9 @@ class Beside(param.Parameterized):
     found = param.Parameter(None)
     said = param.String("")
 
-    def __init__(self, threaded: bool, **given: Any) -> None:
-        super().__init__(**given)
-        self._worker: Any = Worker() if threaded else at_once
+    def __init__(self, worker: Any) -> None:
+        super().__init__()
+        self._worker = worker
 
     def do(self, text: str, make: Callable[[Tell, Show], Any]) -> None:
         """Begin it, unless something is going on.
@@ -76,13 +75,11 @@ class Beside(param.Parameterized):
 
     def cancel(self) -> None:
         """End it at its next step."""
-        if isinstance(self._worker, Worker):
-            self._worker.cancel()
+        self._worker.cancel()
 
     def close(self) -> None:
         """End it, and wait for that step."""
-        if isinstance(self._worker, Worker):
-            self._worker.close()
+        self._worker.close()
 
 
 _kept: WeakKeyDictionary[Session, dict[str, Beside]] = WeakKeyDictionary()
@@ -92,7 +89,7 @@ def beside(session: Session, name: str) -> Beside:
     """The work of that name of a session."""
     own = _kept.setdefault(session, {})
     if name not in own:
-        own[name] = Beside(isinstance(session.worker, Worker))
+        own[name] = Beside(type(session.worker)())
     return own[name]
 
 

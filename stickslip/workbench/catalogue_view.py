@@ -7,7 +7,7 @@ from typing import Any
 
 import panel as pn
 
-from .controls import BUTTON, Catalogue, Message, Words
+from .controls import GAP, Catalogue, Message, Words, button
 from .evidence import rows
 from .ladder_view import CARD
 from .residual_view import Residual
@@ -19,16 +19,12 @@ class Listed:
 
     def __init__(self, session: Session, residual: Residual) -> None:
         self._session, self._residual = session, residual
-        self._diagnose = pn.widgets.Button(
-            name="Diagnose", stylesheets=[BUTTON], width=110, sizing_mode="fixed", margin=(0, 10, 0, 0),
-            description="Fit every effect, judge each on unseen runs, add the best, repeat "
-            "(minutes, in the background)",
-        )  # fmt: skip
-        self._diagnose.on_click(lambda event: session.diagnose())
-        self._words = Words(sizing_mode="stretch_width", margin=(6, 0, 0, 0))
-        self.head = pn.Row(self._diagnose, self._words, sizing_mode="stretch_width", margin=(16, 0, 8, 0))
-        self.part = Catalogue(heard=self._heard, sizing_mode="stretch_width")
-        self.verdict = pn.pane.HTML("", sizing_mode="stretch_width", margin=(8, 0, 0, 0))
+        what = "Fit every effect, judge each on unseen runs, add the best, repeat (minutes, in the background)"
+        self._diagnose = button("Diagnose", session.diagnose, 110, margin=GAP, description=what)
+        self._words = Words(margin=(6, 0, 0, 0))
+        self.head = pn.Row(self._diagnose, self._words, margin=(16, 0, 8, 0))
+        self.part = Catalogue(heard=self._heard)
+        self.verdict = pn.pane.HTML("", margin=(8, 0, 0, 0))
         for field in (residual.against, residual.period):
             field.param.watch(lambda event: self.update(), "value")
         heard = ["steps", "at", "promises", "listed", "diagnosis", "busy", "searching", "loaded", "restored"]

@@ -14,11 +14,10 @@ from ..objects.campaign import Campaign
 from ..system.units import shown
 from .adding_form import adding
 from .beside import Beside, Show, Tell, beside
-from .controls import Message
 from .event_view import EventView
 from .figures import label, unit_of
-from .parts import Sentences, Table, progress, row_of
-from .picked import chosen, select
+from .parts import Sentences, Table, progress
+from .selection import chosen, select
 from .session import Session, watch
 from .signals import Signals
 
@@ -52,24 +51,18 @@ def page(session: Session) -> Any:
     work = beside(session, "inspection")
     signals, event = Signals(session), EventView(session)
     bar = progress(work, stopping=False)
-    wide = {"sizing_mode": "stretch_width"}
 
     def look_at() -> None:
-        campaign = session.campaign
+        campaign = session.data
         known = work.found is not None and work.found.campaign is campaign
-        if campaign is not None and not known and not session.busy:
+        if not known and not session.busy:
             work.do("looking at the data", lambda tell, show: looked(campaign, tell, show))
 
     watch(session, ["campaign", "busy"], look_at)
-    watch(work, ["doing"], look_at)
-    look_at()
+    watch(work, ["doing"], look_at, now=True)
     return pn.Column(
-        pn.Row(pn.Column(_runs(session), bar, **wide), _told(session, work), **wide),
-        *(pn.pane.Bokeh(f, **wide) for f in (signals.whole, *signals.figures.values())),
-        pn.Row(*(pn.pane.Bokeh(f, **wide) for f in event.figures.values()), **wide),
-        _events(session, work),
-        adding(session),
-        margin=(8, 0, 24, 0), **wide,
+        pn.Row(pn.Column(_runs(session), bar), _told(session, work)), signals.whole, *signals.figures.values(),
+        pn.Row(*event.figures.values()), _events(session, work), adding(session), margin=(8, 0, 24, 0),
     )  # fmt: skip
 
 
@@ -151,63 +144,44 @@ def groups(found: Looked | None) -> list[dict[str, Any]]:
 
 
 def _told(session: Session, work: Beside) -> Any:
-    made = Sentences(tall=264, sizing_mode="stretch_width", margin=(0, 0, 0, 16))
+    made = Sentences(tall=264, margin=(0, 0, 0, 16))
 
     def update() -> None:
         found = work.found
         made.groups = groups(found if found is not None and found.campaign is session.campaign else None)
 
     watch(work, ["found"], update)
-    watch(session, ["campaign"], update)
-    update()
+    watch(session, ["campaign"], update, now=True)
     return made
 
 
 def _runs(session: Session) -> Table:
-    def heard(message: Message) -> None:
-        campaign = session.campaign
-        number = row_of(message, len(campaign) if campaign is not None else 0)
-        if campaign is not None and number is not None:
-            select(session, campaign.names[number], session.event)
-
-    made = Table(heard=heard, tall=230, sizing_mode="stretch_width")
+    made = Table(lambda number: select(session, session.data.names[number], session.event), tall=230)
 
     def update() -> None:
-        if session.campaign is not None:
-            columns, rows = run_rows(session.campaign)
-            made.param.update(columns=columns, rows=rows)
-            mark()
+        columns, rows = run_rows(session.data)
+        made.param.update(columns=columns, rows=rows)
+        mark()
 
     def mark() -> None:
-        if session.campaign is not None:
-            made.chosen = session.campaign.names.index(chosen(session)[0])
+        made.chosen = session.data.names.index(chosen(session)[0])
 
-    watch(session, ["campaign"], update)
+    watch(session, ["campaign"], update, now=True)
     watch(session, ["run"], mark)
-    update()
     return made
 
 
 def _events(session: Session, work: Beside) -> Table:
-    def heard(message: Message) -> None:
-        number = row_of(message, len(made.rows))
-        if number is not None:
-            select(session, chosen(session)[0], number)
-
-    made = Table(heard=heard, tall=260, sizing_mode="stretch_width", margin=(8, 0, 0, 0))
+    made = Table(lambda number: select(session, chosen(session)[0], number), tall=260, margin=(8, 0, 0, 0))
 
     def update() -> None:
-        campaign = session.campaign
-        if campaign is None:
-            return
         run, event = chosen(session)
         found = work.found
-        if found is None or found.campaign is not campaign:
-            found = Looked(campaign, campaign.events)
+        if found is None or found.campaign is not session.data:
+            found = Looked(session.data, session.data.events)
         columns, rows = event_rows(found, run)
         made.param.update(columns=columns, rows=rows, chosen=event if rows else -1)
 
     watch(session, ["run", "event", "campaign"], update)
-    watch(work, ["found"], update)
-    update()
+    watch(work, ["found"], update, now=True)
     return made

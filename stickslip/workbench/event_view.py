@@ -6,15 +6,21 @@ from typing import Any
 
 import numpy as np
 
+from ..data.segment import Segmentation
 from ..objects.campaign import Campaign
-from .event_parts import PARTS, Curve, part
 from .figures import figure, label, look, source, unit_of
-from .overview import events_of, record
-from .picked import chosen
+from .overview import Array, Record, events_of, record, reduced
+from .selection import chosen
 from .session import Session, watch
 
+CREEP, SLIP, RING = "creep", "slip", "ring-down"
+PARTS = (CREEP, SLIP, RING)
+POINTS = 600  # of a part
+AFTER = 1.5  # durations of a slip that its ring-down is shown
+MARGIN = 0.3  # durations of a slip that are shown before and after it
+Curve = tuple[Array, Array]
 OTHERS = 40  # events that are drawn thin
-FROM = {"creep": "time before the onset", "slip": "time after the onset", "ring-down": "time after the arrest"}
+FROM = {CREEP: "time before the onset", SLIP: "time after the onset", RING: "time after the arrest"}
 
 
 class EventView:
@@ -32,8 +38,7 @@ class EventView:
         self._others = {name: source(t=[], y=[]) for name in PARTS}
         self._own = {name: source(t=[], y=[]) for name in PARTS}
         self.figures = {name: self._make(name) for name in PARTS}
-        watch(session, ["run", "event", "campaign"], self.update)
-        self.update()
+        watch(session, ["run", "event", "campaign"], self.update, now=True)
 
     def _make(self, name: str) -> Any:
         theme = look()
@@ -46,9 +51,7 @@ class EventView:
 
     def update(self) -> None:
         """Show the chosen event."""
-        campaign = self._session.campaign
-        if campaign is None:
-            return
+        campaign = self._session.data
         run, event = chosen(self._session)
         number = campaign.names.index(run)
         found = campaign.events[number]
@@ -70,3 +73,37 @@ class EventView:
             thin = f"; {len(others)} others as thin lines" if others else ""
             what = f"{name} of event {event + 1}{thin}" if found.events else "no slip in this run"
             self.figures[name].title.text = what
+
+
+def part(record: Record, found: Segmentation, number: int, which: str) -> Curve | None:
+    """Time (s) and displacement (the record's unit) of a part of an event.
+
+    Creep and slip are laid on the onset, the ring-down on the arrest; displacements are along the slip.
+
+    Args:
+        record, found: of the run.
+        number: of the event in it, from 0.
+        which: one of :data:`PARTS`.
+
+    Returns:
+        None where the record does not hold it.
+    """
+    event = found.events[number]
+    first, last = float(record.time[0]), float(record.time[-1])
+    before = found.events[number - 1] if number else None
+    after = found.events[number + 1].t_onset if number + 1 < len(found.events) else last
+    if which == CREEP:
+        begin = first if before is None else min(before.t_arrest + AFTER * before.duration, event.t_onset)
+        span, at = (begin, event.t_onset), (event.t_onset, event.x_onset)
+    elif which == SLIP:
+        margin = MARGIN * event.duration
+        span, at = (max(event.t_onset - margin, first), event.t_arrest + margin), (event.t_onset, event.x_onset)
+    else:
+        span, at = (
+            (event.t_arrest, min(event.t_arrest + AFTER * event.duration, after)),
+            (event.t_arrest, event.x_arrest),
+        )
+    t, x = reduced(record.time, record.position, *span, points=POINTS)
+    if t.size < 2:
+        return None
+    return t - at[0], (x - at[1]) * (event.direction or 1)

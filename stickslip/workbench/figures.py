@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from bokeh.models import (
     BoxZoomTool,
     ColumnDataSource,
@@ -16,10 +15,12 @@ from bokeh.models import (
     SaveTool,
     WheelZoomTool,
 )
-from bokeh.models.annotations import Legend, Span
+from bokeh.models.annotations import Span
 from bokeh.plotting import figure as bokeh_figure
 
-from ..show.plots.style import RUNS, scaled
+from ..show.plots.style import RUNS
+from ..show.plots.style import label as label
+from ..show.plots.style import scaled as unit_of  # noqa: F401
 
 FEW = "canvas"  # what draws some hundred points quickest
 DASHES = ("solid", "dashed", "dotdash", "dotted")  # as many as have no factor in common with the number of colours
@@ -82,13 +83,6 @@ def of_run(number: int) -> dict[str, Any]:
     return {"color": runs[number % len(runs)], "line_dash": DASHES[number % len(DASHES)]}
 
 
-def label(text: str, unit: str = "") -> str:
-    """Text of an axis: quantity over unit."""
-    if unit in ("", "1"):
-        return text
-    return f"{text} / ({unit})" if "/" in unit else f"{text} / {unit}"
-
-
 def figure(title: str = "", x: str = "", y: str = "", height: int = 260, **more: Any) -> Any:
     """A figure of this window's look, as wide as its place.
 
@@ -106,24 +100,27 @@ def figure(title: str = "", x: str = "", y: str = "", height: int = 260, **more:
         title=title, x_axis_label=x, y_axis_label=y, height=height, toolbar_location="above",
         tools=[PanTool(), WheelZoomTool(), BoxZoomTool(), ResetTool(), SaveTool()], active_drag=None, **more,
     )  # fmt: skip
-    made.toolbar.logo = None
-    made.toolbar.autohide = True
-    made.toolbar_inner = True
-    made.background_fill_color = theme.surface
-    made.border_fill_color = theme.surface
-    made.outline_line_color = None
-    made.min_border_right = 14
+    made.toolbar.update(logo=None, autohide=True)
+    made.update(
+        toolbar_inner=True, background_fill_color=theme.surface, border_fill_color=theme.surface,
+        outline_line_color=None, min_border_right=14,
+    )  # fmt: skip
     for axis in made.axis:
-        axis.axis_label_text_font_style = "normal"
-        axis.axis_label_text_color = axis.major_label_text_color = theme.text
-        axis.axis_label_text_font_size = "13px"
-        axis.major_label_text_font_size = "12px"
-        axis.axis_line_color = axis.major_tick_line_color = theme.soft
-        axis.minor_tick_line_color = None
+        axis.update(
+            axis_label_text_font_style="normal", axis_label_text_color=theme.text, axis_label_text_font_size="13px",
+            major_label_text_color=theme.text, major_label_text_font_size="12px", axis_line_color=theme.soft,
+            major_tick_line_color=theme.soft, minor_tick_line_color=None,
+        )  # fmt: skip
     made.grid.grid_line_color = theme.line
-    made.title.text_color = theme.text
-    made.title.text_font_size = "13px"
+    made.title.update(text_color=theme.text, text_font_size="13px")
     return made
+
+
+def compared(made: Any, measured: Any, model: Any, columns: tuple[str, str], name: str, width: float = 2.5) -> None:
+    """Two curves over ``t``, ``columns`` of two sources: what was measured, and dashed the model's, by its ``name``."""
+    theme, (own, other) = look(), columns
+    made.line("t", own, source=measured, color=theme.measured, line_width=width, legend_label="measured")
+    made.line("t", other, source=model, color=theme.model, line_width=2, line_dash="dashed", legend_label=name)
 
 
 def crosshair(*figures: Any) -> None:
@@ -143,17 +140,12 @@ def legend(made: Any, place: str = "above", steady: bool = False, **more: Any) -
         more: properties of the legend.
     """
     theme = look()
-    for item in list(made.legend):
-        found: Legend = item
-        found.orientation = "horizontal"
-        found.click_policy = "hide"
-        found.background_fill_color = theme.surface
-        found.border_line_color = None
-        found.label_text_color = theme.text
-        found.inactive_fill_color = theme.surface
-        found.label_text_font_size = "12px"
-        found.update(padding=2, margin=2, spacing=12)
-        found.update(**more)
+    for found in list(made.legend):
+        found.update(
+            orientation="horizontal", click_policy="hide", background_fill_color=theme.surface,
+            border_line_color=None, label_text_color=theme.text, inactive_fill_color=theme.surface,
+            label_text_font_size="12px", padding=2, margin=2, spacing=12, **more,
+        )  # fmt: skip
         for each in () if steady else found.items:
             _while_drawn(each)
         made.add_layout(found, place)
@@ -180,8 +172,3 @@ def _while_drawn(item: Any) -> None:
 def source(**columns: Any) -> ColumnDataSource:
     """A source of columns, empty unless given."""
     return ColumnDataSource({name: list(values) for name, values in columns.items()})
-
-
-def unit_of(values: Any, unit: str) -> tuple[float, str]:
-    """Factor and unit that show values (SI) as numbers that can be read."""
-    return scaled(np.asarray(values, float), unit)

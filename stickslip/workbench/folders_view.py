@@ -10,15 +10,13 @@ import panel as pn
 from ..errors import StickslipError
 from . import kept, kept_simulations
 from .beside import Show, Tell, beside
-from .controls import BUTTON, Message, Words
+from .controls import Words, button, field
 from .history import SIMULATIONS, told, when
-from .parts import Table, head, progress, row_of
+from .parts import Table, head, progress, starter
 from .session import Session, watch
 
 MODEL, DIAGNOSIS = "the model as it stands", "the diagnosis"
 SIMULATED = dict(zip(("the simulation", "the sweep", "the experiments"), SIMULATIONS, strict=True))
-FIXED: dict[str, Any] = {"sizing_mode": "fixed"}
-WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
 
 CLOSED = (
     '<meta http-equiv="Content-Security-Policy" '
@@ -47,47 +45,32 @@ class Folders:
         self._session = session
         self._work = beside(session, "saving")
         self._listed: list[kept.Kept] = []
-        self.what: Any = pn.widgets.Select(
-            name="what is saved", options=[MODEL, DIAGNOSIS, *SIMULATED], value=MODEL, width=210, margin=(0, 10, 0, 0),
-            **FIXED,
-        )  # fmt: skip
-        self.name: Any = pn.widgets.TextInput(
-            name="name of the run folder", placeholder="first", width=160, margin=(0, 10, 0, 0), **FIXED
-        )
-        self._save = pn.widgets.Button(name="Save", width=80, stylesheets=[BUTTON], margin=(18, 0, 0, 0), **FIXED)
-        self._save.on_click(lambda event: self.save())
-        self._table = Table(
-            columns=["run folder", "of", "verdict or error", "when"], heard=self._heard, tall=360, **WIDE
-        )
-        self._said = Words(**WIDE)
-        self._frame = pn.pane.HTML("", **WIDE)
-        self._tab = pn.widgets.Button(
-            name="Open it in a tab of its own", width=220, visible=False, stylesheets=[BUTTON], **FIXED
-        )
+        self.what = field(pn.widgets.Select, "what is saved", 210, options=[MODEL, DIAGNOSIS, *SIMULATED], value=MODEL)
+        self.name = field(pn.widgets.TextInput, "name of the run folder", 160, placeholder="first")
+        self._table = Table(self._choose, columns=["run folder", "of", "verdict or error", "when"], tall=360)
+        self._said = Words()
+        self._frame = pn.pane.HTML("")
+        self._tab = button("Open it in a tab of its own", lambda: None, 220, visible=False)
         self._tab.js_on_click(args={"pane": self._frame}, code=_OPEN)
-        again = pn.widgets.Button(name="Look again", width=110, stylesheets=[BUTTON], **FIXED)
-        again.on_click(lambda event: self.update())
-        filed = session.campaign is not None and session.campaign.description.filed
+        save = starter(self._work, "Save", self.save, 80, margin=(18, 0, 0, 0))
+        again = button("Look again", self.update, 110)
+        filed = session.data.description.filed
         self.view = pn.Column(
             head("Save as a run folder beside the campaign, as the command writes it"),
-            pn.FlexBox(self.what, self.name, self._save), progress(self._work),
-            pn.Row(head("Run folders there; a click shows the report"), again, **WIDE),
-            self._table, self._said, visible=filed, **WIDE,
+            pn.FlexBox(self.what, self.name, save), progress(self._work),
+            pn.Row(head("Run folders there; a click shows the report"), again),
+            self._table, self._said, visible=filed,
         )  # fmt: skip
-        self.shown = pn.Column(self._tab, self._frame, **WIDE)
+        self.shown = pn.Column(self._tab, self._frame)
         watch(self._work, ["doing"], self.update)
-        watch(session, ["campaign", "steps", "diagnosis"], self.update)
-        self.update()
+        watch(session, ["campaign", "steps", "diagnosis"], self.update, now=True)
 
     def save(self) -> None:
         """Save what is chosen."""
         session, name, what = self._session, self.name.value_input or self.name.value, self.what.value
-        campaign = session.campaign
         found: Any = session.fit if what == MODEL else session.diagnosis if what == DIAGNOSIS else None
         if what in SIMULATED:
             found = beside(session, SIMULATED[what]).found
-        if campaign is None:
-            return
         if found is None:
             self._work.said = f"not there yet: {what}"
             return
@@ -95,9 +78,9 @@ class Folders:
         def make(tell: Tell, show: Show) -> Any:
             tell("saving", 0.0)
             if what in SIMULATED:
-                folder = kept_simulations.save(found, campaign, name, tell, session.options())
+                folder = kept_simulations.save(found, session.data, name, tell, session.options())
             else:
-                folder = kept.save(found, campaign, name, tell, told(session))
+                folder = kept.save(found, session.data, name, tell, told(session))
             self._work.said = f"saved as {folder.name}"
             return folder
 
@@ -105,18 +88,14 @@ class Folders:
 
     def update(self) -> None:
         """List what is there now."""
-        campaign = self._session.campaign
-        self._save.disabled = bool(self._work.doing)
-        if campaign is None or not campaign.description.filed:
+        described = self._session.data.description
+        if not described.filed:
             return
-        self._listed = kept.listed(campaign.description.folder)
+        self._listed = kept.listed(described.folder)
         rows = [[k.name, k.kind, k.words, when(k.when)] for k in self._listed]
         self._table.param.update(rows=rows, chosen=-1)
 
-    def _heard(self, message: Message) -> None:
-        number = row_of(message, len(self._listed))
-        if number is None:
-            return
+    def _choose(self, number: int) -> None:
         try:
             self._frame.object = framed(kept.report(self._listed[number]))
             self._said.text, self._tab.visible, self._table.chosen = "", True, number

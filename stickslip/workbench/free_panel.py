@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..objects.fit import Fit
 from ..system.units import shown
 from .controls import Words
-from .figures import FEW, figure, label, legend, look, source, unit_of
+from .figures import FEW, compared, figure, label, legend, source, unit_of
 from .overview import reduced
 from .selection import selected
 from .session import Session, watch
-
-if TYPE_CHECKING:
-    import xarray
 
 AROUND = (2.0, 3.0)  # durations of the slip that are shown before and after it
 POINTS = 800
@@ -26,20 +20,14 @@ class Free:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        theme = look()
         self._measured, self._model = source(t=[], x=[]), source(t=[], x=[])
         self._model.name = "free"
         self.figure = figure("free simulation of the slip from the arrest before", height=300, output_backend=FEW)
-        self.figure.line("t", "x", source=self._measured, color=theme.measured, line_width=2.5, legend_label="measured")
-        self.figure.line(
-            "t", "x", source=self._model, color=theme.model, line_width=2, line_dash="dashed",
-            legend_label="model, to its arrest",
-        )  # fmt: skip
+        compared(self.figure, self._measured, self._model, ("x", "x"), "model, to its arrest")
         legend(self.figure, steady=True)
-        self.words = Words(sizing_mode="stretch_width", margin=(0, 0, 8, 70))
-        watch(session, ["steps", "at", "run", "event"], self.ask)
+        self.words = Words(margin=(0, 0, 8, 70))
         watch(session, ["free"], self.update)
-        self.ask()
+        watch(session, ["steps", "at", "run", "event"], self.ask, now=True)
 
     def ask(self) -> None:
         """Have it run again where model or run are others; draw what is there."""
@@ -49,8 +37,7 @@ class Free:
 
     def update(self) -> None:
         """Draw the selected cycle."""
-        free: tuple[Fit, str, xarray.Dataset | None] = self._session.free
-        fit, run, found = free
+        fit, run, found = self._session.free
         name, number = selected(self._session)
         if fit is not self._session.fit or run != name:  # not yet
             self.words.text = "simulated when the sliders are at rest"
@@ -62,7 +49,7 @@ class Free:
             self.words.text = "this cycle cannot be simulated freely"
             return
         cycle = found.sel(cycle=number)
-        trace = next(t for t in fit.campaign.displaced[0] if t.name == name)
+        trace = next(t for t in self._session.data.displaced[0] if t.name == name)
         duration, half = float(cycle.measured_arrest - cycle.measured_onset), float(cycle.measured_half)
         place = float(cycle.measured_place)
         late = float(cycle.half) - half

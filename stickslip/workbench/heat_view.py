@@ -10,7 +10,7 @@ from bokeh.events import Tap
 from bokeh.models import CustomJSTickFormatter, HoverTool
 
 from ..system.units import shown
-from .controls import BUTTON
+from .controls import BUTTON, field
 from .figures import FEW, figure, look, source
 from .selection import choose, worst
 from .session import Session, watch
@@ -24,22 +24,16 @@ class Heat:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self.kind = pn.widgets.RadioButtonGroup(
-            options=[NOW, "unseen runs"],
-            value=NOW,
-            stylesheets=[BUTTON],
-            width=220,
-            sizing_mode="fixed",
+        self.kind = field(
+            pn.widgets.RadioButtonGroup, "", 220, options=[NOW, "unseen runs"], value=NOW, stylesheets=[BUTTON],
             margin=(0, 0, 0, 70),
-        )
+        )  # fmt: skip
         self._data = source(run=[], phase=[], error=[], std=[], text=[], colour=[], ink=[])
         self._data.name = "heat"
         self.figure = figure("error in floors; a click shows the worst cycle", "run, velocity of its drive",
                              "phase of the cycle", height=284, x_range=["all"], y_range=["all"],
                              output_backend=FEW)  # fmt: skip
-        self.figure.rect(
-            "run", "phase", 0.96, 0.94, source=self._data, fill_color="colour", line_color=None,
-        )  # fmt: skip
+        self.figure.rect("run", "phase", 0.96, 0.94, source=self._data, fill_color="colour", line_color=None)
         self.figure.text(
             "run", "phase", text="text", text_color="ink", text_align="center", text_baseline="middle",
             text_font_size="11px", text_line_height=1.05, source=self._data,
@@ -55,8 +49,7 @@ class Heat:
         self.figure.toolbar_location = None
         self.figure.on_event(Tap, self._tapped)
         self.kind.param.watch(lambda event: self.update(), "value")
-        watch(session, ["steps", "at"], self.update)
-        self.update()
+        watch(session, ["steps", "at"], self.update, now=True)
 
     def _tapped(self, event: Any) -> None:
         fit = self._session.fit
@@ -95,9 +88,8 @@ class Heat:
 
     def _speeds(self, runs: list[str]) -> dict[str, float]:
         """Run -> velocity of its drive (m/s), for those that have one."""
-        campaign = self._session.campaign
-        known = set() if campaign is None else set(campaign.names) & set(runs)
-        speeds = {run: campaign[run].drive_velocity for run in runs if run in known}  # type: ignore[index]
+        campaign = self._session.data
+        speeds = {run: campaign[run].drive_velocity for run in runs if run in campaign}
         return {run: abs(speed) for run, speed in speeds.items() if speed}
 
 

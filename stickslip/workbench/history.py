@@ -39,10 +39,8 @@ def when(text: str) -> str:
 
 def commands(session: Session) -> str:
     """Commands that come to the model as it stands, and to the diagnosis."""
-    campaign, fit = session.campaign, session.fit
-    if campaign is None:
-        return ""
-    file = quote(campaign.description.path.name)
+    fit = session.fit
+    file = quote(session.data.description.path.name)
     own = session.options()
     made, by_hand = [], False
     if fit is not None:

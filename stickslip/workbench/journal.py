@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..objects.campaign import Campaign
+from ..objects.run import write_arrays
 from ..system.runstore import digests, json_text, read_result, write_aside
 
 if TYPE_CHECKING:
@@ -105,10 +106,7 @@ class Journal:
             digest.update(key.encode() + np.ascontiguousarray(array).tobytes())
         name = digest.hexdigest()[:20]
         if not self._path(name).is_file():
-            aside = self._path(name).with_suffix(".part")
-            with aside.open("wb") as stream:
-                np.savez(stream, allow_pickle=False, **arrays)
-            aside.replace(self._path(name))
+            write_arrays(self._path(name), arrays)
         self._names[id(found)] = (found, name)
         return name
 

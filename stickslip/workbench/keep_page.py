@@ -8,49 +8,38 @@ import panel as pn
 
 from . import history
 from .beside import beside
-from .controls import Message, Words
+from .controls import Words
 from .folders_view import Folders
-from .parts import Copy, Table, head, row_of
+from .parts import Copy, Table, head
 from .session import Session, watch
-
-WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
 
 
 def page(session: Session) -> Any:
     """The page of a session."""
     folders = Folders(session)
-    left = pn.Column(*_history(session), *_lines(session), **WIDE)
-    right = pn.Column(folders.view, margin=(0, 0, 0, 24), **WIDE)
-    return pn.Column(pn.Row(left, right, **WIDE), folders.shown, margin=(8, 0, 24, 0), **WIDE)
+    both = pn.Row(pn.Column(*_history(session), *_lines(session)), pn.Column(folders.view, margin=(0, 0, 0, 24)))
+    return pn.Column(both, folders.shown, margin=(8, 0, 24, 0))
 
 
 def _history(session: Session) -> list[Any]:
-    def heard(message: Message) -> None:
-        number = row_of(message, len(session.steps))
-        if number is not None:
-            session.show(number)
-
     columns = ["step", "what was done", "when", "error / floors", "on unseen runs", ""]
-    made = Table(columns=columns, heard=heard, tall=360, **WIDE)
+    made = Table(session.show, columns=columns, tall=360)
 
     def update() -> None:
         made.param.update(rows=history.rows(session), chosen=session.at)
 
-    watch(session, ["steps", "at"], update)
-    update()
-    floors = Words(text="Errors are in floors of each step's own model: 1 is as good as the data allow.", **WIDE)
+    watch(session, ["steps", "at"], update, now=True)
+    floors = Words(text="Errors are in floors of each step's own model: 1 is as good as the data allow.")
     return [head("History: a click shows the model after a step; later steps remain available"), made, floors]
 
 
 def _lines(session: Session) -> list[Any]:
-    python, shell = Copy(**WIDE), Copy(**WIDE)
+    python, shell = Copy(), Copy()
 
     def update() -> None:
-        if session.campaign is not None:
-            python.text, shell.text = history.python(session), history.commands(session)
+        python.text, shell.text = history.python(session), history.commands(session)
 
-    watch(session, ["steps", "at", "campaign"], update)
     for name in history.SIMULATIONS:
         watch(beside(session, name), ["doing"], update)
-    update()
+    watch(session, ["steps", "at", "campaign"], update, now=True)
     return [head("The same in Python, in the campaign's folder"), python, head("and as commands"), shell]

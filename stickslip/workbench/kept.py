@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +18,13 @@ from ..objects.fit import Fit
 from ..show.report.html import REPORT
 from ..system.runstore import RESULT, read_result
 from ..system.units import shown_with
-from . import pictures
-from .places import new_place
+from .places import new_folder
 
 MOST = 100  # run folders that are listed
 LARGEST = 64 << 20  # bytes of a report that is shown
+PICTURES_DEEP = 2  # folders of a run folder in which pictures are looked for
+MOST_PICTURES, LARGEST_PICTURE = 24, 8 << 20  # of them, and bytes of one, that are shown
+STYLE = "body { font: 15px sans-serif; margin: 16px } img { max-width: 100%; display: block; margin: 8px 0 24px }"
 DEEP = 2  # folders below the campaign's in which run folders are looked for
 
 
@@ -62,7 +66,7 @@ def listed(folder: Path) -> list[Kept]:
         except (RunFolderError, OSError):
             continue
         when = datetime.fromtimestamp(written).strftime("%Y-%m-%d %H:%M")
-        report = any(p.resolve().is_relative_to(home) for p in (own / REPORT, *pictures.of(own)) if p.is_file())
+        report = any(p.resolve().is_relative_to(home) for p in (own / REPORT, *pictures(own)) if p.is_file())
         name = own.relative_to(folder).as_posix()
         found.append((written, Kept(name, own, str(result.get("kind", "")), words(result), when, report)))
     return [kept for _, kept in sorted(found, key=lambda pair: -pair[0])[:MOST]]
@@ -108,9 +112,7 @@ def save(
     Raises:
         InputError: the name cannot be used or is there already; the campaign has no folder; it cannot be written.
     """
-    if not campaign.description.filed:
-        raise InputError("this campaign has no folder", hint="only a campaign of a file has one")
-    folder = new_place(campaign.description.folder, name, "name of the run folder")
+    folder = new_folder(campaign, name, "name of the run folder")
     if isinstance(found, Diagnosis) and found.folder is not None:
         return _copied(found.folder, folder)
     if isinstance(found, Fit):
@@ -140,9 +142,28 @@ def report(kept: Kept) -> str:
     """
     path = kept.folder / REPORT
     if kept.report and not path.is_file():
-        return pictures.page(kept.folder, kept.name, kept.words)
+        return _pictured(kept.folder, kept.name, kept.words)
     if not kept.report:
         raise InputError("this run folder has no report", value=kept.name)
     if path.stat().st_size > LARGEST:
         raise InputError("the report is too large to be shown here", value=kept.name, hint=f"open {REPORT} itself")
     return path.read_text(encoding="utf-8", errors="replace")
+
+
+def pictures(folder: Path) -> list[Path]:
+    """Pictures in a run folder, and in the run folders within it; none that lies elsewhere."""
+    found = [p for deep in range(PICTURES_DEEP) for p in sorted(folder.glob("/".join(["*"] * deep + ["*.png"])))]
+    home = folder.resolve()
+    return [p for p in found if p.is_file() and p.resolve().is_relative_to(home)][:MOST_PICTURES]
+
+
+def _pictured(folder: Path, name: str, words: str) -> str:
+    """A page that holds them."""
+    parts = [f"<h1>{escape(name)}</h1><p>{escape(words)}</p>"]
+    for path in pictures(folder):
+        if path.stat().st_size <= LARGEST_PICTURE:
+            data = base64.b64encode(path.read_bytes()).decode()
+            title = escape(path.relative_to(folder).as_posix())
+            parts.append(f'<h2>{title}</h2><img alt="{title}" src="data:image/png;base64,{data}">')
+    head = f"<meta charset='utf-8'><style>{STYLE}</style>"
+    return f"<!doctype html><html><head>{head}</head><body>{''.join(parts)}</body></html>"

@@ -11,18 +11,19 @@ from ..errors import InputError
 from ..inference.fit.serialised import KEY
 from ..inference.fit.serialised import record as model_record
 from ..objects.campaign import Campaign
-from ..objects.experiments.events import Simulated, Tell
+from ..objects.experiments.events import Simulated
 from ..objects.experiments.setting import Setting, scenario
 from ..objects.experiments.sweeps import Swept
 from ..objects.experiments.telling import Telling
 from ..objects.fit import Fit
+from ..objects.run import Tell
 from ..show.simulated import head, numbers, series_numbers, write_series, write_single
 from ..simulation.scenario import Scenario
 from ..simulation.scenario.recording import Recording
 from ..simulation.scenario.series import scenarios_of, summary
 from ..system.progress import breathe
 from ..system.runstore import Run, open_run, versions
-from .places import new_place
+from .places import new_folder
 from .simulation_lines import Found, command, commands, one, python
 
 AGAIN = "again"
@@ -42,9 +43,7 @@ def save(found: Found, campaign: Campaign, name: str, tell: Tell, effects: str =
     Raises:
         InputError: the name cannot be used or is there already; the campaign has no folder; nothing is there to keep.
     """
-    if not campaign.description.filed:
-        raise InputError("this campaign has no folder", hint="only a campaign of a file has one")
-    folder = new_place(campaign.description.folder, name, "name of the run folder")
+    folder = new_folder(campaign, name, "name of the run folder")
     own = folder.name
     if not isinstance(found, Simulated | Swept) and not any(t.recordings for t in found):
         raise InputError("no experiment was simulated", hint="Simulate each, on the page Simulate")

@@ -50,9 +50,8 @@ class Ladder:
         self.figure.x_range.range_padding = 0.4
         self.figure.y_range.start = 0.0
         legend(self.figure)
-        self.table = pn.pane.HTML("", sizing_mode="stretch_width")
-        watch(session, ["steps", "at"], self.update)
-        self.update()
+        self.table = pn.pane.HTML("")
+        watch(session, ["steps", "at"], self.update, now=True)
 
     def update(self) -> None:
         """Draw it anew."""

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import param
-
 if TYPE_CHECKING:
     from ..inference.force.first_order import Promise
     from ..objects.diagnosis import Diagnosis
@@ -29,67 +27,60 @@ class Looking:
         self._session = session
         self._search: Search | None = None
         self._listing: Search | None = None
-        self._at: tuple[Fit | None, int] = (None, 0)
-        self._known: list[tuple[Fit, int, tuple[Promise, ...]]] = []
+        self._at: tuple[Fit, int] | None = None
+        self._known: dict[tuple[Fit, int], tuple[Promise, ...]] = {}
 
     def promises(self) -> None:
         """Look at every effect on top of the model as it stands, unless that goes on or is known already."""
         from . import searches
 
-        session, fit, loaded = self._session, self._session.fitted, self._session.loaded
-        if fit is None or (session.listed < 1.0 and self._at == (fit, loaded)):
+        session, fit = self._session, self._session.fitted
+        if fit is None or (session.listed < 1.0 and self._at == (fit, session.loaded)):
             return
-        self._at = (fit, loaded)
+        self._at = at = (fit, session.loaded)
         if self._listing is not None:
             self._listing.cancel()
             self._listing = None
-        for known, when, found_before in self._known:
-            if known is fit and when == loaded:
-                session.param.update(promises=found_before, listed=1.0)
-                return
+        if at in self._known:
+            session.param.update(promises=self._known[at], listed=1.0)
+            return
         session.param.update(promises=(), listed=0.0)
-        own: list[Search] = []
-
-        def current() -> bool:
-            return bool(own) and self._listing is own[0]
+        begun: list[Search] = []
 
         def found(part: Sequence[Promise], share: float) -> None:
-            if current():
+            if begun and self._listing is begun[0]:
                 session.param.update(promises=(*session.promises, *part), listed=share)
                 if share >= 1.0:
-                    self._known = [*self._known[1 - KEPT :], (fit, loaded, session.promises)]
+                    self._known = dict([*self._known.items()][1 - KEPT :]) | {at: session.promises}
 
         def failed(text: str) -> None:
-            if current():
+            if begun and self._listing is begun[0]:
                 session.listed, session.said = 1.0, f"the effects could not be looked at: {text}"
 
-        own.append(searches.promises(fit, session.effects, found, failed))
-        self._listing = own[0]
+        self._listing = searches.promises(fit, session.effects, found, failed)
+        begun.append(self._listing)
 
     def diagnose(self, out: Path | None) -> None:
         """The whole search, with ``out`` for its run folder; finished pieces are kept and used again."""
         from . import searches
 
         session = self._session
-        if session.searching or session.campaign is None:
+        if session.searching:
             return
-        session.searching, session.searched = "beginning", 0.0
+        session.param.update(searching="beginning", searched=0.0)
 
         def tell(text: str, share: float) -> None:
-            with param.parameterized.batch_call_watchers(session):
-                session.searching, session.searched = text.splitlines()[0], share
+            session.param.update(searching=text.splitlines()[0], searched=share)
 
         def done(found: Diagnosis) -> None:
             self._search = None
-            with param.parameterized.batch_call_watchers(session):
-                session.diagnosis, session.searching = found, ""
+            session.param.update(diagnosis=found, searching="")
 
         def failed(text: str) -> None:
             self._search = None
-            with param.parameterized.batch_call_watchers(session):
-                session.searching, session.said = "", f"the diagnosis ended: {text}"
+            session.param.update(searching="", said=f"the diagnosis ended: {text}")
 
-        self._search = searches.diagnosis(session.campaign, session.effects, out, tell, done, failed)
+        self._search = searches.diagnosis(session.data, session.effects, out, tell, done, failed)
 
     def stop(self) -> None:
         """End the diagnosis; what it has finished is used when it is begun again."""

@@ -18,13 +18,7 @@ def page(session: Session) -> Any:
     residual, ladder, bone = Residual(session), Ladder(session), Backbone(session)
     listed = Listed(session, residual)
     left = pn.Column(
-        pn.Row(residual.against, residual.period, sizing_mode="stretch_width"),
-        pn.pane.Bokeh(residual.figure, sizing_mode="stretch_width"),
-        pn.pane.Bokeh(ladder.figure, sizing_mode="stretch_width"),
-        ladder.table,
-        pn.pane.Bokeh(bone.figure, sizing_mode="stretch_width"),
-        bone.words,
-        sizing_mode="stretch_width", margin=(8, 12, 0, 0),
+        pn.Row(residual.against, residual.period), residual.figure, ladder.figure, ladder.table, bone.figure,
+        bone.words, margin=(8, 12, 0, 0),
     )  # fmt: skip
-    right = pn.Column(listed.head, listed.part, listed.verdict, sizing_mode="stretch_width", margin=(8, 0, 0, 0))
-    return pn.Row(left, right, sizing_mode="stretch_width")
+    return pn.Row(left, pn.Column(listed.head, listed.part, listed.verdict, margin=(8, 0, 0, 0)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -10,9 +9,9 @@ import numpy as np
 import panel as pn
 
 from ..objects.fit import Fit
-from ..objects.picture import balanced
-from .controls import BUTTON, Knobs, Message, Words
-from .figures import FEW, crosshair, figure, label, legend, look, source, unit_of
+from ..objects.picture import balanced, one_cycle
+from .controls import Knobs, Message, Words, button, field
+from .figures import FEW, compared, crosshair, figure, label, legend, look, source, unit_of
 from .free_panel import Free
 from .heat_view import Heat
 from .knobs import Knob, given, knobs, rows
@@ -27,24 +26,8 @@ def page(session: Session) -> Any:
     heat = Heat(session)
     free = Free(session)
     left = pn.Column(buttons, sliders, width=350, sizing_mode="fixed", margin=(8, 12, 0, 0))
-    right = pn.Column(
-        cycle.chooser,
-        pn.pane.Bokeh(cycle.force, sizing_mode="stretch_width"),
-        pn.pane.Bokeh(cycle.residual, sizing_mode="stretch_width"),
-        pn.Row(
-            pn.Column(
-                pn.pane.Bokeh(cycle.creep, sizing_mode="stretch_width"),
-                pn.pane.Bokeh(free.figure, sizing_mode="stretch_width"),
-                free.words,
-                sizing_mode="stretch_width",
-            ),
-            pn.Column(heat.kind, pn.pane.Bokeh(heat.figure, sizing_mode="stretch_width"), sizing_mode="stretch_width"),
-            sizing_mode="stretch_width",
-        ),
-        sizing_mode="stretch_width",
-        margin=(8, 0, 0, 0),
-    )
-    return pn.Row(left, right, sizing_mode="stretch_width")
+    below = pn.Row(pn.Column(cycle.creep, free.figure, free.words), pn.Column(heat.kind, heat.figure))
+    return pn.Row(left, pn.Column(cycle.chooser, cycle.force, cycle.residual, below, margin=(8, 0, 0, 0)))
 
 
 def _buttons(session: Session) -> Any:
@@ -54,13 +37,7 @@ def _buttons(session: Session) -> Any:
         "Redo": (session.redo, "Show the step after"),
         "Base": (session.back, "Show the base model again"),
     }
-    found = {}
-    for name, (call, words) in made.items():
-        button = pn.widgets.Button(
-            name=name, description=words, stylesheets=[BUTTON], width=76, sizing_mode="fixed", margin=(0, 6, 0, 0)
-        )
-        button.on_click(partial(_pressed, call))
-        found[name] = button
+    found = {n: button(n, call, 76, description=words, margin=(0, 6, 0, 0)) for n, (call, words) in made.items()}
 
     def update() -> None:
         found["Fit"].disabled = bool(session.busy) or session.campaign is None
@@ -68,13 +45,8 @@ def _buttons(session: Session) -> Any:
         found["Redo"].disabled = session.at >= len(session.steps) - 1
         found["Base"].disabled = session.at <= 0
 
-    watch(session, ["steps", "at", "busy", "campaign"], update)
-    update()
+    watch(session, ["steps", "at", "busy", "campaign"], update, now=True)
     return pn.Row(*found.values(), sizing_mode="fixed")
-
-
-def _pressed(call: Callable[[], None], event: Any) -> None:
-    call()
 
 
 def _sliders(session: Session) -> Knobs:
@@ -91,7 +63,7 @@ def _sliders(session: Session) -> Knobs:
         elif kind == "lock":
             session.lock(name, bool(message.get("on")))
 
-    part = Knobs(heard=heard, sizing_mode="stretch_width", margin=(8, 0, 0, 0))
+    part = Knobs(heard=heard, margin=(8, 0, 0, 0))
 
     def update() -> None:
         fit = session.fit
@@ -105,8 +77,7 @@ def _sliders(session: Session) -> Knobs:
             part.given = given(fitted)
         part.param.update(rows=rows(fit, fitted, made, session.locked), closed=bool(session.busy))
 
-    watch(session, ["steps", "at", "locked", "busy"], update)
-    update()
+    watch(session, ["steps", "at", "locked", "busy"], update, now=True)
     return part
 
 
@@ -116,23 +87,19 @@ class _Cycle:
     def __init__(self, session: Session) -> None:
         self._session = session
         theme = look()
-        self._run = pn.widgets.Select(name="", options=[], width=180, sizing_mode="fixed", margin=(0, 8, 0, 0))
-        self._before = pn.widgets.Button(
-            name="◀", description="Cycle before (←)", width=44, sizing_mode="fixed", stylesheets=[BUTTON]
-        )
-        self._after = pn.widgets.Button(
-            name="▶", description="Next cycle (→)", width=44, sizing_mode="fixed", stylesheets=[BUTTON]
-        )
-        self._where = Words(sizing_mode="stretch_width", margin=(6, 0, 0, 8))
-        for button in (self._before, self._after):
-            button.margin = (0, 4, 0, 0)
-        self.chooser = pn.Row(self._run, self._before, self._after, self._where, sizing_mode="stretch_width")
+        self._run = field(pn.widgets.Select, "", 180, options=[], margin=(0, 8, 0, 0))
+        self._where = Words(margin=(6, 0, 0, 8))
+        steps = [
+            button(sign, partial(self._go, step), 44, description=words, margin=(0, 4, 0, 0))
+            for sign, step, words in (("◀", -1, "Cycle before (←)"), ("▶", 1, "Next cycle (→)"))
+        ]
+        self.chooser = pn.Row(self._run, *steps, self._where)
         self._data = source(t=[], measured=[], model=[], residual=[], low=[], high=[])
         self._data.name = "cycle"
         self._creep = source(t=[], measured=[], model=[])
 
         self.force = figure(y="force of the contact", height=270, output_backend=FEW)
-        _compare(self.force, self._data, "model")
+        compared(self.force, self._data, self._data, ("measured", "model"), "model")
         self.force.xaxis.major_label_text_font_size = "0px"
         self.residual = figure(y="measured - model", height=190, x_range=self.force.x_range, output_backend=FEW)
         self.residual.varea(
@@ -142,17 +109,14 @@ class _Cycle:
         self.residual.line("t", "residual", source=self._data, color=theme.model, line_width=1.5)
         self.residual.scatter("t", "residual", source=self._data, color=theme.model, size=3)
         self.creep = figure("creep before the onset", height=300, output_backend=FEW)
-        _compare(self.creep, self._creep, "model in balance")
+        compared(self.creep, self._creep, self._creep, ("measured", "model"), "model in balance")
         for made in (self.force, self.residual, self.creep):
             legend(made)
         self.force.min_border_left = self.residual.min_border_left = 72
         crosshair(self.force, self.residual)
 
         self._run.param.watch(self._chosen, "value")
-        self._before.on_click(lambda event: self._go(-1))
-        self._after.on_click(lambda event: self._go(1))
-        watch(session, ["steps", "at", "run", "event"], self.update)
-        self.update()
+        watch(session, ["steps", "at", "run", "event"], self.update, now=True)
 
     def _chosen(self, event: Any) -> None:
         if event.new and event.new != selected(self._session)[0]:
@@ -171,10 +135,7 @@ class _Cycle:
         counts = cycles(self._session)
         self._run.param.update(options=list(counts), value=name)
         self._where.text = f"cycle {event + 1} of {counts[name]}   (keys: ← → cycles, ↑ ↓ runs)"
-        data = fit.force
-        own = np.flatnonzero((data.run.values == name) & (data.event.values == event))
-        own = own[np.argsort(data.time.values[own])]
-        part = data.isel(point=own)
+        part = one_cycle(fit.force, name, event)
         t = part.time.values - part.time.values[0]
         k, force = unit_of(part.measured.values, "N")
         r, small = unit_of(np.concatenate([part.residual.values, 2 * part.floor.values]), "N")
@@ -202,10 +163,3 @@ class _Cycle:
         }  # fmt: skip
         self.creep.xaxis.axis_label = label("time before the onset", "s")
         self.creep.yaxis.axis_label = label("creep", unit)
-
-
-def _compare(made: Any, data: Any, name: str) -> None:
-    """What was measured, and the model's beside it."""
-    theme = look()
-    made.line("t", "measured", source=data, color=theme.measured, line_width=2.5, legend_label="measured")
-    made.line("t", "model", source=data, color=theme.model, line_width=2, line_dash="dashed", legend_label=name)

@@ -25,10 +25,9 @@ def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
         InputError: as of :func:`stickslip.load_campaign`; a run folder whose campaign or effect is not found.
     """
     own = tuple(p.resolve() for p in effects)
-    if not path.is_dir():
-        return Session(campaign=load_campaign(path, own), effects=own)
-    if (path / CAMPAIGN).is_file():
-        return Session(campaign=load_campaign(path / CAMPAIGN, own), effects=own)
+    file = path / CAMPAIGN if path.is_dir() else path
+    if file.is_file() or not path.is_dir():
+        return Session(campaign=load_campaign(file, own), effects=own)
     from ..inference.fit.serialised import KEY
     from ..objects.diagnosis import Diagnosis
     from ..objects.fitted_run import load_run

@@ -69,6 +69,11 @@ class Record:
     position: Array
     unit: str
 
+    @property
+    def span(self) -> tuple[float, float]:
+        """Its begin and end (s)."""
+        return float(self.time[0]), float(self.time[-1])
+
 
 _records: WeakKeyDictionary[Trace, Record] = WeakKeyDictionary()
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+import panel as pn
 import param
 from panel.custom import JSComponent
 
 from .beside import Beside
-from .controls import Message, Spoken, static
+from .controls import Message, Spoken, button, static
 from .watching import watch
 
 _STYLE = [static("table.css")]
@@ -18,18 +22,32 @@ class Table(Spoken):
     Attributes:
         columns, rows: texts.
         chosen: number of the row that is marked, -1 for none.
-        choosing: whether a row can be chosen; it is told as ``{"kind": "row", "row": number}``.
+        choosing: whether a row can be chosen.
         tall: pixels after which it scrolls, 0 for never.
+
+    Args:
+        choose: is told the number of a row that was chosen; None where none can be.
+        given: as above.
     """
 
     columns = param.List([])
     rows = param.List([])
     chosen = param.Integer(-1)
-    choosing = param.Boolean(True)
+    choosing = param.Boolean(False)
     tall = param.Integer(0)
 
     _esm = static("table.js")
     _stylesheets = _STYLE
+
+    def __init__(self, choose: Callable[[int], None] | None = None, **given: Any) -> None:
+        super().__init__(heard=self._heard, choosing=choose is not None, **given)
+        self._choose = choose
+
+    def _heard(self, message: Message) -> None:
+        number: Any = message.get("row")
+        whole = isinstance(number, int) and not isinstance(number, bool)
+        if self._choose is not None and message.get("kind") == "row" and whole and 0 <= number < len(self.rows):
+            self._choose(number)
 
 
 class Sentences(JSComponent):
@@ -49,9 +67,7 @@ class Sentences(JSComponent):
 
 def head(text: str) -> Sentences:
     """The heading of a part of a page."""
-    return Sentences(
-        groups=[{"head": text, "items": [], "mark": ""}], sizing_mode="stretch_width", margin=(16, 0, 4, 0)
-    )
+    return Sentences(groups=[{"head": text, "items": [], "mark": ""}], margin=(16, 0, 4, 0))
 
 
 class Progress(Spoken):
@@ -75,6 +91,17 @@ class Copy(JSComponent):
     _stylesheets = _STYLE
 
 
+def starter(work: Beside, name: str, call: Callable[[], None], width: int = 150, **more: Any) -> pn.widgets.Button:
+    """A button that begins a piece of work, and cannot be pressed while that goes on."""
+    made = button(name, call, width, **{"margin": (22, 8, 0, 0), **more})
+
+    def update() -> None:
+        made.disabled = bool(work.doing)
+
+    watch(work, ["doing"], update, now=True)
+    return made
+
+
 def progress(work: Beside, stopping: bool = True) -> Progress:
     """Of a piece of work."""
 
@@ -82,18 +109,10 @@ def progress(work: Beside, stopping: bool = True) -> Progress:
         if message.get("kind") == "cancel":
             work.cancel()
 
-    made = Progress(heard=heard, stopping=stopping, sizing_mode="stretch_width")
+    made = Progress(heard=heard, stopping=stopping)
 
     def update() -> None:
         made.param.update(doing=work.doing, share=work.share, said=work.said)
 
-    watch(work, ["doing", "share", "said"], update)
-    update()
+    watch(work, ["doing", "share", "said"], update, now=True)
     return made
-
-
-def row_of(message: Message, rows: int) -> int | None:
-    """Number of the row that was chosen, or None where the message is none."""
-    number = message.get("row")
-    whole = isinstance(number, int) and not isinstance(number, bool)
-    return int(number) if message.get("kind") == "row" and whole and 0 <= int(number) < rows else None  # type: ignore[arg-type]

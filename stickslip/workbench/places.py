@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import InputError
+from ..objects.campaign import Campaign
 
 LONGEST = 120
 FORBIDDEN = '/\\:*?"<>|'
@@ -40,3 +41,14 @@ def new_place(folder: Path, name: str, key: str = "name") -> Path:
     if taken or path.is_symlink() or path.resolve().parent != folder.resolve():
         raise InputError("there is something of that name already", key=key, value=name, hint="choose another name")
     return path
+
+
+def new_folder(campaign: Campaign, name: str, key: str) -> Path:
+    """The same in the folder of a campaign.
+
+    Raises:
+        InputError: as of :func:`new_place`, or the campaign is of no file.
+    """
+    if not campaign.description.filed:
+        raise InputError("this campaign has no folder", hint="only a campaign of a file has one")
+    return new_place(campaign.description.folder, name, key)

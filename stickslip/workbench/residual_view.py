@@ -11,9 +11,11 @@ from bokeh.models.annotations import Span
 
 from ..errors import InputError
 from ..objects.fit import Fit
-from ..objects.picture import AGAINST, PARTS, WIDEST
+from ..objects.picture import AGAINST, WIDEST
+from ..show.plots.style import PARTS
 from ..system.units import shown
 from . import folding
+from .controls import field
 from .curves import bent, bent_ticks, smooth
 from .evidence import bins, law
 from .figures import figure, label, legend, look, of_run, source, unit_of
@@ -39,12 +41,12 @@ class Residual:
         self.chosen, self._wrong = "", ""
         self.drawn: tuple[str, float | None] = "age", None
         theme = look()
-        self.against = pn.widgets.Select(
-            name="residual force against", options={WORDS.get(a, a): a for a in (*AGAINST, PHASE)}, value="age",
-            width=220, sizing_mode="fixed",
-        )  # fmt: skip
-        self.period = pn.widgets.TextInput(
-            name="folded over a period of", value="", width=260, sizing_mode="fixed",
+        options = {WORDS.get(a, a): a for a in (*AGAINST, PHASE)}
+        self.against = field(
+            pn.widgets.Select, "residual force against", 220, options=options, value="age", margin=(5, 10)
+        )
+        self.period = field(
+            pn.widgets.TextInput, "folded over a period of", 260, margin=(5, 10),
             description="Shows the phase of a lead screw's turn, of a vibration, of a modulation, of a worn track",
         )  # fmt: skip
         self.figure = figure(y="residual force / floor", height=330)
@@ -85,7 +87,7 @@ class Residual:
 
     def _draw_runs(self) -> None:
         """A colour and a dash for every run that has none yet, under the two curves of all runs."""
-        for name in self._session.campaign.names if self._session.campaign is not None else ():
+        for name in self._session.data.names:
             if name not in self._points:
                 more = {**of_run(len(self._points)), "legend_label": name[:24]}
                 self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import panel as pn
 
@@ -13,13 +11,13 @@ from ..objects.diagnosis import Diagnosis
 from ..objects.experiments import MEASURES, Telling
 from ..physics.effects import catalogue
 from ..system.units import to_si
-from .asked import FIXED, WIDE, Asked, needed, press
+from .asked import Asked, needed
 from .beside import Show, Tell, beside
-from .controls import Message, Words
+from .controls import Words, field
 from .evidence import LEAST, best_forms
 from .figures import figure, label, legend, of_run, unit_of
 from .measures import cells, thinned
-from .parts import Table, head, progress, row_of
+from .parts import Table, head, progress, starter
 from .remembering import Remembered
 from .session import Session, watch
 
@@ -47,21 +45,18 @@ class Rivals:
         self._sets: list[tuple[tuple[str, ...], str]] = []
         self._drawn: Telling | None = None
         self._offered: list[str] = []
-        self.which = pn.widgets.Select(
-            name="effects that these data cannot distinguish", options=[], width=420, margin=(0, 10, 0, 0), **FIXED
-        )
-        self.effects: Any = pn.widgets.MultiChoice(
-            name="effects to compare, each in the model in place of the others", options=[], value=[],
-            max_items=RIVALS, width=420, margin=(0, 10, 0, 0), **FIXED,
+        self.which = field(pn.widgets.Select, "effects that these data cannot distinguish", 420, options=[])
+        self.effects = field(
+            pn.widgets.MultiChoice, "effects to compare, each in the model in place of the others", 420,
+            options=[], value=[], max_items=RIVALS,
         )  # fmt: skip
-        self._button = press("Simulate each", self.start)
-        self._said = Words(**WIDE)
-        self._table = Table(heard=self._heard, columns=[], rows=[], **WIDE)
-        self._place = pn.Column(**WIDE)
+        begin = starter(self._work, "Simulate each", self.start)
+        self._said, self._place = Words(), pn.Column()
+        self._table = Table(self._choose)
         self.view = pn.Column(
             head("The experiment that would separate candidates"), self._said,
-            pn.FlexBox(self.which, self.effects, self._button, gap="6px 10px"), progress(self._work), self._table,
-            self._place, **WIDE,
+            pn.FlexBox(self.which, self.effects, begin, gap="6px 10px"), progress(self._work), self._table,
+            self._place,
         )  # fmt: skip
         self._kept = Remembered(session, "rivals", {"effects": self.effects})
         self.which.param.watch(lambda event: self._propose(), "value")
@@ -100,9 +95,7 @@ class Rivals:
 
     def start(self) -> None:
         """Fit the model with each effect and simulate every experiment."""
-        campaign, tags, asked = self._session.campaign, list(self.effects.value), self._asked.setting()
-        if campaign is None:
-            return
+        campaign, tags, asked = self._session.data, list(self.effects.value), self._asked.setting()
         if len(tags) < 2:
             self._work.said = "choose two effects at least"
             return
@@ -117,29 +110,21 @@ class Rivals:
             options = experiments.practicable(asked, abs(velocity), block.spring_stiffness, block.mass)
             if not asked.as_measured:
                 options = {"as set above": asked, **options}
-            fits = experiments.rivals(fit, tags, told, lambda text, share: tell(text, 0.5 * share))
-            after = lambda text, share: tell(text, 0.5 + 0.5 * share)  # noqa: E731
-            return experiments.tell_apart(fit, fits, options, after, show, code)
+            fits = experiments.rivals(fit, tags, told, experiments.part(tell, 0, 2))
+            return experiments.tell_apart(fit, fits, options, experiments.part(tell, 1, 2), show, code)
 
         self._work.do("fitting each of them", make)
 
-    def _heard(self, message: Message) -> None:
-        number = row_of(message, len(self._work.found or ()))
-        if number is not None:
+    def _choose(self, number: int) -> None:
+        if number < len(self._work.found or ()):  # of a search that has begun anew
             self._draw(self._work.found[number])
 
     def update(self) -> None:
         """List the experiments, and draw the one in which they differ most."""
-        self._button.disabled = bool(self._work.doing)
         found: list[Telling] | None = self._work.found
         if not found:
             return
-        columns = [
-            "experiment: a click draws it",
-            "the true one becomes",
-            "they differ most in",
-            "by",
-        ]
+        columns = ["experiment: a click draws it", "the true one becomes", "they differ most in", "by"]
         rows = [
             [t.words, t.note] if t.note else
             [t.words, t.tells, experiments.where(t.measure, t.slip), f"{100 * t.share:.2g} %"] if t.measure else
@@ -152,9 +137,8 @@ class Rivals:
     def _draw(self, telling: Telling) -> None:
         """The models side by side in one experiment."""
         found: list[Telling] = self._work.found
-        campaign = self._session.campaign
         self._table.chosen = next((i for i, t in enumerate(found) if t is telling), -1)
-        if telling is self._drawn or not telling.recordings or campaign is None:
+        if telling is self._drawn or not telling.recordings:
             return
         self._drawn = telling
         made = [figure(name, height=280, output_backend="canvas") for name in ("displacement", "load point - block")]
@@ -168,14 +152,13 @@ class Rivals:
             own.xaxis.axis_label, own.yaxis.axis_label = label("time from the start", "s"), label(name, unit)
             legend(own)
         made[1].x_range = made[0].x_range
-        trace = campaign[telling.setting.run]
+        trace = self._session.data[telling.setting.run]
         rows = [[tag, *cells(experiments.simulated(r, trace))] for tag, r in telling.recordings.items()]
         columns = [
             f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
         ]  # fmt: skip
-        table = Table(columns=columns, rows=rows, choosing=False, **WIDE)
-        words = Words(text=_difference(telling), **WIDE)
-        self._place[:] = [words, pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in made), **WIDE), table]
+        table = Table(columns=columns, rows=rows)
+        self._place[:] = [Words(text=_difference(telling)), pn.Row(*made), table]
 
 
 def _difference(telling: Telling) -> str:

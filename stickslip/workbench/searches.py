@@ -30,19 +30,15 @@ def promises(
     failed: Callable[[str], None],
 ) -> Search:  # fmt: skip
     """Look at every effect on top of a model; ``found`` is told the promises as they come, and the share done."""
+    tags = [t for t in catalogue.tags() if t not in fit.effects]
 
     def told(item: Any, share: float) -> None:
         found([item], min(share, 0.999))
 
-    def done(count: int) -> None:
-        found([], 1.0)
-
-    base = fit.force_fit
-    tags = [t for t in catalogue.tags() if t not in fit.effects]
-    return Search(partial(_promises, base, tags), files, told, done, failed)
+    return Search(partial(_promises, fit.force_fit, tags), files, told, lambda _: found([], 1.0), failed)
 
 
-def _promises(base: ForceFit, tags: Sequence[str], tell: Callable[[Promise, float], None]) -> int:
+def _promises(base: ForceFit, tags: Sequence[str], tell: Callable[[Promise, float], None]) -> None:
     explained = Explained(base)
     forms = sorted(every_form(tags), key=lambda job: job[0] not in FIRST)
     for i, (tag, form) in enumerate(forms):
@@ -53,7 +49,6 @@ def _promises(base: ForceFit, tags: Sequence[str], tell: Callable[[Promise, floa
         except Exception as error:
             if blamed(error) is None:
                 raise
-    return len(forms)
 
 
 def diagnosis(

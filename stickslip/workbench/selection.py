@@ -1,4 +1,4 @@
-"""What is selected: a cycle of a run, by the keyboard, a click or by name; all windows of a session select together."""
+"""What is selected: an event of a run, or a cycle of the fit; all windows of a session select together."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .picked import chosen, select
 from .session import Session
 
 if TYPE_CHECKING:
@@ -19,38 +18,54 @@ def follow(session: Session, key: str) -> None:
         return
     fitted = cycles(session)
     modelled = bool(fitted) and (session.run in fitted or not session.run)
-    (run, event), choice = (selected(session), choose) if modelled else (chosen(session), select)
-    names = list(fitted) if modelled else list(session.campaign.names)
+    counts = fitted if modelled else slips(session)
+    names, (run, event) = list(counts), _selected(session, counts)
     if key in ("ArrowUp", "ArrowDown"):
-        at = (names.index(run) + (1 if key == "ArrowDown" else -1)) % len(names)
-        choice(session, names[at], event)
+        _select(session, names[(names.index(run) + (1 if key == "ArrowDown" else -1)) % len(names)], event, counts)
     elif key in ("ArrowLeft", "ArrowRight"):
-        choice(session, run, event + (1 if key == "ArrowRight" else -1))
+        _select(session, run, event + (1 if key == "ArrowRight" else -1), counts)
+
+
+def slips(session: Session) -> dict[str, int]:
+    """Run -> number of its events in the data, whether there is a model yet or not."""
+    return {t.name: len(s.events) for t, s in zip(session.data.traces, session.data.events, strict=True)}
 
 
 def cycles(session: Session) -> dict[str, int]:
     """Run -> number of its cycles in the fit."""
-    fit = session.fit
-    if fit is None:
-        return {}
-    problem = fit.force_fit.problem
-    return {k.name: k.events for k in problem.runs}
+    return {} if session.fit is None else {k.name: k.events for k in session.fit.force_fit.problem.runs}
+
+
+def select(session: Session, run: str, event: int) -> None:
+    """Select an event of a run, or the nearest there is."""
+    _select(session, run, event, slips(session))
 
 
 def choose(session: Session, run: str, event: int) -> None:
     """Select a cycle, or the nearest there is."""
-    count = cycles(session).get(run, 1)
-    session.param.update(run=run, event=min(max(event, 0), max(count - 1, 0)))
-    session.later()
+    _select(session, run, event, cycles(session))
+
+
+def chosen(session: Session) -> tuple[str, int]:
+    """The event that is selected; the middle one of the first run where none was."""
+    return _selected(session, slips(session))
 
 
 def selected(session: Session) -> tuple[str, int]:
-    """The cycle that is selected; the middle one of the first run where none was."""
-    counts = cycles(session)
-    if session.run in counts:
-        return session.run, min(max(session.event, 0), counts[session.run] - 1)
-    name = next(iter(counts), "")
-    return name, counts.get(name, 1) // 2
+    """The same of the cycles in the fit."""
+    return _selected(session, cycles(session))
+
+
+def _select(session: Session, run: str, event: int, counts: dict[str, int]) -> None:
+    if run in counts:
+        session.param.update(run=run, event=min(max(event, 0), max(counts[run] - 1, 0)))
+        session.later()
+
+
+def _selected(session: Session, counts: dict[str, int]) -> tuple[str, int]:
+    name = session.run if session.run in counts else next(iter(counts), "")
+    count = counts.get(name, 0)
+    return name, min(max(session.event if name == session.run else count // 2, 0), max(count - 1, 0))
 
 
 def worst(fit: Fit, run: str, phase: str) -> tuple[str, int] | None:

@@ -16,14 +16,14 @@ import param
 
 from ..errors import RunFolderError, StickslipError
 from ..objects.campaign import Campaign, load_campaign
+from ..objects.example import to_work_in
 from . import again
 from .keeper import Keeper
 from .looking import Looking
-from .shipped import to_work_in
 from .steps import Step, complete, fewer, first, moved
-from .telling import Long, Note
+from .telling import Note, long
 from .watching import watch
-from .work import Worker, at_once
+from .work import AtOnce
 
 if TYPE_CHECKING:
     from ..objects.fit import Fit
@@ -76,8 +76,8 @@ class Session(param.Parameterized):
     listed = param.Number(1.0)
     effects = param.Parameter(())
     loaded = param.Integer(0)
-    worker = param.Parameter(at_once)
-    aside = param.Parameter(at_once)
+    worker = param.Parameter(AtOnce())
+    aside = param.Parameter(AtOnce())
     free = param.Parameter((None, "", None))
     rough = param.Parameter((None, None))
     view = param.Dict({})
@@ -90,6 +90,12 @@ class Session(param.Parameterized):
         self._moves: dict[str, float | str] = {}
         self._guard = threading.Lock()
         self._anew = False
+
+    @property
+    def data(self) -> Campaign:
+        """The campaign that is open; pages are made only where one is."""
+        assert self.campaign is not None
+        return self.campaign
 
     @property
     def fit(self) -> Fit | None:
@@ -112,7 +118,7 @@ class Session(param.Parameterized):
         """Open one of what is offered."""
 
         def job() -> None:
-            with Long(self, f"reading {self.offers[number]}"):
+            with long(self, f"reading {self.offers[number]}"):
                 try:
                     path = to_work_in(self.offers[number], self.home)
                 except OSError as error:
@@ -134,23 +140,20 @@ class Session(param.Parameterized):
         Args:
             keep: keep the history beside the campaign's file.
         """
-        campaign = self.campaign
-        assert campaign is not None
-        if keep and campaign.description.filed:
-            self._keeper.begin(campaign)
-        self.worker("", partial(self._begin, campaign))
+        if keep and self.data.description.filed:
+            self._keeper.begin(self.data)
+        self.worker("", partial(self._begin, self.data))
 
     def reopen(self, campaign: Campaign) -> None:
         """Another campaign in place of the open one, such as the same with a run more; the history begins anew."""
         self.stop()
         self.cancel()
         keep = self._keeper.journal is not None
-        with param.parameterized.batch_call_watchers(self):
-            self.param.update(campaign=campaign, steps=(), at=-1, diagnosis=None, locked=frozenset(), run="", event=0)
+        self.param.update(campaign=campaign, steps=(), at=-1, diagnosis=None, locked=frozenset(), run="", event=0)
         self.begin(keep=keep)
 
     def _begin(self, campaign: Campaign) -> None:
-        with Long(self, LOOKING):
+        with long(self, LOOKING):
             if self._keeper.journal is None or not again.history(self, self._keeper.journal):
                 self.busy = "fitting the base model"
                 self.first(complete(campaign.fit()))
@@ -203,7 +206,7 @@ class Session(param.Parameterized):
     def show(self, at: int) -> None:
         """Show a step of the history, by its number."""
         self.at = max(min(at, len(self.steps) - 1), min(0, len(self.steps) - 1))
-        self.worker("keep", self.keep, STILL)
+        self.later()
 
     def first(self, fit: Fit) -> None:
         """Begin the history with the base model."""
@@ -229,10 +232,10 @@ class Session(param.Parameterized):
         if fit is None or not values:
             return
         over = over and bool(self.taken) and bool(self.taken[-1].changed)
-        with Long(self):
+        with long(self):
             self.take(moved(fit, values, self.taken[-1].changed if over else {}), over)
             self.said = ""
-        self.worker("keep", self.keep, STILL)
+        self.later()
 
     def refit(self) -> None:
         """Fitted anew, locked parameters as they are; the base model, where that was cancelled."""
@@ -240,44 +243,41 @@ class Session(param.Parameterized):
             self.worker("", partial(self._begin, self.campaign))
             return
         locked = sorted(self.locked)
-        self._change(
-            "fitting", lambda fit: fit.refit([n for n in locked if n in fit.values]), "fit",
-            f"fit = fit.refit({locked!r})",
-        )  # fmt: skip
+
+        def make(fit: Fit) -> Step:
+            return Step("fit", fit.refit([n for n in locked if n in fit.values]), f"fit = fit.refit({locked!r})")
+
+        self._change("fitting", make)
 
     def add(self, effect: str) -> None:
         """An effect more, fitted."""
 
-        def command(fit: Fit) -> str:
-            every = (*fit.effect_forms, effect)
-            return "stickslip fit campaign.toml " + " ".join(f"--add {e}" for e in every)
+        def make(fit: Fit) -> Step:
+            added = " ".join(f"--add {e}" for e in (*fit.effect_forms, effect))
+            code = f"fit = fit.add({effect!r})"
+            return Step(f"with {effect}", fit.add(effect), code, f"stickslip fit campaign.toml {added}")
 
-        self._change(
-            f"fitting with {effect}", lambda fit: fit.add(effect), f"with {effect}", f"fit = fit.add({effect!r})",
-            command,
-        )  # fmt: skip
+        self._change(f"fitting with {effect}", make)
 
     def remove(self, effect: str) -> None:
         """An effect less, fitted anew."""
-        self._change(
-            f"fitting without {effect}", lambda fit: fit.remove(effect), f"without {effect}",
-            f"fit = fit.remove({effect!r})",
-        )  # fmt: skip
 
-    def _change(
-        self, busy: str, make: Callable[[Fit], Fit], text: str, code: str,
-        command: Callable[[Fit], str] = lambda fit: "",
-    ) -> None:  # fmt: skip
+        def make(fit: Fit) -> Step:
+            return Step(f"without {effect}", fit.remove(effect), f"fit = fit.remove({effect!r})")
+
+        self._change(f"fitting without {effect}", make)
+
+    def _change(self, busy: str, make: Callable[[Fit], Step]) -> None:
         def job() -> None:
             fit = self.fit
             if fit is None:
                 return
-            with Long(self, busy):
-                made = make(fit)
-                complete(made)
+            with long(self, busy):
+                step = make(fit)
+                complete(step.fit)
                 if self.campaign is not fit.campaign:  # another was opened meanwhile
                     return
-                self.take(Step(text, made, code, command(fit)))
+                self.take(step)
                 self.said = ""
             self.keep()
 
@@ -317,13 +317,11 @@ class Session(param.Parameterized):
 
     def cancel(self) -> None:
         """End the fit that is going on."""
-        if isinstance(self.worker, Worker):
-            self.worker.cancel()
+        self.worker.cancel()
 
     def shown(self, path: Path) -> str:
         """A path as it is written from the campaign's folder."""
-        assert self.campaign is not None
-        home = self.campaign.description.folder.resolve()
+        home = self.data.description.folder.resolve()
         own = path.resolve()
         return str(own.relative_to(home) if own.is_relative_to(home) else own)
 
@@ -333,8 +331,7 @@ class Session(param.Parameterized):
 
     def code(self) -> str:
         """The lines of Python that lead to the model as it stands."""
-        assert self.campaign is not None
-        path = self.campaign.description.path.name
+        path = self.data.description.path.name
         own = f", effects={[self.shown(p) for p in self.effects]!r}" if self.effects else ""
         first: Sequence[str] = ("import stickslip as ss", f"campaign = ss.load_campaign({path!r}{own})")
         return "\n".join([*first, *(s.code for s in self.taken)])
@@ -367,7 +364,7 @@ class Session(param.Parameterized):
         from ..simulation.conformance import load_effects
 
         def job() -> None:
-            with Long(self):
+            with long(self):
                 classes = load_effects([path])
                 tags = [cls.tag for cls in classes]
                 self.said = Note(f"{path.name} was reloaded: {', '.join(tags)}")
@@ -375,7 +372,7 @@ class Session(param.Parameterized):
                 forms = {} if fit is None else dict(zip(fit.effects, fit.effect_forms, strict=True))
                 for tag in tags:
                     if fit is not None and tag in forms:
-                        with Long(self, f"fitting with the new {tag}"):
+                        with long(self, f"fitting with the new {tag}"):
                             fit = fit.remove(tag).add(forms[tag])
                             self.take(Step(f"new {tag}", fit, f"fit = fit.remove({tag!r}).add({forms[tag]!r})"))
                 gone = [tag for tag in forms if tag not in catalogue.tags()]

@@ -14,7 +14,7 @@ from ..objects.campaign import Campaign
 from ..system.units import shown
 from .figures import crosshair, figure, label, look, source, unit_of
 from .overview import DISPLACEMENT, FORCE, GAP, Levels, Record, Window, record
-from .picked import chosen, select
+from .selection import chosen, select
 from .session import Session, watch
 
 CURVES = (DISPLACEMENT, FORCE, GAP)
@@ -66,7 +66,7 @@ class Signals:
         kept = self._session.view.get(ZOOM)
         if self._of is None or self._record is None or not isinstance(kept, dict) or kept.get("run") != self._of[1]:
             return
-        begin, last = float(self._record.time[0]), float(self._record.time[-1])
+        begin, last = self._record.span
         ends = [min(max(float(v), begin), last) for v in (kept.get("from"), kept.get("to")) if isinstance(v, float)]
         if len(ends) == 2 and ends[0] < ends[1]:
             self.range.update(start=ends[0], end=ends[1])
@@ -110,9 +110,7 @@ class Signals:
 
     def update(self) -> None:
         """Show the chosen run, and mark the chosen event."""
-        campaign = self._session.campaign
-        if campaign is None:
-            return
+        campaign = self._session.data
         run, event = chosen(self._session)
         if self._of != (campaign, run):
             self._of = (campaign, run)
@@ -146,7 +144,7 @@ class Signals:
         self._record = own = record(campaign.traces[number], self._found)
         self._curves, told = self._force(campaign, run, own)
         self.figures[FORCE].title.text = told
-        begin, end = float(own.time[0]), float(own.time[-1])
+        begin, end = own.span
         self._window = Window((begin, end))
         self._factors = {}
         last = [name for name in CURVES if name in self._curves][-1]
@@ -183,7 +181,7 @@ class Signals:
         low, high = float(self.range.start), float(self.range.end)
         if low <= time <= high or self._record is None:
             return
-        begin, end = float(self._record.time[0]), float(self._record.time[-1])
+        begin, end = self._record.span
         width = high - low
         start = min(max(time - 0.5 * width, begin), max(end - width, begin))
         self.range.update(start=start, end=start + width)

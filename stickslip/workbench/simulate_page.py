@@ -7,11 +7,12 @@ from typing import Any
 import panel as pn
 
 from . import synthetic
-from .asked import FIXED, WIDE, Asked, needed, press
+from .asked import Asked, needed
 from .beside import Show, Tell, beside
-from .parts import head, progress
+from .controls import field
+from .parts import head, progress, starter
 from .rivals_view import Rivals
-from .session import Session, watch
+from .session import Session
 from .simulated_view import SimulatedView
 from .sweep_view import SweepView
 
@@ -21,7 +22,7 @@ def page(session: Session) -> Any:
     asked = Asked(session)
     return pn.Column(
         asked.view, SimulatedView(session, asked).view, SweepView(session, asked).view, Rivals(session, asked).view,
-        _Synthetic(session, asked).view, margin=(8, 0, 24, 0), **WIDE,
+        _Synthetic(session, asked).view, margin=(8, 0, 24, 0),
     )  # fmt: skip
 
 
@@ -31,23 +32,17 @@ class _Synthetic:
     def __init__(self, session: Session, asked: Asked) -> None:
         self._session, self._asked = session, asked
         self._work = beside(session, "synthetic")
-        self.name: Any = pn.widgets.TextInput(
-            name="folder beside the campaign", value="synthetic", width=240, margin=(0, 10, 0, 0), **FIXED
-        )
-        self._button = press("Write a record", self.start)
-        filed = session.campaign is not None and session.campaign.description.filed
+        self.name = field(pn.widgets.TextInput, "folder beside the campaign", 240, value="synthetic")
+        begin = starter(self._work, "Write a record", self.start)
         words = "What is set above as a vibrometer would record it: record.csv and campaign.toml in a new folder"
         self.view = pn.Column(
-            head(words), pn.FlexBox(self.name, self._button, gap="6px 10px"), progress(self._work), visible=filed,
-            **WIDE,
+            head(words), pn.FlexBox(self.name, begin, gap="6px 10px"), progress(self._work),
+            visible=session.data.description.filed,
         )  # fmt: skip
-        watch(self._work, ["doing"], self.update)
 
     def start(self) -> None:
         """Simulate and write it."""
-        setting, name, campaign = self._asked.setting(), self.name.value, self._session.campaign
-        if campaign is None:
-            return
+        setting, name, campaign = self._asked.setting(), self.name.value, self._session.data
 
         def make(tell: Tell, show: Show) -> Any:
             folder = synthetic.write(needed(self._session), setting, campaign, name, tell)
@@ -55,7 +50,3 @@ class _Synthetic:
             return folder
 
         self._work.do("simulating the record", make)
-
-    def update(self) -> None:
-        """Whether it can be pressed."""
-        self._button.disabled = bool(self._work.doing)

@@ -10,12 +10,12 @@ from bokeh.core.properties import value
 
 from ..objects import experiments
 from ..objects.experiments import Simulated
-from .asked import WIDE, Asked, named, needed, press
+from .asked import Asked, named, needed
 from .beside import Show, Tell, beside
-from .figures import crosshair, figure, label, legend, look, source, unit_of
+from .figures import compared, crosshair, figure, label, legend, source, unit_of
 from .measures import event_rows, thinned
 from .overview import record
-from .parts import Table, progress
+from .parts import Table, progress, starter
 from .session import Session, watch
 
 LEFT = 76
@@ -27,7 +27,6 @@ class SimulatedView:
     def __init__(self, session: Session, asked: Asked) -> None:
         self._session, self._asked = session, asked
         self._work = beside(session, "simulation")
-        theme = look()
         self._measured = source(t=[], x=[], gap=[])
         self._model = source(t=[], x=[], gap=[])
         self._model.name = "simulated"
@@ -35,13 +34,7 @@ class SimulatedView:
         for key in ("x", "gap"):
             linked = {"x_range": self.figures["x"].x_range} if self.figures else {}
             made = figure(height=230, window_axis="x", output_backend="canvas", **linked)
-            for name, data, colour, dash in (
-                ("measured", self._measured, theme.measured, "solid"),
-                ("model", self._model, theme.model, "dashed"),
-            ):
-                made.line(
-                    "t", key, source=data, color=colour, line_width=2, line_dash=dash, legend_label=name,
-                )  # fmt: skip
+            compared(made, self._measured, self._model, (key, key), "model", width=2)
             made.min_border_left = LEFT
             self.figures[key] = made
         self.figures["x"].xaxis.major_label_text_font_size = "0px"  # it has that of the figure below
@@ -49,16 +42,12 @@ class SimulatedView:
         self._name = self.figures["x"].legend[0].items[1]
         self.figures["gap"].legend.visible = False
         crosshair(*self.figures.values())
-        self._table = Table(choosing=False, **WIDE)
-        self._button = press("Simulate", self.start)
-        asked.row.append(self._button)
-        self.view = pn.Column(
-            progress(self._work), *(pn.pane.Bokeh(f, **WIDE) for f in self.figures.values()), self._table, **WIDE
-        )
+        self._table = Table()
+        asked.row.append(starter(self._work, "Simulate", self.start))
+        self.view = pn.Column(progress(self._work), *self.figures.values(), self._table)
         asked.run.param.watch(lambda event: self.update(), "value")
         watch(self._work, ["found", "doing"], self.update)
-        watch(session, ["campaign", "steps", "at"], self.update)
-        self.update()
+        watch(session, ["campaign", "steps", "at"], self.update, now=True)
 
     def start(self) -> None:
         """Simulate what is asked for."""
@@ -73,15 +62,14 @@ class SimulatedView:
 
     def update(self) -> None:
         """Draw both."""
-        self._button.disabled = bool(self._work.doing)
-        campaign, run = self._session.campaign, self._asked.run.value
-        if campaign is None or run not in campaign.names:
+        campaign, run = self._session.data, self._asked.run.value
+        if run not in campaign.names:
             return
-        trace = campaign[run]
+        trace, events = campaign[run], campaign.events[campaign.names.index(run)]
         found: Simulated | None = self._work.found
         if found is not None and (found.setting.run != run or found.fit.campaign is not campaign):
             found = None
-        t, x, gap = _motion(trace, campaign.events[campaign.names.index(run)])
+        t, x, gap = _motion(trace, events)
         k, unit = unit_of(x, "m")
         g, small = unit_of(gap, "m")
         self._measured.data = thinned(t, x * k, gap * g)
@@ -95,7 +83,7 @@ class SimulatedView:
             r = found.recording
             moved = r["displacement"].values
             self._model.data = thinned(r["time"].values, moved * k, (r["drive_position"].values - moved) * g)
-        own = experiments.measured(trace, campaign.events[campaign.names.index(run)])
+        own = experiments.measured(trace, events)
         columns, rows = event_rows(own, found, trace, self._session.fit)
         self._table.param.update(columns=columns, rows=rows)
 

@@ -29,7 +29,7 @@ def python(found: Found, most: int | None = None) -> list[str]:
         each = "ss.simulate(scenario.with_changes([('drive.velocity', v)]))"
         return [f"scenario = {_scenario('fit', found.fit, found.setting)}", f"velocities = {list(found.velocities)!r}",
                 f"recordings = [{each} for v in velocities]"]  # fmt: skip
-    made = [f"base = {_base(found[0])}", f"rivals = {_rivals(found[0])}"] if found else []
+    made = _rivals(found[0]) if found else []
     done = [t for t in found if t.recordings]
     for telling in done[:most]:
         made += [f"# {telling.words}", "recordings = {"]
@@ -79,18 +79,13 @@ def _scenario(name: str, fit: Fit, setting: Setting) -> str:
     return f"{made}.with_changes({changed!r})" if changed else made
 
 
-def _base(telling: Telling) -> str:
-    return "fit" + "".join(f".remove({tag!r})" for tag in telling.fits if tag in telling.model.effects)
-
-
-def _rivals(telling: Telling) -> str:
-    fits = [f"{tag!r}: {_fitted(telling, tag)}" for tag in telling.fits]
-    return "{" + ", ".join(fits) + "}"
-
-
-def _fitted(telling: Telling, tag: str) -> str:
-    fit = telling.fits[tag]
-    return "fit" if fit is telling.model else f"base.add({fit.effect_forms[fit.effects.index(tag)]!r})"
+def _rivals(telling: Telling) -> list[str]:
+    base = "fit" + "".join(f".remove({tag!r})" for tag in telling.fits if tag in telling.model.effects)
+    made = {
+        tag: "fit" if fit is telling.model else f"base.add({fit.effect_forms[fit.effects.index(tag)]!r})"
+        for tag, fit in telling.fits.items()
+    }
+    return [f"base = {base}", f"rivals = {{{', '.join(f'{tag!r}: {line}' for tag, line in made.items())}}}"]
 
 
 def _toml(value: Any) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,11 +11,11 @@ from bokeh.models import FixedTicker, Range1d
 from ..objects import experiments
 from ..objects.experiments import Swept
 from ..system.units import shown
-from .asked import FIXED, WIDE, Asked, named, needed, press
+from .asked import Asked, named, needed
 from .beside import Show, Tell, beside
-from .controls import Signs
+from .controls import Signs, field
 from .figures import figure, label, look, source, unit_of
-from .parts import head, progress
+from .parts import head, progress, starter
 from .remembering import Remembered
 from .session import Session, watch
 
@@ -60,13 +59,9 @@ class SweepView:
         self._session, self._asked = session, asked
         self._work = beside(session, "sweep")
         theme = look()
-        text: Any = partial(pn.widgets.TextInput, width=130, margin=(0, 10, 0, 0), **FIXED)
-        self.low, self.high = text(name="velocities from"), text(name="to")
-        self.points = pn.widgets.IntInput(
-            name="how many", value=6, start=2, end=40, width=90, margin=(0, 10, 0, 0), **FIXED
-        )
+        self.low, self.high = (field(pn.widgets.TextInput, name, 130) for name in ("velocities from", "to"))
+        self.points = field(pn.widgets.IntInput, "how many", 90, value=6, start=2, end=40)
         self._kept = Remembered(session, "sweep", {"low": self.low, "high": self.high, "points": self.points})
-        self._button = press("Sweep", self.start)
         self._model = source(v=[], recurrence=[], slip=[])
         self._model.name = "sweep"
         self._measured = source(v=[], recurrence=[], slip=[], run=[])
@@ -85,14 +80,13 @@ class SweepView:
             made.multi_line("xs", "ys", source=self._bars[key], color=theme.measured, line_width=1.5)
             made.scatter("v", key, source=self._measured, color=theme.measured, size=9)
             self.figures[key] = made
-        self.signs = Signs(**WIDE)
+        self.signs = Signs()
         self.view = pn.Column(
             head("A sweep of the velocity: means over the slips after the first, with their scatter"),
-            pn.FlexBox(self.low, self.high, self.points, self._button, gap="6px 0"),
+            pn.FlexBox(self.low, self.high, self.points, starter(self._work, "Sweep", self.start), gap="6px 0"),
             progress(self._work),
             self.signs,
-            pn.Row(*(pn.pane.Bokeh(f, **WIDE) for f in self.figures.values()), **WIDE),
-            **WIDE,
+            pn.Row(*self.figures.values()),
         )
         watch(self._work, ["found", "doing"], self.update)
         watch(session, ["campaign"], self._anew)
@@ -105,9 +99,7 @@ class SweepView:
         self._prepare()
 
     def _prepare(self) -> None:
-        campaign = self._session.campaign
-        if campaign is None:
-            return
+        campaign = self._session.data
         self._steady = experiments.steady_runs(campaign)
         speeds = [v for v, _ in self._steady.values()] or [t.drive_velocity or 1e-4 for t in campaign.traces]
         with self._kept.aside():
@@ -127,7 +119,6 @@ class SweepView:
 
     def update(self) -> None:
         """Draw what there is."""
-        self._button.disabled = bool(self._work.doing)
         found: Swept | None = self._work.found
         every = [v for v, _ in self._steady.values()]
         velocities = np.array([*every, *([] if found is None else found.velocities)])

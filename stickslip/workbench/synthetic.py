@@ -5,13 +5,13 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from ..errors import InputError
 from ..objects.campaign import Campaign
-from ..objects.experiments.events import Tell, run
+from ..objects.experiments.events import run
 from ..objects.experiments.setting import Setting, scenario
 from ..objects.fit import Fit
+from ..objects.run import Tell
 from ..simulation.scenario.writers import write_campaign
-from .places import new_place
+from .places import new_folder
 
 RATE = 10_000.0  # Hz at which a synthetic record is written
 COUNT = 7.91e-9  # m, where the campaign's runs have no count of their own
@@ -23,9 +23,7 @@ def write(fit: Fit, setting: Setting, campaign: Campaign, name: str, tell: Tell)
     Raises:
         InputError: the name cannot be used or is there already; as of :func:`scenario`.
     """
-    if not campaign.description.filed:
-        raise InputError("this campaign has no folder", hint="only a campaign of a file has one")
-    folder = new_place(campaign.description.folder, name, "name of the folder")
+    folder = new_folder(campaign, name, "name of the folder")
     counts = [t.resolution for t in campaign.traces if t.leading == "displacement" and t.resolution]
     sensor = {"resolution": float(counts[0]) if counts else COUNT}
     made = scenario(fit, setting).with_changes(

@@ -50,20 +50,29 @@ def placed(place: Place) -> Iterator[None]:
         _place.reset(before)
 
 
-def watch(session: param.Parameterized, names: Sequence[str], call: Callable[[], Any]) -> None:
-    """Call a function whenever some of these parameters of a session change.
+def watch(session: param.Parameterized, names: Sequence[str], call: Callable[[], Any], now: bool = False) -> None:
+    """Call a function whenever some of these parameters of a session change, and now where that is asked for.
 
     In a window it is called in its document, once for all changes since the last call, and later if its page is not
     seen; else at once. What changes while the window is being made is followed when it is there: before, a document
     loses what it is asked to call.
     """
     import panel as pn
-    from panel.io import hold
 
-    doc, place = pn.state.curdoc, _place.get()
+    doc = pn.state.curdoc
     if doc is None or doc.session_context is None:
         session.param.watch(lambda *events: call(), list(names))
-        return
+    else:
+        _watch_within(doc, session, names, call)
+    if now:
+        call()
+
+
+def _watch_within(doc: Any, session: param.Parameterized, names: Sequence[str], call: Callable[[], Any]) -> None:
+    import panel as pn
+    from panel.io import hold
+
+    place = _place.get()
     guard = threading.Lock()
     loaded, waiting = False, False
 

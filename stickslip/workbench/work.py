@@ -16,9 +16,9 @@ from typing import Any
 from cloudpickle import dumps, loads
 
 from ..errors import StickslipError
-from ..system.progress import Cancelled, cancellable
+from ..objects.run import Tell
+from ..system.progress import cancellable
 
-Tell = Callable[[str, float], None]
 PATIENCE = 3.0  # s that a process has to end after it gave its answer; its own workers may wait for more work
 STEP = 10.0  # s that a step of a fit may take, the compilation of a program in it
 QUIET = "ignore::UserWarning:joblib.externals.loky.backend.resource_tracker"  # of workers that were ended
@@ -90,9 +90,17 @@ class Worker:
             self._busy = False
 
 
-def at_once(kind: str, job: Callable[[], None], after: float = 0.0) -> None:
-    """Does the job in the same thread, in place of a :class:`Worker`."""
-    job()
+class AtOnce:
+    """Does a job in the same thread, in place of a :class:`Worker`."""
+
+    def __call__(self, kind: str, job: Callable[[], None], after: float = 0.0) -> None:
+        """Do it."""
+        job()
+
+    def cancel(self) -> None:
+        """Nothing goes on when it is called."""
+
+    close = cancel
 
 
 class Search:
@@ -192,6 +200,3 @@ def _fault() -> None:
     import logging
 
     logging.getLogger(__name__).exception("the workbench")
-
-
-__all__ = ["Cancelled", "Search", "Worker", "at_once"]

@@ -73,7 +73,7 @@ def test_deviations_of_errors_are_those_of_leaving_out_events(base):
     """Against the jackknife over events."""
     data = base.force
     kept = ~data.left_out.values
-    z, event = base.residuals.values[kept], base._fit.problem.of[kept]
+    z, event = base.residuals.values[kept], base.force_fit.problem.of[kept]
     left = np.array([np.sqrt(np.mean(z[event != e] ** 2)) for e in np.unique(event)])
     jackknife = np.sqrt((left.size - 1) / left.size * np.sum((left - left.mean()) ** 2))
     assert base.error_deviations.loc["all", "all"] == pytest.approx(jackknife, rel=0.1)
@@ -86,12 +86,12 @@ def test_values_set_by_hand_move_the_force_as_the_derivatives_say(base):
     moved = base.with_values({name: base.values[name] + step})
     i = [f.name for f in base.free].index(name)
     f = base.free[i]
-    slope = base._fit.slopes.shared[:, i] / f.slope(float(base._fit.point.z[i]))
+    slope = base.force_fit.slopes.shared[:, i] / f.slope(float(base.force_fit.point.z[i]))
     change = moved.force.residual.values - base.force.residual.values
     assert np.linalg.norm(change - slope * step) < 1e-3 * np.linalg.norm(slope * step)
     assert moved.by_hand and moved.values["rig.damping"] == base.values["rig.damping"]
     assert moved.errors.notna().any(axis=None) and moved.error > 0.0
-    assert "slopes" not in vars(moved._fit)  # which take most of the time, and a hand does not wait for
+    assert "slopes" not in vars(moved.force_fit)  # which take most of the time, and a hand does not wait for
     assert moved.covariance.shape == base.covariance.shape
 
 

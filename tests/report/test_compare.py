@@ -7,8 +7,7 @@ import pytest
 
 from stickslip.cli import run
 from stickslip.errors import RunFolderError
-from stickslip.show.report.compare import comparison
-from stickslip.show.report.compare_figure import comparison_figure
+from stickslip.show.report.compare import comparison, comparison_figure
 from stickslip.system.runstore import json_text
 
 

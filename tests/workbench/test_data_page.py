@@ -19,8 +19,7 @@ from stickslip.workbench import adding_form, data_page
 from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, guess, look
 from stickslip.workbench.adding_form import FirstRun, Form
 from stickslip.workbench.beside import close_all
-from stickslip.workbench.event_parts import PARTS, part
-from stickslip.workbench.event_view import EventView
+from stickslip.workbench.event_view import PARTS, EventView, part
 from stickslip.workbench.overview import AROUND, DISPLACEMENT, FORCE, GAP, Levels, Window, record, reduced
 from stickslip.workbench.places import new_place
 from stickslip.workbench.session import Session

@@ -96,7 +96,7 @@ def test_the_page_saves_lists_and_shows(session, folder):
     assert [row["step"] for row in told["steps"]] == ["the base model"]
     assert told["python"] == session.code().splitlines()
     assert told["commands"] == history.commands(session).splitlines()
-    made._heard({"kind": "row", "row": names.index("by the page")})
+    made._table._handle_msg({"kind": "row", "row": names.index("by the page")})
     assert "<iframe" in made._frame.object and made._tab.visible
     made.save()
     assert "already" in beside(session, "saving").said
@@ -104,7 +104,7 @@ def test_the_page_saves_lists_and_shows(session, folder):
     made.save()
     assert "not there yet" in beside(session, "saving").said
     for message in ({"kind": "row", "row": 10**6}, {"kind": "row", "row": "x"}, {"row": 0}, {}):
-        made._heard(message)
+        made._table._handle_msg(message)
 
 
 def test_the_lines_of_python_come_to_the_same_error(session, base, folder, monkeypatch):

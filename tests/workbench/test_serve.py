@@ -17,14 +17,13 @@ from stickslip.cli import run
 from stickslip.errors import InputError
 from stickslip.inference.fit.serialised import KEY, record
 from stickslip.objects import example as example_file
-from stickslip.objects.example import example
+from stickslip.objects.example import copied, example, to_work_in
 from stickslip.system.runstore import json_text
 from stickslip.workbench import own
 from stickslip.workbench.journal import FOLDER
 from stickslip.workbench.opening import campaign_of, offered, opened
 from stickslip.workbench.serve import PATIENCE, _free
 from stickslip.workbench.session import Note, Session
-from stickslip.workbench.shipped import copied, to_work_in
 
 from .browser import Served
 from .conftest import SCENARIO

@@ -15,7 +15,7 @@ from stickslip.workbench import searches
 from stickslip.workbench.journal import FOLDER, Journal
 from stickslip.workbench.selection import choose, cycles, follow, selected, worst
 from stickslip.workbench.session import Session
-from stickslip.workbench.steps import complete, fewer, moved
+from stickslip.workbench.steps import Step, complete, fewer, moved
 
 DROP = "weakening.drop"
 
@@ -165,9 +165,9 @@ def test_a_base_that_was_cancelled_can_be_fitted(campaign, base, monkeypatch):
 def test_a_fit_of_a_campaign_that_is_not_open_any_more_is_no_step(base, session):
     def slow(fit):
         session.campaign = None
-        return fit
+        return Step("text", fit, "code")
 
-    session._change("fitting", slow, "text", "code")
+    session._change("fitting", slow)
     assert len(session.steps) == 1
 
 

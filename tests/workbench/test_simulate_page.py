@@ -203,7 +203,7 @@ def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(
         and "as likely as any other" in words.text
         and table.rows[0][0] == "contact-ageing"
     )
-    made._heard({"kind": "row", "row": 1})
+    made._table._handle_msg({"kind": "row", "row": 1})
     assert made._table.chosen == 1 and made._drawn is found[1]
 
 

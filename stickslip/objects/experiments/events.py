@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +15,9 @@ from ...simulation.scenario.simulation import record
 from ...system.progress import breathe
 from ..campaign import Campaign
 from ..fit import Fit
+from ..run import Tell
 from .setting import Setting
 
-Tell = Callable[[str, float], None]
 Spread = tuple[float, float, int]  # mean, deviation, number
 MEASURES = {"recurrence": "s", "slip": "m", "peak_velocity": "m/s", "creep_before_slip": "m"}
 
@@ -36,6 +35,11 @@ class Simulated:
     setting: Setting
     recording: Recording
     code: str = ""
+
+
+def part(tell: Tell, number: int, of: int, words: str = "") -> Tell:
+    """Tells the progress of one of so many parts, its number from 0, after ``words``, as that of the whole."""
+    return lambda text, share: tell(f"{words}{text}", (number + share) / of)
 
 
 def run(made: Scenario, tell: Tell | None = None, text: str = "simulating") -> Recording:
@@ -68,14 +72,25 @@ def simulated(recording: Recording, trace: Trace) -> dict[str, Spread]:
 
     The recorder's own slips begin earlier, where the block outruns the load point; the creep between is no error.
     """
-    own = trace.leading == "displacement"
-    t, drive = recording["time"].values, recording["drive_position"].values
-    seen = Trace(
-        trace.name, t, displacement=recording["displacement"].values, drive=Drive.sampled(t, drive),
-        resolution=trace.resolution if own else None, noise=trace.noise if own else None, virgin=trace.virgin,
-        minimum_slip=trace.minimum_slip,
-    )  # fmt: skip
+    t, x, drive = (recording[name].values for name in ("time", "displacement", "drive_position"))
+    seen = sensed(trace, t, x, drive, virgin=trace.virgin)
     return measured(seen, segment(seen))
+
+
+def sensed(like: Trace, t: np.ndarray, x: np.ndarray, drive: np.ndarray, **more: Any) -> Trace:
+    """A motion with the sensor of a measured run, its noise and its smallest slip.
+
+    Args:
+        like: the measured run.
+        t: s, shape (n,).
+        x, drive: of the block and of the load point (m), shape (n,).
+        more: of the :class:`Trace` besides.
+    """
+    own = like.leading == "displacement"
+    return Trace(
+        like.name, t, displacement=x, drive=Drive.sampled(t, drive), resolution=like.resolution if own else None,
+        noise=like.noise if own else None, minimum_slip=like.minimum_slip, **more,
+    )  # fmt: skip
 
 
 def steady_runs(campaign: Campaign) -> dict[str, tuple[float, dict[str, Spread]]]:

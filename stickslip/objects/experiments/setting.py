@@ -15,6 +15,7 @@ from ..fit import Fit
 
 LONGEST_HOLD = 300.0  # s; a record of one takes a gigabyte of memory
 STICKS = (1.6, 2.6)  # mean recurrences of drive before and after a hold, so that it begins and ends between slips
+HOLDS = ("1 s", "10 s", "100 s")  # that are easily made
 SHORTEST = 0.1  # of the drive after a step, in those recurrences, however fast it is
 
 
@@ -118,6 +119,31 @@ def settled(fit: Fit, setting: Setting) -> Setting:
     """The same with the times of its drive as they are for a model, so that others are put to the very same."""
     drive = dict(changes(fit, setting)).get("drive", {})
     return replace(setting, pieces=tuple((p["velocity"], p["duration"]) for p in drive.get("piece", ())))
+
+
+def practicable(setting: Setting, velocity: float, spring: float, mass: float) -> dict[str, Setting]:
+    """What is easily done, in words, and as a setting; the rest of it as it is.
+
+    Args:
+        setting: what else is asked for.
+        velocity, spring, mass: as they are (m/s, N/m, kg).
+    """
+    plain = replace(setting, velocity=f"{velocity:.6g} m/s", hold="", step="", back=False)
+
+    def at(factor: float) -> str:
+        return f"{factor * velocity:.6g} m/s"
+
+    return {
+        **{f"a hold of {hold}": replace(plain, hold=hold) for hold in HOLDS},
+        "a quarter of the velocity": replace(plain, velocity=at(0.25)),
+        "four times the velocity": replace(plain, velocity=at(4.0)),
+        "a step to ten times the velocity": replace(plain, step=at(10.0)),
+        "a block twice as heavy": replace(plain, mass=f"{2.0 * mass:.6g} kg"),
+        "a spring half as stiff": replace(plain, spring=f"{0.5 * spring:.6g} N/m"),
+        "half the load": replace(plain, load="0.5"),
+        "twice the load": replace(plain, load="2"),
+        "back over the same track": replace(plain, back=True),
+    }
 
 
 def _positive(text: str, unit: str, key: str) -> float:

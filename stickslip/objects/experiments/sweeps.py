@@ -13,7 +13,8 @@ from ...simulation.scenario.schema import SweepTable
 from ...simulation.scenario.series import scenarios_of
 from ...system.units import to_si
 from ..fit import Fit
-from .events import Spread, Tell, run, simulated
+from ..run import Tell
+from .events import Spread, part, run, simulated
 from .setting import Setting, scenario
 
 FEWEST, MOST = 2, 40  # runs of a sweep
@@ -72,12 +73,7 @@ def sweep(
     series = SweepTable(key="drive.velocity", start=ends[0], stop=ends[1], points=points)
     done = Swept(fit, steady, series, code=code)
     for i, (value, member) in enumerate(scenarios_of(scenario(fit, steady), series)):
-        words = f"{i + 1} of {points}: {1e6 * value:.4g} µm/s"
-
-        def within(text: str, share: float, i: int = i) -> None:
-            tell(text, (i + share) / points)
-
-        found = run(member, within, words)
+        found = run(member, part(tell, i, points), f"{i + 1} of {points}: {1e6 * value:.4g} µm/s")
         done = replace(
             done, velocities=(*done.velocities, value), recordings=(*done.recordings, found),
             events=(*done.events, simulated(found, fit.campaign[setting.run])),

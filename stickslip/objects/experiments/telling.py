@@ -10,7 +10,6 @@ import numpy as np
 from scipy.signal import detrend
 
 from ...data.segment import segment
-from ...data.trace import Drive, Trace
 from ...errors import InputError, StickslipError
 from ...inference.diagnose.prepare import Prepared
 from ...inference.diagnose.telling import information, margins
@@ -21,7 +20,8 @@ from ...simulation.conformance.trial import first_line
 from ...simulation.scenario.recording import Recording
 from ...system.progress import Cancelled
 from ..fit import Fit
-from .events import MEASURES, Tell, run
+from ..run import Tell
+from .events import MEASURES, part, run, sensed
 from .setting import Setting, changed, scenario, settled
 
 READ, CREEP, SWING = "slip as read", "creep in the hold", "swing in the hold"
@@ -85,14 +85,9 @@ def rivals(
     out = {}
     for i, tag in enumerate(tags):
         tell(f"fitting with {tag}", i / len(tags))
-        out[tag] = fit if inside == [tag] else base.add(formed(tag, forms))
+        form = ",".join(f"{k}={v}" for k, v in forms.get(tag, {}).items())
+        out[tag] = fit if inside == [tag] else base.add(f"{tag}:{form}" if form else tag)
     return out
-
-
-def formed(tag: str, forms: Mapping[str, Mapping[str, Any]]) -> str:
-    """An effect as :meth:`stickslip.Fit.add` takes it, with its form where that is not the usual one."""
-    form = ",".join(f"{k}={v}" for k, v in forms.get(tag, {}).items())
-    return f"{tag}:{form}" if form else tag
 
 
 def tell_apart(
@@ -114,12 +109,8 @@ def tell_apart(
     for i, (words, setting) in enumerate(options.items()):
         if not until():
             break
-
-        def within(text: str, share: float, i: int = i, words: str = words) -> None:
-            tell(f"{words}, {text}", (i + share) / len(options))
-
         try:
-            out.append(_told(words, setting, model, fits, within, code))
+            out.append(_told(words, setting, model, fits, part(tell, i, len(options), f"{words}, "), code))
         except Cancelled:
             raise
         except Exception as error:  # an effect of one's own may fail in any way
@@ -135,18 +126,13 @@ def _told(words: str, setting: Setting, model: Fit, fits: Mapping[str, Fit], tel
     setting = settled(model, setting)
     found, seen = {}, []
     for i, (tag, fit) in enumerate(fits.items()):
-
-        def within(text: str, share: float, i: int = i) -> None:
-            tell(text, (i + share) / len(fits))
-
         made = scenario(fit, setting)
-        found[tag] = run(made, within, f"with {tag}")
+        found[tag] = run(made, part(tell, i, len(fits)), f"with {tag}")
         spring = made.file.block.spring_stiffness if setting.spring.strip() else None
         seen.append(seen_as(found[tag], fit.climbed.prepared, setting.run, spring))
     apart = margins([fit.force_fit for fit in fits.values()], seen, changed(model, setting))
     least = float(apart[~np.eye(len(apart), dtype=bool)].min())
-    best = farthest(found)
-    measure, slip, share = best or ("", -1, 0.0)
+    measure, slip, share = farthest(found) or ("", -1, 0.0)
     return Telling(
         words, setting, model, fits, found, information(apart), least, measure, slip + 1, share, code=code
     )  # fmt: skip
@@ -168,13 +154,8 @@ def seen_as(recording: Recording, prepared: Prepared, run: str, spring: float | 
     t = recording["time"].values
     rate = min(like.sampling_rate, (t.size - 1) / (t[-1] - t[0]))
     at = np.arange(t[0], t[-1], 1.0 / rate)
-    own = like.leading == "displacement"
-    trace = Trace(
-        run, at, displacement=np.interp(at, t, recording["reading"].values),
-        drive=Drive.sampled(at, np.interp(at, t, recording["drive_position"].values)),
-        resolution=like.resolution if own else None, noise=like.noise if own else None, virgin=True,
-        spring_stiffness=like.spring_stiffness if spring is None else spring, minimum_slip=like.minimum_slip,
-    )  # fmt: skip
+    read, drive = (np.interp(at, t, recording[name].values) for name in ("reading", "drive_position"))
+    trace = sensed(like, at, read, drive, virgin=True, spring_stiffness=spring or like.spring_stiffness)
     found = segment(trace)
     if not found.events:
         raise InputError("no slip")

@@ -10,13 +10,7 @@ from ...data.segment import thin
 from .style import DARK, MIDDLE, figure, remark, scaled, styled
 
 if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from ...simulation.scenario import Recording
-
-    Run = xarray.Dataset | Recording
+    from .style import Axes, Figure, Run
 
 
 @styled

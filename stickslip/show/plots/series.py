@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .style import DARK, LIGHT, figure, logarithmic, plain, remark, scaled, styled
+from .style import DARK, LIGHT, figure, label, logarithmic, plain, remark, scaled, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -37,7 +37,7 @@ def series_figure(table: xarray.Dataset) -> Figure:
     spread = bool(np.all(value > 0) and value.max() > 4 * value.min())
     for panel, (name, si, text) in zip(axes.flat, _PANELS, strict=True):
         _panel(panel, value * k, table[name].values, table[f"{name}_std"].values, si, text, spread)
-        panel.set_xlabel(f"{table.attrs['key']}" + (f" / {_bracketed(shown)}" if shown not in ("1", "") else ""))
+        panel.set_xlabel(label(str(table.attrs["key"]), shown))
     slipping = int((table["events"].values > 0).sum())
     made.suptitle(plain(f"{table.attrs['title']}: {slipping} of {value.size} runs slip"))
     return made
@@ -66,9 +66,4 @@ def _panel(
     if (~good).any():
         axes.plot([], [], color=LIGHT, ls=":", label=_ABSENT.get(text, "no slip"))
         axes.legend()
-    axes.set_ylabel(f"{text} / {_bracketed(shown)}")
-
-
-def _bracketed(unit: str) -> str:
-    """A unit that is itself a quotient stands in brackets."""
-    return f"({unit})" if "/" in unit else unit
+    axes.set_ylabel(label(text, shown))

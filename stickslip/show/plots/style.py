@@ -15,8 +15,13 @@ from ...system.runstore import write_aside
 from ...system.units import PREFIXES, power_for, takes_prefix
 
 if TYPE_CHECKING:  # what only takes colours from here need not wait for matplotlib
+    import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from ...simulation.scenario.recording import Recording
+
+    Run = xarray.Dataset | Recording
 
 P = ParamSpec("P")
 # dark, middle and light, so that a grey print keeps them apart; the line styles differ as well
@@ -24,6 +29,7 @@ DARK, MIDDLE, LIGHT = "#14213d", "#c8553d", "#8d99ae"
 # of runs, in reports and in the workbench: the first three of Okabe and Ito, the others as far from all as may be
 # for those who see red or green otherwise, which a test computes
 RUNS = ("#0072b2", "#d55e00", "#009e73", "#7e5de8", "#949db1", "#fd0e60", "#792419")
+PARTS = 15  # of a variable's range, each with as many points, whose medians are drawn
 _DASHES = ("-", "--", "-.", ":")
 _LOOK: Any = {
     "font.size": 10,
@@ -103,6 +109,30 @@ def scaled(values: np.ndarray, unit: str) -> tuple[float, str]:
         return 1.0, unit
     power = power_for(top, 12, 0)
     return 10.0**-power, PREFIXES[power] + unit
+
+
+def label(text: str, unit: str = "") -> str:
+    """Text of an axis: quantity over unit."""
+    if unit in ("", "1"):
+        return text
+    return f"{text} / ({unit})" if "/" in unit else f"{text} / {unit}"
+
+
+def medians(axes: Axes, x: np.ndarray, z: np.ndarray, number: int, name: str, bold: bool = False) -> None:
+    """Points of a run as faint dots, and the medians of :data:`PARTS` of them, each with as many points.
+
+    Args:
+        axes: drawn in.
+        x, z: the points, shape (n,).
+        number: of the run, by which it has its colour.
+        name: of the run, for the legend.
+        bold: for a picture that stands alone.
+    """
+    curve = of_run(number)
+    axes.plot(x, np.clip(z, -6, 6), ".", ms=2.0 if bold else 1.5, color=curve["color"], alpha=0.3 if bold else 0.25)
+    pieces = [p for p in np.array_split(np.argsort(x), PARTS) if p.size]
+    middle = [[np.median(v[p]) for p in pieces] for v in (x, z)]
+    axes.plot(*middle, color=curve["color"], ls=curve["ls"], lw=1.5 if bold else 1.4, label=name)
 
 
 def logarithmic(axes: Axes, which: str) -> None:

@@ -7,16 +7,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ...data.segment import thin
-from .style import DARK, LIGHT, MIDDLE, figure, plain, remark, scaled, styled
+from .style import DARK, LIGHT, MIDDLE, figure, label, plain, remark, scaled, styled
 
 if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from ...simulation.scenario import Recording
-
-    Run = xarray.Dataset | Recording
+    from .style import Axes, Figure, Run
 
 
 @styled
@@ -50,9 +44,9 @@ def creep(axes: Axes, data: Run) -> None:
         begin = arrest[-2] if onset.size > 1 else t[0]
         end = onset[-1]
         part = (t >= begin + 0.01 * (end - begin)) & (t <= end - 0.002 * (end - begin))
-        label = f"time before slip {onset.size} / s"
+        clock = f"time before slip {onset.size} / s"
     else:
-        part, end, label = t >= t[0], 0.0, "time / s"
+        part, end, clock = t >= t[0], 0.0, "time / s"
     if part.sum() < 2:
         remark(axes, "no creep between the samples")
         return
@@ -64,7 +58,7 @@ def creep(axes: Axes, data: Run) -> None:
     axes.plot(*thin(t[part] - end, (x[part] - zero) * k), color=DARK, label="block")
     low, high = (x[part] - zero).min() * k, (x[part] - zero).max() * k
     axes.set_ylim(low - 0.15 * (high - low) - 1e-12, high + 0.15 * (high - low) + 1e-12)
-    axes.set(xlabel=label, ylabel=f"displacement / {unit}")
+    axes.set(xlabel=clock, ylabel=f"displacement / {unit}")
     axes.locator_params(axis="x", nbins=6)
     axes.legend(loc=_free_corner(x[part] - zero))
 
@@ -97,7 +91,7 @@ def slip(axes: Axes, data: Run) -> None:
     other = axes.twinx()
     k, unit = scaled(v, "m/s")
     other.plot(ms, v * k, color=MIDDLE, ls="--", lw=1.1, label="velocity")
-    other.set_ylabel(f"velocity / ({unit})")
+    other.set_ylabel(label("velocity", unit))
     other.grid(False)
     other.spines["right"].set_visible(True)
     lines = [*axes.get_lines(), *other.get_lines()]
@@ -129,12 +123,12 @@ def phase_plane(axes: Axes, data: Run) -> None:
     kf, unit_f = scaled(force, "N")
     kv, unit_v = scaled(v, "m/s")
     axes.plot(force * kf, v * kv, color=DARK, lw=0.8)
-    full, label = data.attrs["friction_force"] * kf, "full static friction"
+    full, name = data.attrs["friction_force"] * kf, "full static friction"
     for side, reached in ((full, force.max() * kf > 0.02 * full), (-full, force.min() * kf < -0.02 * full)):
         if reached:
-            axes.axvline(side, color=MIDDLE, ls="--", lw=1.1, label=label)
-            label = "_" + label  # named once
-    axes.set(xlabel=f"spring force / {unit_f}", ylabel=f"velocity / ({unit_v})", title="phase plane")
+            axes.axvline(side, color=MIDDLE, ls="--", lw=1.1, label=name)
+            name = "_" + name  # named once
+    axes.set(xlabel=f"spring force / {unit_f}", ylabel=label("velocity", unit_v), title="phase plane")
     if axes.get_legend_handles_labels()[0]:
         both = force.max() * kf > 0.02 * full and force.min() * kf < -0.02 * full
         axes.legend(loc="upper center" if both else "upper left" if v.max() > -v.min() else "lower right")

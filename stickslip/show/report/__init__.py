@@ -5,9 +5,4 @@ from .describe import describe_trace
 from .excerpts import trace_pieces
 from .html import write_report
 
-__all__ = [
-    "abilities",
-    "describe_trace",
-    "trace_pieces",
-    "write_report",
-]
+__all__ = ["abilities", "describe_trace", "trace_pieces", "write_report"]

@@ -11,12 +11,20 @@ from ...data.checks.spring_force import stick_gain
 from ...data.segment import LEVELS, Event, Segmentation, Shape, Shapes, event_shapes
 from ...data.trace import Trace
 
+_OF_EVENT = (
+    "index", "t_onset", "t_arrest", "duration", "slip", "recurrence", "stick_time", "peak_velocity", "hold_time",
+    "drive_position", "x_onset", "x_arrest", "direction",
+)  # fmt: skip
 _TIMES = (
     "t_onset", "t_arrest", "duration", "recurrence", "stick_time", "hold_time", "holds", "slip_times", "rise_time",
     "decay_time", "creep_before",
 )  # fmt: skip
 _LENGTHS = (
     "x_onset", "x_arrest", "slip", "drive_position", "overshoot", "ring_amplitude", "creep", "hold_motion"
+)  # fmt: skip
+_OF_TRACE = (
+    "duration", "sampling_rate", "resolution", "noise", "walk", "hum", "drive_velocity", "spring_stiffness", "virgin",
+    "role",
 )  # fmt: skip
 FEATURES = (
     "slip", "recurrence", "peak_velocity", "rise_time", "overshoot", "ring_frequency", "decay_time", "creep",
@@ -26,26 +34,14 @@ FEATURES = (
 
 def event_units(unit: str = "m") -> dict[str, str]:
     """Unit of every number of an event; ``unit`` is that of the segmentation's positions."""
-    units = dict.fromkeys(_TIMES, "s")
-    units |= dict.fromkeys(_LENGTHS, unit)
-    return (
-        units
-        | {"peak_velocity": f"{unit}/s", "ring_frequency": "Hz"}
-        | dict.fromkeys(("direction", "index", "decay_law"), "1")
-    )
+    known = {"peak_velocity": f"{unit}/s", "ring_frequency": "Hz", "direction": "1", "index": "1", "decay_law": "1"}
+    return dict.fromkeys(_TIMES, "s") | dict.fromkeys(_LENGTHS, unit) | known
 
 
 def _describe_event(event: Event, shape: Shape) -> dict[str, Any]:
     ring = shape.ring
     return {
-        "index": event.index,
-        "t_onset": event.t_onset,
-        "t_arrest": event.t_arrest,
-        "duration": event.duration,
-        "slip": event.slip,
-        "recurrence": event.recurrence,
-        "stick_time": event.stick_time,
-        "peak_velocity": event.peak_velocity,
+        **{name: getattr(event, name) for name in _OF_EVENT},
         "slip_times": shape.slip_times.tolist(),
         "rise_time": float(shape.slip_times[-1] - shape.slip_times[0]),
         "overshoot": shape.overshoot,
@@ -55,12 +51,7 @@ def _describe_event(event: Event, shape: Shape) -> dict[str, Any]:
         "decay_time": ring.decay_time if ring else float("nan"),
         "creep": shape.creep.tolist(),
         "holds": [list(hold) for hold in event.holds],
-        "hold_time": event.hold_time,
         "hold_motion": list(shape.hold_motion),
-        "drive_position": event.drive_position,
-        "x_onset": event.x_onset,
-        "x_arrest": event.x_arrest,
-        "direction": event.direction,
         "warnings": list(event.warnings),
     }
 
@@ -147,16 +138,7 @@ def describe_trace(trace: Trace, found: Segmentation) -> dict[str, Any]:
         "notes": list(p.notes),
         "signals": signals,
         "samples": int(trace.time.size),
-        "duration": trace.duration,
-        "sampling_rate": trace.sampling_rate,
-        "resolution": trace.resolution,
-        "noise": trace.noise,
-        "walk": trace.walk,
-        "hum": trace.hum,
-        "drive_velocity": trace.drive_velocity,
-        "spring_stiffness": trace.spring_stiffness,
-        "virgin": trace.virgin,
-        "role": trace.role,
+        **{name: getattr(trace, name) for name in _OF_TRACE},
         "regime": found.regime,
         "reason": found.reason,
         "units": event_units(found.settings.unit),

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...data.segment import Event, Segmentation, block_motion, reduce_trace, thin
 from ...data.trace import SIGNALS, Trace
+from .describe import describe_trace
 
 OVERVIEW, ZOOM = 3000, 1500
 Variables = dict[str, tuple[str, np.ndarray, dict[str, Any]]]
@@ -50,6 +51,15 @@ def trace_pieces(trace: Trace, found: Segmentation, number: int) -> Variables:
         start = out[f"{key}_position"][1][0] - drive[0]
         out[f"{key}_drive"] = (key, drive + start, {"units": "m"})
     return out
+
+
+def trace_sections(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> tuple[dict[str, Any], Variables]:
+    """Entries of ``result.json`` on the traces, and the variables behind their pictures."""
+    pairs = list(zip(traces, segmentations, strict=True))
+    variables: Variables = {}
+    for i, (trace, found) in enumerate(pairs):
+        variables |= trace_pieces(trace, found, i)
+    return {"traces": [describe_trace(t, s) for t, s in pairs]}, variables
 
 
 def reduced_record(trace: Trace, found: Segmentation, number: int) -> Variables:

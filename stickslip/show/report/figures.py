@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, remark, scaled, styled
+from ..plots.style import DARK, MIDDLE, figure, plain, remark, scaled, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -25,7 +25,7 @@ def series(data: xarray.Dataset, key: str, name: str) -> np.ndarray | None:
 
 @styled
 def trace_picture(data: xarray.Dataset, number: int, facts: dict[str, Any]) -> Figure:
-    """The whole trace with its events, one stick, one slip and what follows it; measured and, if any, modelled."""
+    """The whole trace with its events, one stick, one slip and what follows it."""
     made, axes = figure(1, 4, width=14.0, height=3.4)
     slips = len(facts.get("events", ()))
     made.suptitle(plain(f"{facts['name']}: {facts.get('regime', '')}, {slips} slips"), fontsize=11)
@@ -50,9 +50,7 @@ def _whole(axes: Axes, data: xarray.Dataset, key: str) -> None:
         return
     unit, label = _unit(data, f"{key}_whole_position"), "position"
     drive = series(data, f"{key}_whole", "drive")
-    model, at = (series(data, f"{key}_model", name) for name in ("position", "time"))
     if drive is not None and unit == "m" and np.ptp(drive - y) < HIDDEN * np.ptp(y):
-        model = None if model is None or at is None else np.interp(at, t, drive) - model
         y, drive, label = drive - y, None, "load point less position"
     zero = float(y[0] if label == "position" else y.min())
     k, unit = scaled(y - zero, unit)
@@ -61,8 +59,6 @@ def _whole(axes: Axes, data: xarray.Dataset, key: str) -> None:
     onset = series(data, f"{key}_event", "onset")
     crowded = onset is not None and onset.size > CROWD
     axes.plot(t, (y - zero) * k, color=DARK, lw=0.6 if crowded else 1.0, label="measured")
-    if model is not None and at is not None:
-        axes.plot(at, (model - zero) * k, color=MIDDLE, lw=1.0, ls=":", label="model")
     if onset is not None and not crowded:
         axes.plot(onset, (np.interp(onset, t, y) - zero) * k, "v", ms=4, color=MIDDLE, label="onset")
     axes.set(xlabel="time / s", ylabel=f"{label} / {unit}")
@@ -89,13 +85,7 @@ def _zoom(axes: Axes, data: xarray.Dataset, key: str, title: str, *, clip: bool)
         k, unit = scaled(shown, _unit(data, f"{key}_position"))
         factor, suffix = (1e3, "ms") if np.ptp(t) < 1 else (1.0, "s")
         when, text = t - t[0], f"time / {suffix}"
-    axes.plot(
-        when * factor, shown * k, color=DARK if series(data, key, "model") is None else LIGHT, lw=1.2, label="measured"
-    )
-    model = series(data, key, "model")
-    if model is not None:
-        axes.plot(when * factor, (model - zero) * k, color=MIDDLE, ls="--", lw=1.2, label="model")
-        axes.legend(fontsize=8)
+    axes.plot(when * factor, shown * k, color=DARK, lw=1.2)
     axes.set(xlabel=text, ylabel=f"position / {unit}")
     axes.locator_params(axis="x", nbins=5)
 
@@ -114,14 +104,7 @@ def _after(axes: Axes, data: xarray.Dataset, key: str) -> None:
     zero = float(np.median(y[late][late.sum() // 2 :]))
     k, unit = scaled(y[late] - zero, _unit(data, f"{key}_slip_position"))
     factor, suffix = (1e3, "ms") if np.ptp(t[late]) < 1 else (1.0, "s")
-    when, model = (t[late] - inside[0]) * factor, series(data, f"{key}_slip", "model")
-    axes.plot(when, (y[late] - zero) * k, color=DARK if model is None else LIGHT, lw=1.0, label="measured")
-    if model is not None:
-        axes.plot(when, (model[late] - zero) * k, color=MIDDLE, ls="--", lw=1.0, label="model")
-        # where the model is set on the next measured arrest it jumps, which is no ring-down
-        low, high = (float(f((y[late] - zero) * k)) for f in (np.min, np.max))
-        axes.set_ylim(low - 0.3 * (high - low), high + 0.3 * (high - low))
-        axes.legend(fontsize=8)
+    axes.plot((t[late] - inside[0]) * factor, (y[late] - zero) * k, color=DARK, lw=1.0)
     axes.set(xlabel=f"time after the arrest / {suffix}", ylabel=f"position / {unit}")
     axes.locator_params(axis="x", nbins=5)
 
@@ -140,13 +123,7 @@ def ripple_picture(data: xarray.Dataset, number: int, facts: dict[str, Any]) -> 
     for line in facts.get("lines", ()):
         f = 1.0 / line["period"]
         ax.axvline(f, color=MIDDLE, ls="--", lw=0.8)
-        ax.annotate(
-            f"{line['period']:.3g} s",
-            (f, line["amplitude"] * k),
-            (4, -2),
-            textcoords="offset points",
-            fontsize=8,
-            color=MIDDLE,
-        )
+        at = (f, line["amplitude"] * k)
+        ax.annotate(f"{line['period']:.3g} s", at, (4, -2), textcoords="offset points", fontsize=8, color=MIDDLE)
     ax.set(xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title=plain(f"{facts['name']}: ripple in the sticks"))
     return made

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, label, plain, scaled, styled
 from .figures import series
 
 if TYPE_CHECKING:
@@ -24,21 +24,25 @@ _MARKS = {
 }
 
 
+def _grid(count: int, tall: int, width: float, height: float) -> tuple[Figure, np.ndarray, list[np.ndarray]]:
+    """A figure, its axes, and those of ``count`` places, up to four beside one another, each of so many axes."""
+    columns = min(4, count)
+    rows = -(-count // columns)
+    made, axes = figure(tall * rows, columns, width=width * columns, height=height * rows)
+    places = [axes[tall * r : tall * (r + 1), c] for r in range(rows) for c in range(columns)]
+    for ax in (ax for place in places[count:] for ax in place):
+        ax.set_visible(False)
+    return made, axes, places[:count]
+
+
 @styled
 def creep_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: int = 8) -> Figure:
     """Some creep processes, the best and the worst among them, with the model and the residual."""
     known = [i for i in range(len(fits)) if f"creep{i}_time" in data]
     order = sorted(known, key=lambda i: fits[i]["nrmse"] or 0.0)
     chosen = [order[int(k)] for k in np.unique(np.linspace(0, len(order) - 1, min(most, len(order))).round())]
-    columns = min(4, len(chosen))
-    rows = -(-len(chosen) // columns)
-    made, axes = figure(2 * rows, columns, width=2.9 * columns, height=3.6 * rows)
-    for a in axes.flat[len(chosen) :]:
-        a.set_visible(False)
-    for n, i in enumerate(chosen):
-        top, low = axes[2 * (n // columns), n % columns], axes[2 * (n // columns) + 1, n % columns]
-        low.set_visible(True)
-        top.set_visible(True)
+    made, axes, pairs = _grid(len(chosen), 2, 2.9, 3.6)
+    for (top, low), i in zip(pairs, chosen, strict=True):
         t, u, model = (series(data, f"creep{i}", name) for name in ("time", "displacement", "model"))
         assert t is not None and u is not None and model is not None
         k, unit = scaled(u, "m")
@@ -61,12 +65,8 @@ def creep_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: in
 def ramp_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: int = 16) -> Figure:
     """Break-away ramps with their fits."""
     chosen = [i for i in range(len(fits)) if f"ramp{i}_tau" in data][:most]
-    columns = min(4, len(chosen))
-    rows = -(-len(chosen) // columns)
-    made, axes = figure(rows, columns, width=2.8 * columns, height=2.3 * rows)
-    for a in axes.flat[len(chosen) :]:
-        a.set_visible(False)
-    for ax, i in zip(axes.flat, chosen, strict=False):
+    made, axes, places = _grid(len(chosen), 1, 2.8, 2.3)
+    for (ax,), i in zip(places, chosen, strict=True):
         tau, u, model = (series(data, f"ramp{i}", name) for name in ("tau", "displacement", "model"))
         assert tau is not None and u is not None and model is not None
         scale = fits[i]["u_max"]
@@ -98,13 +98,13 @@ def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
     phases = list(dict.fromkeys(p for step in ladder for key in kinds for p in (step.get(key) or {})))
     for phase in phases:
         mark, colour = _MARKS.get(phase, ("x", DARK))
-        label = plain(phase, 30)
+        name = plain(phase, 30)
         for key, style in zip(kinds, ("-", "--"), strict=True):
             found = [(step.get(key) or {}).get(phase) for step in ladder]
             y = np.array([np.nan if v is None else v for v in found], float)
             if np.isfinite(y).any():
-                axes[0, 1].plot(x, y, style, marker=mark, color=colour, label=label)
-                label = "_unseen"  # once in the legend
+                axes[0, 1].plot(x, y, style, marker=mark, color=colour, label=name)
+                name = "_unseen"  # once in the legend
     axes[0, 0].set_title("all phases", fontsize=9, loc="left")
     axes[0, 1].set_title("by phase (dashed: unseen runs)", fontsize=9, loc="left")
     for ax in axes.flat:
@@ -125,6 +125,6 @@ def profile_picture(profile: Mapping[str, Any]) -> Figure:
     value, unit = scaled(np.array(profile["value"], float), profile.get("unit") or "1")
     ax.plot(np.array(profile["value"]) * value, profile["rise"], "o-", color=DARK)
     ax.axhline(3.84, color=MIDDLE, ls="--", lw=1.0, label="95 %")
-    ax.set(xlabel=plain(f"{profile['name']}" + (f" / {unit}" if unit != "1" else "")), ylabel="rise of chi-square")
+    ax.set(xlabel=plain(label(profile["name"], unit)), ylabel="rise of chi-square")
     ax.legend()
     return made

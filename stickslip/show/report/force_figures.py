@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, of_run, plain, scaled, signed_log, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, label, medians, plain, scaled, signed_log, styled
 from .figures import series
 
 if TYPE_CHECKING:
@@ -71,17 +71,11 @@ def residual_picture(data: xarray.Dataset, names: list[str]) -> Figure:
         k, shown = scaled(np.concatenate(values), unit)
         for i, (r, x) in enumerate(zip(runs, values, strict=True)):
             z = data[f"force{r}_base_residual"].values / data[f"force{r}_floor"].values
-            curve = of_run(i)
-            label = plain(names[r] if r < len(names) else str(r), 20)
-            order = np.argsort(x)
-            pieces = [p for p in np.array_split(order, 15) if p.size]
-            ax.plot(x * k, np.clip(z, -6, 6), ".", ms=1.5, color=curve["color"], alpha=0.25)
-            middle = np.array([np.median(x[p]) for p in pieces]) * k
-            ax.plot(middle, [np.median(z[p]) for p in pieces], **curve, lw=1.4, label=label)
+            medians(ax, x * k, z, i, plain(names[r] if r < len(names) else str(r), 20))
         if name in ("velocity", "time_in_contact"):
             signed_log(ax, np.concatenate(values) * k)
         ax.axhline(0.0, color=LIGHT, lw=0.8)
-        ax.set(xlabel=f"{text} / ({shown})" if "/" in shown else f"{text} / {shown}", ylim=(-4, 4))
+        ax.set(xlabel=label(text, shown), ylim=(-4, 4))
     axes[0, 0].set_ylabel("residual force / floor")
     made.legend(
         *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=max(len(runs), 1), fontsize=8

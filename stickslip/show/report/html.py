@@ -59,7 +59,7 @@ def render(result: dict[str, Any], images: Iterable[tuple[str, str, Figure]]) ->
     shown: dict[str, list[dict[str, str]]] = {}
     for section, caption, drawn in images:
         shown.setdefault(section, []).append({"caption": caption, "data": _png(drawn)})
-    return template.render(r=result, images=shown, **tables(result))
+    return template.render({**tables(result), "images": shown})
 
 
 def _png(drawn: Figure) -> str:

@@ -6,12 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from .figures import ripple_picture, series, trace_picture
-from .fit_figures import (
-    creep_grid,
-    ladder_picture,
-    profile_picture,
-    ramp_grid,
-)
+from .fit_figures import creep_grid, ladder_picture, profile_picture, ramp_grid
 from .force_figures import backbone_picture, cycle_picture, residual_picture, runs_of
 from .forecast_figures import calibration_picture, levels_picture
 from .free_figures import free_picture

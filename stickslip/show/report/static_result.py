@@ -17,10 +17,10 @@ from ...inference.fit.normalised import Ramp, break_away, fit_ramps, is_ramp
 from ...inference.fit.static import SATISFYING, Align, CreepFit, Form, StaticFit, fit_static, tied_quantities
 from ...inference.fit.static_table import StaticRig
 from ...system.units import shown
+from .excerpts import Variables
 
 MOST_SHOWN = 60
 _APART = 0.2  # of H, a third of the range that surfaces have
-Variables = dict[str, tuple[str, np.ndarray, dict[str, Any]]]
 
 
 def static_result(
@@ -140,22 +140,16 @@ def _range(fit: StaticFit) -> str:
 
 
 def _one(f: CreepFit) -> dict[str, Any]:
-    note = f"at the edge of its range: {', '.join(f.at_bound)}" if f.at_bound else ""
-    if f.process.virgin:
-        note = "virgin" + (f"; {note}" if note else "")
+    notes = ["virgin"] if f.process.virgin else []
+    notes += [f"at the edge of its range: {', '.join(f.at_bound)}"] if f.at_bound else []
+    same = ("hurst", "hurst_std", "h_rms", "h_rms_std", "u_max", "nrmse", "satisfying")
     return {
         "trace": f.process.trace,
         "event": f.process.event + 1,
-        "hurst": f.hurst,
-        "hurst_std": f.hurst_std,
-        "h_rms": f.h_rms,
-        "h_rms_std": f.h_rms_std,
-        "u_max": f.u_max,
-        "nrmse": f.nrmse,
+        **{name: getattr(f, name) for name in same},
         "creep": f.process.amplitude,
         "noise": _noise_share(f),
-        "satisfying": f.satisfying,
-        "note": note,
+        "note": "; ".join(notes),
     }
 
 
@@ -194,17 +188,12 @@ def _ramp_part(ramps: list[Ramp], springs: int | None) -> tuple[dict[str, Any], 
         variables[f"{key}_tau"] = (key, f.ramp.tau, {"units": "1"})
         variables[f"{key}_displacement"] = (key, f.ramp.displacement, {"units": "m"})
         variables[f"{key}_model"] = (key, f.model, {"units": "m"})
+    same = ("hurst", "hurst_std", "u_max", "u_max_std", "friction_force", "nrmse", "satisfying")
     rows = [
         {
             "trace": f.ramp.trace,
-            "hurst": f.hurst,
-            "hurst_std": f.hurst_std,
-            "u_max": f.u_max,
-            "u_max_std": f.u_max_std,
+            **{name: getattr(f, name) for name in same},
             "force": f.ramp.force,
-            "friction_force": f.friction_force,
-            "nrmse": f.nrmse,
-            "satisfying": f.satisfying,
             "note": "H at the edge of its range" if f.at_bound else "",
         }
         for f in fits

@@ -8,25 +8,13 @@ from typing import Any
 
 from ...system.units import shown
 
-_KNOWN: dict[str, Any] = {
-    "verdict": {}, "ladder": [], "ranking": [], "parameters": {}, "equations": [], "identifiability": [], "traces": [],
-    "dropped": [], "inputs": [], "versions": {}, "static": None, "next_experiment": None, "can": [],
-    "cannot": [], "profiles": [], "ramps": None, "notes": [], "title": "", "kind": "run",
-    "seconds": None, "summary": "", "caution": [], "ranking_base": None, "later_rounds": [],
-    "visible": {}, "structure": None, "backbone": None,
-}  # fmt: skip
-
 
 def tables(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Variables of the template: every key it knows, with an empty value where the result has none."""
-    found = {key: _or(result.get(key), empty) for key, empty in _KNOWN.items()}
-    found["ladder_phases"] = list(dict.fromkeys(p for step in found["ladder"] for p in _or(step.get("by_phase"), {})))
-    found["free_simulated"] = any(step.get("free") for step in found["ladder"])
-    return found
-
-
-def _or(value: Any, empty: Any) -> Any:
-    return empty if value is None else value
+    """Variables of the template: what the result has, and what follows from its ladder."""
+    found = {key: value for key, value in result.items() if value is not None}
+    ladder = found.get("ladder", ())
+    phases = dict.fromkeys(p for step in ladder for p in step.get("by_phase") or ())
+    return {**found, "ladder_phases": list(phases), "free_simulated": any(step.get("free") for step in ladder)}
 
 
 def show(value: Any, unit: str = "1", digits: int = 4) -> str:
