@@ -21,7 +21,7 @@ def aged():
 @pytest.fixture(scope="module")
 def way(aged):
     """Counted in the deviations of the derivatives, without what profiles add to them."""
-    return walked(replace(aged._fit, valleys=()))
+    return walked(replace(aged.force_fit, valleys=()))
 
 
 def test_the_gradient_is_that_of_the_density(way):

@@ -27,6 +27,7 @@ LAST = 30  # evaluations with the covariance as it was found
 STEPS = 4  # evaluations between
 NEWTON = 4  # steps of the sizes between
 FIRST = 0.6  # share of the rounds of a fit that begins in what it takes, at most
+ADJUSTED = 0.8  # share of a base fit before the motion is adjusted
 LARGER = 1.0  # e-folds by which sizes are taken for larger where a search may stand in a dent
 
 
@@ -225,7 +226,8 @@ def fit_base(problem: Problem, point: Point) -> Fit:
     those of the adjusted observations, as a model with errors in its variables needs them (Pope 1972; Lenzmann &
     Lenzmann 2004): damping and healing, and laws of the velocity, are biased otherwise.
     """
-    found = fit(problem, point)
+    with portion(0.0, ADJUSTED):
+        found = fit(problem, point)
     rows = by_reading(found.problem, found.around, found.slopes)
     weighted = np.zeros(found.problem.at.size)
     there = found.blocks.there
@@ -233,7 +235,8 @@ def fit_base(problem: Problem, point: Point) -> Fit:
     errors = reading_errors(found.problem, rows, weighted, found.scatter.named()["white"])
     problem = found.problem.adjusted(errors, found.point)
     found = again(problem, found.point, found.scatter, found.dropped, found.around, found.evaluations)
-    other = adapted(refit(problem, found.point, found))
+    with portion(ADJUSTED, 1.0):
+        other = adapted(refit(problem, found.point, found))
     return replace(other, evaluations=found.evaluations + other.evaluations)
 
 
