@@ -129,6 +129,45 @@ def cases(found: dict[str, Any]) -> str:
     )
 
 
+HIDDEN = {
+    "nothing": "nothing", "one": "one effect", "two": "two effects", "outside": "an effect outside the catalogue",
+}  # fmt: skip
+
+
+@_drawn
+def sealed(found: dict[str, Any]) -> str:
+    """A sealed run: rates by what was hidden and by amplitude, the targets, and every case."""
+    shares = ("exact", "right", "class")
+    rows: list[list[object]] = [[HIDDEN[k], *(rate(row[s]) for s in shares)] for k, row in found["by_kind"].items()]
+    for b in found["by_amplitude"]:
+        times = f"one or two effects, {b['from']:g} to {b['to']:g} times detection"
+        rows.append([times, *(rate(b[s]) for s in shares)])
+    sizes, alarms = rate(found["amplitude"]["all"]), rate(found["false_alarms"])
+    head = ["hidden (times detection)", "answer", "named, or the set", "right", "error on unseen runs / floors"]
+    parts = [
+        table(["hidden", *shares], [row for row in rows if any(row[1:])]),
+        f"Amplitudes within a factor of two: {sizes}. False alarms: {alarms}.",
+        table(["target", "found", ""], [[aim["text"], rate(aim), _met(aim)] for aim in found["aims"]]),
+        table(head, map(_sealed_case, found["list"])),
+    ]
+    return "\n\n".join(parts)
+
+
+def _met(aim: dict[str, Any]) -> str:
+    if aim["met"] is None:
+        return ""
+    return ("met" if aim["shown"] else "met, not shown") if aim["met"] else "MISSED"
+
+
+def _sealed_case(case: dict[str, Any]) -> list[object]:
+    hidden = [f"{e['tag']} ({e['multiple']:.3g})" if e["multiple"] else e["tag"] for e in case["hidden"]]
+    errors = [f"{e:.2f}" for e in (case["heldout_base"], case["heldout_final"]) if e is not None]
+    return [
+        ", ".join(hidden) or "nothing", f"`{case['answer']}`", ", ".join(case["set"] or case["named"]),
+        "yes" if case["right"] else "no", " → ".join(errors),
+    ]  # fmt: skip
+
+
 @_drawn
 def ranks(found: dict[str, Any]) -> str:
     """How well the posterior contains the true values, a row for each parameter of ``posterior.json``."""
