@@ -118,8 +118,8 @@ def _along(fit: Fit, run: Knots, changed: Changed, turn: float) -> _Held:
     )  # fmt: skip
     phases = known.phases
     own = np.array([[0.0 if f.name == PULL else turn / float(f.scale)] for f in phases]).reshape(len(phases), 1)
-    alike = problem.readings.shape[1] - 2 * problem.hums.size
-    common = np.concatenate([fit.point.common[:alike], np.zeros(2 * problem.hums.size)])
+    alike = problem.alike
+    common = np.concatenate([fit.point.common[:alike], np.zeros(problem.usual.size - alike)])
     events = np.zeros((problem.events, fit.point.events.shape[1]))
     point = Point(z, own, changed.load * fit.point.weights, events, common)
     blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
@@ -141,13 +141,13 @@ def _deviations(fit: Fit, problem: Problem, load: float) -> Array:
     """Of parameters of a problem of one run, by independent combinations: those of the campaign, and the run's own."""
     a, k = fit.point.z.size, fit.point.weights.size
     there, here = fit.point.phases.size, len(problem.composition.phases)
-    alike = problem.readings.shape[1] - 2 * problem.hums.size
+    alike = problem.alike
     known = np.concatenate([np.arange(a), a + there + np.arange(k + alike)])
     part = fit.covariance[np.ix_(known, known)]
     scale = np.sqrt(np.maximum(np.diag(part), 1e-300))  # metres beside newtons
     values, vectors = np.linalg.eigh(part / scale[:, None] / scale)
     told = np.concatenate([np.arange(a), a + here + np.arange(k + alike)])
-    total = a + here + k + problem.readings.shape[1]
+    total = a + here + k + problem.usual.size
     own = np.setdiff1d(np.arange(total), told)
     out = np.zeros((total, known.size + own.size))
     out[np.ix_(told, np.arange(known.size))] = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))

@@ -69,9 +69,9 @@ def by_reading(problem: Problem, point: Point, slopes: Slopes) -> list[csr_array
 
 
 def carrier(problem: Problem, slopes: Slopes, rows: Sequence[csr_array]) -> Array:
-    """What carries errors of the position that are found with the model (see :meth:`.problem.Problem.carried_by`)."""
+    """What carries what is found with the model besides its parameters (see :meth:`.problem.Problem.carried_by`)."""
     hum = np.concatenate([row @ run.hum for run, row in zip(problem.runs, rows, strict=True)])
-    return np.column_stack([slopes.tangent, hum])
+    return np.column_stack([slopes.tangent, hum, slopes.local[:, 0]])
 
 
 def noise(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Array:

@@ -245,7 +245,7 @@ def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Pr
         np.zeros((len(composition.phases), len(runs))),
         np.full(elements, strength / elements),
         np.zeros((problem.events, OWN)),
-        np.zeros(problem.readings.shape[1]),
+        np.zeros(problem.usual.size),
     )
     return problem, with_weights(problem, point, strength)
 

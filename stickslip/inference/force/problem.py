@@ -27,6 +27,7 @@ from .point import OWN, Forces, Point, Slopes
 Array = NDArray[np.float64]
 CREEPING = PHASES.index("creep")
 LEAST_ROOM = 1024  # knots
+LEVEL = 1e-4  # e-folds of strength by which runs may differ whatever the law, and below which nothing is claimed
 LOADED = 1e-3  # of the load, which it must vary by to be told of
 NODES = (
     -8.0,
@@ -47,7 +48,9 @@ NODES = (
 class Problem:
     """All runs of a campaign under one composition.
 
-    Errors of the position that are found with the model are ``readings`` (m), shape (p, c), each about ``usual`` times.
+    What is found with the model besides its parameters, each about as large as ``usual``, shape (c,): errors of the
+    position that ``alike`` hats along the cycle give to all cycles, a level for each run, by which the logarithm of its
+    strength is another, and what is left of the hum.
     Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
     the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`).
     """
@@ -78,8 +81,10 @@ class Problem:
         alike = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
         self.hums = np.array([r for r, k in enumerate(runs) if k.hum.any()], int)
         at_points = np.concatenate([k.mean @ (k.reading.displacement @ k.hum) for k in runs])
-        self.readings = np.hstack([alike, self._by_run(at_points)])
-        self.usual = np.concatenate([np.full(alike.shape[1], systematic), np.ones(2 * self.hums.size)])
+        self.alike, self._hats, self._hums = alike.shape[1], alike, self._by_run(at_points)
+        self.usual = np.concatenate(
+            [np.full(self.alike, systematic), np.full(len(runs), LEVEL), np.ones(2 * self.hums.size)]
+        )
         self.carrier: Array | None = None
         self.errors = tuple(np.zeros(k.t.size) for k in runs)
         self.offset = np.zeros(self.at.size)
@@ -97,12 +102,13 @@ class Problem:
         return other
 
     def carried_by(self, carrier: Array) -> Problem:
-        """The same with what carries errors of the position to a force held as it is.
+        """The same with what carries errors of the position and levels of runs to a force held as it is.
 
         With that of the model as it moves, a spring that begins to slide would make the force jump.
 
         Args:
-            carrier: stiffness for what cycles share (N/m), and what sine and cosine of the hum do (N), shape (p, 3).
+            carrier: stiffness for what cycles share (N/m), what sine and cosine of the hum do (N), and what one e-fold
+                of strength does (N), shape (p, 4).
         """
         other = self.with_composition(self.composition)
         other.carrier = carrier
@@ -136,18 +142,20 @@ class Problem:
 
     def recarried(self, slopes: Slopes, point: Point) -> Slopes:
         """What :meth:`evaluate` would say at the point where another carrier has."""
-        columns = self._carried(slopes.tangent)
+        columns = self._carried(slopes.tangent, slopes.local)
         c = columns.shape[1]
         shared = np.hstack([slopes.shared[:, :-c], columns])
         return replace(
             slopes, residual=slopes.residual + (columns - slopes.shared[:, -c:]) @ point.common, shared=shared
         )
 
-    def _carried(self, tangent: Array) -> Array:
+    def _carried(self, tangent: Array, local: Array) -> Array:
+        own = self.run[:, None] == np.arange(len(self.runs))
         if self.carrier is None:
-            return np.asarray(tangent[:, None] * self.readings)
-        alike = self.readings.shape[1] - 2 * self.hums.size
-        return np.hstack([self.carrier[:, :1] * self.readings[:, :alike], self._by_run(self.carrier[:, 1:])])
+            return np.hstack([tangent[:, None] * self._hats, local[:, :1] * own, tangent[:, None] * self._hums])
+        shared, sine, cosine, level = self.carrier.T
+        both = self._by_run(np.column_stack([sine, cosine]))
+        return np.hstack([shared[:, None] * self._hats, level[:, None] * own, both])
 
     def values(self, point: Point) -> dict[str, float]:
         """Name -> SI value of what is shared."""
@@ -198,7 +206,7 @@ class Problem:
         starts = {**c.fixed, **{f.name: f.start for f in c.shared}}
         slow = self.phase == CREEPING
         share = np.ones(size)
-        errors = self.readings.shape[1]
+        errors = self.usual.size
         slopes, local = np.zeros((size, a + b * runs + k + errors)), np.zeros((size, OWN))
         sensed = any(isinstance(e, Sensor) for e in c.effects)
         common = scales, phase_scale, fixed, leaves, weights, c.reach
@@ -251,7 +259,7 @@ class Problem:
             slides, sliding, psi = (a[:n] for a in state)
             kept.append(((tangent[:n] + beside) * shares, slides, sliding * shares, psi))
             p += run.at.size
-        slopes[:, a + b * runs + k :] = self._carried(tangents)
+        slopes[:, a + b * runs + k :] = self._carried(tangents, local)
         residual += slopes[:, a + b * runs + k :] @ point.common
         sticking, sliding, forces, states = zip(*kept, strict=True)
         return Forces(residual, local, springs, tangents, sticking, sliding, forces, states, held, share), slopes

@@ -117,7 +117,7 @@ def begin(
     problem = Problem(composition, runs)
     flat = np.full(elements, strength / elements)
     point = Point(
-        vector(composition.shared), begun, flat, np.zeros((problem.events, OWN)), np.zeros(problem.readings.shape[1])
+        vector(composition.shared), begun, flat, np.zeros((problem.events, OWN)), np.zeros(problem.usual.size)
     )
     return problem, with_weights(problem, point, strength)
 
