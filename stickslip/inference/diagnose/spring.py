@@ -15,6 +15,7 @@ from ..force.rig import slips_finding, spring_freed
 from .decide import Judge
 from .prepare import prepare
 
+EXACT = 1e-3  # share of its value by which no spring and no mass is stated better
 OR_ELSE = (
     " An effect on the spring's force (a nonlinear spring, tilt, the spring's own inertia) makes much the same: "
     "stickslip diagnose compares them."
@@ -35,6 +36,8 @@ def spring_finding(campaign: Campaign, traces: Sequence[Trace], found: Sequence[
         base = fit_base(prepared.problem, prepared.start)
         freed = spring_freed(base)
         if freed is None or not Judge(base, 1).beside(freed, 1).seen:
+            return None
+        if abs(freed.values["rig.spring_stiffness"] / rig.spring_stiffness - 1.0) < EXACT:
             return None
     except StickslipError:  # too little for a fit: inspect has said so already
         return None
