@@ -58,12 +58,12 @@ def refitted(fit, left_out):
 def test_a_run_left_out_is_predicted_as_least_squares_without_it(fitted):
     """The density of each event by itself too, where no walk of the sensor makes it a matter of their order."""
     sizes = fitted.scatter.sizes - 8.0 * (np.array(NAMES) == "walk")
-    for fit, exact in ((fitted, False), (replace(fitted, scatter=Scatter(sizes)), True)):
-        parts = [np.flatnonzero(fit.problem.event_run == r) for r in (1, 0)]
-        predicted = unseen(fit, parts)
+    for found, exact in ((fitted, False), (replace(fitted, scatter=Scatter(sizes)), True)):
+        parts = [np.flatnonzero(found.problem.event_run == r) for r in (1, 0)]
+        predicted = unseen(found, parts)
         for part in parts:
-            own, force, cost = refitted(fit, part)
-            np.testing.assert_allclose(predicted.residual[own], force, atol=2e-5 * fit.strength)
+            own, force, cost = refitted(found, part)
+            np.testing.assert_allclose(predicted.residual[own], force, atol=2e-5 * found.strength)
             if exact:
                 assert predicted.cost[part].sum() == pytest.approx(cost, abs=0.005)
 
