@@ -126,8 +126,7 @@ class Problem:
             point: of a fit.
         """
         zero = np.zeros(self.at.size)
-        twice = [2.0 * new - old for new, old in zip(errors, self.errors, strict=True)]
-        before, beyond = self.moved(self.errors, zero).forces(point), self.moved(twice, zero).forces(point)
+        before, beyond = (self.moved([k * e for e in errors], zero).forces(point) for k in (0.0, 2.0))
         return self.moved(errors, 0.5 * (before.residual / before.share - beyond.residual / beyond.share))
 
     def moved(self, errors: Sequence[Array], offset: Array) -> Problem:
