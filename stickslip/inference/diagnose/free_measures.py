@@ -6,7 +6,8 @@ The measures are features of a cycle (:mod:`stickslip.inference.features`), of d
 
 * strength, yield displacements and the sensor's error at the arrest differ from event to event. What that does to a
   measure is asked of the model: every second event is changed, then the others, which tells the influence of the own
-  event from that of the one before (about F_s/(c_s v) in recurrence for a strength that is doubled);
+  event from that of the one before (about F_s/(c_s v) in recurrence for a strength that is doubled). The level of a run
+  (:data:`~stickslip.inference.force.problem.LEVEL`) is that of all its events together;
 * a misfit of the force in the nucleation, a share e of the strength F_s, lets the slip begin at another force: it comes
   e F_s/(c_s v) later and is (1 + q) e F_s/c_s longer, where q is the share of its swing that the damping leaves of the
   second half (1 without damping). A misfit in the slip is a kinetic friction that differs: (1 + q) e F_s/c_s as well.
@@ -31,7 +32,7 @@ from ..force.fit import Fit
 from ..force.free_run import run_freely
 from ..force.knots import NUCLEATION
 from ..force.point import Point
-from ..force.problem import Problem
+from ..force.problem import LEVEL, Problem
 from ..force.scatter import EVENTS
 
 Array = NDArray[np.float64]
@@ -126,12 +127,17 @@ def scatter(m: Measurement, fit: Fit, runs: list[int]) -> Measures:
     plain = _all(m, fit, runs, np.zeros((n, len(EVENTS))))
     total = {k: a + b for (k, a), b in zip(_sensor(m).items(), _misfit(m, fit, runs), strict=True)}
     for j, (step, deviation) in enumerate(zip(steps, sizes, strict=True)):
+        every: Any = dict.fromkeys(NAMES, 0.0)
         for own in (even, 1.0 - even):
             change = np.zeros((n, len(EVENTS)))
             change[:, j] = step * own
             moved = _all(m, fit, runs, change)
             # the own event's influence where it was changed, that of the one before elsewhere
-            total = {k: total[k] + (np.nan_to_num(moved[k] - plain[k]) * deviation / step) ** 2 for k in NAMES}
+            influence = {k: np.nan_to_num(moved[k] - plain[k]) / step for k in NAMES}
+            total = {k: total[k] + (influence[k] * deviation) ** 2 for k in NAMES}
+            every = {k: every[k] + influence[k] for k in NAMES}
+        if EVENTS[j] == "strength":
+            total = {k: total[k] + (every[k] * LEVEL) ** 2 for k in NAMES}
     return Measures(**{k: np.sqrt(total[k]) for k in NAMES})
 
 
