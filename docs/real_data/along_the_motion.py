@@ -47,7 +47,7 @@ def told(name: str, made: Diagnosis) -> dict[str, Any]:
     return {
         "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
         "says": f"{verdict['kind']}: {verdict['text']}",
-        "scatter": fits[-1].scatter.named(),
+        "scatter": made.result["scatter"],
         "ladder": [
             {
                 "model": rung.added, "fitted": rms(rung.residual) / level, "unseen": rms(rung.unseen) / level,

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 import stickslip as ss
+from stickslip.physics.effects.base import Effect
 from stickslip.physics.model import Model
 from stickslip.simulation.conformance.rig import base_model
 from stickslip.simulation.solve import Tolerance, integrate
@@ -30,21 +31,28 @@ class Moved(NamedTuple):
     course: CubicHermiteSpline
     end: float
     speed: float
+    turn: float | None = None
 
 
-def moved(speed: float, end: float, tolerance: float = 1e-4, **weakening: float) -> Moved:
-    """The base model under a steady drive; ``damping`` and ``healing_time`` may be others than the rig's."""
-    times = np.array([0.0, end])
-    values = [times, times * speed, MASS, STIFFNESS]
+def moved(
+    speed: float, end: float, tolerance: float = 1e-4, effects: Sequence[Effect] = (), turn: float | None = None,
+    **weakening: float,
+) -> Moved:  # fmt: skip
+    """The base model, with ``effects``, under a steady drive that may turn at a time (s) and go back.
+
+    ``damping`` and ``healing_time`` may be others than the rig's.
+    """
+    times = np.array([0.0, end]) if turn is None else np.array([0.0, turn, end])
+    values = [times, speed * (times if turn is None else np.array([0.0, turn, 2.0 * turn - end])), MASS, STIFFNESS]
 
     def of(m: Model) -> list[object]:
         own = {"damping": m.block.damping, "healing_time": m.weakening.healing_time}
         fields = [m.load_point.times, m.load_point.positions, m.block.mass, m.block.spring_stiffness]
         return [*fields, *(own[name] for name in weakening)]
 
-    model = eqx.tree_at(of, base_model(()), [jnp.asarray(a) for a in (*values, *weakening.values())])
+    model = eqx.tree_at(of, base_model(tuple(effects)), [jnp.asarray(a) for a in (*values, *weakening.values())])
     steps = integrate(model, end, tolerance=Tolerance(tolerance, 1e-12, 1e-9), largest_step=4e-3)[0].steps
-    return Moved(model, CubicHermiteSpline(steps.t, steps.x, steps.v), float(steps.t[-1]), speed)
+    return Moved(model, CubicHermiteSpline(steps.t, steps.x, steps.v), float(steps.t[-1]), speed, turn)
 
 
 def read(runs: Sequence[Moved], seed: int, noise: float = NOISE, count: float = COUNT) -> ss.Campaign:
@@ -55,7 +63,8 @@ def read(runs: Sequence[Moved], seed: int, noise: float = NOISE, count: float = 
         x = run.course(t) + noise * random.standard_normal(t.size)
         x = count * np.round(x / count) if count else x
         name = f"v{1e6 * run.speed:.0f}"
-        traces.append(
-            ss.Trace.from_arrays(name, time=t, displacement=x, drive_velocity=run.speed, resolution=count or 1e-13)
-        )
+        drive = {"drive_velocity": run.speed}
+        if run.turn is not None:
+            drive = {"drive_position": run.speed * np.where(t < run.turn, t, 2.0 * run.turn - t)}
+        traces.append(ss.Trace.from_arrays(name, time=t, displacement=x, resolution=count or 1e-13, **drive))
     return ss.Campaign.from_traces(traces, RIG)

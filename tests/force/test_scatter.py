@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip.inference.force.knots import PHASES
+from stickslip.inference.force.linked_events import grown
 from stickslip.inference.force.scatter import (
     EVENTS as EVENTS_OWN,
 )
@@ -22,7 +23,6 @@ from stickslip.inference.force.scatter import (
     misfit,
     weigh,
 )
-from stickslip.inference.force.sensor_walk import grown
 
 from .whole import dense
 
@@ -115,7 +115,7 @@ def test_the_walk_is_found_where_it_went():
     known, sizes = events(), true()
     sizes[NAMES.index("walk")] = np.log(2e-8)
     residual = drawn(sizes, known, 11)
-    walk = weigh(sizes, residual, known).walk
+    walk = weigh(sizes, residual, known).linked
     before, after = grown(known.spread(sizes), known.first)
     begun = known.first
     assert np.abs(before[begun]).max() < 1e-12 * after.max()

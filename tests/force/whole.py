@@ -31,4 +31,16 @@ def dense(sizes: np.ndarray, known: Known) -> np.ndarray:
         )
         shape = (own.size, points, own.size, points)
         out[np.ix_(own, range(points), own, range(points))] += walk**2 * together.reshape(shape)
+    if known.chain is not None:
+        level, length = np.exp(sizes[len(NAMES) :][:2])
+        chain = known.chain
+        at = np.stack([chain.begin, chain.end], axis=1).ravel()
+        apart = np.abs(np.subtract.outer(at, at)) / chain.unit / length
+        group = np.repeat(chain.group, 2)
+        together = level**2 * np.exp(-apart) * np.equal.outer(group, group)
+        shares = np.stack([1.0 - chain.share, chain.share], axis=2)
+        out += np.einsum(
+            "ei,eia,eafb,fjb,fj->eifj", known.local[..., 0], shares, together.reshape(events, 2, events, 2), shares,
+            known.local[..., 0], optimize=True,
+        )  # fmt: skip
     return out.reshape(events * points, events * points)

@@ -25,7 +25,6 @@ from ..force.prescribed import applies
 from ..force.problem import Problem
 from ..force.residual import Structure, structures
 from ..force.rig import slips_finding, spring_freed
-from ..force.scatter import Scatter
 from ..force.signatures import Explained
 from ..force.valleys import LEVEL, widened
 from .checkpoints import Store, kept, name_of
@@ -344,7 +343,8 @@ def foretells(before: Fit, after: Fit) -> bool:
 def without(base: Fit, tag: str) -> Fit:
     """The model without one of its effects, fitted anew with what is random."""
     problem, point = _taken_out(base, tag)
-    return fit(problem, point, Scatter(base.scatter.sizes), first=True)
+    free = replace(base.scatter, most=np.full_like(base.scatter.most, np.inf))
+    return fit(problem, point, free, first=True)
 
 
 def _taken_out(base: Fit, tag: str) -> tuple[Problem, Point]:

@@ -120,6 +120,7 @@ def scatter(m: Measurement, fit: Fit, runs: list[int]) -> Measures:
     """
     size = fit.scatter.named()
     sizes = [size[name] for name in EVENTS]
+    sizes[0] = float(np.hypot(sizes[0], size.get("level", 0.0)))
     n = np.shape(m.cycles.start)[1]
     even = (np.arange(n) % 2 == 0).astype(float)
     usual = float(np.median(m.values[..., m.layout.slices()["size"].start][np.asarray(m.cycles.used)]))

@@ -20,6 +20,7 @@ from ..force.knots import PHASES
 from ..force.linearised import Array
 from ..force.prescribed import placeholders
 from ..force.residual import coordinates
+from ..force.scatter import Scatter
 from .decide import CHANCE, ERRORS, Judged, best_forms
 from .engine import Diagnosis, Round, Rung
 from .fitted import fitted_model
@@ -88,7 +89,7 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
             *cautions(d.confirmation, {r.model: error(r.unseen, d) for r in d.ladder[1:] if r.unseen is not None}),
         ],
         "ladder": [_rung(r, d) for r in d.ladder],
-        "scatter": d.fit.scatter.named(),
+        "scatter": d.fit.scatter.named() | followed(d.fit.scatter),
         "parameters": parameters(d.fit, found, rig),
         "backbone": section(d.shape),
         "held_out": "every run in turn; in halves if a run has its own parameters",
@@ -98,6 +99,21 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
         KEY: record(found),
     }  # fmt: skip
     return result, variables(d), found
+
+
+def followed(scatter: Scatter) -> dict[str, Any]:
+    """What the level of the strength follows: ``coordinate``, ``alike`` and ``text``, or nothing."""
+    if scatter.follows is None:
+        return {}
+    size, (coordinate, *others) = scatter.named(), (scatter.follows.coordinate, *scatter.follows.alike)
+    unit = "s" if coordinate == "time" else "m"
+    like = f" (or {' or '.join(others)}: these data cannot tell)" if others else ""
+    text = (
+        f"From event to event the strength wanders by {100 * size['level']:.2g} % along {coordinate}{like}, with a "
+        f"length of {shown(size['length'], unit, 2)}; {100 * size['strength']:.2g} % are an event's own. "
+        "All effects are tried on top of this."
+    )
+    return {"coordinate": coordinate, "alike": others, "text": text}
 
 
 def error(residual: Array, d: Diagnosis, where: np.ndarray | None = None) -> float:

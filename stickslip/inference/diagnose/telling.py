@@ -124,7 +124,8 @@ def _along(fit: Fit, run: Knots, changed: Changed, turn: float) -> _Held:
     point = Point(z, own, changed.load * fit.point.weights, events, common)
     blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
     rows, none = by_reading(problem, point, slopes), np.zeros(problem.of.size, bool)
-    white = Whitening(fit.scatter.sizes, known_of(problem, slopes, rows, blocks, none))
+    noise = known_of(problem, slopes, rows, blocks, none, fit.scatter.follows)
+    white = Whitening(fit.scatter.sizes, noise)
     unsure = [slopes.shared @ _deviations(fit, problem, changed.load)]
     first = z.size + own.size
     if changed.load != 1.0:

@@ -15,11 +15,22 @@ from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
 from .linearised import FARTHEST, Array, Linearised, moved
+from .linked_events import LEVEL, grown
 from .noise import beyond, by_reading, carrier, known_of, left_out, reading_errors
 from .point import Forces, Point, Slopes
 from .problem import Problem
-from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
-from .sensor_walk import grown
+from .scatter import (
+    WANDER,
+    Blocks,
+    Follows,
+    Known,
+    Scatter,
+    Whitening,
+    WithEvents,
+    covariance,
+    estimate,
+    misfit,
+)
 
 PLACED = 2  # rounds after which the bank's elements are put where the strength is
 ROUNDS = 10  # times that the scatter is estimated anew
@@ -28,6 +39,8 @@ STEPS = 4  # evaluations between
 NEWTON = 4  # steps of the sizes between
 FIRST = 0.6  # share of the rounds of a fit that begins in what it takes, at most
 ADJUSTED = 0.8  # share of a base fit before the motion is adjusted
+FEWEST = 12  # events from which on it is asked whether their strengths follow each other
+ALIKE = 6.0  # of the cost, by which coordinates that can be told apart differ at least: a likelihood ratio of twenty
 LARGER = 1.0  # e-folds by which sizes are taken for larger where a search may stand in a dent
 
 
@@ -188,7 +201,7 @@ def fit(
         rows = by_reading(problem, point, slopes)
         problem = problem.carried_by(carrier(problem, slopes, rows))
         slopes = problem.recarried(slopes, point)
-        made = known_of(problem, slopes, rows, blocks, out)
+        made = known_of(problem, slopes, rows, blocks, out, sizes.follows)
         if turn or first:
             marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
             sizes = estimate(sizes, marginal, made, NEWTON)
@@ -201,10 +214,12 @@ def fit(
         evaluations += count
         if turn > PLACED + 2 and total < 1.0:
             break
-    made, around = known_of(problem, slopes, by_reading(problem, point, slopes), blocks, out), point
+    made = known_of(problem, slopes, by_reading(problem, point, slopes), blocks, out, sizes.follows)
+    around = point
     point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, blocks, LAST)
     with portion(FIRST, 1.0):
-        return _arrived(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
+        found = _arrived(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
+        return wandering(found) if scatter is None else found
 
 
 def _arrived(found: Fit) -> Fit:
@@ -285,6 +300,32 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
     return _like(found, problem, point, slopes, sizes, evaluations)
 
 
+def wandering(found: Fit) -> Fit:
+    """The fit with strengths of events that follow each other, if that pays; else the same.
+
+    Of the coordinates along which a level may wander the one under which the events, with the parameters as they are,
+    are most likely.
+    """
+    problem, tried = found.problem, {}
+    for coordinate in problem.along if problem.events >= FEWEST else ():
+        follows = Follows(coordinate, problem.distance(coordinate))
+        chain = problem.chain(follows, found.blocks)
+        assert chain is not None
+        start = replace(found, scatter=found.scatter.following(follows), known=found.known.following(chain))
+        tried[coordinate] = adapted(start, rounds=0)
+    if not tried:
+        return found
+    best = min(tried.values(), key=lambda f: f.cost)
+    assert best.scatter.follows is not None
+    if found.cost - best.cost < len(WANDER) * np.log(problem.events):  # Schwarz's criterion
+        return found
+    alike = tuple(name for name, f in tried.items() if f is not best and f.cost - best.cost < ALIKE)
+    own = replace(best.scatter, follows=replace(best.scatter.follows, alike=alike))
+    best = replace(best, scatter=own)
+    best = min(best, adapted(best), key=lambda f: f.cost)
+    return replace(best, evaluations=found.evaluations + best.evaluations)
+
+
 def at(problem: Problem, point: Point, scatter: Scatter, base: Fit) -> Fit:
     """A model at a point, with what is known of the noise as in another fit of the same data."""
     return _like(base, problem, point, problem.forces(point), scatter, 1)
@@ -296,7 +337,7 @@ def again(
     """A fit that was made before, from where it ended; arguments as the attributes of :class:`Fit`."""
     blocks = Blocks.of(problem.of, problem.events)
     slopes = problem.evaluate(around)
-    known = known_of(problem, slopes, by_reading(problem, around, slopes), blocks, dropped)
+    known = known_of(problem, slopes, by_reading(problem, around, slopes), blocks, dropped, scatter.follows)
     return _found(problem, point, problem.evaluate(point), scatter, dropped, known, around, evaluations)
 
 
@@ -321,7 +362,11 @@ def deviations(found: Fit) -> Array:
     before, after = (v[:, None] for v in grown(known.spread(sizes), known.first))
     (first, second), (_, whole) = np.moveaxis(known.nodes, 2, 0), covariance(sizes, known)
     walked = first * (first + 2.0 * second) * before + second**2 * after  # the later node goes on from the earlier
-    sd = np.sqrt(np.diagonal(whole, axis1=1, axis2=2) + walked)
+    level = 0.0
+    if (levels := known.levels(sizes)) is not None:
+        loads = known.loads[..., LEVEL:]
+        level = np.einsum("eik,ekl,eil->ei", loads, levels.of_events(), loads)
+    sd = np.sqrt(np.diagonal(whole, axis1=1, axis2=2) + walked + level)
     out = np.zeros(found.problem.of.size)
     out[found.blocks.index[found.blocks.there]] = sd[found.blocks.there]
     return out

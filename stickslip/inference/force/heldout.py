@@ -8,6 +8,7 @@ own, a phase or the pull at its start, is left out by halves: they are told by i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.optimize import lsq_linear
 from .fit import STEPS, Fit, deviations, refit
 from .linearised import Array, Linearised, moved, prior_rows, reach
 from .point import Point
-from .scatter import Whitening
+from .scatter import Whitening, WithEvents
 
 SHARES = (1.0, 0.5, 0.25, 0.1)  # of the step to what a fit without some events would give
 
@@ -56,9 +57,9 @@ def halves(fit: Fit) -> list[NDArray[np.intp]]:
 class _Parts:
     """The linear system at the optimum, event by event, so that any of them can be taken out."""
 
-    def __init__(self, fit: Fit) -> None:
+    def __init__(self, fit: Fit, left_out: Sequence[NDArray[np.intp]]) -> None:
         self.fit = fit
-        white = fit.white
+        white = _parted(fit, left_out)
         low, high = reach(fit.problem, fit.point)
         self.free = np.flatnonzero((low < 0.0) & (high > 0.0))
         blocks = fit.blocks
@@ -97,11 +98,25 @@ class _Parts:
         return self.scale * step, self.scale[:, None] * unsure
 
 
+def _parted(fit: Fit, left_out: Sequence[NDArray[np.intp]]) -> WithEvents:
+    """Whitens residuals of events whose level does not go on from one fold to another: none is told by another one."""
+    chain = fit.known.chain
+    if chain is None:
+        return fit.white
+    fold = np.full(chain.group.size, -1)
+    for i, part in enumerate(left_out):
+        fold[part] = i
+    _, group = np.unique(np.stack([chain.group, fold]), axis=1, return_inverse=True)
+    known = fit.known.following(replace(chain, group=group.ravel()))
+    return Whitening(fit.scatter.sizes, known).with_events(known.local)
+
+
 def unseen(fit: Fit, left_out: list[NDArray[np.intp]] | None = None) -> Unseen:
     """Predict every fold from the others."""
-    parts, blocks = _Parts(fit), fit.blocks
+    left_out = left_out or folds(fit)
+    parts, blocks = _Parts(fit, left_out), fit.blocks
     cost, (residual, spread) = np.zeros(len(parts.rest)), np.zeros((2, fit.problem.of.size))
-    for part in left_out or folds(fit):
+    for part in left_out:
         step, unsure = parts.without(part)
         predicted = parts.rest[part] + parts.rows[part] @ step
         cost[part] = _predictive(predicted, parts.rows[part] @ unsure) + parts.logs[part]

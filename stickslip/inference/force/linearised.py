@@ -51,9 +51,8 @@ class Linearised:
 
     def objective(self, point: Point, slopes: Forces) -> float:
         """Of residual, random effects and priors, with this covariance."""
-        white = self.plain(self.blocks(slopes.residual)[..., None])
         _, target = prior_rows(self.problem, point)
-        return float((white**2).sum() + (point.events**2 / self.random).sum() + (target**2).sum())
+        return self.plain.squares(self.blocks(slopes.residual), point.events) + float((target**2).sum())
 
     def step(self, damping: float = 0.0, farthest: float = FARTHEST) -> tuple[Array, Array, float]:
         """Changes of what is shared, the events' own values after them, and the cost expected.
@@ -77,8 +76,10 @@ class Linearised:
 
     def events_after(self, change: Array) -> Array:
         """The events' own values where what is shared is changed, shape (E, 4)."""
-        weighted = self.white.weighted(self.marginal + self.shared @ change)
-        return np.asarray(-self.random * np.einsum("eia,ei->ea", self.local, weighted))
+        rest = self.marginal + self.shared @ change
+        events = -self.random * np.einsum("eia,ei->ea", self.local, self.white.weighted(rest))
+        events[:, 0] -= self.white.level(rest)
+        return np.asarray(events)
 
     def covariance(self) -> Array:
         """Of the shared parameters; what stands at a bound does not move."""

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array, csr_array, dia_array
 
 from .point import Point, Slopes
 from .problem import Problem
-from .scatter import Blocks, Known, Scatter, weigh
+from .scatter import Blocks, Follows, Known, Scatter, weigh
 
 Array = NDArray[np.float64]
 FORGOTTEN = 4.0  # e-folds after which the weakening remembers nothing of the path
@@ -27,15 +27,16 @@ def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size
 
 
 def known_of(
-    problem: Problem, slopes: Slopes, rows: Sequence[csr_array], blocks: Blocks, dropped: NDArray[np.bool_]
-) -> Known:
+    problem: Problem, slopes: Slopes, rows: Sequence[csr_array], blocks: Blocks, dropped: NDArray[np.bool_],
+    follows: Follows | None = None,
+) -> Known:  # fmt: skip
     """What the covariance is made of, at a point; ``rows`` of :func:`by_reading`."""
     strength = problem.composition.nominal[0]  # not the model's: a weaker contact would have a smaller misfit allowed
     return Known(
         noise(problem, rows, blocks), periodic(problem, rows, blocks),
         blocks(left_out(problem, dropped)), blocks(slopes.local), blocks(problem.phase),
         blocks(slopes.spring), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed),
-        problem.lasting, problem.begins, blocks.there, strength,
+        problem.lasting, problem.begins, blocks.there, strength, problem.chain(follows, blocks),
     )  # fmt: skip
 
 

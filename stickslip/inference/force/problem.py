@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import jax
@@ -22,12 +23,16 @@ from .along import Way
 from .compiled_force import EMPTY, Own, compiled
 from .composition import BESIDE, DAMPING, Composition
 from .knots import PHASES, Knots
+from .linked_events import Chain
 from .point import OWN, Forces, Point, Slopes
+from .scatter import Blocks, Follows
 
 Array = NDArray[np.float64]
 CREEPING = PHASES.index("creep")
 LEAST_ROOM = 1024  # knots
 LEVEL = 1e-4  # e-folds of strength by which runs may differ whatever the law, and below which nothing is claimed
+ALONG = ("time", "slip path", "place")  # what a level may follow
+SHORT = 0.5  # of the range of places, above which an event has no place of its own
 LOADED = 1e-3  # of the load, which it must vary by to be told of
 NODES = (
     -8.0,
@@ -88,6 +93,34 @@ class Problem:
         self.carrier: Array | None = None
         self.errors = tuple(np.zeros(k.t.size) for k in runs)
         self.offset = np.zeros(self.at.size)
+        self.coordinates = _coordinates(runs)
+
+    @property
+    def along(self) -> tuple[str, ...]:
+        """What the level of the strength may follow: the place only where the block goes back over it."""
+        begin, end, _ = self.coordinates[ALONG.index("place")]
+        x, back = np.concatenate([_mean(k, k.x) for k in self.runs]), False
+        for r in range(len(self.runs)):
+            own = np.flatnonzero(self.event_run == r)
+            within = [np.ptp(x[self.of == e]) for e in own if (self.of == e).any()]
+            steps = (end - begin)[own]
+            there, returned = steps[steps > 0.0].sum(), -steps[steps < 0.0].sum()
+            short = np.median(within) < SHORT * np.ptp(end[own])
+            back |= bool(short and min(there, returned) > 2.0 * np.median(np.abs(steps)))
+        usable = [name for name in ALONG if self.distance(name) > 0.0]
+        return tuple(name for name in usable if back or name != "place")
+
+    def distance(self, coordinate: str) -> float:
+        """Usual distance of neighbouring events along a coordinate (s or m)."""
+        begin, end, _ = self.coordinates[ALONG.index(coordinate)]
+        return float(np.median(np.abs(end - begin)))
+
+    def chain(self, follows: Follows | None, blocks: Blocks) -> Chain | None:
+        """How levels go on from event to event; runs by themselves."""
+        if follows is None:
+            return None
+        begin, end, share = self.coordinates[ALONG.index(follows.coordinate)]
+        return Chain(begin, end, self.event_run, follows.unit, blocks(share))
 
     def _by_run(self, both: Array) -> Array:
         """Sine and cosine, shape (p, 2), apart for every run with hum, shape (p, 2 h)."""
@@ -262,6 +295,41 @@ class Problem:
         residual += slopes[:, a + b * runs + k :] @ point.common
         sticking, sliding, forces, states = zip(*kept, strict=True)
         return Forces(residual, local, springs, tangents, sticking, sliding, forces, states, held, share), slopes
+
+
+def _coordinates(runs: Sequence[Knots]) -> list[tuple[Array, Array, Array]]:
+    """In the order of :data:`ALONG`: where every event begins and ends, shape (E,), and shares between, shape (p,).
+
+    Events end in the middle of a slip. The share is of the way of an event that is over at a point.
+    """
+    out = []
+    for name in ALONG:
+        parts = []
+        for k in runs:
+            way = {"time": k.t, "slip path": np.append(0.0, np.cumsum(np.abs(np.diff(k.x)))), "place": k.x}[name]
+            limits, values = np.interp(_limits(k), k.t, way), k.at if name == "time" else _mean(k, way)
+            far = np.diff(limits)[k.of]
+            share = (values - limits[k.of]) / np.where(far == 0.0, 1.0, far)
+            parts.append((limits[:-1], limits[1:], np.clip(share, 0.0, 1.0)))
+        begin, end, share = (np.concatenate(v) for v in zip(*parts, strict=True))
+        out.append((begin, end, share))
+    return out
+
+
+def _limits(k: Knots) -> Array:
+    """Times at which the events of a run begin, and at which the last one ends, shape (E + 1,)."""
+    out = np.full(k.events + 1, np.nan)
+    out[0], out[-1] = k.t[0], k.t[-1]
+    seen = np.unique(k.of)  # an event may have no point, and lies between its neighbours
+    for before, after in pairwise(seen.tolist()):
+        out[after] = 0.5 * (k.at[k.of == before].max() + k.at[k.of == after].min())
+    known = np.isfinite(out)
+    return np.interp(np.arange(out.size), np.flatnonzero(known), out[known])
+
+
+def _mean(k: Knots, values: Array) -> Array:
+    """Of what is given at the knots, at the points."""
+    return np.asarray(k.mean @ values / (k.mean @ np.ones(values.size)))
 
 
 def _room(size: int) -> int:

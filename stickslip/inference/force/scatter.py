@@ -1,7 +1,8 @@
 """What is random: noise of the sensor, events that differ, and misfit that is alike from point to point.
 
-But for a walk of the sensor, which goes on from event to event (:mod:`.sensor_walk`), residuals of one event belong
-together and those of two events do not. The covariance of an event's residuals is
+But for a walk of the sensor and a level of the strength that wanders, which go on from event to event
+(:mod:`.linked_events`), residuals of one event belong together and those of two events do not. The covariance of an
+event's residuals is
 
     S = N + diag(numeric) + Z D Z' + L K L',    K_ij = exp(-|s_i - s_j|)
 
@@ -23,22 +24,39 @@ from scipy.linalg.lapack import dtrtri, dtrtrs
 
 from ...errors import FitError
 from .knots import PHASES
-from .sensor_walk import SensorWalk, nodes
+from .linked_events import LEVEL, Chain, Levels, Linked, Links, nodes
 
 Array = NDArray[np.float64]
 EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event to event
 NAMES = (*EVENTS, *PHASES, "position", "walk", "fringe", "white")
+WANDER = ("level", "length", "bend")  # where the strength wanders; the length in usual ways of an event
 _OWN, _PHASE = len(EVENTS), slice(len(EVENTS), len(EVENTS) + len(PHASES))
 _LENGTHS = EVENTS.index("offset")  # that many are logarithms
-_POSITION, _WALK, _FRINGE, _WHITE = range(len(NAMES) - 4, len(NAMES))
+_POSITION, _WALK, _FRINGE, _WHITE, _LEVEL, _LENGTH, _BEND = range(len(NAMES) - 4, len(NAMES) + len(WANDER))
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
-CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0]))
-WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 1.0, 0.1])
+CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0, 1e-3, 4.0, 1e-3]))
+WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 1.0, 0.1, 2.0, 1.5, 2.0])
 NUMERIC = 1e-4  # share of the strength below which nothing is claimed
 REACH = 1.0  # correlation length along the place
 FARTHEST = 1.5  # step of a size, in e-folds
 DAMPINGS = 6  # of a step that does not lower the cost
 SETTLED = 0.05  # fall of the cost at which the search ends
+SHORTEST = 0.5  # length of a wander, in usual distances of events
+
+
+@dataclass(frozen=True)
+class Follows:
+    """What the level of the strength follows.
+
+    Attributes:
+        coordinate: one of :data:`.problem.ALONG`.
+        unit: usual distance of events along it (s or m).
+        alike: coordinates that these data cannot tell from it.
+    """
+
+    coordinate: str
+    unit: float
+    alike: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -46,12 +64,14 @@ class Scatter:
     """Logarithms of the sizes, in the order of NAMES.
 
     Attributes:
-        sizes: of what is random, shape (12,).
-        most: of what differs from event to event, which is not estimated larger, shape (4,).
+        sizes: of what is random, shape (12,), with a level that wanders (15,).
+        most: of what differs from event to event, which is not estimated larger, shape (5,), the last one of the level.
+        follows: what the level follows; None where strengths of events are independent.
     """
 
     sizes: Array
-    most: Array = field(default_factory=lambda: np.full(_OWN, np.inf))
+    most: Array = field(default_factory=lambda: np.full(_OWN + 1, np.inf))
+    follows: Follows | None = None
 
     @classmethod
     def wide(cls) -> Scatter:
@@ -60,20 +80,29 @@ class Scatter:
 
     def larger(self, folds: float) -> Scatter:
         """The same, all but the noise of samples, larger by ``folds`` e-folds."""
-        return replace(self, sizes=self.sizes + folds * (np.arange(len(NAMES)) != _WHITE))
+        return replace(self, sizes=self.sizes + folds * ~np.isin(np.arange(self.sizes.size), (_WHITE, _LENGTH)))
 
     def within(self, other: Scatter) -> Scatter:
-        """The same where events may not differ more than in another.
+        """The same where events may not differ more than in another, and their level follows what it does there.
 
         A law that is added to a model explains a part of how events differ under it, or nothing of that. Where a model
         describes the forces within events badly, a wrong law may describe them better and leave events less alike.
         """
-        return replace(self, most=other.sizes[:_OWN])
+        own = np.append(self.sizes[: len(NAMES)], other.sizes[len(NAMES) :])
+        level = other.sizes[_LEVEL:_LENGTH] if other.follows else [np.inf]
+        return replace(self, sizes=own, most=np.append(other.sizes[:_OWN], level), follows=other.follows)
+
+    def following(self, follows: Follows) -> Scatter:
+        """The same with a level that wanders, which takes most of what the strength of events differs."""
+        size = self.sizes[0]
+        sizes = np.concatenate([self.sizes[: len(NAMES)], [size + np.log(0.8), CENTRES[_LENGTH], size - 2.0]])
+        sizes[0] = size + np.log(0.6)
+        return replace(self, sizes=sizes, follows=follows)
 
     @property
     def prior(self) -> float:
         """How far the sizes are from what is expected of them (chi-square)."""
-        return float((((self.sizes - CENTRES) / WIDTHS) ** 2).sum())
+        return _prior(self.sizes)
 
     def unexpected(self) -> dict[str, float]:
         """Phase -> misfit (share of the strength) that lies beyond two standard deviations of what is expected."""
@@ -81,8 +110,15 @@ class Scatter:
         return {name: float(np.exp(s)) for name, s, far in zip(PHASES, self.sizes[_PHASE], beyond, strict=True) if far}
 
     def named(self) -> dict[str, float]:
-        """Name -> size: shares of strength and of yield displacement, metres of position."""
-        return dict(zip(NAMES, np.exp(self.sizes).tolist(), strict=True))
+        """Name -> size: shares of strength and of yield displacement, metres of position; the length in m or s."""
+        sizes = np.exp(self.sizes)
+        if self.follows is not None:
+            sizes[_LENGTH] *= self.follows.unit
+        return dict(zip((*NAMES, *WANDER)[: sizes.size], sizes.tolist(), strict=True))
+
+
+def _prior(sizes: Array) -> float:
+    return float((((sizes - CENTRES[: sizes.size]) / WIDTHS[: sizes.size]) ** 2).sum())
 
 
 @dataclass(frozen=True)
@@ -122,7 +158,8 @@ class Known:
     within a fringe, shape (E, n, n); ``dropped`` a variance (N^2) that takes
     a point's weight; ``spring`` and ``tangent`` are stiffnesses of the spring and of what sticks (N/m); ``elapsed`` is
     the time since the arrest before, of ``lasting``, shape (E,), to the one after (s); ``first`` tells the first events
-    of the runs, shape (E,); ``strength`` is what is known of the contact's beforehand (N).
+    of the runs, shape (E,); ``strength`` is what is known of the contact's beforehand (N); ``chain`` tells how the
+    level of the strength goes on from event to event, where it does.
     """
 
     noise: Array
@@ -138,6 +175,7 @@ class Known:
     first: NDArray[np.bool_]
     there: NDArray[np.bool_]
     strength: float
+    chain: Chain | None = None
 
     def with_local(self, local: Array) -> Known:
         """The same with other derivatives in the events' own."""
@@ -147,8 +185,12 @@ class Known:
         """The same with other points left out: a variance (N^2) that takes their weight, shape (E, n)."""
         return self._with(replace(self, dropped=dropped))
 
+    def following(self, chain: Chain) -> Known:
+        """The same with levels that go on along a chain."""
+        return self._with(replace(self, chain=chain))
+
     def _with(self, other: Known) -> Known:
-        other.__dict__.update(near=self.near, shifts=self.shifts, nodes=self.nodes)  # which depend on neither
+        other.__dict__.update(near=self.near, shifts=self.shifts, nodes=self.nodes)  # which depend on none of them
         return other
 
     @cached_property
@@ -175,9 +217,35 @@ class Known:
         """What the nodes of the sensor's walk do to the residual force (N/m), shape (E, n, 2)."""
         return nodes(self.spring, self.tangent, self._over) * self.there[..., None]
 
-    def walk(self, sizes: Array, white: Array) -> SensorWalk:
-        """The nodes of the sensor's walk, given them whitened by what events have of their own."""
-        return SensorWalk(white, self.spread(sizes), self.first)
+    @property
+    def loads(self) -> Array:
+        """What all nodes that go on from event to event do to the residual force, shape (E, n, 2 or 4)."""
+        if self.chain is None:
+            return self.nodes
+        return np.concatenate([self.nodes, self.chain.loads(self.local[..., 0])], axis=2)
+
+    @cached_property
+    def bridge(self) -> Array | None:
+        """Covariance (N^2) by a level between its nodes, for a variance of 1 gained over an event of usual length."""
+        if self.chain is None:
+            return None
+        local = self.local[..., 0]
+        return np.asarray(local[:, :, None] * self.chain.bridge() * local[:, None, :])
+
+    @cached_property
+    def links(self) -> Links:
+        """The nodes that go on from event to event."""
+        return Links(self.first, self.chain)
+
+    def linked(self, sizes: Array, white: Array) -> Linked:
+        """The same, given what they do, whitened by what events have of their own."""
+        return Linked(white, self.spread(sizes), self.links, self.levels(sizes))
+
+    def levels(self, sizes: Array) -> Levels | None:
+        """Covariance of the levels of the strength."""
+        if self.chain is None:
+            return None
+        return Levels(self.chain, float(np.exp(sizes[_LEVEL])), float(np.exp(sizes[_LENGTH])))
 
     def spread(self, sizes: Array) -> Array:
         """Standard deviation of the sensor's walk over each event (m), shape (E,)."""
@@ -196,6 +264,8 @@ def _plain(sizes: Array, k: Known) -> Array:
     out = _by_phase(s, k)
     for size, part in ((s[_POSITION], placed), (s[_WALK], walked), (s[_FRINGE], k.periodic), (s[_WHITE], k.noise)):
         out += size**2 * part
+    if (bridge := k.bridge) is not None:
+        out += s[_BEND] ** 2 * bridge
     at = np.arange(out.shape[1])
     out[:, at, at] += np.where(k.there, k.dropped + (NUMERIC * k.strength) ** 2, 1.0)
     return out
@@ -220,12 +290,22 @@ class Whitening:
         root = np.asarray(np.linalg.cholesky(_plain(sizes, known)), float)
         self.back = inverse(root)
         self.logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-        self.nodes = self.back @ known.nodes
-        self.walk = known.walk(sizes, self.nodes)
+        self.loads = self.back @ known.loads
+        loads = self.loads
+        if known.chain is not None:
+            # given its strength, an event tells of its levels by their difference, and by how they stand to it
+            own, least = self.back @ known.local[..., :1], np.exp(-sizes[0])
+            half = np.zeros((loads.shape[0], 1, 4))
+            half[..., LEVEL:] = 0.5 * least
+            loads = np.concatenate([loads - 0.5 * own * (np.arange(4) >= LEVEL), half], axis=1)
+        self.linked = known.linked(sizes, loads)
 
-    def __call__(self, values: Array) -> Array:
-        """Whitened where what is the events' own is given: shape (E, n, m) to (E, n + 1, m)."""
-        return self.walk.apart(self.back @ values)
+    def squares(self, values: Array, events: Array) -> float:
+        """Of residuals (E, n) with what is the events' own, (E, 4), under the covariance of both."""
+        white, own = self.back @ values[..., None], events / np.exp(self.sizes[:_OWN])
+        if self.known.chain is not None:
+            white, own = np.concatenate([white, -own[:, None, :1]], axis=1), own[:, 1:]
+        return float((self.linked.apart(white) ** 2).sum() + (own**2).sum())
 
     def with_events(self, local: Array) -> WithEvents:
         """The same with events that differ; ``local`` are derivatives in what is their own, shape (E, n, 4)."""
@@ -242,21 +322,33 @@ class WithEvents:
         values = np.maximum(values, 0.0)
         self.aside = aside @ turn
         self.share = 1.0 / (1.0 + values + np.sqrt(1.0 + values))  # of (1 + U U')^(-1/2) = 1 - U share U'
-        self.walk = plain.known.walk(plain.sizes, self._apart(plain.nodes))
-        self.logs = plain.logs + np.log1p(values).sum(axis=1) + self.walk.logs
+        known = plain.known
+        loads = plain.loads
+        if known.chain is not None:
+            loads = np.concatenate([loads[..., :LEVEL], self.back @ known.chain.loads(local[..., 0])], axis=2)
+        self.linked = known.linked(plain.sizes, self._apart(loads))
+        self.logs = plain.logs + np.log1p(values).sum(axis=1) + self.linked.logs
 
     def _apart(self, white: Array) -> Array:
         along = np.swapaxes(self.aside, 1, 2) @ white
         return np.asarray(white - self.aside @ (self.share[..., None] * along))
 
     def __call__(self, values: Array) -> Array:
-        """Whitened: shape (E, n, m) to (E, n + 1, m), the last row by the steps of the sensor's walk."""
-        return self.walk.apart(self._apart(self.back @ values))
+        """Whitened: shape (E, n, m) to (E, n + 1, m), the last row by the steps of the sensor's walk.
+
+        With a level that wanders there are two rows more, by its steps.
+        """
+        return self.linked.apart(self._apart(self.back @ values))
 
     def weighted(self, values: Array) -> Array:
         """Times the inverse covariance, shape (E, n)."""
-        white = self._apart(self(values[..., None])[:, :-1])
+        white = self._apart(self(values[..., None])[:, : values.shape[1]])
         return np.asarray((np.swapaxes(self.back, 1, 2) @ white)[..., 0])
+
+    def level(self, values: Array) -> Array:
+        """Mean level (share of the strength) of each event for residuals (E, n), shape (E,); zero where none is."""
+        stands = self.linked.found(self._apart(self.back @ values[..., None]))
+        return np.asarray(0.5 * stands[:, LEVEL:, 0].sum(axis=1))
 
 
 def inverse(root: Array) -> Array:
@@ -275,12 +367,15 @@ def _misfit(sizes: Array, residual: Array, k: Known) -> tuple[float, Array]:
         root = np.asarray(np.linalg.cholesky(covariance(sizes, k)[1]), float)
     except np.linalg.LinAlgError:
         return np.inf, np.zeros(0)
-    side = np.concatenate([residual[..., None], k.nodes], axis=2)
+    side = np.concatenate([residual[..., None], k.loads], axis=2)
     white = np.stack([dtrtrs(one, r, lower=1)[0] for one, r in zip(root, side, strict=True)])
-    walk = k.walk(sizes, white[..., 1:])
-    logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + walk.logs.sum()
-    squares = float((walk.apart(white[..., :1]) ** 2).sum())
-    return squares + float(logs) + Scatter(sizes).prior, root
+    try:
+        linked = k.linked(sizes, white[..., 1:])
+    except np.linalg.LinAlgError:
+        return np.inf, np.zeros(0)
+    logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + linked.logs.sum()
+    squares = float((linked.apart(white[..., :1]) ** 2).sum())
+    return squares + float(logs) + _prior(sizes), root
 
 
 @dataclass(frozen=True)
@@ -290,30 +385,33 @@ class Weighed:
     Attributes:
         inverted: blocks of the events in the inverse of the covariance (N^-2), shape (E, n, n).
         weighted: the inverse covariance times the residuals (1/N), shape (E, n).
-        walk: of the sensor.
-        stands: its most likely nodes (m), shape (E, 2).
+        linked: what goes on from event to event.
+        stands: its most likely nodes (m, and shares of the strength), shape (E, 2 or 4).
         back: inverse root of the covariance with the nodes known (1/N), shape (E, n, n).
+        white: residuals whitened by it, shape (E, n).
     """
 
     inverted: Array
     weighted: Array
-    walk: SensorWalk
+    linked: Linked
     stands: Array
     back: Array
+    white: Array
 
 
 def weigh(sizes: Array, residual: Array, k: Known, root: Array | None = None) -> Weighed:
     """Residuals (E, n) under the whole covariance, of which the root with the nodes known may be given."""
     back = inverse(np.asarray(np.linalg.cholesky(covariance(sizes, k)[1]) if root is None else root, float))
     turned = np.swapaxes(back, 1, 2)
-    white = back @ k.nodes
-    walk = k.walk(sizes, white)
+    white = back @ k.loads
+    linked = k.linked(sizes, white)
     residual = back @ residual[..., None]
-    stands = np.stack(walk.found(residual), axis=1)
+    stands = linked.found(residual)
     upon = turned @ white
     inverted = turned @ back
-    inverted -= upon @ walk.covariance() @ np.swapaxes(upon, 1, 2)
-    return Weighed(inverted, (turned @ (residual - white @ stands))[..., 0], walk, stands[..., 0], back)
+    inverted -= upon @ linked.covariance() @ np.swapaxes(upon, 1, 2)
+    weighted = turned @ (residual - white @ stands)
+    return Weighed(inverted, weighted[..., 0], linked, stands[..., 0], back, residual[..., 0])
 
 
 def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array, Array]:
@@ -339,14 +437,23 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
         pulled = (part @ a[..., None])[..., 0]
         gradient[i] = 2.0 * s[i] ** 2 * (np.einsum("eij,eij->", inverted, part) - (a * pulled).sum())
         moved[..., i] = 2.0 * s[i] ** 2 * pulled
-    steps = np.array([-1.0, 1.0])
-    left = ((steps @ found.walk.covariance() @ steps) + (found.stands @ steps) ** 2) / found.walk.spread**2
-    gradient[_WALK] += 2.0 * (1.0 - left).sum()
-    moved[..., _WALK] += 2.0 * (k.nodes @ found.stands[..., None])[..., 0]
-    white = found.walk.apart(found.back @ moved).reshape(-1, sizes.size)
+    between = [_WALK, _LEVEL, _LENGTH][: 1 if k.chain is None else 3]
+    gradient[between] += found.linked.slopes(found.white)
+    moved[..., _WALK] += 2.0 * (k.nodes @ found.stands[:, :LEVEL, None])[..., 0]
+    if k.chain is not None and (levels := k.levels(sizes)) is not None:
+        loads = k.loads[..., LEVEL:]
+        pulled = k.chain.to_nodes(np.einsum("eik,ei->ek", loads, a))
+        assert k.bridge is not None
+        part = (k.bridge @ a[..., None])[..., 0]
+        gradient[_BEND] = 2.0 * s[_BEND] ** 2 * (np.einsum("eij,eij->", inverted, k.bridge) - (a * part).sum())
+        moved[..., _BEND] = 2.0 * s[_BEND] ** 2 * part
+        for size, of_nodes in ((_LEVEL, 2.0 * levels.times(pulled)), (_LENGTH, levels.slope_times(pulled))):
+            moved[..., size] = np.einsum("eik,ek->ei", loads, of_nodes[k.chain.nodes])
+    white = found.linked.apart(found.back @ moved).reshape(-1, sizes.size)
     information = white.T @ white
-    gradient += 2.0 * (sizes - CENTRES) / WIDTHS**2
-    return gradient, information + np.diag(2.0 / WIDTHS**2)
+    width = WIDTHS[: sizes.size]
+    gradient += 2.0 * (sizes - CENTRES[: sizes.size]) / width**2
+    return gradient, information + np.diag(2.0 / width**2)
 
 
 def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> Scatter:
@@ -358,10 +465,14 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     Raises:
         FitError: the covariance is not positive definite in double precision.
     """
-    low = np.append(CENTRES[:-1] - 5.0 * WIDTHS[:-1], -0.05)
-    high = np.append(CENTRES[:-1] + 4.0 * WIDTHS[:-1], 1.0)
+    low, high = CENTRES - 5.0 * WIDTHS, CENTRES + 4.0 * WIDTHS
+    low[_WHITE], high[_WHITE] = -0.05, 1.0
     high[:_LENGTHS] = np.minimum(high[:_LENGTHS], 0.0)  # further apart than an e-fold are no two events of one contact
-    high[:_OWN] = np.maximum(np.minimum(high[:_OWN], start.most), low[:_OWN])
+    own = [*range(_OWN), _LEVEL]
+    high[own] = np.maximum(np.minimum(high[own], start.most), low[own])
+    if known.chain is not None:  # shorter ones are no wander, and longer ones would be a level of every run
+        low[_LENGTH], high[_LENGTH] = np.log(SHORTEST), np.log(max(known.chain.longest, 2.0 * SHORTEST))
+    low, high = low[: start.sizes.size], high[: start.sizes.size]
     sizes, damping = np.clip(start.sizes, low, high), 1e-2
     cost, root = _misfit(sizes, residual, known)
     if not np.isfinite(cost):

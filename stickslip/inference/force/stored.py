@@ -11,7 +11,7 @@ from .fit import Fit, again
 from .linearised import Array
 from .point import Point
 from .problem import Problem
-from .scatter import Scatter
+from .scatter import Follows, Scatter
 
 POINT = ("z", "phases", "weights", "events", "common")
 AROUND = "around_"
@@ -27,15 +27,25 @@ def point_of(kept: Mapping[str, np.ndarray], prefix: str = "") -> Point:
     return Point(*(np.asarray(kept[prefix + name], float) for name in POINT))
 
 
-def scatter_arrays(scatter: Scatter) -> dict[str, Array]:
-    """Sizes of what is random by name, and what they may not pass."""
-    return {"sizes": scatter.sizes, "most": np.asarray(scatter.most, float)}
+def scatter_arrays(scatter: Scatter) -> dict[str, np.ndarray]:
+    """Sizes of what is random by name, what they may not pass, and what the level of the strength follows."""
+    own = {"sizes": scatter.sizes, "most": np.asarray(scatter.most, float)}
+    if (f := scatter.follows) is None:
+        return own
+    return {**own, "follows": np.array([f.coordinate, *f.alike]), "unit": np.array(f.unit)}
 
 
 def scatter_of(kept: Mapping[str, np.ndarray]) -> Scatter:
     """The sizes again."""
-    sizes = Scatter(np.asarray(kept["sizes"], float))
-    return replace(sizes, most=np.asarray(kept["most"], float)) if "most" in kept else sizes  # files of before
+    scatter = Scatter(np.asarray(kept["sizes"], float))
+    if "most" in kept:  # not in files of before
+        most = scatter.most.copy()
+        most[: kept["most"].size] = kept["most"]
+        scatter = replace(scatter, most=most)
+    if "follows" in kept:
+        coordinate, *alike = (str(name) for name in kept["follows"])
+        scatter = replace(scatter, follows=Follows(coordinate, float(kept["unit"]), tuple(alike)))
+    return scatter
 
 
 def fit_arrays(found: Fit) -> dict[str, np.ndarray]:
