@@ -24,9 +24,9 @@ from stickslip.inference.force.scatter import (
 )
 
 from .test_scatter import EVENTS, POINTS, RUN, events, true
-from .whole import dense
+from .whole import dense, states
 
-LEVEL, LENGTH, BEND = 8e-3, 4.0, 1e-2  # shares of the strength, and usual ways of an event
+LEVEL, LENGTH, BEND = 8e-3, 4.0, 7e-2  # shares of the strength, and usual ways of an event
 FOLLOWS = Follows("time", 1.0)
 BOTH = ["onward", "there and back"]
 
@@ -77,28 +77,34 @@ def test_the_covariance_of_levels_is_what_it_is_said_to_be(way):
     rng = np.random.default_rng(3)
 
     def whole(length: float) -> np.ndarray:
-        apart = np.abs(np.subtract.outer(chain.at, chain.at))
-        return LEVEL**2 * np.exp(-apart / length) * np.equal.outer(chain.of, chain.of)
+        return states(chain.at, chain.of, LEVEL, length)
 
-    levels, values = Levels(chain, LEVEL, LENGTH), rng.standard_normal(chain.at.size)
-    np.testing.assert_allclose(levels.times(values), whole(LENGTH) @ values, rtol=0.0, atol=1e-5 * LEVEL**2)
+    levels, values = Levels(chain, LEVEL, LENGTH), rng.standard_normal(2 * chain.at.size)
+    close = {"rtol": 0.0, "atol": 1e-5 * LEVEL**2 * np.abs(values).sum()}
+    np.testing.assert_allclose(levels.times(values), whole(LENGTH) @ values, **close)
     slope = (whole(LENGTH * np.exp(1e-5)) - whole(LENGTH * np.exp(-1e-5))) / 2e-5
-    np.testing.assert_allclose(levels.slope_times(values), slope @ values, rtol=0.0, atol=2e-5 * LEVEL**2)
+    np.testing.assert_allclose(levels.slope_times(values), slope @ values, **close)
+    here = chain.states
+    of_events = np.stack([whole(LENGTH)[np.ix_(own, own)] for own in here])
+    np.testing.assert_allclose(levels.of_events(), of_events, rtol=0.0, atol=1e-12 * LEVEL**2)
 
 
 def test_between_its_nodes_a_level_is_the_process_too():
     """Nodes and bridge together are the covariance of the process at all points, for events shorter than the length."""
     known, length = levelled("onward", short=False), 300.0
     plain = replace(known, chain=None)
-    at = sizes(LEVEL, length, LEVEL * np.sqrt(2.0 / length))
+    rate = np.sqrt(3.0) / length
+    at = sizes(LEVEL, length, 2.0 * LEVEL * rate**1.5)
     found = dense(at, known) - dense(at[: len(NAMES)], plain)
     chain = known.chain
     s = chain.begin[:, None] + chain.share * (chain.end - chain.begin)[:, None]
-    apart = np.abs(np.subtract.outer(s.ravel(), s.ravel()))
+    q = rate * np.abs(np.subtract.outer(s.ravel(), s.ravel()))
     group = np.repeat(chain.group, POINTS)
     strength = known.local[..., 0].ravel()
-    whole = LEVEL**2 * np.exp(-apart / length) * np.equal.outer(group, group) * np.multiply.outer(strength, strength)
-    np.testing.assert_allclose(found, whole, rtol=0.0, atol=1e-5 * whole.max())
+    whole = LEVEL**2 * (1.0 + q) * np.exp(-q) * np.equal.outer(group, group) * np.multiply.outer(strength, strength)
+    without = dense(sizes(LEVEL, length, 1e-12), known) - dense(at[: len(NAMES)], plain)
+    off, bridged = np.abs(found - whole).max(), np.abs(found - without).max()
+    assert off < 0.05 * bridged, (off, bridged)
 
 
 @pytest.mark.parametrize("way", BOTH)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from stickslip.inference.force.scatter import NAMES, Known, covariance
 
@@ -33,14 +34,22 @@ def dense(sizes: np.ndarray, known: Known) -> np.ndarray:
         out[np.ix_(own, range(points), own, range(points))] += walk**2 * together.reshape(shape)
     if known.chain is not None:
         level, length = np.exp(sizes[len(NAMES) :][:2])
-        chain = known.chain
-        at = np.stack([chain.begin, chain.end], axis=1).ravel()
-        apart = np.abs(np.subtract.outer(at, at)) / chain.unit / length
-        group = np.repeat(chain.group, 2)
-        together = level**2 * np.exp(-apart) * np.equal.outer(group, group)
-        shares = np.stack([1.0 - chain.share, chain.share], axis=2)
-        out += np.einsum(
-            "ei,eia,eafb,fjb,fj->eifj", known.local[..., 0], shares, together.reshape(events, 2, events, 2), shares,
-            known.local[..., 0], optimize=True,
-        )  # fmt: skip
+        chain, (begin, end) = known.chain, (known.chain.begin, known.chain.end)
+        of_states = states(np.stack([begin, end], axis=1).ravel(), np.repeat(chain.group, 2), level, length * chain.unit)
+        of_states[1::2] *= chain.unit  # slopes are over the usual way of an event
+        of_states[:, 1::2] *= chain.unit
+        cubic = CubicHermiteSpline([0.0, 1.0], np.eye(4).reshape(2, 2, 4)[:, 0], np.eye(4).reshape(2, 2, 4)[:, 1])
+        load = cubic(chain.share) * np.stack([np.ones(events), chain.way, np.ones(events), chain.way], axis=1)[:, None]
+        load *= known.local[..., :1]
+        whole = of_states.reshape(events, 4, events, 4)
+        out += np.einsum("eia,eafb,fjb->eifj", load, whole, load, optimize=True)
     return out.reshape(events * points, events * points)
+
+
+def states(at: np.ndarray, group: np.ndarray, size: float, length: float) -> np.ndarray:
+    """Covariance of values and slopes of a Matern process of order 3/2, one after the other, shape (2 n, 2 n)."""
+    far, rate = np.subtract.outer(at, at), np.sqrt(3.0) / length
+    q = rate * np.abs(far)
+    both = np.stack([[1.0 + q, rate**2 * far], [-(rate**2) * far, rate**2 * (1.0 - q)]])
+    both = size**2 * np.exp(-q) * both * np.equal.outer(group, group)
+    return np.transpose(both, (2, 0, 3, 1)).reshape(2 * at.size, 2 * at.size)

@@ -15,7 +15,7 @@ from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
 from .linearised import FARTHEST, Array, Linearised, moved
-from .linked_events import LEVEL, grown
+from .linked_events import WALK, grown
 from .noise import beyond, by_reading, carrier, known_of, left_out, reading_errors
 from .point import Forces, Point, Slopes
 from .problem import Problem
@@ -364,7 +364,7 @@ def deviations(found: Fit) -> Array:
     walked = first * (first + 2.0 * second) * before + second**2 * after  # the later node goes on from the earlier
     level = 0.0
     if (levels := known.levels(sizes)) is not None:
-        loads = known.loads[..., LEVEL:]
+        loads = known.loads[..., WALK:]
         level = np.einsum("eik,ekl,eil->ei", loads, levels.of_events(), loads)
     sd = np.sqrt(np.diagonal(whole, axis1=1, axis2=2) + walked + level)
     out = np.zeros(found.problem.of.size)

@@ -5,10 +5,11 @@ from it, and what sticks (k) remembers where it was at the arrest t0. With w_0 a
 a time T apart, w(t) = (1 - s) w_0 + s w_1 and a Brownian bridge, s = (t - t0) / T. The bridge is an event's own. The
 nodes hang together from event to event of a run, w_1 - w_0 ~ N(0, size^2 T), and begin at zero.
 
-*Level.* The strength of an event is partly its own and partly a level l, an Ornstein-Uhlenbeck process along time, slip
-path or place with nodes where events end, in the middle of slips: cov(l_i, l_j) = size^2 exp(-|s_i - s_j| / length) in
-a run, nothing between runs. Between its nodes it goes straight but for a Brownian bridge, which is an event's own and
-has a size by itself: the level may be smoother than its steps from event to event.
+*Level.* The strength of an event is partly its own and partly a level, a Matern process of order 3/2 along time, slip path
+or place: cov = size^2 (1 + q) exp(-q) with q = sqrt(3) |s_i - s_j| / length in a run, nothing between runs. It has a
+slope, and value and slope together are Markov (Hartikainen & Sarkka 2010); its nodes are where events end, in the
+middle of slips. Between two nodes it goes as a cubic but for the bridge of an integrated Brownian motion, which is an
+event's own and has a size by itself: the level may be smoother than its steps from event to event.
 
 Given the nodes events are independent, so that these are eliminated with a banded matrix (Rue & Held 2005, Gaussian
 Markov Random Fields, ch. 2).
@@ -25,11 +26,15 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded, solve_banded
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.special import gammainc
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-LEVEL = 2  # columns of the walk, before those of the levels
-CLOSEST = 1e-6  # of the usual distance: levels at one place are one
+WALK = 2  # columns of the walk, before those of the levels
+STATES = 2  # of a level at a node: value, and slope times the usual way of an event
+CLOSEST = 1e-3  # of that way: levels at one place are nearly one
+FARTHEST = 1e3  # lengths, at which nothing is left of a level
+TURN = 1e-5  # e-folds of the length, for derivatives in it
 
 
 def nodes(spring: Array, tangent: Array, share: Array) -> Array:
@@ -49,7 +54,7 @@ class Chain:
     Attributes:
         begin, end: coordinate where every event begins and ends, shape (E,).
         group: events of one group hang together, shape (E,).
-        unit: usual length of an event, in which lengths are counted.
+        unit: usual way of an event, in which lengths are counted.
         share: of the way of an event that is over, shape (E, n).
     """
 
@@ -61,7 +66,7 @@ class Chain:
 
     @cached_property
     def nodes(self) -> Index:
-        """Levels where every event begins and ends, shape (E, 2)."""
+        """Nodes where every event begins and ends, shape (E, 2)."""
         events = self.end.size
         first = np.append(True, self.group[1:] != self.group[:-1])
         before = np.arange(events) - 1
@@ -91,90 +96,162 @@ class Chain:
 
     @cached_property
     def gaps(self) -> Array:
-        """From the node before, in units, in order; infinite at the first of a group, shape (L,)."""
+        """From the node before along the chain, in units; infinite at the first of a group, shape (L,)."""
         at, of = self.at[self.order], self.of[self.order]
         apart = np.maximum(np.diff(at, prepend=at[:1]) / self.unit, CLOSEST)
-        return np.where(np.append(True, of[1:] != of[:-1]), np.inf, apart)
+        out = np.empty(at.size)
+        out[self.order] = np.where(np.append(True, of[1:] != of[:-1]), np.inf, apart)
+        return out
 
     @cached_property
     def before(self) -> Index:
         """The node that comes before along the chain, -1 for none, shape (L,)."""
         out = np.full(self.at.size, -1)
-        out[self.order] = np.where(np.isinf(self.gaps), -1, np.append(-1, self.order[:-1]))
-        return out
+        out[self.order] = np.append(-1, self.order[:-1])
+        return np.where(np.isinf(self.gaps), -1, out)
+
+    @property
+    def states(self) -> Index:
+        """Values and slopes at the two ends of every event, shape (E, 4)."""
+        return pairs(self.nodes)
 
     @cached_property
     def longest(self) -> float:
         """Of a group, in units."""
         return float(max(np.ptp(self.at[self.of == g]) for g in np.unique(self.of))) / self.unit
 
+    @cached_property
+    def way(self) -> Array:
+        """From begin to end, in units, shape (E,)."""
+        return (self.end - self.begin) / self.unit
+
+    @cached_property
+    def mean(self) -> Array:
+        """The mean over an event, of its four states, shape (E, 4)."""
+        half = np.full_like(self.way, 0.5)
+        return np.stack([half, self.way / 12.0, half, -self.way / 12.0], axis=1)
+
     def loads(self, strength: Array) -> Array:
-        """What the levels at the two ends of an event do, given what its strength does: (E, n) to (E, n, 2)."""
-        return np.asarray(strength[..., None] * np.stack([1.0 - self.share, self.share], axis=2))
+        """What the four states of an event do, given what its strength does: (E, n) to (E, n, 4)."""
+        s, way = self.share, self.way[:, None]
+        cubic = [
+            1.0 - s**2 * (3.0 - 2.0 * s), way * s * (1.0 - s) ** 2, s**2 * (3.0 - 2.0 * s), -way * s**2 * (1.0 - s)
+        ]  # fmt: skip
+        return np.asarray(strength[..., None] * np.stack(cubic, axis=2))
 
     def bridge(self) -> Array:
-        """Covariance between its nodes of a Brownian level that gains a variance of 1 over a unit, shape (E, n, n)."""
-        least = np.minimum(self.share[:, :, None], self.share[:, None, :])
-        far = np.abs(self.end - self.begin)[:, None, None] / self.unit
-        return np.asarray(far * (least - self.share[:, :, None] * self.share[:, None, :]))
+        """Covariance between its nodes of a level whose slope gains a variance of 1 over a unit, shape (E, n, n).
 
-    def to_nodes(self, values: Array) -> Array:
-        """Sums of what belongs to the two ends of events, shape (E, 2) to (L,)."""
-        return np.asarray(np.bincount(self.nodes.ravel(), values.ravel(), self.at.size), float)
+        That of an integrated Brownian motion with both ends given: the influence function of a clamped beam.
+        """
+        s = np.minimum(self.share[:, :, None], self.share[:, None, :])
+        t = np.maximum(self.share[:, :, None], self.share[:, None, :])
+        return np.asarray(np.abs(self.way[:, None, None]) ** 3 * s**2 * (1.0 - t) ** 2 * (3.0 * t - s - 2.0 * t * s) / 6.0)
+
+    def to_states(self, values: Array) -> Array:
+        """Sums of what belongs to the states of events, shape (E, 4) to (2 L,)."""
+        return np.asarray(np.bincount(self.states.ravel(), values.ravel(), STATES * self.at.size), float)
+
+
+def pairs(of: Index) -> Index:
+    """Numbers of both states of nodes, -1 for none: (n, k) to (n, 2 k)."""
+    both = np.where(of[..., None] < 0, -1, STATES * of[..., None] + np.arange(STATES))
+    return both.reshape(*of.shape[:-1], -1)
 
 
 class Levels:
-    """The covariance C of levels.
+    """The covariance C of levels: x = A x_before + N(0, Q) along the chain.
 
     Args:
         chain: which follows which.
         size: standard deviation (share of the strength).
         length: in the chain's units.
+
+    Attributes:
+        kept: A of every node, zero where none comes before, shape (L, 2, 2).
+        new: Q of every node, shape (L, 2, 2).
     """
 
     def __init__(self, chain: Chain, size: float, length: float) -> None:
-        self.chain, self.size, self.length, order = chain, size, length, chain.order
-        far = chain.gaps / length
-        self._kept, self._new = np.exp(-far), -(size**2) * np.expm1(-2.0 * far)  # along the chain
-        self._longer = self._kept * np.where(np.isinf(far), 0.0, far)  # derivatives in the length's logarithm
-        self._less = -2.0 * size**2 * self._kept * self._longer
-        self.kept, self.new, self.longer, self.less = (np.empty_like(far) for _ in range(4))
-        for out, values in zip(
-            (self.kept, self.new, self.longer, self.less), (self._kept, self._new, self._longer, self._less),
-            strict=True,
-        ):  # fmt: skip
-            out[order] = values
+        self.chain, self.size, self.length = chain, size, length
+        self.kept, self.new = self._step(chain.gaps)
+
+    def _step(self, gaps: Array) -> tuple[Array, Array]:
+        rate = np.sqrt(3.0) / self.length
+        q = np.minimum(rate * gaps, FARTHEST)
+        left, lost = np.exp(-q), gammainc(3.0, 2.0 * q)  # lost: 1 - exp(-2 q) (1 + 2 q + 2 q^2)
+        kept = _matrices(left * (1.0 + q), left * q / rate, -left * q * rate, left * (1.0 - q))
+        both = 2.0 * rate * (q * left) ** 2
+        return kept, self.size**2 * _matrices(lost, both, both, rate**2 * (lost + 4.0 * q * left**2))
+
+    @cached_property
+    def _inverse(self) -> Array:
+        (a, b), (_, d) = np.moveaxis(self.new, 0, 2)
+        return _matrices(d, -b, -b, a) / self._size[:, None, None]
+
+    @cached_property
+    def _size(self) -> Array:
+        (a, b), (_, d) = np.moveaxis(self.new, 0, 2)
+        return np.asarray(a * d - b**2)
+
+    @property
+    def logs(self) -> Array:
+        """Logarithms of the determinants of Q, shape (L,)."""
+        return np.log(self._size)
+
+    @cached_property
+    def precision(self) -> Array:
+        """What every node adds to the inverse of C, of the states before it and its own, shape (L, 4, 4)."""
+        apart = np.concatenate([-self.kept, np.broadcast_to(np.eye(STATES), self.kept.shape)], axis=2)
+        return np.asarray(np.swapaxes(apart, 1, 2) @ self._inverse @ apart)
+
+    def whitened(self, states: Array, before: Array) -> Array:
+        """Steps of states (L, 2, m) from those before them, of unit variance."""
+        root = np.swapaxes(np.linalg.cholesky(self._inverse), 1, 2)
+        return np.asarray(root @ (states - self.kept @ before))
+
+    def longer(self) -> tuple[Levels, Levels]:
+        """The same a little shorter and longer, for derivatives in the logarithm of the length."""
+        return tuple(Levels(self.chain, self.size, self.length * np.exp(f)) for f in (-TURN, TURN))  # type: ignore[return-value]
 
     def times(self, values: Array) -> Array:
-        """C times values, shape (L,)."""
-        return self._back(self._forth(self._new * self._turned(values[self.chain.order])))
+        """C times values, shape (2 L,)."""
+        order = self.chain.order
+        kept, new = self.kept[order], self.new[order]
+        band = np.zeros((2 * STATES, values.size))
+        band[0] = 1.0
+        for i in range(STATES):
+            for j in range(STATES):
+                band[STATES + i - j, j:-STATES:STATES] = -kept[1:, i, j]
+        upper = np.zeros_like(band)  # the same transposed
+        for k in range(2 * STATES):
+            upper[-1 - k, k:] = band[k, : values.size - k]
+        way = pairs(order[:, None]).ravel()
+        turned = solve_banded((0, 2 * STATES - 1), upper, values[way]).reshape(-1, STATES, 1)
+        out = np.empty_like(values)
+        out[way] = solve_banded((2 * STATES - 1, 0), band, (new @ turned).ravel())
+        return out
 
     def slope_times(self, values: Array) -> Array:
-        """Derivative of C in the logarithm of the length, times values, shape (L,)."""
-        turned = self._turned(values[self.chain.order])
-        whole = self._forth(self._new * turned)
-        later = np.append((self._longer * turned)[1:], 0.0)
-        earlier = self._longer * np.append(0.0, whole[:-1])
-        return self._back(self._forth(earlier + self._less * turned + self._new * self._turned(later)))
+        """Derivative of C in the logarithm of the length, times values, shape (2 L,)."""
+        less, more = self.longer()
+        return (more.times(values) - less.times(values)) / (2.0 * TURN)
 
     def of_events(self) -> Array:
-        """C of the two levels of every event, shape (E, 2, 2)."""
-        begin, end = self.chain.at[self.chain.nodes].T
-        beside = np.exp(-np.abs(end - begin) / self.chain.unit / self.length)
-        one = np.ones_like(beside)
-        return self.size**2 * np.stack([np.stack([one, beside], axis=1), np.stack([beside, one], axis=1)], axis=1)
+        """C of the four states of every event, shape (E, 4, 4)."""
+        way = self.chain.way
+        rest = self.size**2 * np.diag([1.0, 3.0 / self.length**2])
+        kept, _ = self._step(np.abs(way))
+        beside = kept @ rest  # of the state that is farther along the coordinate, and the other one
+        beside = np.where((way < 0.0)[:, None, None], np.swapaxes(beside, 1, 2), beside)
+        own = np.broadcast_to(rest, beside.shape)
+        return np.concatenate(
+            [np.concatenate([own, np.swapaxes(beside, 1, 2)], axis=2), np.concatenate([beside, own], axis=2)], axis=1
+        )
 
-    def _forth(self, values: Array) -> Array:
-        return np.asarray(solve_banded((1, 0), np.stack([np.ones_like(values), -np.append(self._kept[1:], 0)]), values))
 
-    def _turned(self, values: Array) -> Array:
-        upper = -np.append(0.0, self._kept[1:])
-        return np.asarray(solve_banded((0, 1), np.stack([upper, np.ones_like(values)]), values))
-
-    def _back(self, values: Array) -> Array:
-        out = np.empty_like(values)
-        out[self.chain.order] = values
-        return out
+def _matrices(a: Array, b: Array, c: Array, d: Array) -> Array:
+    return np.stack([np.stack([a, b], axis=-1), np.stack([c, d], axis=-1)], axis=-2)
 
 
 class Links:
@@ -183,43 +260,46 @@ class Links:
     Args:
         first: whether an event is the first of its run, where the walk begins at zero, shape (E,).
         chain: of the levels, None where there are none.
+
+    Attributes:
+        nodes: of every event: the walk before and after, the states of the level before and after, -1 for none.
+        steps: of every node of the level: the states before it and its own, shape (L, 4).
     """
 
     def __init__(self, first: NDArray[np.bool_], chain: Chain | None) -> None:
         events = np.arange(first.size)
-        nodes = np.stack([np.where(first, -1, events - 1), events], axis=1)
-        self.size, self.at = first.size, events
-        self.levels = self.before = np.zeros(0, int)
+        self.nodes = np.stack([np.where(first, -1, events - 1), events], axis=1)
+        self.size, self.steps = first.size, np.zeros((0, 2 * STATES), int)
         if chain is not None:
-            self.levels = first.size + np.arange(chain.at.size)
-            self.before = np.where(chain.before < 0, -1, chain.before + first.size)
-            nodes = np.concatenate([nodes, chain.nodes + first.size], axis=1)
-            self.size += self.levels.size
-        self.nodes = nodes  # of every event: the walk before and after, the levels before and after, -1 for none
+            levels = np.arange(chain.at.size)
+            steps = pairs(np.stack([chain.before, levels], axis=1))
+            self.steps = np.where(steps < 0, -1, steps + first.size)
+            self.nodes = np.concatenate([self.nodes, chain.states + first.size], axis=1)
+            self.size += STATES * levels.size
+        self.at = np.arange(self.size)
         if chain is not None:
             i, j = self._pairs()
             graph = coo_array((np.ones(i.size), (i, j)), shape=(self.size, self.size)).tocsr()
-            self.at = np.empty(self.size, int)
             self.at[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(self.size)
         i, j = self._pairs()
         self.width = int(np.abs(self.at[i] - self.at[j]).max())
 
     def _pairs(self) -> tuple[Index, Index]:
-        k = self.nodes.shape[1]
-        i = np.concatenate([np.repeat(self.nodes, k, axis=1).ravel(), self.before, self.levels])
-        j = np.concatenate([np.tile(self.nodes, k).ravel(), self.levels, self.before])
+        parts = [np.broadcast_arrays(m[:, :, None], m[:, None, :]) for m in (self.nodes, self.steps)]
+        i, j = (np.concatenate([part[k].ravel() for part in parts]) for k in (0, 1))
         there = (i >= 0) & (j >= 0)
         return i[there], j[there]
 
-    def add(self, band: Array, i: Index, j: Index, values: Array) -> None:
-        """Values to the lower half of a banded matrix, shape (width + 1, nodes)."""
-        i, j, values = np.broadcast_arrays(i, j, values)
+    def add(self, band: Array, which: Index, values: Array) -> None:
+        """Symmetric matrices (g, k, k) of nodes (g, k) to the lower half of a banded matrix (width + 1, nodes)."""
+        i, j = np.broadcast_arrays(which[:, :, None], which[:, None, :])
         row, column = self.at[i], self.at[j]
         use = (i >= 0) & (j >= 0) & (row >= column)
         np.add.at(band, ((row - column)[use], column[use]), values[use])
 
-    def of(self, band: Array, i: Index, j: Index) -> Array:
-        """Entries of a symmetric banded matrix, zero where there is no node."""
+    def of(self, band: Array, which: Index) -> Array:
+        """Parts (g, k, k) of a symmetric banded matrix for nodes (g, k), zero where there is no node."""
+        i, j = np.broadcast_arrays(which[:, :, None], which[:, None, :])
         there = (i >= 0) & (j >= 0)
         row, column = self.at[np.where(there, i, 0)], self.at[np.where(there, j, 0)]
         return np.where(there, band[np.abs(row - column), np.minimum(row, column)], 0.0)
@@ -229,7 +309,7 @@ class Linked:
     """The nodes under a likelihood in which events are independent otherwise.
 
     Args:
-        white: what they do to residuals, whitened, shape (E, n, 2), or (E, n, 4) with levels.
+        white: what they do to residuals, whitened, shape (E, n, 2), or (E, n, 6) with levels.
         spread: standard deviation of the sensor's walk over each event (m), shape (E,).
         links: the nodes.
         levels: their covariance.
@@ -239,20 +319,16 @@ class Linked:
         self.white, self.spread, self.links, self.levels = white, spread, links, levels
         own = np.swapaxes(white, 1, 2) @ white
         steps = np.array([[1.0, -1.0], [-1.0, 1.0]])
-        own[:, :LEVEL, :LEVEL] += steps / spread[:, None, None] ** 2
+        own[:, :WALK, :WALK] += steps / spread[:, None, None] ** 2
         band = np.zeros((links.width + 1, links.size))
         if levels is not None:
-            level, before = links.levels, links.before
-            links.add(band, level, level, 1.0 / levels.new)
-            links.add(band, before, before, levels.kept**2 / levels.new)
-            links.add(band, before, level, -levels.kept / levels.new)
-            links.add(band, level, before, -levels.kept / levels.new)
-        links.add(band, links.nodes[:, :, None], links.nodes[:, None, :], own)
+            links.add(band, links.steps, levels.precision)
+        links.add(band, links.nodes, own)
         self.root = cholesky_banded(band, lower=True)
 
     def found(self, white: Array) -> Array:
-        """Most likely nodes of each event for whitened residuals (E, n, m), shape (E, 2 or 4, m)."""
-        return self._of(self._found(white), self.links.nodes)
+        """Most likely nodes of each event for whitened residuals (E, n, m), shape (E, 2 or 6, m)."""
+        return _of(self._found(white), self.links.nodes)
 
     def _found(self, white: Array) -> Array:
         along, links = np.swapaxes(self.white, 1, 2) @ white, self.links
@@ -261,44 +337,40 @@ class Linked:
         np.add.at(right, links.at[links.nodes[there]], along[there])
         return np.asarray(cho_solve_banded((self.root, True), right)[links.at])
 
-    def _of(self, nodes: Array, which: Index) -> Array:
-        return np.where((which >= 0)[..., None], nodes[which], 0.0)
-
     def apart(self, white: Array) -> Array:
         """Whitened residuals less what the nodes take of them, and the nodes' steps in rows after them.
 
-        Shape (E, n + 1, m), with levels (E, n + 3, m): the step to the level at the end of an event, and, at the
-        first of a group, the level where it begins.
+        Shape (E, n + 1, m), with levels (E, n + 5, m): the steps of value and slope to the end of an event, and, at the
+        first of a group, those where it begins.
         """
         nodes = self._found(white)
-        stands = self._of(nodes, self.links.nodes)
+        stands = _of(nodes, self.links.nodes)
         rows = [white - self.white @ stands, ((stands[:, 0] - stands[:, 1]) / self.spread[:, None])[:, None]]
         if self.levels is not None:
-            steps = self._steps(nodes) / np.sqrt(self.levels.new)[:, None]
-            rows.append(self._by_event(steps))
+            states = _of(nodes, self.links.steps)
+            steps = self.levels.whitened(states[:, STATES:], states[:, :STATES])
+            rows.append(self._by_event(steps).reshape(white.shape[0], 2 * STATES, -1))
         return np.concatenate(rows, axis=1)
 
-    def _steps(self, nodes: Array) -> Array:
-        """Of the levels (L, m), from what is left of the one before."""
-        assert self.levels is not None
-        return nodes[self.links.levels] - self.levels.kept[:, None] * self._of(nodes, self.links.before)
-
     def _by_event(self, values: Array) -> Array:
-        """What belongs to the levels (L, m): to those where events end, and where the first ones begin."""
-        events = self.links.nodes.shape[0]
-        out = np.zeros((events, 2, values.shape[1]))
+        """What belongs to nodes of the level, (L, ...), to the events that end or are the first to begin there."""
+        events = self.spread.size
+        assert self.levels is not None
+        begin = self.levels.chain.nodes[:, 0]
+        out = np.zeros((events, 2, *values.shape[1:]))
         out[:, 0] = values[:events]
-        out[self.links.nodes[:, LEVEL] >= 2 * events, 1] = values[events:]
+        out[begin >= events, 1] = values[events:]
         return out
 
     @property
     def logs(self) -> Array:
         """What each event adds to the logarithm of the determinant of the covariance, shape (E,)."""
-        roots, events = np.log(self.root[0])[self.links.at][:, None], self.spread.size
-        out = roots[:events, 0] + np.log(self.spread)
+        roots, events = 2.0 * np.log(self.root[0])[self.links.at], self.spread.size
+        out = roots[:events] + 2.0 * np.log(self.spread)
         if self.levels is not None:
-            out += self._by_event(roots[events:] + 0.5 * np.log(self.levels.new)[:, None]).sum(axis=(1, 2))
-        return 2.0 * out
+            own = roots[events:].reshape(-1, STATES).sum(axis=1) + self.levels.logs
+            out = out + self._by_event(own).sum(axis=1)
+        return np.asarray(out)
 
     @cached_property
     def _inverse(self) -> Array:
@@ -315,8 +387,8 @@ class Linked:
         return out
 
     def covariance(self) -> Array:
-        """Of the nodes of each event, given the residuals, shape (E, 2, 2) or (E, 4, 4)."""
-        return self.links.of(self._inverse, self.links.nodes[:, :, None], self.links.nodes[:, None, :])
+        """Of the nodes of each event, given the residuals, shape (E, 2, 2) or (E, 6, 6)."""
+        return self.links.of(self._inverse, self.links.nodes)
 
     def slopes(self, white: Array) -> Array:
         """Of the cost in the logarithms of the walk's size and of size and length of the levels, shape (1,) or (3,).
@@ -325,21 +397,22 @@ class Linked:
             white: whitened residuals, shape (E, n).
         """
         nodes, steps = self._found(white[..., None]), np.array([1.0, -1.0])
-        off = self._of(nodes, self.links.nodes)[:, :LEVEL, 0] @ steps
-        walk = (steps @ self.covariance()[:, :LEVEL, :LEVEL] @ steps + off**2) / self.spread**2
+        off = _of(nodes, self.links.nodes)[:, :WALK, 0] @ steps
+        walk = (steps @ self.covariance()[:, :WALK, :WALK] @ steps + off**2) / self.spread**2
         out = [2.0 * (1.0 - walk).sum()]
         if self.levels is not None:
-            levels, before, level = self.levels, self.links.before, self.links.levels
-            last, step = self._of(nodes, before)[:, 0], self._steps(nodes)[:, 0]
-            own, both, prior = (
-                self.links.of(self._inverse, i, j) for i, j in ((level, level), (level, before), (before, before))
-            )
-            squares = step**2 + own - 2.0 * levels.kept * both + levels.kept**2 * prior
-            shared = step * last + both - levels.kept * prior
-            left = 1.0 - squares / levels.new
-            out.append(2.0 * left.sum())
-            out.append(((left * levels.less - 2.0 * levels.longer * shared) / levels.new).sum())
+            states = _of(nodes, self.links.steps)
+            squares = states @ np.swapaxes(states, 1, 2) + self.links.of(self._inverse, self.links.steps)
+            out.append(2.0 * (STATES * squares.shape[0] - (self.levels.precision * squares).sum()))
+            less, more = self.levels.longer()
+            changed = ((more.precision - less.precision) * squares).sum() + (more.logs - less.logs).sum()
+            out.append(changed / (2.0 * TURN))
         return np.array(out)
+
+
+def _of(nodes: Array, which: Index) -> Array:
+    """Values of nodes (n, m) in the order that is asked for, (g, k) to (g, k, m); zero where there is none."""
+    return np.where((which >= 0)[..., None], nodes[which], 0.0)
 
 
 def grown(spread: Array, first: NDArray[np.bool_]) -> tuple[Array, Array]:

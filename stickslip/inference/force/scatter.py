@@ -24,7 +24,7 @@ from scipy.linalg.lapack import dtrtri, dtrtrs
 
 from ...errors import FitError
 from .knots import PHASES
-from .linked_events import LEVEL, Chain, Levels, Linked, Links, nodes
+from .linked_events import WALK, Chain, Levels, Linked, Links, nodes
 
 Array = NDArray[np.float64]
 EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event to event
@@ -94,9 +94,10 @@ class Scatter:
 
     def following(self, follows: Follows) -> Scatter:
         """The same with a level that wanders, which takes most of what the strength of events differs."""
-        size = self.sizes[0]
-        sizes = np.concatenate([self.sizes[: len(NAMES)], [size + np.log(0.8), CENTRES[_LENGTH], size - 2.0]])
-        sizes[0] = size + np.log(0.6)
+        level, length = self.sizes[0] + np.log(0.8), CENTRES[_LENGTH]
+        bend = level + np.log(2.0) + 1.5 * (0.5 * np.log(3.0) - length)  # of the process itself
+        sizes = np.concatenate([self.sizes[: len(NAMES)], [level, length, bend]])
+        sizes[0] += np.log(0.6)
         return replace(self, sizes=sizes, follows=follows)
 
     @property
@@ -219,14 +220,14 @@ class Known:
 
     @property
     def loads(self) -> Array:
-        """What all nodes that go on from event to event do to the residual force, shape (E, n, 2 or 4)."""
+        """What all nodes that go on from event to event do to the residual force, shape (E, n, 2 or 6)."""
         if self.chain is None:
             return self.nodes
         return np.concatenate([self.nodes, self.chain.loads(self.local[..., 0])], axis=2)
 
     @cached_property
     def bridge(self) -> Array | None:
-        """Covariance (N^2) by a level between its nodes, for a variance of 1 gained over an event of usual length."""
+        """Covariance (N^2) by a level between its nodes, whose slope gains a variance of 1 over an event of usual length."""
         if self.chain is None:
             return None
         local = self.local[..., 0]
@@ -295,9 +296,8 @@ class Whitening:
         if known.chain is not None:
             # given its strength, an event tells of its levels by their difference, and by how they stand to it
             own, least = self.back @ known.local[..., :1], np.exp(-sizes[0])
-            half = np.zeros((loads.shape[0], 1, 4))
-            half[..., LEVEL:] = 0.5 * least
-            loads = np.concatenate([loads - 0.5 * own * (np.arange(4) >= LEVEL), half], axis=1)
+            mean = np.pad(known.chain.mean, ((0, 0), (WALK, 0)))[:, None]
+            loads = np.concatenate([loads - own * mean, least * mean], axis=1)
         self.linked = known.linked(sizes, loads)
 
     def squares(self, values: Array, events: Array) -> float:
@@ -322,10 +322,10 @@ class WithEvents:
         values = np.maximum(values, 0.0)
         self.aside = aside @ turn
         self.share = 1.0 / (1.0 + values + np.sqrt(1.0 + values))  # of (1 + U U')^(-1/2) = 1 - U share U'
-        known = plain.known
+        self.known = known = plain.known
         loads = plain.loads
         if known.chain is not None:
-            loads = np.concatenate([loads[..., :LEVEL], self.back @ known.chain.loads(local[..., 0])], axis=2)
+            loads = np.concatenate([loads[..., :WALK], self.back @ known.chain.loads(local[..., 0])], axis=2)
         self.linked = known.linked(plain.sizes, self._apart(loads))
         self.logs = plain.logs + np.log1p(values).sum(axis=1) + self.linked.logs
 
@@ -336,7 +336,7 @@ class WithEvents:
     def __call__(self, values: Array) -> Array:
         """Whitened: shape (E, n, m) to (E, n + 1, m), the last row by the steps of the sensor's walk.
 
-        With a level that wanders there are two rows more, by its steps.
+        With a level that wanders there are four rows more, by its steps.
         """
         return self.linked.apart(self._apart(self.back @ values))
 
@@ -347,8 +347,10 @@ class WithEvents:
 
     def level(self, values: Array) -> Array:
         """Mean level (share of the strength) of each event for residuals (E, n), shape (E,); zero where none is."""
+        if self.known.chain is None:
+            return np.zeros(values.shape[0])
         stands = self.linked.found(self._apart(self.back @ values[..., None]))
-        return np.asarray(0.5 * stands[:, LEVEL:, 0].sum(axis=1))
+        return np.asarray((self.known.chain.mean * stands[:, WALK:, 0]).sum(axis=1))
 
 
 def inverse(root: Array) -> Array:
@@ -386,7 +388,7 @@ class Weighed:
         inverted: blocks of the events in the inverse of the covariance (N^-2), shape (E, n, n).
         weighted: the inverse covariance times the residuals (1/N), shape (E, n).
         linked: what goes on from event to event.
-        stands: its most likely nodes (m, and shares of the strength), shape (E, 2 or 4).
+        stands: its most likely nodes (m, and shares of the strength), shape (E, 2 or 6).
         back: inverse root of the covariance with the nodes known (1/N), shape (E, n, n).
         white: residuals whitened by it, shape (E, n).
     """
@@ -439,16 +441,16 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
         moved[..., i] = 2.0 * s[i] ** 2 * pulled
     between = [_WALK, _LEVEL, _LENGTH][: 1 if k.chain is None else 3]
     gradient[between] += found.linked.slopes(found.white)
-    moved[..., _WALK] += 2.0 * (k.nodes @ found.stands[:, :LEVEL, None])[..., 0]
+    moved[..., _WALK] += 2.0 * (k.nodes @ found.stands[:, :WALK, None])[..., 0]
     if k.chain is not None and (levels := k.levels(sizes)) is not None:
-        loads = k.loads[..., LEVEL:]
-        pulled = k.chain.to_nodes(np.einsum("eik,ei->ek", loads, a))
+        loads = k.loads[..., WALK:]
+        pulled = k.chain.to_states(np.einsum("eik,ei->ek", loads, a))
         assert k.bridge is not None
         part = (k.bridge @ a[..., None])[..., 0]
         gradient[_BEND] = 2.0 * s[_BEND] ** 2 * (np.einsum("eij,eij->", inverted, k.bridge) - (a * part).sum())
         moved[..., _BEND] = 2.0 * s[_BEND] ** 2 * part
-        for size, of_nodes in ((_LEVEL, 2.0 * levels.times(pulled)), (_LENGTH, levels.slope_times(pulled))):
-            moved[..., size] = np.einsum("eik,ek->ei", loads, of_nodes[k.chain.nodes])
+        for size, of_states in ((_LEVEL, 2.0 * levels.times(pulled)), (_LENGTH, levels.slope_times(pulled))):
+            moved[..., size] = np.einsum("eik,ek->ei", loads, of_states[k.chain.states])
     white = found.linked.apart(found.back @ moved).reshape(-1, sizes.size)
     information = white.T @ white
     width = WIDTHS[: sizes.size]
