@@ -121,7 +121,7 @@ class Fit:
     @property
     def cost(self) -> float:
         """Twice the negative logarithm of likelihood and priors, those of the sizes of what is random included."""
-        return float(self.likelihood.sum()) + self.prior + self.scatter.prior
+        return float(self.likelihood.sum()) + self.prior + self.known.prior(self.scatter.sizes)
 
     @property
     def residual(self) -> Array:

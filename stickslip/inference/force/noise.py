@@ -35,7 +35,7 @@ def known_of(
         noise(problem, rows, blocks), periodic(problem, rows, blocks),
         blocks(left_out(problem, dropped)), blocks(slopes.local), blocks(problem.phase),
         blocks(slopes.spring), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed),
-        problem.lasting, problem.begins, blocks.there, strength,
+        problem.lasting, problem.begins, blocks.there, strength, problem.walk,
     )  # fmt: skip
 
 

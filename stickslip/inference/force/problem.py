@@ -85,6 +85,8 @@ class Problem:
         self.usual = np.concatenate(
             [np.full(self.alike, systematic), np.full(len(runs), LEVEL), np.ones(2 * self.hums.size)]
         )
+        walks = np.array([k.walk for k in runs])
+        self.walk = float(np.exp(np.log(walks).mean())) if (walks > 0.0).all() else 0.0  # as stated, m/s^0.5
         self.carrier: Array | None = None
         self.errors = tuple(np.zeros(k.t.size) for k in runs)
         self.offset = np.zeros(self.at.size)

@@ -34,6 +34,7 @@ _POSITION, _WALK, _FRINGE, _WHITE = range(len(NAMES) - 4, len(NAMES))
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
 CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0]))
 WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 1.0, 0.1])
+STATED = 0.25  # e-folds around a walk of the sensor that is stated: a record at rest tells it to one digit
 NUMERIC = 1e-4  # share of the strength below which nothing is claimed
 REACH = 1.0  # correlation length along the place
 FARTHEST = 1.5  # step of a size, in e-folds
@@ -69,11 +70,6 @@ class Scatter:
         describes the forces within events badly, a wrong law may describe them better and leave events less alike.
         """
         return replace(self, most=other.sizes[:_OWN])
-
-    @property
-    def prior(self) -> float:
-        """How far the sizes are from what is expected of them (chi-square)."""
-        return float((((self.sizes - CENTRES) / WIDTHS) ** 2).sum())
 
     def unexpected(self) -> dict[str, float]:
         """Phase -> misfit (share of the strength) that lies beyond two standard deviations of what is expected."""
@@ -122,7 +118,8 @@ class Known:
     within a fringe, shape (E, n, n); ``dropped`` a variance (N^2) that takes
     a point's weight; ``spring`` and ``tangent`` are stiffnesses of the spring and of what sticks (N/m); ``elapsed`` is
     the time since the arrest before, of ``lasting``, shape (E,), to the one after (s); ``first`` tells the first events
-    of the runs, shape (E,); ``strength`` is what is known of the contact's beforehand (N).
+    of the runs, shape (E,); ``strength`` is what is known of the contact's beforehand (N); ``stated`` is a walk of the
+    sensor that is stated (m/s^0.5), zero where none is.
     """
 
     noise: Array
@@ -138,6 +135,20 @@ class Known:
     first: NDArray[np.bool_]
     there: NDArray[np.bool_]
     strength: float
+    stated: float = 0.0
+
+    @cached_property
+    def expected(self) -> tuple[Array, Array]:
+        """Logarithms of sizes as they are expected, and how many e-folds around it, shape (12,) each."""
+        centres, widths = CENTRES.copy(), WIDTHS.copy()
+        if self.stated > 0.0:
+            centres[_WALK], widths[_WALK] = np.log(self.stated), STATED
+        return centres, widths
+
+    def prior(self, sizes: Array) -> float:
+        """How far sizes are from what is expected of them (chi-square)."""
+        centres, widths = self.expected
+        return float((((sizes - centres) / widths) ** 2).sum())
 
     def with_local(self, local: Array) -> Known:
         """The same with other derivatives in the events' own."""
@@ -280,7 +291,7 @@ def _misfit(sizes: Array, residual: Array, k: Known) -> tuple[float, Array]:
     walk = k.walk(sizes, white[..., 1:])
     logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + walk.logs.sum()
     squares = float((walk.apart(white[..., :1]) ** 2).sum())
-    return squares + float(logs) + Scatter(sizes).prior, root
+    return squares + float(logs) + k.prior(sizes), root
 
 
 @dataclass(frozen=True)
@@ -345,8 +356,9 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
     moved[..., _WALK] += 2.0 * (k.nodes @ found.stands[..., None])[..., 0]
     white = found.walk.apart(found.back @ moved).reshape(-1, sizes.size)
     information = white.T @ white
-    gradient += 2.0 * (sizes - CENTRES) / WIDTHS**2
-    return gradient, information + np.diag(2.0 / WIDTHS**2)
+    centres, widths = k.expected
+    gradient += 2.0 * (sizes - centres) / widths**2
+    return gradient, information + np.diag(2.0 / widths**2)
 
 
 def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> Scatter:
@@ -358,8 +370,9 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     Raises:
         FitError: the covariance is not positive definite in double precision.
     """
-    low = np.append(CENTRES[:-1] - 5.0 * WIDTHS[:-1], -0.05)
-    high = np.append(CENTRES[:-1] + 4.0 * WIDTHS[:-1], 1.0)
+    centres, widths = known.expected
+    low = np.append(centres[:-1] - 5.0 * widths[:-1], -0.05)
+    high = np.append(centres[:-1] + 4.0 * widths[:-1], 1.0)
     high[:_LENGTHS] = np.minimum(high[:_LENGTHS], 0.0)  # further apart than an e-fold are no two events of one contact
     high[:_OWN] = np.maximum(np.minimum(high[:_OWN], start.most), low[:_OWN])
     sizes, damping = np.clip(start.sizes, low, high), 1e-2
