@@ -14,8 +14,9 @@ from ...system.progress import breathe, portion
 from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
+from .jumps import jumping
 from .linearised import FARTHEST, Array, Linearised, moved
-from .noise import beyond, by_reading, carrier, known_of, left_out, reading_errors
+from .noise import FAR, beyond, by_reading, carrier, known_of, left_out, reading_errors
 from .point import Forces, Point, Slopes
 from .problem import Problem
 from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
@@ -27,6 +28,7 @@ LAST = 30  # evaluations with the covariance as it was found
 STEPS = 4  # evaluations between
 NEWTON = 4  # steps of the sizes between
 FIRST = 0.6  # share of the rounds of a fit that begins in what it takes, at most
+MOST_JUMPS = 4  # of the reading in a campaign: they are rare
 ADJUSTED = 0.8  # share of a base fit before the motion is adjusted
 LARGER = 1.0  # e-folds by which sizes are taken for larger where a search may stand in a dent
 
@@ -237,7 +239,20 @@ def fit_base(problem: Problem, point: Point) -> Fit:
     found = again(problem, found.point, found.scatter, found.dropped, found.around, found.evaluations)
     with portion(ADJUSTED, 1.0):
         other = adapted(refit(problem, found.point, found))
+        while len(other.problem.jumps) < MOST_JUMPS and (event := jumping(other.problem, other._system)) is not None:
+            after = _jumped(other, event)
+            if other.cost - after.cost < FAR**2:
+                break
+            other = after
     return replace(other, evaluations=found.evaluations + other.evaluations)
+
+
+def _jumped(found: Fit, event: int) -> Fit:
+    """The fit with a reading that jumps before an event."""
+    problem = found.problem.with_jump(event)
+    point, around = (replace(p, common=np.append(p.common, 0.0)) for p in (found.point, found.around))
+    same = again(problem, point, found.scatter, found.dropped, around, found.evaluations)
+    return adapted(refit(problem, point, same))
 
 
 def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:

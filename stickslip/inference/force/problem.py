@@ -27,6 +27,7 @@ from .point import OWN, Forces, Point, Slopes
 Array = NDArray[np.float64]
 CREEPING = PHASES.index("creep")
 LEAST_ROOM = 1024  # knots
+JUMP = 5e-8  # m, usual size of a jump of the reading: some speckle, less than a fringe
 LEVEL = 1e-4  # e-folds of strength by which runs may differ whatever the law, and below which nothing is claimed
 LOADED = 1e-3  # of the load, which it must vary by to be told of
 NODES = (
@@ -50,7 +51,7 @@ class Problem:
 
     What is found with the model besides its parameters, each about as large as ``usual``, shape (c,): errors of the
     position that ``alike`` hats along the cycle give to all cycles, a level for each run, by which the logarithm of its
-    strength is another, and what is left of the hum.
+    strength is another, what is left of the hum, and jumps of the reading before some events (:meth:`with_jump`).
     Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
     the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`).
     """
@@ -88,6 +89,7 @@ class Problem:
         walks = np.array([k.walk for k in runs])
         self.walk = float(np.exp(np.log(walks).mean())) if (walks > 0.0).all() else 0.0  # as stated, m/s^0.5
         self.carrier: Array | None = None
+        self.jumps: tuple[int, ...] = ()
         self.errors = tuple(np.zeros(k.t.size) for k in runs)
         self.offset = np.zeros(self.at.size)
 
@@ -102,6 +104,20 @@ class Problem:
         other.__dict__.update(self.__dict__)
         other.composition = composition
         return other
+
+    def with_jump(self, event: int) -> Problem:
+        """The same with a reading that jumps before an event and stays there; its size comes last in ``common``."""
+        other = self.with_composition(self.composition)
+        other.jumps, other.usual = (*self.jumps, event), np.append(self.usual, JUMP)
+        return other
+
+    def jumped(self, event: int) -> Array:
+        """What a reading that is too high by 1 m from an event on takes from the residual (N), shape (p,)."""
+        run = int(self.event_run[event])
+        named = {f.name: f.start for f in self.composition.shared} | dict(self.composition.fixed)
+        own = self.runs[run].stiffness
+        spring = named["rig.spring_stiffness"] if own is None else own
+        return np.where((self.run == run) & (self.of >= event), spring, 0.0)
 
     def carried_by(self, carrier: Array) -> Problem:
         """The same with what carries errors of the position and levels of runs to a force held as it is.
@@ -152,11 +168,12 @@ class Problem:
 
     def _carried(self, tangent: Array, local: Array) -> Array:
         own = self.run[:, None] == np.arange(len(self.runs))
+        jumps = np.stack([self.jumped(e) for e in self.jumps], axis=1) if self.jumps else np.zeros((own.shape[0], 0))
         if self.carrier is None:
-            return np.hstack([tangent[:, None] * self._hats, local[:, :1] * own, tangent[:, None] * self._hums])
+            return np.hstack([tangent[:, None] * self._hats, local[:, :1] * own, tangent[:, None] * self._hums, jumps])
         shared, sine, cosine, level = self.carrier.T
         both = self._by_run(np.column_stack([sine, cosine]))
-        return np.hstack([shared[:, None] * self._hats, level[:, None] * own, both])
+        return np.hstack([shared[:, None] * self._hats, level[:, None] * own, both, jumps])
 
     def values(self, point: Point) -> dict[str, float]:
         """Name -> SI value of what is shared."""
