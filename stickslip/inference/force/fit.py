@@ -16,7 +16,7 @@ from .bank import placed
 from .descent import DAMPING, descend
 from .jumps import jumping
 from .linearised import FARTHEST, Array, Linearised, moved
-from .noise import FAR, beyond, by_reading, carrier, known_of, left_out, reading_errors
+from .noise import FAR, bands, beyond, by_reading, carrier, known_of, left_out, reading_errors
 from .point import Forces, Point, Slopes
 from .problem import Problem
 from .scatter import Blocks, Known, Scatter, Whitening, WithEvents, covariance, estimate, misfit
@@ -244,6 +244,10 @@ def fit_base(problem: Problem, point: Point) -> Fit:
             if other.cost - after.cost < FAR**2:
                 break
             other = after
+    if not any(run.prescribed for run in problem.runs):
+        rows = by_reading(other.problem, other.around, other.problem.evaluate(other.around))
+        frequencies = bands(other.problem, rows, other.blocks, other.scatter, other.known)
+        other = replace(other, problem=other.problem.in_bands(frequencies))
     return replace(other, evaluations=found.evaluations + other.evaluations)
 
 

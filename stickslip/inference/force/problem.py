@@ -90,6 +90,7 @@ class Problem:
         self.walk = float(np.exp(np.log(walks).mean())) if (walks > 0.0).all() else 0.0  # as stated, m/s^0.5
         self.carrier: Array | None = None
         self.jumps: tuple[int, ...] = ()
+        self.bands = np.full(len(PHASES), float(np.mean([k.band for k in runs])))
         self.errors = tuple(np.zeros(k.t.size) for k in runs)
         self.offset = np.zeros(self.at.size)
 
@@ -118,6 +119,12 @@ class Problem:
         own = self.runs[run].stiffness
         spring = named["rig.spring_stiffness"] if own is None else own
         return np.where((self.run == run) & (self.of >= event), spring, 0.0)
+
+    def in_bands(self, bands: Array) -> Problem:
+        """The same with other frequencies of the noise, by phase (rad/s), shape (4,)."""
+        other = self.with_composition(self.composition)
+        other.bands = bands
+        return other
 
     def carried_by(self, carrier: Array) -> Problem:
         """The same with what carries errors of the position and levels of runs to a force held as it is.
@@ -187,11 +194,10 @@ class Problem:
         return [Own(events[index, columns], (index >= 0).astype(float)) for index in self._events]
 
     def run_arguments(self, point: Point) -> list[tuple[Any, ...]]:
-        """Of every run: its own spring (N/m), way, number of knots, band, and what differs from event to event."""
+        """Of every run: its own spring (N/m), way, number of knots, and what differs from event to event."""
         springs = [np.float64(np.nan if k.stiffness is None else k.stiffness) for k in self.runs]
         knots = [np.int64(k.t.size) for k in self.runs]
-        bands = [np.float64(k.band) for k in self.runs]
-        return list(zip(springs, self.ways, knots, bands, self.own(point), strict=True))
+        return list(zip(springs, self.ways, knots, self.own(point), strict=True))
 
     def evaluate(self, point: Point) -> Slopes:
         """Residuals and derivatives."""
@@ -239,8 +245,8 @@ class Problem:
         p, kept = 0, []
         for r, (run, parts) in enumerate(zip(self.runs, found, strict=True)):
             n, s = run.t.size, slice(p, p + run.at.size)
-            q, shift, mass, slope, gain, late, *parts = parts
-            dq, dshift, dmass, dslope, dgain, dlate, elements, tangent, *state = parts
+            q, shift, mass, slope, gain, delay, *parts = parts
+            dq, dshift, dmass, dslope, dgain, ddelay, elements, tangent, *state = parts
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             way = mean @ (run.x - run.x[0])
@@ -249,6 +255,9 @@ class Problem:
                 way = way + mean @ shift[:n]
             spring = starts["rig.spring_stiffness"] if run.stiffness is None else run.stiffness
             steep = mean @ slope[:n] / (mean @ np.ones(n))
+            # the noise of a reading that is late is taken ahead as well, the faster it is the larger it becomes
+            band = self.bands[run.phase]
+            late, later = np.sqrt(1.0 + (band * delay) ** 2), band**2 * delay * ddelay[:, None]
             read = not run.prescribed  # else a reading is told by itself, and the likelihood is that of the force
             counts = gain * np.where(slow[s], steep / spring, late * mass / c.mass) if read else np.ones(run.at.size)
             share[s] = 1.0 / counts
@@ -258,7 +267,7 @@ class Problem:
             if sensed:
                 moved = moved - mass * (second @ dshift[:, :n].T) - damping * (first @ dshift[:, :n].T)
                 moved = moved - beside * (mean @ dshift[:, :n].T)
-            faster = dmass / mass + dlate / late
+            faster = dmass / mass + later.T / late[:, None] ** 2
             grown = np.where(slow[s, None], (mean @ dslope[:, :n].T) / (mean @ slope[:n])[:, None], faster)
             moved = share[s, None] * moved - read * residual[s, None] * (grown + dgain / gain)
             local[s] = moved[:, -OWN:]
