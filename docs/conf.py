@@ -50,7 +50,13 @@ def write_effect_pages(app: Any) -> None:
 
 def drawn_anew(app: Any, env: Any, added: set[str], changed: set[str], removed: set[str]) -> list[str]:
     """Pages with tables from files of results that are newer than the page was read."""
-    sources = [HERE / "tables.py", HERE / "pictures.py", HERE / "results", *HERE.glob("results/*.json"), *HERE.glob("paper/*.json")]
+    sources = [
+        HERE / "tables.py",
+        HERE / "pictures.py",
+        HERE / "results",
+        *HERE.glob("results/*.json"),
+        *HERE.glob("paper/*.json"),
+    ]
     newest = max(path.stat().st_mtime_ns for path in sources) // 1000
     old = [page for page, read in env.all_docs.items() if read < newest and Path(env.doc2path(page)).is_file()]
     texts = {page: Path(env.doc2path(page)).read_text(encoding="utf-8") for page in old}

@@ -29,11 +29,13 @@ class Case:
 
     Attributes:
         truth: of the generator.
+        rig: as it is stated.
         traces, found, knots, times: data, events, runs at their knots, and the times they were thinned by.
         problem, point: the base and where its fit begins.
     """
 
     truth: dict[str, Any]
+    rig: Any
     traces: list[Trace]
     found: list[Segmentation]
     knots: list[Knots]
@@ -51,7 +53,7 @@ def made(folder: Any, seed: int, effects: Any = (), runs: tuple[Run, ...] = SMAL
     times = scales(list(zip(traces, found, strict=True)), ringing(traces, found), traces[0].sampling_rate)
     thinned = [knots(t, s, times) for t, s in zip(traces, found, strict=True)]
     problem, point = begin(campaign.rig, traces, found, thinned, times)
-    return Case(truth, traces, found, thinned, times, problem, point)
+    return Case(truth, campaign.rig, traces, found, thinned, times, problem, point)
 
 
 def seen(tag: str, form: str, multiple: float) -> tuple[str, float, str]:

@@ -35,7 +35,8 @@ def dense(sizes: np.ndarray, known: Known) -> np.ndarray:
     if known.chain is not None:
         level, length = np.exp(sizes[len(NAMES) :][:2])
         chain, (begin, end) = known.chain, (known.chain.begin, known.chain.end)
-        of_states = states(np.stack([begin, end], axis=1).ravel(), np.repeat(chain.group, 2), level, length * chain.unit)
+        ends, group = np.stack([begin, end], axis=1).ravel(), np.repeat(chain.group, 2)
+        of_states = states(ends, group, level, length * chain.unit)
         of_states[1::2] *= chain.unit  # slopes are over the usual way of an event
         of_states[:, 1::2] *= chain.unit
         cubic = CubicHermiteSpline([0.0, 1.0], np.eye(4).reshape(2, 2, 4)[:, 0], np.eye(4).reshape(2, 2, 4)[:, 1])

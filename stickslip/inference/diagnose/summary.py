@@ -16,6 +16,7 @@ from ..force.composition import PULL
 from ..force.errors import of_all, sums
 from ..force.fit import Fit
 from ..force.heldout import apart
+from ..force.jumps import jumps
 from ..force.knots import PHASES
 from ..force.linearised import Array
 from ..force.prescribed import placeholders
@@ -94,7 +95,7 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
         "backbone": section(d.shape),
         "held_out": "every run in turn; in halves if a run has its own parameters",
         "kept_aside": list(d.prepared.aside),
-        "dropped": [*d.dropped, *left_out(d.confirmation)],
+        "dropped": [*d.dropped, *jumps(d.fit), *left_out(d.confirmation)],
         "equations": [{"text": words.text(), "latex": words.latex()}],
         KEY: record(found),
     }  # fmt: skip

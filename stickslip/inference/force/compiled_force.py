@@ -46,7 +46,7 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
 
     def forces(
         z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, spring: Any,
-        way: Way, knots: Any, band: Any,
+        way: Way, knots: Any,
     ) -> Any:  # fmt: skip
         si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
         values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
@@ -54,7 +54,7 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
             stiffness = jnp.where(jnp.isnan(spring), values["rig.spring_stiffness"], spring)
             way = way._replace(drive=way.drive + values[PULL] / stiffness)
         model = model_of(values, effects, Bank(weights / reach, weights), spring)
-        seen, late = way, jnp.ones(())
+        seen, delay = way, jnp.zeros(())
         if any(isinstance(e, Sensor) for e in effects):
             # the measured force, near enough for a sensor that sees it
             force = model.block.spring_stiffness * (way.drive - way.x) + way.force
@@ -62,9 +62,8 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
             def before(rate: Any) -> Way:
                 return undone(model, way._replace(v=rate), force, knots)
 
-            # what a reading that is late is taken ahead by is its rate's, and the faster the larger
             seen, ahead = jax.jvp(before, (way.v,), (jnp.ones_like(way.v),))
-            late = jnp.sqrt(1.0 + (band * jnp.sum(ahead.x) / way.x.size) ** 2)
+            delay = jnp.sum(ahead.x) / way.x.size  # a reading that is late is taken ahead by its rate
         shift = seen.x - way.x
         held = along(model, of_events(seen, event), knots)
         steep = jax.vmap(jax.grad(model.pull))(lead(model, way.t, way.drive) - seen.x)
@@ -72,19 +71,19 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
         steps = jnp.diff(way.x)
         gain = 1.0 + jnp.sum(steps * jnp.diff(shift)) / jnp.sum(steps**2)
         return (
-            (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, gain, late),
+            (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, gain, delay),
             (held.elements, held.tangent, held.slides, held.sliding, held.psi),
         )
 
     def derived(
         z: Any, turn: Any, scales: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any, spring: Any,
-        way: Way, knots: Any, band: Any, own: Own,
+        way: Way, knots: Any, own: Own,
     ) -> Any:  # fmt: skip
         effects = jax.tree.unflatten(structure, leaves)
 
         def moved(row: Any) -> Any:
             def f(z: Any, turn: Any, event: Any) -> Any:
-                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots, band)
+                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots)
 
             # all events are moved at once: each acts on its own points only
             step = own.moves * row[a + b :]

@@ -14,9 +14,10 @@ from ...system.progress import breathe, portion
 from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
+from .jumps import jumping
 from .linearised import FARTHEST, Array, Linearised, moved
 from .linked_events import WALK, grown
-from .noise import beyond, by_reading, carrier, known_of, left_out, reading_errors
+from .noise import FAR, bands, beyond, by_reading, carrier, known_of, left_out, reading_errors
 from .point import Forces, Point, Slopes
 from .problem import Problem
 from .scatter import (
@@ -38,6 +39,7 @@ LAST = 30  # evaluations with the covariance as it was found
 STEPS = 4  # evaluations between
 NEWTON = 4  # steps of the sizes between
 FIRST = 0.6  # share of the rounds of a fit that begins in what it takes, at most
+MOST_JUMPS = 4  # of the reading in a campaign: they are rare
 ADJUSTED = 0.8  # share of a base fit before the motion is adjusted
 FEWEST = 12  # events from which on it is asked whether their strengths follow each other
 ALIKE = 6.0  # of the cost, by which coordinates that can be told apart differ at least: a likelihood ratio of twenty
@@ -134,7 +136,7 @@ class Fit:
     @property
     def cost(self) -> float:
         """Twice the negative logarithm of likelihood and priors, those of the sizes of what is random included."""
-        return float(self.likelihood.sum()) + self.prior + self.scatter.prior
+        return float(self.likelihood.sum()) + self.prior + self.known.prior(self.scatter.sizes)
 
     @property
     def residual(self) -> Array:
@@ -252,7 +254,24 @@ def fit_base(problem: Problem, point: Point) -> Fit:
     found = again(problem, found.point, found.scatter, found.dropped, found.around, found.evaluations)
     with portion(ADJUSTED, 1.0):
         other = adapted(refit(problem, found.point, found))
+        while len(other.problem.jumps) < MOST_JUMPS and (event := jumping(other.problem, other._system)) is not None:
+            after = _jumped(other, event)
+            if other.cost - after.cost < FAR**2:
+                break
+            other = after
+    if not any(run.prescribed for run in problem.runs):
+        rows = by_reading(other.problem, other.around, other.problem.evaluate(other.around))
+        frequencies = bands(other.problem, rows, other.blocks, other.scatter, other.known)
+        other = replace(other, problem=other.problem.in_bands(frequencies))
     return replace(other, evaluations=found.evaluations + other.evaluations)
+
+
+def _jumped(found: Fit, event: int) -> Fit:
+    """The fit with a reading that jumps before an event."""
+    problem = found.problem.with_jump(event)
+    point, around = (replace(p, common=np.append(p.common, 0.0)) for p in (found.point, found.around))
+    same = again(problem, point, found.scatter, found.dropped, around, found.evaluations)
+    return adapted(refit(problem, point, same))
 
 
 def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:

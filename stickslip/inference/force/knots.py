@@ -69,6 +69,8 @@ class Knots:
         band: angular frequency of what the test function's second derivative leaves of white noise (rad/s).
         hum: what sine and cosine of the sensor's hum, each as large as is expected, add to the samples of each group
             (m), shape (g, 2).
+        walk: random walk of the reading where it is stated (m/s^0.5), else zero.
+        step: between samples (s).
     """
 
     name: str
@@ -97,6 +99,8 @@ class Knots:
     force_noise: Array
     band: float
     hum: Array
+    walk: float = 0.0
+    step: float = 0.0
 
     @property
     def prescribed(self) -> bool:
@@ -339,7 +343,7 @@ class _Pieces:
             made["at"], phase, of, made["rate"], made["acceleration"], told,
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, begun), np.diff(begun),
             noise, trace.spring_stiffness, trace.virgin, np.zeros(knot_t.size), load_at(trace, knot_t),
-            np.zeros(of.size), band(second, rate), told.sums(times.hum.at(t)),
+            np.zeros(of.size), band(second, rate), told.sums(times.hum.at(t)), trace.walk, 1.0 / rate,
         )  # fmt: skip
         return selected(knots_made, keep)
 

@@ -5,9 +5,9 @@ from it, and what sticks (k) remembers where it was at the arrest t0. With w_0 a
 a time T apart, w(t) = (1 - s) w_0 + s w_1 and a Brownian bridge, s = (t - t0) / T. The bridge is an event's own. The
 nodes hang together from event to event of a run, w_1 - w_0 ~ N(0, size^2 T), and begin at zero.
 
-*Level.* The strength of an event is partly its own and partly a level, a Matern process of order 3/2 along time, slip path
-or place: cov = size^2 (1 + q) exp(-q) with q = sqrt(3) |s_i - s_j| / length in a run, nothing between runs. It has a
-slope, and value and slope together are Markov (Hartikainen & Sarkka 2010); its nodes are where events end, in the
+*Level.* The strength of an event is partly its own and partly a level, a Matern process of order 3/2 along time, slip
+path or place: cov = size^2 (1 + q) exp(-q) with q = sqrt(3) |s_i - s_j| / length in a run, nothing between runs. It has
+a slope, and value and slope together are Markov (Hartikainen & Sarkka 2010); its nodes are where events end, in the
 middle of slips. Between two nodes it goes as a cubic but for the bridge of an integrated Brownian motion, which is an
 event's own and has a size by itself: the level may be smoother than its steps from event to event.
 
@@ -146,7 +146,8 @@ class Chain:
         """
         s = np.minimum(self.share[:, :, None], self.share[:, None, :])
         t = np.maximum(self.share[:, :, None], self.share[:, None, :])
-        return np.asarray(np.abs(self.way[:, None, None]) ** 3 * s**2 * (1.0 - t) ** 2 * (3.0 * t - s - 2.0 * t * s) / 6.0)
+        clamped = s**2 * (1.0 - t) ** 2 * (3.0 * t - s - 2.0 * t * s) / 6.0
+        return np.asarray(np.abs(self.way[:, None, None]) ** 3 * clamped)
 
     def to_states(self, values: Array) -> Array:
         """Sums of what belongs to the states of events, shape (E, 4) to (2 L,)."""

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, dia_array
+from scipy.sparse import coo_array, csr_array, dia_array, diags_array
 
+from .knots import PHASES
 from .point import Point, Slopes
 from .problem import Problem
-from .scatter import Blocks, Follows, Known, Scatter, weigh
+from .scatter import Blocks, Follows, Known, Scatter, covariance, weigh
 
 Array = NDArray[np.float64]
 FORGOTTEN = 4.0  # e-folds after which the weakening remembers nothing of the path
@@ -36,7 +37,7 @@ def known_of(
         noise(problem, rows, blocks), periodic(problem, rows, blocks),
         blocks(left_out(problem, dropped)), blocks(slopes.local), blocks(problem.phase),
         blocks(slopes.spring), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed),
-        problem.lasting, problem.begins, blocks.there, strength, problem.chain(follows, blocks),
+        problem.lasting, problem.begins, blocks.there, strength, problem.walk, problem.chain(follows, blocks),
     )  # fmt: skip
 
 
@@ -168,3 +169,24 @@ def weakened(t: Array, x: Array, sliding: Array, psi: Array, ratio: float, reach
     stored = np.zeros(t.size + 1, int)
     stored[slide + 1] = counts
     return csr_array((value, j, np.cumsum(stored)), shape=(t.size,) * 2)
+
+
+def bands(problem: Problem, carried: Sequence[csr_array], blocks: Blocks, scatter: Scatter, known: Known) -> Array:
+    """Angular frequency of the noise by phase (rad/s), shape (4,).
+
+    Where a model takes a reading ahead by a time tau, its noise e becomes e + tau e', and the covariance S of the
+    residuals S + tau^2 N with the covariance N by the noise of the rates. The likelihood is that of the readings, so
+    that residuals are told by their size before: in the phase each is divided by (1 + (omega tau)^2)^0.5, where omega^2
+    is the mean of diag(S^-1 N), by which the logarithm of the determinant grows as it should.
+    """
+    rates = []
+    for run, row in zip(problem.runs, carried, strict=True):
+        single = run.reading.count == 1  # beside each other in time
+        both = (single[1:] & single[:-1]).astype(float)
+        ends = diags_array([np.append(-both, 0.0), both], offsets=[0, 1], shape=(single.size, single.size))
+        rates.append(csr_array(row @ ends.T) / run.step)
+    grown = scatter.named()["white"] ** 2 * noise(problem, rates, blocks)
+    _, whole = covariance(scatter.sizes, known)
+    share = np.einsum("eij,eji->ei", np.linalg.inv(whole), grown)
+    phases = [share[blocks.there & (known.phase == i)] for i in range(len(PHASES))]
+    return np.sqrt(np.maximum([own.mean() if own.size else 0.0 for own in phases], 0.0))

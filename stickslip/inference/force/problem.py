@@ -30,6 +30,7 @@ from .scatter import Blocks, Follows
 Array = NDArray[np.float64]
 CREEPING = PHASES.index("creep")
 LEAST_ROOM = 1024  # knots
+JUMP = 5e-8  # m, usual size of a jump of the reading: some speckle, less than a fringe
 LEVEL = 1e-4  # e-folds of strength by which runs may differ whatever the law, and below which nothing is claimed
 ALONG = ("time", "slip path", "place")  # what a level may follow
 SHORT = 0.5  # of the range of places, above which an event has no place of its own
@@ -55,7 +56,7 @@ class Problem:
 
     What is found with the model besides its parameters, each about as large as ``usual``, shape (c,): errors of the
     position that ``alike`` hats along the cycle give to all cycles, a level for each run, by which the logarithm of its
-    strength is another, and what is left of the hum.
+    strength is another, what is left of the hum, and jumps of the reading before some events (:meth:`with_jump`).
     Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
     the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`).
     """
@@ -90,7 +91,11 @@ class Problem:
         self.usual = np.concatenate(
             [np.full(self.alike, systematic), np.full(len(runs), LEVEL), np.ones(2 * self.hums.size)]
         )
+        walks = np.array([k.walk for k in runs])
+        self.walk = float(np.exp(np.log(walks).mean())) if (walks > 0.0).all() else 0.0  # as stated, m/s^0.5
         self.carrier: Array | None = None
+        self.jumps: tuple[int, ...] = ()
+        self.bands = np.full(len(PHASES), float(np.mean([k.band for k in runs])))
         self.errors = tuple(np.zeros(k.t.size) for k in runs)
         self.offset = np.zeros(self.at.size)
         self.coordinates = _coordinates(runs)
@@ -132,6 +137,26 @@ class Problem:
         other = object.__new__(Problem)
         other.__dict__.update(self.__dict__)
         other.composition = composition
+        return other
+
+    def with_jump(self, event: int) -> Problem:
+        """The same with a reading that jumps before an event and stays there; its size comes last in ``common``."""
+        other = self.with_composition(self.composition)
+        other.jumps, other.usual = (*self.jumps, event), np.append(self.usual, JUMP)
+        return other
+
+    def jumped(self, event: int) -> Array:
+        """What a reading that is too high by 1 m from an event on takes from the residual (N), shape (p,)."""
+        run = int(self.event_run[event])
+        named = {f.name: f.start for f in self.composition.shared} | dict(self.composition.fixed)
+        own = self.runs[run].stiffness
+        spring = named["rig.spring_stiffness"] if own is None else own
+        return np.where((self.run == run) & (self.of >= event), spring, 0.0)
+
+    def in_bands(self, bands: Array) -> Problem:
+        """The same with other frequencies of the noise, by phase (rad/s), shape (4,)."""
+        other = self.with_composition(self.composition)
+        other.bands = bands
         return other
 
     def carried_by(self, carrier: Array) -> Problem:
@@ -183,11 +208,12 @@ class Problem:
 
     def _carried(self, tangent: Array, local: Array) -> Array:
         own = self.run[:, None] == np.arange(len(self.runs))
+        jumps = np.stack([self.jumped(e) for e in self.jumps], axis=1) if self.jumps else np.zeros((own.shape[0], 0))
         if self.carrier is None:
-            return np.hstack([tangent[:, None] * self._hats, local[:, :1] * own, tangent[:, None] * self._hums])
+            return np.hstack([tangent[:, None] * self._hats, local[:, :1] * own, tangent[:, None] * self._hums, jumps])
         shared, sine, cosine, level = self.carrier.T
         both = self._by_run(np.column_stack([sine, cosine]))
-        return np.hstack([shared[:, None] * self._hats, level[:, None] * own, both])
+        return np.hstack([shared[:, None] * self._hats, level[:, None] * own, both, jumps])
 
     def values(self, point: Point) -> dict[str, float]:
         """Name -> SI value of what is shared."""
@@ -201,11 +227,10 @@ class Problem:
         return [Own(events[index, columns], (index >= 0).astype(float)) for index in self._events]
 
     def run_arguments(self, point: Point) -> list[tuple[Any, ...]]:
-        """Of every run: its own spring (N/m), way, number of knots, band, and what differs from event to event."""
+        """Of every run: its own spring (N/m), way, number of knots, and what differs from event to event."""
         springs = [np.float64(np.nan if k.stiffness is None else k.stiffness) for k in self.runs]
         knots = [np.int64(k.t.size) for k in self.runs]
-        bands = [np.float64(k.band) for k in self.runs]
-        return list(zip(springs, self.ways, knots, bands, self.own(point), strict=True))
+        return list(zip(springs, self.ways, knots, self.own(point), strict=True))
 
     def evaluate(self, point: Point) -> Slopes:
         """Residuals and derivatives."""
@@ -253,8 +278,8 @@ class Problem:
         p, kept = 0, []
         for r, (run, parts) in enumerate(zip(self.runs, found, strict=True)):
             n, s = run.t.size, slice(p, p + run.at.size)
-            q, shift, mass, slope, gain, late, *parts = parts
-            dq, dshift, dmass, dslope, dgain, dlate, elements, tangent, *state = parts
+            q, shift, mass, slope, gain, delay, *parts = parts
+            dq, dshift, dmass, dslope, dgain, ddelay, elements, tangent, *state = parts
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             way = mean @ (run.x - run.x[0])
@@ -263,6 +288,9 @@ class Problem:
                 way = way + mean @ shift[:n]
             spring = starts["rig.spring_stiffness"] if run.stiffness is None else run.stiffness
             steep = mean @ slope[:n] / (mean @ np.ones(n))
+            # the noise of a reading that is late is taken ahead as well, the faster it is the larger it becomes
+            band = self.bands[run.phase]
+            late, later = np.sqrt(1.0 + (band * delay) ** 2), band**2 * delay * ddelay[:, None]
             read = not run.prescribed  # else a reading is told by itself, and the likelihood is that of the force
             counts = gain * np.where(slow[s], steep / spring, late * mass / c.mass) if read else np.ones(run.at.size)
             share[s] = 1.0 / counts
@@ -272,7 +300,7 @@ class Problem:
             if sensed:
                 moved = moved - mass * (second @ dshift[:, :n].T) - damping * (first @ dshift[:, :n].T)
                 moved = moved - beside * (mean @ dshift[:, :n].T)
-            faster = dmass / mass + dlate / late
+            faster = dmass / mass + later.T / late[:, None] ** 2
             grown = np.where(slow[s, None], (mean @ dslope[:, :n].T) / (mean @ slope[:n])[:, None], faster)
             moved = share[s, None] * moved - read * residual[s, None] * (grown + dgain / gain)
             local[s] = moved[:, -OWN:]

@@ -36,6 +36,7 @@ _POSITION, _WALK, _FRINGE, _WHITE, _LEVEL, _LENGTH, _BEND = range(len(NAMES) - 4
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
 CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0, 1e-3, 4.0, 1e-3]))
 WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 1.0, 0.1, 2.0, 1.5, 2.0])
+STATED = 0.25  # e-folds around a walk of the sensor that is stated: a record at rest tells it to one digit
 NUMERIC = 1e-4  # share of the strength below which nothing is claimed
 REACH = 1.0  # correlation length along the place
 FARTHEST = 1.5  # step of a size, in e-folds
@@ -100,11 +101,6 @@ class Scatter:
         sizes[0] += np.log(0.6)
         return replace(self, sizes=sizes, follows=follows)
 
-    @property
-    def prior(self) -> float:
-        """How far the sizes are from what is expected of them (chi-square)."""
-        return _prior(self.sizes)
-
     def unexpected(self) -> dict[str, float]:
         """Phase -> misfit (share of the strength) that lies beyond two standard deviations of what is expected."""
         beyond = self.sizes[_PHASE] > CENTRES[_PHASE] + 2.0 * WIDTHS[_PHASE]
@@ -116,10 +112,6 @@ class Scatter:
         if self.follows is not None:
             sizes[_LENGTH] *= self.follows.unit
         return dict(zip((*NAMES, *WANDER)[: sizes.size], sizes.tolist(), strict=True))
-
-
-def _prior(sizes: Array) -> float:
-    return float((((sizes - CENTRES[: sizes.size]) / WIDTHS[: sizes.size]) ** 2).sum())
 
 
 @dataclass(frozen=True)
@@ -159,8 +151,9 @@ class Known:
     within a fringe, shape (E, n, n); ``dropped`` a variance (N^2) that takes
     a point's weight; ``spring`` and ``tangent`` are stiffnesses of the spring and of what sticks (N/m); ``elapsed`` is
     the time since the arrest before, of ``lasting``, shape (E,), to the one after (s); ``first`` tells the first events
-    of the runs, shape (E,); ``strength`` is what is known of the contact's beforehand (N); ``chain`` tells how the
-    level of the strength goes on from event to event, where it does.
+    of the runs, shape (E,); ``strength`` is what is known of the contact's beforehand (N); ``stated`` is a walk of the
+    sensor that is stated (m/s^0.5), zero where none is; ``chain`` tells how the level of the strength goes on from
+    event to event, where it does.
     """
 
     noise: Array
@@ -176,7 +169,22 @@ class Known:
     first: NDArray[np.bool_]
     there: NDArray[np.bool_]
     strength: float
+    stated: float = 0.0
     chain: Chain | None = None
+
+    @cached_property
+    def expected(self) -> tuple[Array, Array]:
+        """Logarithms of sizes as they are expected, and how many e-folds around it, shape (12,) or (15,) each."""
+        size = len(NAMES) if self.chain is None else len(CENTRES)
+        centres, widths = CENTRES[:size].copy(), WIDTHS[:size].copy()
+        if self.stated > 0.0:
+            centres[_WALK], widths[_WALK] = np.log(self.stated), STATED
+        return centres, widths
+
+    def prior(self, sizes: Array) -> float:
+        """How far sizes are from what is expected of them (chi-square)."""
+        centres, widths = self.expected
+        return float((((sizes - centres) / widths) ** 2).sum())
 
     def with_local(self, local: Array) -> Known:
         """The same with other derivatives in the events' own."""
@@ -227,7 +235,7 @@ class Known:
 
     @cached_property
     def bridge(self) -> Array | None:
-        """Covariance (N^2) by a level between its nodes, whose slope gains a variance of 1 over an event of usual length."""
+        """Covariance (N^2) by a level between its nodes, whose slope gains a variance of 1 over a usual event."""
         if self.chain is None:
             return None
         local = self.local[..., 0]
@@ -377,7 +385,7 @@ def _misfit(sizes: Array, residual: Array, k: Known) -> tuple[float, Array]:
         return np.inf, np.zeros(0)
     logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum() + linked.logs.sum()
     squares = float((linked.apart(white[..., :1]) ** 2).sum())
-    return squares + float(logs) + _prior(sizes), root
+    return squares + float(logs) + k.prior(sizes), root
 
 
 @dataclass(frozen=True)
@@ -453,9 +461,9 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
             moved[..., size] = np.einsum("eik,ek->ei", loads, of_states[k.chain.states])
     white = found.linked.apart(found.back @ moved).reshape(-1, sizes.size)
     information = white.T @ white
-    width = WIDTHS[: sizes.size]
-    gradient += 2.0 * (sizes - CENTRES[: sizes.size]) / width**2
-    return gradient, information + np.diag(2.0 / width**2)
+    centres, widths = k.expected
+    gradient += 2.0 * (sizes - centres) / widths**2
+    return gradient, information + np.diag(2.0 / widths**2)
 
 
 def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> Scatter:
@@ -467,14 +475,14 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     Raises:
         FitError: the covariance is not positive definite in double precision.
     """
-    low, high = CENTRES - 5.0 * WIDTHS, CENTRES + 4.0 * WIDTHS
+    centres, widths = known.expected
+    low, high = centres - 5.0 * widths, centres + 4.0 * widths
     low[_WHITE], high[_WHITE] = -0.05, 1.0
     high[:_LENGTHS] = np.minimum(high[:_LENGTHS], 0.0)  # further apart than an e-fold are no two events of one contact
-    own = [*range(_OWN), _LEVEL]
-    high[own] = np.maximum(np.minimum(high[own], start.most), low[own])
+    own = [*range(_OWN), _LEVEL] if known.chain is not None else [*range(_OWN)]
+    high[own] = np.maximum(np.minimum(high[own], start.most[: len(own)]), low[own])
     if known.chain is not None:  # shorter ones are no wander, and longer ones would be a level of every run
         low[_LENGTH], high[_LENGTH] = np.log(SHORTEST), np.log(max(known.chain.longest, 2.0 * SHORTEST))
-    low, high = low[: start.sizes.size], high[: start.sizes.size]
     sizes, damping = np.clip(start.sizes, low, high), 1e-2
     cost, root = _misfit(sizes, residual, known)
     if not np.isfinite(cost):

@@ -86,7 +86,7 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
 
     def one(
         values: Any, known: Any, leaves: Any, weights: Any, reach: Any, turned: Any, spring: Any, way: Way, knots: Any,
-        band: Any, own: Own,
+        own: Own,
     ) -> Any:  # fmt: skip
         effects = jax.tree.unflatten(base, leaves)
         everything = {**known, **turned}
@@ -109,7 +109,7 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
 
         return jax.jvp(forces, (values[names[place]],), (jnp.ones(()),))[1]
 
-    every = jax.vmap(one, in_axes=(0, *[None] * 10))
+    every = jax.vmap(one, in_axes=(0, *[None] * 9))
     own = of_this_package(base) and cls.__module__.split(".")[0] == __name__.split(".")[0]
     return Program(every, f"signature {base} {structure}" if own else None)
 

@@ -60,6 +60,8 @@ def fit_arrays(found: Fit) -> dict[str, np.ndarray]:
         "carrier": np.asarray([] if problem.carrier is None else problem.carrier),
         "errors": np.concatenate(problem.errors),
         "offset": problem.offset,
+        "jumps": np.array(problem.jumps, int),
+        "bands": problem.bands,
         "valleys": np.array(found.valleys),
         "evaluations": np.array(found.evaluations),
     }
@@ -79,6 +81,10 @@ def fit_of(problem: Problem, kept: Mapping[str, np.ndarray]) -> Fit:
     if "errors" in kept:  # files of before have none
         ends = np.cumsum([e.size for e in problem.errors])[:-1]
         problem = problem.moved(np.split(np.asarray(kept["errors"], float), ends), np.asarray(kept["offset"], float))
+    if "bands" in kept:
+        problem = problem.in_bands(np.asarray(kept["bands"], float))
+    for event in kept.get("jumps", ()):
+        problem = problem.with_jump(int(event))
     if kept["carrier"].size:
         problem = problem.carried_by(np.asarray(kept["carrier"], float))
     found = again(
