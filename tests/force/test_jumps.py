@@ -47,9 +47,10 @@ def test_a_jump_is_found_with_its_size(longer, sign):
     assert base.point.common[-1] == pytest.approx(sign * SIZE, abs=1e-8)
     (text,) = jumps(base)
     assert f"during slip {SLIP};" in text and problem.runs[RUN].name in text
-    kept = fit_of(begun.with_composition(problem.composition), fit_arrays(base))
-    assert kept.problem.jumps == problem.jumps
-    np.testing.assert_allclose(kept.residual, base.residual, rtol=0.0, atol=1e-12)
+    for other in (begun, problem):
+        kept = fit_of(other.with_composition(problem.composition), fit_arrays(base))
+        assert kept.problem.jumps == problem.jumps
+        np.testing.assert_allclose(kept.residual, base.residual, rtol=0.0, atol=1e-12)
 
 
 def test_where_nothing_jumps_nothing_is_found(longer):

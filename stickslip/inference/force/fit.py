@@ -268,7 +268,7 @@ def fit_base(problem: Problem, point: Point) -> Fit:
 
 def _jumped(found: Fit, event: int) -> Fit:
     """The fit with a reading that jumps before an event."""
-    problem = found.problem.with_jump(event)
+    problem = found.problem.with_jumps((*found.problem.jumps, event))
     point, around = (replace(p, common=np.append(p.common, 0.0)) for p in (found.point, found.around))
     same = again(problem, point, found.scatter, found.dropped, around, found.evaluations)
     return adapted(refit(problem, point, same))

@@ -56,7 +56,7 @@ class Problem:
 
     What is found with the model besides its parameters, each about as large as ``usual``, shape (c,): errors of the
     position that ``alike`` hats along the cycle give to all cycles, a level for each run, by which the logarithm of its
-    strength is another, what is left of the hum, and jumps of the reading before some events (:meth:`with_jump`).
+    strength is another, what is left of the hum, and jumps of the reading before some events (:meth:`with_jumps`).
     Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
     the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`).
     """
@@ -139,10 +139,11 @@ class Problem:
         other.composition = composition
         return other
 
-    def with_jump(self, event: int) -> Problem:
-        """The same with a reading that jumps before an event and stays there; its size comes last in ``common``."""
+    def with_jumps(self, events: Sequence[int]) -> Problem:
+        """The same with a reading that jumps before some events and stays there; the sizes come last in ``common``."""
         other = self.with_composition(self.composition)
-        other.jumps, other.usual = (*self.jumps, event), np.append(self.usual, JUMP)
+        rest = self.usual[: self.usual.size - len(self.jumps)]
+        other.jumps, other.usual = tuple(events), np.append(rest, np.full(len(events), JUMP))
         return other
 
     def jumped(self, event: int) -> Array:

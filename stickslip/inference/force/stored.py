@@ -83,8 +83,8 @@ def fit_of(problem: Problem, kept: Mapping[str, np.ndarray]) -> Fit:
         problem = problem.moved(np.split(np.asarray(kept["errors"], float), ends), np.asarray(kept["offset"], float))
     if "bands" in kept:
         problem = problem.in_bands(np.asarray(kept["bands"], float))
-    for event in kept.get("jumps", ()):
-        problem = problem.with_jump(int(event))
+    if "jumps" in kept:
+        problem = problem.with_jumps([int(event) for event in kept["jumps"]])
     if kept["carrier"].size:
         problem = problem.carried_by(np.asarray(kept["carrier"], float))
     found = again(
