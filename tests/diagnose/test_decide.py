@@ -79,7 +79,8 @@ def test_of_a_law_and_its_special_case_the_special_case_stays():
 
 
 def test_what_lies_far_from_where_such_effects_lie_is_not_seen():
-    pair = [judged("velocity-weakening", 300.0, 8.5, far={"velocity-weakening.drop": 12.0}), judged("wear", 300.0, 8.0)]
+    far = np.sqrt(400.0 / DISPERSION)  # at a price of more than it gains
+    pair = [judged("velocity-weakening", 300.0, 8.5, far={"velocity-weakening.drop": far}), judged("wear", 300.0, 8.0)]
     assert [j.tag for j in named(pair)] == ["wear"]
     assert named(pair[:1]) == []
 

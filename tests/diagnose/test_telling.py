@@ -69,10 +69,17 @@ def test_the_margin_is_that_of_the_whole_covariance(pair):
 def test_what_the_campaign_leaves_unknown_of_the_parameters_tells_nothing(pair):
     """A change along the covariance of the parameters is less than the same change where they are known."""
     run = pair[0].problem.runs[1]
-    sure = [replace(fit, valleys=()) for fit in pair]
-    for fit in sure:
-        fit.__dict__["_judged"] = (*fit._judged[:2], 1e-12 * fit._judged[2])
-    assert margins(sure, [run, run])[0, 1] > 2.0 * margins(pair, [run, run])[0, 1]
+
+    def told(deviation):
+        known = [replace(fit, valleys=tuple(deviation * v for v in fit.valleys)) for fit in pair]
+        for fit in known:
+            fit.__dict__["_judged"] = (*fit._judged[:2], deviation**2 * fit._judged[2])
+        return margins(known, [run, run])[0, 1]
+
+    sure, as_found, vague = told(1e-6), told(1.0), told(2.0)
+    assert as_found == pytest.approx(margins(pair, [run, run])[0, 1], rel=1e-9)
+    assert vague < as_found < sure
+    assert sure > 2.0 * vague
 
 
 def test_a_load_that_is_put_in_is_known_to_one_per_cent(pair, monkeypatch):

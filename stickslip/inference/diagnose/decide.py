@@ -35,7 +35,7 @@ from ..force.linearised import Array
 
 CHANCE = 1e-3  # of any effect at all being seen where nothing is missing
 ERRORS = 2.5  # standard errors
-DISPERSION = 3.0  # of the fall of the cost where nothing is hidden, over that of perfectly known covariances
+DISPERSION = 2.0  # of the fall of the cost where nothing is hidden, over that of perfectly known covariances
 
 
 @dataclass(frozen=True)
