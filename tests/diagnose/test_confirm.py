@@ -19,6 +19,7 @@ from stickslip.inference.force.fit import fit
 from stickslip.inference.force.heldout import halves, points
 from stickslip.inference.force.knots import NUCLEATION
 from stickslip.inference.force.linearised import moved
+from stickslip.inference.force.problem import LEVEL
 from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
 from stickslip.show.report.free_figures import free_picture
@@ -80,10 +81,10 @@ def unsure(base) -> np.ndarray:
 
 
 def test_the_scatter_of_the_recurrence_is_that_of_the_force_at_the_onset(plain, confirmed):
-    """Of strengths that differ, of the misfit, and of parameters that are not known better."""
+    """Of strengths that differ, also from run to run, of the misfit, and of parameters that are not known better."""
     _, base = plain
     size, m = base.scatter.named(), confirmed.measurement
-    random = np.hypot(size["strength"], size["nucleation"]) * base.strength
+    random = np.sqrt(size["strength"] ** 2 + LEVEL**2 + size["nucleation"] ** 2) * base.strength
     force = np.hypot(random, unsure(base).reshape(2, 4)[:, 1:])
     expected = force / base.values["rig.spring_stiffness"] / np.asarray(m.velocities)[:, None]
     np.testing.assert_allclose(confirmed.scatter.recurrence[:, 1:4], expected, rtol=0.25)
