@@ -33,7 +33,7 @@ class Model(SimpleNamespace):
         composition = SimpleNamespace(shared=(), phases=(), without=self._without)
         problem = SimpleNamespace(composition=composition, with_composition=lambda made: made)
         point = SimpleNamespace(z=np.zeros(0), phases=np.zeros((0, 1)))
-        super().__init__(tags=tags, problem=problem, point=point, scatter=SimpleNamespace(sizes=None), dropped=None)
+        super().__init__(tags=tags, problem=problem, point=point, scatter=SimpleNamespace(unbound=dict), dropped=None)
 
     def _without(self, tag: str) -> Model:
         return Model(tuple(t for t in self.tags if t != tag))

@@ -187,7 +187,7 @@ def test_the_cost_is_linear_in_the_events():
             np.tile(1e-8 * np.eye(6), (n, 1, 1)), np.zeros((n, 6, 6)), np.zeros((n, 6)), local,
             np.tile(np.arange(6) % 4, (n, 1)), np.ones((n, 6)), np.ones((n, 6)), np.tile(np.arange(6.0), (n, 1)),
             share, np.ones(n), np.arange(n) == 0, np.ones((n, 6), bool), 1.0,
-            Chain(np.arange(n) * 1.0, np.arange(n) + 1.0, np.zeros(n, int), 1.0, share),
+            chain=Chain(np.arange(n) * 1.0, np.arange(n) + 1.0, np.zeros(n, int), 1.0, share),
         )  # fmt: skip
         residual = 1e-2 * rng.standard_normal((n, 6))
         begun = time.process_time()

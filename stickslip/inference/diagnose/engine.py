@@ -343,8 +343,7 @@ def foretells(before: Fit, after: Fit) -> bool:
 def without(base: Fit, tag: str) -> Fit:
     """The model without one of its effects, fitted anew with what is random."""
     problem, point = _taken_out(base, tag)
-    free = replace(base.scatter, most=np.full_like(base.scatter.most, np.inf))
-    return fit(problem, point, free, first=True)
+    return fit(problem, point, base.scatter.unbound(), first=True)
 
 
 def _taken_out(base: Fit, tag: str) -> tuple[Problem, Point]:

@@ -21,7 +21,7 @@ from ..force.knots import PHASES
 from ..force.linearised import Array
 from ..force.prescribed import placeholders
 from ..force.residual import coordinates
-from ..force.scatter import Scatter
+from ..force.scatter import NUMERIC, Scatter
 from .decide import CHANCE, ERRORS, Judged, best_forms
 from .engine import Diagnosis, Round, Rung
 from .fitted import fitted_model
@@ -104,7 +104,7 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
 
 def followed(scatter: Scatter) -> dict[str, Any]:
     """What the level of the strength follows: ``coordinate``, ``alike`` and ``text``, or nothing."""
-    if scatter.follows is None:
+    if scatter.follows is None or scatter.named()["level"] < NUMERIC:  # an effect may have taken its place
         return {}
     size, (coordinate, *others) = scatter.named(), (scatter.follows.coordinate, *scatter.follows.alike)
     unit = "s" if coordinate == "time" else "m"

@@ -220,8 +220,7 @@ def fit(
     around = point
     point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, blocks, LAST)
     with portion(FIRST, 1.0):
-        found = _arrived(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
-        return wandering(found) if scatter is None else found
+        return _arrived(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
 
 
 def _arrived(found: Fit) -> Fit:
@@ -259,6 +258,7 @@ def fit_base(problem: Problem, point: Point) -> Fit:
             if other.cost - after.cost < FAR**2:
                 break
             other = after
+        other = wandering(other)
     if not any(run.prescribed for run in problem.runs):
         rows = by_reading(other.problem, other.around, other.problem.evaluate(other.around))
         frequencies = bands(other.problem, rows, other.blocks, other.scatter, other.known)

@@ -383,8 +383,9 @@ class Linked:
             beside = -near @ below
             own = root[0, j] ** -2.0 - below @ beside
             out[0, j], out[1:, j] = own, beside
-            near[1:, 1:] = near[:-1, :-1].copy()
-            near[0, 0], near[0, 1:], near[1:, 0] = own, beside[:-1], beside[:-1]
+            if width:
+                near[1:, 1:] = near[:-1, :-1].copy()
+                near[0, 0], near[0, 1:], near[1:, 0] = own, beside[:-1], beside[:-1]
         return out
 
     def covariance(self) -> Array:

@@ -93,6 +93,10 @@ class Scatter:
         level = other.sizes[_LEVEL:_LENGTH] if other.follows else [np.inf]
         return replace(self, sizes=own, most=np.append(other.sizes[:_OWN], level), follows=other.follows)
 
+    def unbound(self) -> Scatter:
+        """The same where events may differ as they do."""
+        return replace(self, most=np.full_like(self.most, np.inf))
+
     def following(self, follows: Follows) -> Scatter:
         """The same with a level that wanders, which takes most of what the strength of events differs."""
         level, length = self.sizes[0] + np.log(0.8), CENTRES[_LENGTH]
