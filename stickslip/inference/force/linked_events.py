@@ -9,7 +9,7 @@ nodes hang together from event to event of a run, w_1 - w_0 ~ N(0, size^2 T), an
 path or place: cov = size^2 (1 + q) exp(-q) with q = sqrt(3) |s_i - s_j| / length in a run, nothing between runs. It has
 a slope, and value and slope together are Markov (Hartikainen & Sarkka 2010); its nodes are where events end, in the
 middle of slips. Between two nodes it goes as a cubic but for the bridge of an integrated Brownian motion, which is an
-event's own and has a size by itself: the level may be smoother than its steps from event to event.
+event's own: so does the process where events are short beside its length.
 
 Given the nodes events are independent, so that these are eliminated with a banded matrix (Rue & Held 2005, Gaussian
 Markov Random Fields, ch. 2).
@@ -176,6 +176,11 @@ class Levels:
     def __init__(self, chain: Chain, size: float, length: float) -> None:
         self.chain, self.size, self.length = chain, size, length
         self.kept, self.new = self._step(chain.gaps)
+
+    @property
+    def bend(self) -> float:
+        """Standard deviation of what the slope gains over a unit."""
+        return float(2.0 * self.size * (np.sqrt(3.0) / self.length) ** 1.5)
 
     def _step(self, gaps: Array) -> tuple[Array, Array]:
         rate = np.sqrt(3.0) / self.length

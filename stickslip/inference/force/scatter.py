@@ -29,20 +29,20 @@ from .linked_events import WALK, Chain, Levels, Linked, Links, nodes
 Array = NDArray[np.float64]
 EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event to event
 NAMES = (*EVENTS, *PHASES, "position", "walk", "fringe", "white")
-WANDER = ("level", "length", "bend")  # where the strength wanders; the length in usual ways of an event
+WANDER = ("level", "length")  # where the strength wanders; the length in usual ways of an event
 _OWN, _PHASE = len(EVENTS), slice(len(EVENTS), len(EVENTS) + len(PHASES))
 _LENGTHS = EVENTS.index("offset")  # that many are logarithms
-_POSITION, _WALK, _FRINGE, _WHITE, _LEVEL, _LENGTH, _BEND = range(len(NAMES) - 4, len(NAMES) + len(WANDER))
+_POSITION, _WALK, _FRINGE, _WHITE, _LEVEL, _LENGTH = range(len(NAMES) - 4, len(NAMES) + len(WANDER))
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
-CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0, 1e-3, 4.0, 1e-3]))
-WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 1.0, 0.1, 2.0, 1.5, 2.0])
+CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0, 1e-3, 4.0]))
+WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 1.0, 0.1, 2.0, 1.5])
 STATED = 0.25  # e-folds around a walk of the sensor that is stated: a record at rest tells it to one digit
 NUMERIC = 1e-4  # share of the strength below which nothing is claimed
 REACH = 1.0  # correlation length along the place
 FARTHEST = 1.5  # step of a size, in e-folds
 DAMPINGS = 6  # of a step that does not lower the cost
 SETTLED = 0.05  # fall of the cost at which the search ends
-SHORTEST = 0.5  # length of a wander, in usual distances of events
+SHORTEST = 2.0  # length of a wander, in usual distances of events: it goes on from one to the next
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Scatter:
     """Logarithms of the sizes, in the order of NAMES.
 
     Attributes:
-        sizes: of what is random, shape (12,), with a level that wanders (15,).
+        sizes: of what is random, shape (12,), with a level that wanders (14,).
         most: of what differs from event to event, which is not estimated larger, shape (5,), the last one of the level.
         follows: what the level follows; None where strengths of events are independent.
     """
@@ -99,9 +99,7 @@ class Scatter:
 
     def following(self, follows: Follows) -> Scatter:
         """The same with a level that wanders, which takes most of what the strength of events differs."""
-        level, length = self.sizes[0] + np.log(0.8), CENTRES[_LENGTH]
-        bend = level + np.log(2.0) + 1.5 * (0.5 * np.log(3.0) - length)  # of the process itself
-        sizes = np.concatenate([self.sizes[: len(NAMES)], [level, length, bend]])
+        sizes = np.concatenate([self.sizes[: len(NAMES)], [self.sizes[0] + np.log(0.8), CENTRES[_LENGTH]]])
         sizes[0] += np.log(0.6)
         return replace(self, sizes=sizes, follows=follows)
 
@@ -178,7 +176,7 @@ class Known:
 
     @cached_property
     def expected(self) -> tuple[Array, Array]:
-        """Logarithms of sizes as they are expected, and how many e-folds around it, shape (12,) or (15,) each."""
+        """Logarithms of sizes as they are expected, and how many e-folds around it, shape (12,) or (14,) each."""
         size = len(NAMES) if self.chain is None else len(CENTRES)
         centres, widths = CENTRES[:size].copy(), WIDTHS[:size].copy()
         if self.stated > 0.0:
@@ -238,10 +236,9 @@ class Known:
         return np.concatenate([self.nodes, self.chain.loads(self.local[..., 0])], axis=2)
 
     @cached_property
-    def bridge(self) -> Array | None:
+    def bridge(self) -> Array:
         """Covariance (N^2) by a level between its nodes, whose slope gains a variance of 1 over a usual event."""
-        if self.chain is None:
-            return None
+        assert self.chain is not None
         local = self.local[..., 0]
         return np.asarray(local[:, :, None] * self.chain.bridge() * local[:, None, :])
 
@@ -277,8 +274,8 @@ def _plain(sizes: Array, k: Known) -> Array:
     out = _by_phase(s, k)
     for size, part in ((s[_POSITION], placed), (s[_WALK], walked), (s[_FRINGE], k.periodic), (s[_WHITE], k.noise)):
         out += size**2 * part
-    if (bridge := k.bridge) is not None:
-        out += s[_BEND] ** 2 * bridge
+    if (levels := k.levels(sizes)) is not None:
+        out += levels.bend**2 * k.bridge
     at = np.arange(out.shape[1])
     out[:, at, at] += np.where(k.there, k.dropped + (NUMERIC * k.strength) ** 2, 1.0)
     return out
@@ -457,12 +454,13 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
     if k.chain is not None and (levels := k.levels(sizes)) is not None:
         loads = k.loads[..., WALK:]
         pulled = k.chain.to_states(np.einsum("eik,ei->ek", loads, a))
-        assert k.bridge is not None
-        part = (k.bridge @ a[..., None])[..., 0]
-        gradient[_BEND] = 2.0 * s[_BEND] ** 2 * (np.einsum("eij,eij->", inverted, k.bridge) - (a * part).sum())
-        moved[..., _BEND] = 2.0 * s[_BEND] ** 2 * part
-        for size, of_states in ((_LEVEL, 2.0 * levels.times(pulled)), (_LENGTH, levels.slope_times(pulled))):
-            moved[..., size] = np.einsum("eik,ek->ei", loads, of_states[k.chain.states])
+        bridge = levels.bend**2 * k.bridge
+        part = (bridge @ a[..., None])[..., 0]
+        left = np.einsum("eij,eij->", inverted, bridge) - (a * part).sum()
+        changes = (_LEVEL, 2.0, 2.0 * levels.times(pulled)), (_LENGTH, -3.0, levels.slope_times(pulled))
+        for size, power, of_states in changes:
+            gradient[size] += power * left
+            moved[..., size] = power * part + np.einsum("eik,ek->ei", loads, of_states[k.chain.states])
     white = found.linked.apart(found.back @ moved).reshape(-1, sizes.size)
     information = white.T @ white
     centres, widths = k.expected
