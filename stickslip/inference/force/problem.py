@@ -102,7 +102,13 @@ class Problem:
 
     @property
     def along(self) -> tuple[str, ...]:
-        """What the level of the strength may follow: the place only where the block goes back over it."""
+        """What the level of the strength may follow: the place only where the block goes back over it.
+
+        An event of a prescribed motion is a whole stroke. Along it friction varies as it does from stroke to stroke,
+        and a level that goes on from event to event says nothing.
+        """
+        if any(run.prescribed for run in self.runs):
+            return ()
         begin, end, _ = self.coordinates[ALONG.index("place")]
         x, back = np.concatenate([_mean(k, k.x) for k in self.runs]), False
         for r in range(len(self.runs)):

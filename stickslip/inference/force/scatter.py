@@ -29,19 +29,20 @@ from .linked_events import WALK, Chain, Levels, Linked, Links, nodes
 Array = NDArray[np.float64]
 EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event to event
 NAMES = (*EVENTS, *PHASES, "position", "walk", "fringe", "white")
-WANDER = ("level", "length")  # where the strength wanders; the length in usual ways of an event
+WANDER = ("level", "length", "bend")  # where the strength wanders; in usual ways of an event, and of the process
 _OWN, _PHASE = len(EVENTS), slice(len(EVENTS), len(EVENTS) + len(PHASES))
 _LENGTHS = EVENTS.index("offset")  # that many are logarithms
-_POSITION, _WALK, _FRINGE, _WHITE, _LEVEL, _LENGTH = range(len(NAMES) - 4, len(NAMES) + len(WANDER))
+_POSITION, _WALK, _FRINGE, _WHITE, _LEVEL, _LENGTH, _BEND = range(len(NAMES) - 4, len(NAMES) + len(WANDER))
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
-CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0, 1e-3, 4.0]))
-WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 1.0, 0.1, 2.0, 1.5])
+CENTRES = np.log(np.array([1e-3, 2e-2, 1e-2, 2e-9, 1e-3, 1e-3, 1e-3, 1e-3, 1e-9, 1e-9, 1e-9, 1.0, 1e-3, 4.0, 0.3]))
+WIDTHS = np.array([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.5, 1.0, 0.1, 2.0, 1.5, 1.0])
 STATED = 0.25  # e-folds around a walk of the sensor that is stated: a record at rest tells it to one digit
 NUMERIC = 1e-4  # share of the strength below which nothing is claimed
 REACH = 1.0  # correlation length along the place
 FARTHEST = 1.5  # step of a size, in e-folds
 DAMPINGS = 6  # of a step that does not lower the cost
 SETTLED = 0.05  # fall of the cost at which the search ends
+EXACT = 0.02  # of a level, to which any process describes it
 SHORTEST = 2.0  # length of a wander, in usual distances of events: it goes on from one to the next
 
 
@@ -65,7 +66,7 @@ class Scatter:
     """Logarithms of the sizes, in the order of NAMES.
 
     Attributes:
-        sizes: of what is random, shape (12,), with a level that wanders (14,).
+        sizes: of what is random, shape (12,), with a level that wanders (15,).
         most: of what differs from event to event, which is not estimated larger, shape (5,), the last one of the level.
         follows: what the level follows; None where strengths of events are independent.
     """
@@ -99,7 +100,8 @@ class Scatter:
 
     def following(self, follows: Follows) -> Scatter:
         """The same with a level that wanders, which takes most of what the strength of events differs."""
-        sizes = np.concatenate([self.sizes[: len(NAMES)], [self.sizes[0] + np.log(0.8), CENTRES[_LENGTH]]])
+        level = [self.sizes[0] + np.log(0.8), *CENTRES[_LENGTH:]]
+        sizes = np.concatenate([self.sizes[: len(NAMES)], level])
         sizes[0] += np.log(0.6)
         return replace(self, sizes=sizes, follows=follows)
 
@@ -176,7 +178,7 @@ class Known:
 
     @cached_property
     def expected(self) -> tuple[Array, Array]:
-        """Logarithms of sizes as they are expected, and how many e-folds around it, shape (12,) or (14,) each."""
+        """Logarithms of sizes as they are expected, and how many e-folds around it, shape (12,) or (15,) each."""
         size = len(NAMES) if self.chain is None else len(CENTRES)
         centres, widths = CENTRES[:size].copy(), WIDTHS[:size].copy()
         if self.stated > 0.0:
@@ -239,8 +241,13 @@ class Known:
     def bridge(self) -> Array:
         """Covariance (N^2) by a level between its nodes, whose slope gains a variance of 1 over a usual event."""
         assert self.chain is not None
+        return np.asarray(self.strengths * self.chain.bridge())
+
+    @cached_property
+    def strengths(self) -> Array:
+        """Covariance (N^2) by strengths of events that differ by an e-fold, shape (E, n, n)."""
         local = self.local[..., 0]
-        return np.asarray(local[:, :, None] * self.chain.bridge() * local[:, None, :])
+        return np.asarray(local[:, :, None] * local[:, None, :])
 
     @cached_property
     def links(self) -> Links:
@@ -275,7 +282,7 @@ def _plain(sizes: Array, k: Known) -> Array:
     for size, part in ((s[_POSITION], placed), (s[_WALK], walked), (s[_FRINGE], k.periodic), (s[_WHITE], k.noise)):
         out += size**2 * part
     if (levels := k.levels(sizes)) is not None:
-        out += levels.bend**2 * k.bridge
+        out += (s[_BEND] * levels.bend) ** 2 * k.bridge + (EXACT * levels.size) ** 2 * k.strengths
     at = np.arange(out.shape[1])
     out[:, at, at] += np.where(k.there, k.dropped + (NUMERIC * k.strength) ** 2, 1.0)
     return out
@@ -454,13 +461,18 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
     if k.chain is not None and (levels := k.levels(sizes)) is not None:
         loads = k.loads[..., WALK:]
         pulled = k.chain.to_states(np.einsum("eik,ei->ek", loads, a))
-        bridge = levels.bend**2 * k.bridge
+        bridge = (s[_BEND] * levels.bend) ** 2 * k.bridge
         part = (bridge @ a[..., None])[..., 0]
         left = np.einsum("eij,eij->", inverted, bridge) - (a * part).sum()
+        inexact = (EXACT * levels.size) ** 2 * k.strengths
+        own = (inexact @ a[..., None])[..., 0]
+        gradient[_LEVEL] += 2.0 * (np.einsum("eij,eij->", inverted, inexact) - (a * own).sum())
+        moved[..., _LEVEL] = 2.0 * own
         changes = (_LEVEL, 2.0, 2.0 * levels.times(pulled)), (_LENGTH, -3.0, levels.slope_times(pulled))
+        gradient[_BEND], moved[..., _BEND] = 2.0 * left, 2.0 * part
         for size, power, of_states in changes:
             gradient[size] += power * left
-            moved[..., size] = power * part + np.einsum("eik,ek->ei", loads, of_states[k.chain.states])
+            moved[..., size] += power * part + np.einsum("eik,ek->ei", loads, of_states[k.chain.states])
     white = found.linked.apart(found.back @ moved).reshape(-1, sizes.size)
     information = white.T @ white
     centres, widths = k.expected
@@ -485,6 +497,7 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     high[own] = np.maximum(np.minimum(high[own], start.most[: len(own)]), low[own])
     if known.chain is not None:  # shorter ones are no wander, and longer ones would be a level of every run
         low[_LENGTH], high[_LENGTH] = np.log(SHORTEST), np.log(max(known.chain.longest, 2.0 * SHORTEST))
+        high[_BEND] = 0.0
     sizes, damping = np.clip(start.sizes, low, high), 1e-2
     cost, root = _misfit(sizes, residual, known)
     if not np.isfinite(cost):
