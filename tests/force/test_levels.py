@@ -32,7 +32,7 @@ FOLLOWS = Follows("time", 1.0)
 BOTH = ["onward", "there and back"]
 
 
-def levelled(way: str, short: bool = True, groups: int = EVENTS // RUN) -> Known:
+def levelled(way: str, short: bool = True, groups: int = EVENTS // RUN, every: bool = False) -> Known:
     """Cycles with levels along a coordinate that goes onward, or back over its own way in the later half of a run."""
     known, rng = events(short), np.random.default_rng(2)
     group = np.arange(EVENTS) * groups // EVENTS
@@ -41,7 +41,8 @@ def levelled(way: str, short: bool = True, groups: int = EVENTS // RUN) -> Known
         steps *= np.where(np.arange(EVENTS) % RUN < RUN // 2, 1.0, -1.0)
     end = np.cumsum(steps)
     share = np.sort(rng.uniform(0.0, 1.0, known.there.shape), axis=1)
-    return known.following(Chain(end - steps, end, group, 1.0, share))
+    slides = np.ones_like(share) if every else np.sort(rng.uniform(0.0, 1.0, share.shape), axis=1)
+    return known.following(Chain(end - steps, end, group, 1.0, share, slides, rng.uniform(0.0, 0.5, EVENTS)))
 
 
 def sizes(level: float = LEVEL, length: float = LENGTH, bend: float = BEND) -> np.ndarray:
@@ -92,7 +93,7 @@ def test_the_covariance_of_levels_is_what_it_is_said_to_be(way):
 
 def test_between_its_nodes_a_level_is_the_process_too():
     """Nodes and bridge together are the covariance of the process at all points, for events shorter than the length."""
-    known, length = levelled("onward", short=False), 300.0
+    known, length = levelled("onward", short=False, every=True), 300.0
     plain = replace(known, chain=None)
     rate = np.sqrt(3.0) / length
     at = sizes(LEVEL, length, 1.0)
@@ -187,7 +188,9 @@ def test_the_cost_is_linear_in_the_events():
             np.tile(1e-8 * np.eye(6), (n, 1, 1)), np.zeros((n, 6, 6)), np.zeros((n, 6)), local,
             np.tile(np.arange(6) % 4, (n, 1)), np.ones((n, 6)), np.ones((n, 6)), np.tile(np.arange(6.0), (n, 1)),
             share, np.ones(n), np.arange(n) == 0, np.ones((n, 6), bool), 1.0,
-            chain=Chain(np.arange(n) * 1.0, np.arange(n) + 1.0, np.zeros(n, int), 1.0, share),
+            chain=Chain(
+                np.arange(n) * 1.0, np.arange(n) + 1.0, np.zeros(n, int), 1.0, share, np.ones_like(share), np.zeros(n)
+            ),
         )  # fmt: skip
         residual = 1e-2 * rng.standard_normal((n, 6))
         begun = time.process_time()

@@ -40,7 +40,9 @@ def dense(sizes: np.ndarray, known: Known) -> np.ndarray:
         of_states[1::2] *= chain.unit  # slopes are over the usual way of an event
         of_states[:, 1::2] *= chain.unit
         cubic = CubicHermiteSpline([0.0, 1.0], np.eye(4).reshape(2, 2, 4)[:, 0], np.eye(4).reshape(2, 2, 4)[:, 1])
-        load = cubic(chain.share) * np.stack([np.ones(events), chain.way, np.ones(events), chain.way], axis=1)[:, None]
+        slides = chain.slides[..., None]
+        load = slides * cubic(chain.share) + (1.0 - slides) * cubic(chain.held)[:, None]
+        load *= np.stack([np.ones(events), chain.way, np.ones(events), chain.way], axis=1)[:, None]
         load *= known.local[..., :1]
         whole = of_states.reshape(events, 4, events, 4)
         out += np.einsum("eia,eafb,fjb->eifj", load, whole, load, optimize=True)

@@ -328,7 +328,7 @@ def wandering(found: Fit) -> Fit:
     problem, tried = found.problem, {}
     for coordinate in problem.along if problem.events >= FEWEST else ():
         follows = Follows(coordinate, problem.distance(coordinate))
-        chain = problem.chain(follows, found.blocks)
+        chain = problem.chain(follows, found.blocks, found.forces)
         assert chain is not None
         start = replace(found, scatter=found.scatter.following(follows), known=found.known.following(chain))
         tried[coordinate] = adapted(start, rounds=0)

@@ -56,6 +56,8 @@ class Chain:
         group: events of one group hang together, shape (E,).
         unit: usual way of an event, in which lengths are counted.
         share: of the way of an event that is over, shape (E, n).
+        slides: share of the strength that slides, and goes with the level where it is, shape (E, n).
+        held: share of the way that was over when the rest came to rest, with the level of then, shape (E,).
     """
 
     begin: Array
@@ -63,6 +65,8 @@ class Chain:
     group: Index
     unit: float
     share: Array
+    slides: Array
+    held: Array
 
     @cached_property
     def nodes(self) -> Index:
@@ -133,25 +137,39 @@ class Chain:
 
     def loads(self, strength: Array) -> Array:
         """What the four states of an event do, given what its strength does: (E, n) to (E, n, 4)."""
-        s, way = self.share, self.way[:, None]
-        cubic = [
-            1.0 - s**2 * (3.0 - 2.0 * s), way * s * (1.0 - s) ** 2, s**2 * (3.0 - 2.0 * s), -way * s**2 * (1.0 - s)
-        ]  # fmt: skip
-        return np.asarray(strength[..., None] * np.stack(cubic, axis=2))
+        own, held = _cubic(self.share, self.way[:, None]), _cubic(self.held, self.way)[:, None]
+        slides = self.slides[..., None]
+        return np.asarray(strength[..., None] * (slides * own + (1.0 - slides) * held))
 
     def bridge(self) -> Array:
         """Covariance between its nodes of a level whose slope gains a variance of 1 over a unit, shape (E, n, n).
 
         That of an integrated Brownian motion with both ends given: the influence function of a clamped beam.
         """
-        s = np.minimum(self.share[:, :, None], self.share[:, None, :])
-        t = np.maximum(self.share[:, :, None], self.share[:, None, :])
-        clamped = s**2 * (1.0 - t) ** 2 * (3.0 * t - s - 2.0 * t * s) / 6.0
-        return np.asarray(np.abs(self.way[:, None, None]) ** 3 * clamped)
+        one, other = self.share[:, :, None], self.share[:, None, :]
+        held, slides = self.held[:, None, None], self.slides
+        rests = 1.0 - slides
+        both = slides[:, :, None] * slides[:, None, :] * _clamped(one, other)
+        both += slides[:, :, None] * rests[:, None, :] * _clamped(one, held)
+        both += rests[:, :, None] * slides[:, None, :] * _clamped(held, other)
+        both += rests[:, :, None] * rests[:, None, :] * _clamped(held, held)
+        return np.asarray(np.abs(self.way[:, None, None]) ** 3 * both)
 
     def to_states(self, values: Array) -> Array:
         """Sums of what belongs to the states of events, shape (E, 4) to (2 L,)."""
         return np.asarray(np.bincount(self.states.ravel(), values.ravel(), STATES * self.at.size), float)
+
+
+def _cubic(s: Array, way: Array) -> Array:
+    """Weights of values and slopes at both ends of a way, at a share of it, shape (..., 4)."""
+    whole = s**2 * (3.0 - 2.0 * s)
+    return np.stack([1.0 - whole, way * s * (1.0 - s) ** 2, whole, -way * s**2 * (1.0 - s)], axis=-1)
+
+
+def _clamped(one: Array, other: Array) -> Array:
+    """Influence function of a clamped beam of unit length."""
+    s, t = np.minimum(one, other), np.maximum(one, other)
+    return np.asarray(s**2 * (1.0 - t) ** 2 * (3.0 * t - s - 2.0 * t * s) / 6.0)
 
 
 def pairs(of: Index) -> Index:

@@ -37,7 +37,7 @@ def known_of(
         noise(problem, rows, blocks), periodic(problem, rows, blocks),
         blocks(left_out(problem, dropped)), blocks(slopes.local), blocks(problem.phase),
         blocks(slopes.spring), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed),
-        problem.lasting, problem.begins, blocks.there, strength, problem.walk, problem.chain(follows, blocks),
+        problem.lasting, problem.begins, blocks.there, strength, problem.walk, problem.chain(follows, blocks, slopes),
     )  # fmt: skip
 
 

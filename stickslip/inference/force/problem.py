@@ -109,7 +109,7 @@ class Problem:
         """
         if any(run.prescribed for run in self.runs):
             return ()
-        begin, end, _ = self.coordinates[ALONG.index("place")]
+        begin, end, *_ = self.coordinates[ALONG.index("place")]
         x, back = np.concatenate([_mean(k, k.x) for k in self.runs]), False
         for r in range(len(self.runs)):
             own = np.flatnonzero(self.event_run == r)
@@ -123,15 +123,18 @@ class Problem:
 
     def distance(self, coordinate: str) -> float:
         """Usual distance of neighbouring events along a coordinate (s or m)."""
-        begin, end, _ = self.coordinates[ALONG.index(coordinate)]
+        begin, end, *_ = self.coordinates[ALONG.index(coordinate)]
         return float(np.median(np.abs(end - begin)))
 
-    def chain(self, follows: Follows | None, blocks: Blocks) -> Chain | None:
+    def chain(self, follows: Follows | None, blocks: Blocks, forces: Forces) -> Chain | None:
         """How levels go on from event to event; runs by themselves."""
         if follows is None:
             return None
-        begin, end, share = self.coordinates[ALONG.index(follows.coordinate)]
-        return Chain(begin, end, self.event_run, follows.unit, blocks(share))
+        begin, end, share, held = self.coordinates[ALONG.index(follows.coordinate)]
+        slide = np.concatenate([_mean(k, s) for k, s in zip(self.runs, forces.sliding, strict=True)])
+        whole = -forces.local[:, 0]
+        slides = np.clip(slide / np.where(whole == 0.0, np.inf, whole), 0.0, 1.0)
+        return Chain(begin, end, self.event_run, follows.unit, blocks(share), blocks(slides), held)
 
     def _by_run(self, both: Array) -> Array:
         """Sine and cosine, shape (p, 2), apart for every run with hum, shape (p, 2 h)."""
@@ -332,10 +335,10 @@ class Problem:
         return Forces(residual, local, springs, tangents, sticking, sliding, forces, states, held, share), slopes
 
 
-def _coordinates(runs: Sequence[Knots]) -> list[tuple[Array, Array, Array]]:
-    """In the order of :data:`ALONG`: where every event begins and ends, shape (E,), and shares between, shape (p,).
+def _coordinates(runs: Sequence[Knots]) -> list[tuple[Array, Array, Array, Array]]:
+    """In the order of :data:`ALONG`: where every event begins and ends (E,), and shares between, (p,) and (E,).
 
-    Events end in the middle of a slip. The share is of the way of an event that is over at a point.
+    Events end in the middle of a slip. The shares are of the way of an event that is over at a point and at the arrest.
     """
     out = []
     for name in ALONG:
@@ -345,9 +348,18 @@ def _coordinates(runs: Sequence[Knots]) -> list[tuple[Array, Array, Array]]:
             limits, values = np.interp(_limits(k), k.t, way), k.at if name == "time" else _mean(k, way)
             far = np.diff(limits)[k.of]
             share = (values - limits[k.of]) / np.where(far == 0.0, 1.0, far)
-            parts.append((limits[:-1], limits[1:], np.clip(share, 0.0, 1.0)))
-        begin, end, share = (np.concatenate(v) for v in zip(*parts, strict=True))
-        out.append((begin, end, share))
+            held = np.interp(_arrests(k), k.t, way) - limits[:-1]
+            held /= np.where(np.diff(limits) == 0.0, 1.0, np.diff(limits))
+            parts.append((limits[:-1], limits[1:], np.clip(share, 0.0, 1.0), np.clip(held, 0.0, 1.0)))
+        begin, end, share, held = (np.concatenate(v) for v in zip(*parts, strict=True))
+        out.append((begin, end, share, held))
+    return out
+
+
+def _arrests(k: Knots) -> Array:
+    """Times from which what sticks in every event has stuck, shape (E,)."""
+    out = np.full(k.events, k.t[0])
+    np.maximum.at(out, k.of, k.at - k.elapsed)
     return out
 
 
