@@ -341,7 +341,7 @@ def wandering(found: Fit) -> Fit:
     alike = tuple(name for name, f in tried.items() if f is not best and f.cost - best.cost < ALIKE)
     own = replace(best.scatter, follows=replace(best.scatter.follows, alike=alike))
     best = replace(best, scatter=own)
-    best = min(best, adapted(best), key=lambda f: f.cost)
+    best = _arrived(adapted(refit(problem, best.point, best)))
     return replace(best, evaluations=found.evaluations + best.evaluations)
 
 

@@ -1,0 +1,45 @@
+"""Friction that wanders along the slip path, in motions of the own solver: its level is part of the base fit."""
+
+from __future__ import annotations
+
+import pytest
+
+from stickslip.data.segment import segment
+from stickslip.effects import make
+from stickslip.inference.diagnose.prepare import prepare
+from stickslip.inference.force import fit as fitting
+from stickslip.inference.force.candidates import try_effect
+from stickslip.inference.force.signatures import Explained
+
+from .counted import moved, read
+
+SIZE, LENGTH = 0.01, 3e-4
+
+
+@pytest.fixture(scope="module")
+def prepared():
+    runs = [
+        moved(speed, end, 1e-4, [make("wandering-friction", size=SIZE, length=LENGTH, draw=i, along="slip")])
+        for i, (speed, end) in enumerate(((1e-4, 8.0), (2e-4, 4.0)))
+    ]
+    campaign = read(runs, 5)
+    return prepare(campaign.description, campaign.traces, [segment(t) for t in campaign.traces])
+
+
+def gain(base, tag):
+    (found,) = try_effect(base, Explained(base), tag, [{}])
+    return base.cost - found.fit.cost
+
+
+def test_the_level_is_found_and_a_wave_that_is_not_there_gains_little(prepared, monkeypatch):
+    base = fitting.fit_base(prepared.problem, prepared.start)
+    size = base.scatter.named()
+    assert base.scatter.follows.coordinate == "slip path"
+    assert 0.3 < size["level"] / SIZE < 2.0 and 0.3 < size["length"] / LENGTH < 3.0  # of one draw, ten lengths long
+    assert size["strength"] < 0.03 * size["level"]
+    assert gain(base, "velocity-weakening") < 30.0
+    with monkeypatch.context() as patch:
+        patch.setattr(fitting, "FEWEST", 10**6)
+        without = fitting.fit_base(prepared.problem, prepared.start)
+    assert without.scatter.follows is None and without.cost - base.cost > 500.0
+    assert gain(base, "position-dependent-friction") < 0.6 * gain(without, "position-dependent-friction")
