@@ -217,8 +217,10 @@ def fit(
         if turn > PLACED + 2 and total < 1.0:
             break
     made = known_of(problem, slopes, by_reading(problem, point, slopes), blocks, out, sizes.follows)
-    around = point
+    around, carried = point, slopes
     point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, blocks, LAST)
+    if slopes is carried:  # which is rounded otherwise than what is evaluated where a stored fit is read
+        slopes = problem.evaluate(point)
     with portion(FIRST, 1.0):
         return _arrived(adapted(_found(problem, point, slopes, sizes, out, made, around, evaluations + count)))
 
