@@ -223,6 +223,15 @@ def test_the_table_of_rates_has_the_parts_that_are_measured(tables: ModuleType) 
     assert "Version 0.1.0, 2026-01-01, seed 1" in tables.cases(part)
 
 
+def test_pages_that_draw_a_picture_show_it() -> None:
+    pages = [
+        path for path in DOCS.glob("*.md") if re.search(r"^import pictures$", path.read_text("utf-8"), re.MULTILINE)
+    ]
+    assert pages
+    for path in pages:  # a figure is shown as its text otherwise
+        assert "%matplotlib inline\nimport pictures\n" in path.read_text("utf-8"), path.name
+
+
 def test_every_picture_has_a_script() -> None:
     own = [ROOT / "tests" / f"{name}.py" for name in ("forecast/real", "forecast/simulated", "force/ranks")]
     files = [*DOCS.glob("*.py"), *DOCS.glob("*/*.py"), *own]
