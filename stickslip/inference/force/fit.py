@@ -255,7 +255,7 @@ def fit_base(problem: Problem, point: Point) -> Fit:
     found = again(problem, found.point, found.scatter, found.dropped, found.around, found.evaluations)
     with portion(ADJUSTED, 1.0):
         other = adapted(refit(problem, found.point, found))
-        while len(other.problem.jumps) < MOST_JUMPS and (event := jumping(other.problem, other._system)) is not None:
+        while len(other.problem.jumps) < MOST_JUMPS and (event := jumping(other._system)) is not None:
             after = _jumped(other, event)
             if other.cost - after.cost < FAR**2:
                 break

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...system.units import shown
 from .linearised import Array, Linearised
-from .problem import JUMP, Problem
+from .problem import JUMP
 
 if TYPE_CHECKING:
     from .fit import Fit
@@ -20,16 +20,15 @@ if TYPE_CHECKING:
 LEAST = 3.0  # standard deviations of a jump that is told of
 
 
-def jumping(problem: Problem, system: Linearised) -> int | None:
+def jumping(system: Linearised) -> int | None:
     """The event before which the reading most likely jumps, if anywhere, all else adjusted; None where it cannot.
 
     The test is Rao's score test of a column for each event that is not the first of its run.
 
     Args:
-        problem: without that jump.
-        system: linear, at the optimum.
+        system: at the optimum, without that jump.
     """
-    blocks = system.blocks
+    problem, blocks = system.problem, system.blocks
     tried = np.setdiff1d(np.flatnonzero(~problem.begins), problem.jumps)
     if tried.size == 0 or any(run.prescribed for run in problem.runs):
         return None

@@ -236,7 +236,8 @@ class Levels:
 
     def longer(self) -> tuple[Levels, Levels]:
         """The same a little shorter and longer, for derivatives in the logarithm of the length."""
-        return tuple(Levels(self.chain, self.size, self.length * np.exp(f)) for f in (-TURN, TURN))  # type: ignore[return-value]
+        less, more = (self.length * np.exp(folds) for folds in (-TURN, TURN))
+        return Levels(self.chain, self.size, less), Levels(self.chain, self.size, more)
 
     def times(self, values: Array) -> Array:
         """C times values, shape (2 L,)."""

@@ -29,7 +29,8 @@ from .linked_events import WALK, Chain, Levels, Linked, Links, nodes
 Array = NDArray[np.float64]
 EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event to event
 NAMES = (*EVENTS, *PHASES, "position", "walk", "fringe", "white")
-WANDER = ("level", "length", "bend")  # where the strength wanders; in usual ways of an event, and of the process
+# where the strength wanders: share of it, usual ways of an event, share of the process's own bend between nodes
+WANDER = ("level", "length", "bend")
 _OWN, _PHASE = len(EVENTS), slice(len(EVENTS), len(EVENTS) + len(PHASES))
 _LENGTHS = EVENTS.index("offset")  # that many are logarithms
 _POSITION, _WALK, _FRINGE, _WHITE, _LEVEL, _LENGTH, _BEND = range(len(NAMES) - 4, len(NAMES) + len(WANDER))
