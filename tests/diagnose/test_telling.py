@@ -14,7 +14,8 @@ from stickslip.inference.diagnose.telling import KNOWN, Changed, information, ma
 from stickslip.inference.force import problem as problem_module
 from stickslip.inference.force.noise import by_reading, known_of
 from stickslip.inference.force.problem import Problem
-from stickslip.inference.force.scatter import Blocks, Whitening
+from stickslip.inference.force.scatter import Blocks
+from stickslip.inference.force.whitening import Whitening
 
 RUNS = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4))
 

@@ -16,13 +16,13 @@ from stickslip.inference.force.scatter import (
     Follows,
     Known,
     Scatter,
-    Whitening,
     _misfit,
     _slopes,
     estimate,
     misfit,
     weigh,
 )
+from stickslip.inference.force.whitening import Whitening
 
 from .test_scatter import EVENTS, POINTS, RUN, events, true
 from .whole import dense, states

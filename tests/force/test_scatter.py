@@ -15,7 +15,6 @@ from stickslip.inference.force.scatter import (
     Blocks,
     Known,
     Scatter,
-    Whitening,
     _misfit,
     _slopes,
     covariance,
@@ -23,6 +22,7 @@ from stickslip.inference.force.scatter import (
     misfit,
     weigh,
 )
+from stickslip.inference.force.whitening import Whitening
 
 from .whole import dense
 

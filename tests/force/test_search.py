@@ -13,8 +13,8 @@ from stickslip.inference.force.candidates import Candidate, Start, _at, _columns
 from stickslip.inference.force.descent import SETTLED, descend
 from stickslip.inference.force.fit import fit, refit
 from stickslip.inference.force.linearised import FARTHEST, Linearised
-from stickslip.inference.force.scatter import Whitening
 from stickslip.inference.force.signatures import Explained
+from stickslip.inference.force.whitening import Whitening
 from stickslip.physics.effects import catalogue
 
 from .conftest import made, seen

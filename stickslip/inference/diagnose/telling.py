@@ -21,7 +21,8 @@ from ..force.linearised import Array
 from ..force.noise import by_reading, known_of
 from ..force.point import LOCAL, Point
 from ..force.problem import Problem
-from ..force.scatter import Blocks, Whitening, WithEvents
+from ..force.scatter import Blocks
+from ..force.whitening import Whitening, WithEvents
 from .decide import DISPERSION
 
 MASS = "rig.mass"

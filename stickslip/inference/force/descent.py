@@ -9,7 +9,8 @@ from ...system.progress import breathe
 from .linearised import Linearised, moved
 from .point import Point, Slopes
 from .problem import Problem
-from .scatter import Blocks, Known, Scatter, Whitening
+from .scatter import Blocks, Known, Scatter
+from .whitening import Whitening
 
 FAILED = 4  # steps in turn that do not lower the cost, after which the search ends
 DAMPING, LEAST = 1e-6, 1e-9  # of the first step, and of any: over the curvature of the cost in each parameter

@@ -26,12 +26,11 @@ from .scatter import (
     Follows,
     Known,
     Scatter,
-    Whitening,
-    WithEvents,
     covariance,
     estimate,
     misfit,
 )
+from .whitening import Whitening, WithEvents
 
 PLACED = 2  # rounds after which the bank's elements are put where the strength is
 ROUNDS = 10  # times that the scatter is estimated anew

@@ -18,7 +18,7 @@ from scipy.optimize import lsq_linear
 from .fit import STEPS, Fit, deviations, refit
 from .linearised import Array, Linearised, moved, prior_rows, reach
 from .point import Point
-from .scatter import Whitening, WithEvents
+from .whitening import Whitening, WithEvents
 
 SHARES = (1.0, 0.5, 0.25, 0.1)  # of the step to what a fit without some events would give
 

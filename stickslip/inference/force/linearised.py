@@ -12,7 +12,8 @@ from .bank import spacing
 from .composition import PULL
 from .point import Forces, Point, Slopes
 from .problem import Problem
-from .scatter import EVENTS, Blocks, Scatter, Whitening
+from .scatter import EVENTS, Blocks, Scatter
+from .whitening import Whitening
 
 Array = NDArray[np.float64]
 BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean

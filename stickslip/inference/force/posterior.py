@@ -16,7 +16,7 @@ from scipy.optimize import lsq_linear
 from .fit import Fit
 from .linearised import Array, moved, prior_rows, reach
 from .point import Point
-from .scatter import WithEvents
+from .whitening import WithEvents
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ EVENTS = ("strength", "stretch", "shape", "offset")  # what differs from event t
 NAMES = (*EVENTS, *PHASES, "position", "walk", "fringe", "white")
 # where the strength wanders: share of it, usual ways of an event, share of the process's own bend between nodes
 WANDER = ("level", "length", "bend")
-_OWN, _PHASE = len(EVENTS), slice(len(EVENTS), len(EVENTS) + len(PHASES))
+OWN, _PHASE = len(EVENTS), slice(len(EVENTS), len(EVENTS) + len(PHASES))
 _LENGTHS = EVENTS.index("offset")  # that many are logarithms
 _POSITION, _WALK, _FRINGE, _WHITE, _LEVEL, _LENGTH, _BEND = range(len(NAMES) - 4, len(NAMES) + len(WANDER))
 # centre of what is expected of each size, and how many e-folds around it: shares, and metres
@@ -73,7 +73,7 @@ class Scatter:
     """
 
     sizes: Array
-    most: Array = field(default_factory=lambda: np.full(_OWN + 1, np.inf))
+    most: Array = field(default_factory=lambda: np.full(OWN + 1, np.inf))
     follows: Follows | None = None
 
     @classmethod
@@ -93,7 +93,7 @@ class Scatter:
         """
         own = np.append(self.sizes[: len(NAMES)], other.sizes[len(NAMES) :])
         level = other.sizes[_LEVEL:_LENGTH] if other.follows else [np.inf]
-        return replace(self, sizes=own, most=np.append(other.sizes[:_OWN], level), follows=other.follows)
+        return replace(self, sizes=own, most=np.append(other.sizes[:OWN], level), follows=other.follows)
 
     def unbound(self) -> Scatter:
         """The same where events may differ as they do."""
@@ -272,11 +272,11 @@ class Known:
 
 def covariance(sizes: Array, k: Known) -> tuple[Array, Array]:
     """The covariance of events without and with the random effects (N^2), shape (E, n, n), the walk's nodes known."""
-    plain, scaled = _plain(sizes, k), k.local * np.exp(sizes[:_OWN])
+    plain, scaled = covariance_alone(sizes, k), k.local * np.exp(sizes[:OWN])
     return plain, plain + scaled @ np.swapaxes(scaled, 1, 2)
 
 
-def _plain(sizes: Array, k: Known) -> Array:
+def covariance_alone(sizes: Array, k: Known) -> Array:
     s = np.exp(sizes)
     placed, walked = k.shifts
     out = _by_phase(s, k)
@@ -295,79 +295,6 @@ def _by_phase(s: Array, k: Known) -> Array:
     out = own[:, :, None] * k.near
     out *= own[:, None, :]
     return out
-
-
-class Whitening:
-    """Residuals to independent ones of unit variance, given the sizes; derivatives in the events' own may change.
-
-    The covariance without random effects is inverted once, what the events' own add is of low rank.
-    """
-
-    def __init__(self, sizes: Array, known: Known) -> None:
-        self.sizes, self.known = sizes, known
-        root = np.asarray(np.linalg.cholesky(_plain(sizes, known)), float)
-        self.back = inverse(root)
-        self.logs = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-        self.loads = self.back @ known.loads
-        loads = self.loads
-        if known.chain is not None:
-            # given its strength, an event tells of its levels by their difference, and by how they stand to it
-            own, least = self.back @ known.local[..., :1], np.exp(-sizes[0])
-            mean = np.pad(known.chain.mean, ((0, 0), (WALK, 0)))[:, None]
-            loads = np.concatenate([loads - own * mean, least * mean], axis=1)
-        self.linked = known.linked(sizes, loads)
-
-    def squares(self, values: Array, events: Array) -> float:
-        """Of residuals (E, n) with what is the events' own, (E, 4), under the covariance of both."""
-        white, own = self.back @ values[..., None], events / np.exp(self.sizes[:_OWN])
-        if self.known.chain is not None:
-            white, own = np.concatenate([white, -own[:, None, :1]], axis=1), own[:, 1:]
-        return float((self.linked.apart(white) ** 2).sum() + (own**2).sum())
-
-    def with_events(self, local: Array) -> WithEvents:
-        """The same with events that differ; ``local`` are derivatives in what is their own, shape (E, n, 4)."""
-        return WithEvents(self, local)
-
-
-class WithEvents:
-    """Residuals to independent ones of unit variance, random effects included."""
-
-    def __init__(self, plain: Whitening, local: Array) -> None:
-        self.back = plain.back
-        aside = self.back @ (local * np.exp(plain.sizes[:_OWN]))
-        values, turn = np.linalg.eigh(np.swapaxes(aside, 1, 2) @ aside)
-        values = np.maximum(values, 0.0)
-        self.aside = aside @ turn
-        self.share = 1.0 / (1.0 + values + np.sqrt(1.0 + values))  # of (1 + U U')^(-1/2) = 1 - U share U'
-        self.known = known = plain.known
-        loads = plain.loads
-        if known.chain is not None:
-            loads = np.concatenate([loads[..., :WALK], self.back @ known.chain.loads(local[..., 0])], axis=2)
-        self.linked = known.linked(plain.sizes, self._apart(loads))
-        self.logs = plain.logs + np.log1p(values).sum(axis=1) + self.linked.logs
-
-    def _apart(self, white: Array) -> Array:
-        along = np.swapaxes(self.aside, 1, 2) @ white
-        return np.asarray(white - self.aside @ (self.share[..., None] * along))
-
-    def __call__(self, values: Array) -> Array:
-        """Whitened: shape (E, n, m) to (E, n + 1, m), the last row by the steps of the sensor's walk.
-
-        With a level that wanders there are four rows more, by its steps.
-        """
-        return self.linked.apart(self._apart(self.back @ values))
-
-    def weighted(self, values: Array) -> Array:
-        """Times the inverse covariance, shape (E, n)."""
-        white = self._apart(self(values[..., None])[:, : values.shape[1]])
-        return np.asarray((np.swapaxes(self.back, 1, 2) @ white)[..., 0])
-
-    def level(self, values: Array) -> Array:
-        """Mean level (share of the strength) of each event for residuals (E, n), shape (E,); zero where none is."""
-        if self.known.chain is None:
-            return np.zeros(values.shape[0])
-        stands = self.linked.found(self._apart(self.back @ values[..., None]))
-        return np.asarray((self.known.chain.mean * stands[:, WALK:, 0]).sum(axis=1))
 
 
 def inverse(root: Array) -> Array:
@@ -440,7 +367,7 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
     a, inverted = found.weighted, found.inverted
     inverted *= k.there[:, :, None]
     gradient, moved = np.zeros(sizes.size), np.zeros((*residual.shape, sizes.size))
-    for r in range(_OWN):
+    for r in range(OWN):
         z = s[r] * k.local[..., r]
         along = np.einsum("ei,ei->e", z, a)
         gradient[r] = 2.0 * (np.einsum("ei,ei->", z, (inverted @ z[..., None])[..., 0]) - (along**2).sum())
@@ -450,8 +377,8 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
     own = (k.phase[..., None] == np.arange(len(PHASES))) & k.there[..., None]
     pulled = misfit @ np.concatenate([a[..., None], own * a[..., None]], axis=2)
     for p in range(len(PHASES)):
-        gradient[_OWN + p] = 2.0 * (traces - a * pulled[..., 0])[own[..., p]].sum()
-        moved[..., _OWN + p] = own[..., p] * pulled[..., 0] + pulled[..., 1 + p]
+        gradient[OWN + p] = 2.0 * (traces - a * pulled[..., 0])[own[..., p]].sum()
+        moved[..., OWN + p] = own[..., p] * pulled[..., 0] + pulled[..., 1 + p]
     for i, part in zip((_POSITION, _WALK, _FRINGE, _WHITE), (*k.shifts, k.periodic, k.noise), strict=True):
         pulled = (part @ a[..., None])[..., 0]
         gradient[i] = 2.0 * s[i] ** 2 * (np.einsum("eij,eij->", inverted, part) - (a * pulled).sum())
@@ -494,7 +421,7 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     low, high = centres - 5.0 * widths, centres + 4.0 * widths
     low[_WHITE], high[_WHITE] = -0.05, 1.0
     high[:_LENGTHS] = np.minimum(high[:_LENGTHS], 0.0)  # further apart than an e-fold are no two events of one contact
-    own = [*range(_OWN), _LEVEL] if known.chain is not None else [*range(_OWN)]
+    own = [*range(OWN), _LEVEL] if known.chain is not None else [*range(OWN)]
     high[own] = np.maximum(np.minimum(high[own], start.most[: len(own)]), low[own])
     if known.chain is not None:  # shorter ones are no wander, and longer ones would be a level of every run
         low[_LENGTH], high[_LENGTH] = np.log(SHORTEST), np.log(max(known.chain.longest, 2.0 * SHORTEST))
