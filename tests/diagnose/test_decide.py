@@ -17,6 +17,7 @@ from stickslip.inference.diagnose.decide import (
     best_forms,
     named,
     odd,
+    out_of_range,
     standard_error,
 )
 from stickslip.inference.fit.parameters import effect_parameters
@@ -103,6 +104,29 @@ def test_an_amplitude_at_its_bound_is_not_seen(amplitude, seen):
     found = replace(judged("rate-and-state", 300.0, 4.0), amplitude=amplitude, std=0.001)
     assert found.seen == seen
     assert not replace(found, std=0.0).seen  # what the fit holds at a bound has no deviation
+
+
+def test_what_only_its_bound_keeps_from_being_seen_stops_a_name():
+    bound = replace(judged("rate-and-state", 600.0, 12.0), amplitude=-0.02, std=0.0)
+    right = judged("wear", 300.0, 8.0)
+    assert out_of_range([right, bound]) is bound
+    assert named([right, bound]) == []
+    assert out_of_range([bound]) is bound
+
+
+@pytest.mark.parametrize("change", [{"chance": 2.0 * CHANCE}, {"spread": 100.0}, {"nearer": -1.0}])
+def test_but_only_if_it_would_be_seen_otherwise(change):
+    bound = replace(judged("rate-and-state", 600.0, 12.0, **change), amplitude=-0.02, std=0.0)
+    right = judged("wear", 300.0, 8.0)
+    assert out_of_range([right, bound]) is None
+    assert named([right, bound]) == [right]
+
+
+def test_and_only_if_it_predicts_better():
+    bound = replace(judged("rate-and-state", 600.0, 8.1), amplitude=-0.02, std=0.0)
+    right = judged("wear", 300.0, 8.0)
+    assert out_of_range([right, bound]) is None
+    assert named([right, bound]) == [right]
 
 
 def test_a_few_events_that_say_all_are_enough():

@@ -13,8 +13,11 @@
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
    effect predicts unseen runs better than it, nothing is named.
-5. *Unknown*: nothing more is seen, but the residual force is a function of a variable, and that would explain more
-   than half of what the named effects do; or the misfit within events is larger than is expected of any law.
+5. *Out of range*: where an effect that only its bound keeps from being seen predicts unseen runs better than all that
+   are seen, nothing is named: what is there acts like it, and is stronger than such effects are.
+6. *Unknown*: nothing more is seen, but an effect is out of range; or the residual force is a function of a variable,
+   and that would explain more than half of what the named effects do; or the misfit within events is larger than is
+   expected of any law.
 """
 
 from __future__ import annotations
@@ -109,11 +112,20 @@ class Judged(Compared):
         return _price(self.odd)
 
     @property
-    def seen(self) -> bool:
-        """Rule 1; what stands at a bound has no deviation."""
+    def inside(self) -> bool:
+        """Whether the amplitude is off its bounds by more than its deviation; what stands at a bound has none."""
         spec = specs(catalogue.get(self.tag))[catalogue.get(self.tag).amplitude]
-        inside = min(self.amplitude - spec.lower, spec.upper - self.amplitude)
-        return super().seen and 0.0 < self.std < inside
+        return 0.0 < self.std < min(self.amplitude - spec.lower, spec.upper - self.amplitude)
+
+    @property
+    def seen(self) -> bool:
+        """Rule 1."""
+        return super().seen and self.inside
+
+    @property
+    def out_of_range(self) -> bool:
+        """Whether nothing but its bound keeps it from being seen."""
+        return super().seen and not self.inside
 
 
 def odd(fit: Fit, tag: str) -> dict[str, float]:
@@ -198,13 +210,20 @@ def best_forms(judged: Sequence[Judged]) -> list[Judged]:
 def named(judged: Sequence[Judged]) -> list[Judged]:
     """The effect to be named, and behind it those that these data cannot tell from it; nothing where none is seen."""
     seen = [j for j in best_forms(judged) if j.seen]
-    if not seen:
+    if not seen or out_of_range(judged) is not None:
         return []
     best = max(seen, key=lambda j: j.better)
     close = [best, *(j for j in seen if j is not best and as_well(best, j))]
     # what contains another of them must pay for what it has more
     simple = [j for j in close if not any(_no_better(j, o) for o in close if o.tag in catalogue.get(j.tag).generalises)]
     return simple or close
+
+
+def out_of_range(judged: Sequence[Judged]) -> Judged | None:
+    """The effect out of range that predicts unseen runs better than all that are seen (rule 5)."""
+    seen = [j for j in judged if j.seen]
+    beyond = [j for j in judged if j.out_of_range and not any(as_well(j, s) for s in seen)]
+    return max(beyond, key=lambda j: j.better, default=None)
 
 
 def _no_better(general: Judged, special: Judged) -> bool:

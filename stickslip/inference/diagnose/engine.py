@@ -29,7 +29,7 @@ from ..force.signatures import Explained
 from ..force.valleys import LEVEL, widened
 from .checkpoints import Store, kept, name_of
 from .confirm import Confirmation, Parts, confirm
-from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named
+from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named, out_of_range
 from .finals import Finals, alone, finalists
 from .prepare import FEWEST, Prepared, prepare
 from .shape import Shape, shape_of, unshaped
@@ -68,6 +68,11 @@ class Round:
         doubted = rival is not None and rival.seen and (not self.close or as_well(self.close[0], rival))
         return rival if doubted else None
 
+    @property
+    def beyond(self) -> Judged | None:
+        """The effect that would have to be stronger than such effects are, where that keeps all from being named."""
+        return None if self.close else out_of_range(self.judged)
+
 
 @dataclass(frozen=True)
 class Rung:
@@ -105,6 +110,7 @@ class Verdict:
         structure: of the residual force, where nothing explains it.
         misfit: phase in which the model is off by more than any law of friction should be, and by which share of the
             strength.
+        beyond: the effect that explains the data best, but not with an amplitude that such effects have.
     """
 
     kind: str
@@ -112,6 +118,7 @@ class Verdict:
     set: tuple[str, ...] = ()
     structure: Structure | None = None
     misfit: tuple[str, float] | None = None
+    beyond: Judged | None = None
 
 
 @dataclass(frozen=True)
@@ -418,19 +425,19 @@ def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: s
 def _end(named: Mapping[str, Round], last: Round) -> Verdict:
     """Nothing more is seen: what that means."""
     taken, sets = tuple(named), [r.close for r in named.values() if len(r.close) > 1]
+    alike = tuple(dict.fromkeys(j.tag for c in sets for j in c))
     structure = None
     found = structures(last.base, Explained(last.base), DISPERSION)
     explained = sum(r.close[0].gain for r in named.values())
     if found and found[0].chance < STRUCTURED and found[0].fall > LEFT * explained and not last.close:
         structure = found[0]
-    if structure is not None:
-        return Verdict("unknown", taken, tuple(dict.fromkeys(j.tag for c in sets for j in c)), structure)
+    if structure is not None or last.beyond is not None:
+        return Verdict("unknown", taken, alike, structure, beyond=last.beyond)
     misfit = max(last.base.scatter.unexpected().items(), key=lambda phase: phase[1], default=None)
     if misfit is not None and not last.close:
-        return Verdict("unknown", taken, tuple(dict.fromkeys(j.tag for c in sets for j in c)), misfit=misfit)
+        return Verdict("unknown", taken, alike, misfit=misfit)
     if sets:
-        every = tuple(dict.fromkeys([*taken, *(j.tag for c in sets for j in c)]))
-        return Verdict("ambiguous", taken, every)
+        return Verdict("ambiguous", taken, tuple(dict.fromkeys([*taken, *alike])))
     return Verdict("missing" if taken else "complete", taken, taken)
 
 

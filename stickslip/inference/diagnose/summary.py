@@ -226,8 +226,13 @@ def failures(j: Judged, done: Round) -> list[str]:
         out.append(f"a gain of this size occurs by chance with probability {j.chance:.2g}")
     if j.better <= ERRORS * j.error:
         out.append(f"unseen runs are not predicted better by more than {ERRORS:g} standard errors")
+    if j.out_of_range:
+        out.append("its amplitude is not inside its bounds by more than its standard deviation")
     if out and j.odd:
         out.append(f"{' and '.join(j.odd)} would be outside {'its' if len(j.odd) == 1 else 'their'} usual range")
+    beyond = done.beyond
+    if not out and beyond is not None:
+        out.append(f"{beyond.tag} predicts unseen runs better, but at its bound")
     if not out and done.close:
         out.append(f"{done.close[0].tag} predicts unseen runs better")
     return out
@@ -295,6 +300,13 @@ def verdict_text(d: Diagnosis) -> str:
         parts.append(named_text(d.shape))
     if v.kind == "ambiguous":
         parts.append("These data cannot distinguish " + "; nor ".join(" from ".join(s) for s in _sets(d)) + ".")
+    if v.beyond is not None:
+        j = v.beyond
+        amount = shown(j.amplitude, catalogue.amplitude(catalogue.get(j.tag)).unit, 3)
+        parts.append(
+            f"Something is missing that no effect of the catalogue explains in its range: {j.tag} comes nearest, with "
+            f"{j.candidate.name} = {amount}, at its bound or known no better than its distance from it."
+        )
     if v.kind == "unknown" and v.structure is not None:
         parts.append(
             f"Something is missing that no effect of the catalogue explains: the residual force depends on the "

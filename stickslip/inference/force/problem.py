@@ -58,7 +58,8 @@ class Problem:
     position that ``alike`` hats along the cycle give to all cycles, a level for each run, by which the logarithm of its
     strength is another, what is left of the hum, and jumps of the reading before some events (:meth:`with_jumps`).
     Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
-    the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`).
+    the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`): it stays the
+    same under other springs and masses, as what the reading's noise does to residuals in units of the reading.
     """
 
     def __init__(self, composition: Composition, runs: Sequence[Knots]) -> None:
@@ -195,7 +196,7 @@ class Problem:
         """
         zero = np.zeros(self.at.size)
         before, beyond = (self.moved([k * e for e in errors], zero).forces(point) for k in (0.0, 2.0))
-        return self.moved(errors, 0.5 * (before.residual / before.share - beyond.residual / beyond.share))
+        return self.moved(errors, 0.5 * (before.residual - beyond.residual))
 
     def moved(self, errors: Sequence[Array], offset: Array) -> Problem:
         """The same with given ``errors`` and ``offset``."""
@@ -304,7 +305,7 @@ class Problem:
             read = not run.prescribed  # else a reading is told by itself, and the likelihood is that of the force
             counts = gain * np.where(slow[s], steep / spring, late * mass / c.mass) if read else np.ones(run.at.size)
             share[s] = 1.0 / counts
-            force = mean @ q[:n] - mass * acceleration - damping * rate - beside * way + self.offset[s]
+            force = mean @ q[:n] - mass * acceleration - damping * rate - beside * way
             residual[s] = share[s] * force
             moved = mean @ dq[:, :n].T - acceleration[:, None] * dmass
             if sensed:
@@ -330,7 +331,7 @@ class Problem:
             kept.append(((tangent[:n] + beside) * shares, slides, sliding * shares, psi))
             p += run.at.size
         slopes[:, a + b * runs + k :] = self._carried(tangents, local)
-        residual += slopes[:, a + b * runs + k :] @ point.common
+        residual += self.offset + slopes[:, a + b * runs + k :] @ point.common
         sticking, sliding, forces, states = zip(*kept, strict=True)
         return Forces(residual, local, springs, tangents, sticking, sliding, forces, states, held, share), slopes
 
