@@ -58,8 +58,8 @@ class Problem:
     position that ``alike`` hats along the cycle give to all cycles, a level for each run, by which the logarithm of its
     strength is another, what is left of the hum, and jumps of the reading before some events (:meth:`with_jumps`).
     Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
-    the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`): it stays the
-    same under other springs and masses, as what the reading's noise does to residuals in units of the reading.
+    the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`). Another
+    spring or mass leaves it as it is: residuals grow as errors of the reading do, not as forces.
     """
 
     def __init__(self, composition: Composition, runs: Sequence[Knots]) -> None:
