@@ -7,7 +7,7 @@ import pytest
 
 from stickslip.inference.diagnose.decide import DISPERSION
 from stickslip.inference.diagnose.engine import STRUCTURED
-from stickslip.inference.force.fit import fit
+from stickslip.inference.force.fit import fit, fit_base
 from stickslip.inference.force.residual import PULLED, coordinates, smooth_force, structures
 from stickslip.inference.force.signatures import Explained
 
@@ -17,7 +17,7 @@ from .conftest import Case, made, seen
 @pytest.fixture(scope="module")
 def free(begun: Case):
     """Nothing hidden, the spring unknown: its stiffness is free."""
-    return fit(begun.problem, begun.point)
+    return fit_base(begun.problem, begun.point)
 
 
 def test_a_force_in_proportion_to_that_of_the_spring_is_another_spring(free):
@@ -30,7 +30,7 @@ def test_a_force_in_proportion_to_that_of_the_spring_is_another_spring(free):
 
 
 def test_nothing_is_seen_where_nothing_is_hidden(free, small):
-    for found in (free, fit(small.problem, small.point)):
+    for found in (free, fit_base(small.problem, small.point)):
         assert min(s.chance for s in structures(found, Explained(found), DISPERSION)) > 1e-2
 
 
