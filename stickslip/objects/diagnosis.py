@@ -244,8 +244,8 @@ def _made(campaign: Campaign, done: Found, able: Any, began: float, limit: float
     proposed = next_experiment(campaign, done, sections["next_experiment"], tell, in_time)
     traces, segmentations = campaign.displaced[0], campaign.scaled[0]
     described, pictured = trace_sections(traces, segmentations)
-    level = sections["scatter"].get("text")  # of the fit, which knows slips better than their forces at the onsets do
-    follows = None if level and not done.prepared.prescribed else wander(campaign)
+    # the fit knows slips better than their forces at the onsets do
+    follows = None if done.level is not None and not done.prepared.prescribed else wander(campaign)
     result: dict[str, Any] = {
         **head(campaign, "diagnose"),
         **sections,
@@ -255,7 +255,6 @@ def _made(campaign: Campaign, done: Found, able: Any, began: float, limit: float
         "notes": [
             *campaign.scaled[1],
             *campaign.displaced[1],
-            *([level] if level else []),
             *([] if follows is None else [wander_sentence(follows)]),
         ],
         "can": list(able.can),

@@ -6,6 +6,7 @@ import pytest
 
 from stickslip.data.segment import segment
 from stickslip.effects import make
+from stickslip.inference.diagnose.level import level_of
 from stickslip.inference.diagnose.prepare import prepare
 from stickslip.inference.force import fit as fitting
 from stickslip.inference.force.candidates import try_effect
@@ -37,9 +38,13 @@ def test_the_level_is_found_and_a_wave_that_is_not_there_gains_little(prepared, 
     assert base.scatter.follows.coordinate == "slip path"
     assert 0.3 < size["level"] / SIZE < 2.0 and 0.3 < size["length"] / LENGTH < 3.0  # of one draw, ten lengths long
     assert size["strength"] < 0.03 * size["level"]
+    level = level_of(base)
+    assert level.form == {"along": "slip"} and level.gain > 500.0
+    assert (level.size, level.length) == (size["level"], size["length"])
     assert gain(base, "velocity-weakening") < 30.0
     with monkeypatch.context() as patch:
         patch.setattr(fitting, "FEWEST", 10**6)
         without = fitting.fit_base(prepared.problem, prepared.start)
-    assert without.scatter.follows is None and without.cost - base.cost > 500.0
+    assert without.scatter.follows is None and level_of(without) is None
+    assert without.cost - base.cost > 500.0
     assert gain(base, "position-dependent-friction") < 0.6 * gain(without, "position-dependent-friction")

@@ -22,6 +22,7 @@ from ..uncertainty import Profile, profile
 from .confirm import Confirmation, confirm
 from .decide import DISPERSION
 from .engine import Diagnosis, Rung, Verdict, leading, settled, static_residual, without
+from .level import level_of
 from .prepare import Prepared
 from .shape import shape_of, unshaped
 from .trials import Tell
@@ -59,7 +60,7 @@ class Climbed:
         shape = unshaped(self.fit, rig) if self.prepared.prescribed else shape_of(self.fit, rig)
         return Diagnosis(
             Verdict("fitted", tuple(self.gains)), self.ladder, (), {}, self.prepared, deviations(self.fit),
-            shape, self.prepared.dropped, confirmation=confirmation,
+            shape, self.prepared.dropped, confirmation=confirmation, level=level_of(self.fit),
         )  # fmt: skip
 
 

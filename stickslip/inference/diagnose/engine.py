@@ -31,6 +31,7 @@ from .checkpoints import Store, kept, name_of
 from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Compared, Judge, Judged, as_well, best_forms, named, out_of_range
 from .finals import Finals, alone, finalists
+from .level import TAG, Level, level_of
 from .prepare import FEWEST, Prepared, prepare
 from .shape import Shape, shape_of, unshaped
 from .trials import Tell, trials
@@ -135,6 +136,7 @@ class Diagnosis:
         in_time: whether the time limit was not met.
         confirmation: the leading models run freely.
         wrong: what the motion contradicts of the rig as it is stated, so that no effect was tried.
+        level: of the strength, which wanders under all models.
     """
 
     verdict: Verdict
@@ -148,6 +150,7 @@ class Diagnosis:
     in_time: bool = True
     confirmation: Confirmation = field(default_factory=Confirmation)
     wrong: tuple[Finding, ...] = ()
+    level: Level | None = None
 
     @property
     def fit(self) -> Fit:
@@ -246,12 +249,13 @@ def diagnose(
     floor = deviations(search.base)
     tell("the laws of the backbone", 1.0)
     shape = unshaped(search.base, campaign.rig) if prepared.prescribed else shape_of(search.base, campaign.rig, tags)
-    verdict = verdict if wrong else with_shape(verdict, shape)
+    level = None if wrong else level_of(search.base)
+    verdict = verdict if wrong else with_shape(with_level(verdict, level), shape)
     complete = in_time()
     confirmed = confirm(leading(ladder, search.named), ladder[-1].model, prepared, store, tell, in_time)
     return Diagnosis(
         verdict, tuple(ladder), tuple(search.rounds), dict(search.named), prepared, floor, shape, tuple(dropped),
-        complete, confirmed, tuple(wrong),
+        complete, confirmed, tuple(wrong), level,
     )  # fmt: skip
 
 
@@ -439,6 +443,16 @@ def _end(named: Mapping[str, Round], last: Round) -> Verdict:
     if sets:
         return Verdict("ambiguous", taken, tuple(dict.fromkeys([*taken, *alike])))
     return Verdict("missing" if taken else "complete", taken, taken)
+
+
+def with_level(verdict: Verdict, level: Level | None) -> Verdict:
+    """The answer with a level of friction that wanders, on top of which all else was found."""
+    if level is None:
+        return verdict
+    effects = (TAG, *verdict.effects)
+    if verdict.kind in ("complete", "missing"):
+        return replace(verdict, kind="missing", effects=effects, set=effects)
+    return replace(verdict, effects=effects)
 
 
 def with_shape(verdict: Verdict, shape: Shape) -> Verdict:

@@ -21,12 +21,12 @@ from ..force.knots import PHASES
 from ..force.linearised import Array
 from ..force.prescribed import placeholders
 from ..force.residual import coordinates
-from ..force.scatter import NUMERIC, Scatter
 from .decide import CHANCE, ERRORS, Judged, best_forms
 from .engine import Diagnosis, Round, Rung
 from .fitted import fitted_model
 from .free_errors import errors
 from .free_words import cautions, free_variables, left_out
+from .level import TAG
 from .shape import Law, named_text, section
 
 Variables = dict[str, Any]
@@ -52,7 +52,8 @@ def summary(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables]:
             "reasons": reasons(d),
             "confidence": None,
             "forms": {tag: dict(r.close[0].candidate.form) for tag, r in d.named.items()}
-            | {law.tag: dict(law.shaped.form) for law in _of_shape(d)[:1]},
+            | {law.tag: dict(law.shaped.form) for law in _of_shape(d)[:1]}
+            | ({TAG: d.level.form} if TAG in d.verdict.effects and d.level is not None else {}),
         },
         "in_time": d.in_time,
         "ranking": _ranking(first, d.ladder[1], d),
@@ -90,7 +91,7 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
             *cautions(d.confirmation, {r.model: error(r.unseen, d) for r in d.ladder[1:] if r.unseen is not None}),
         ],
         "ladder": [_rung(r, d) for r in d.ladder],
-        "scatter": d.fit.scatter.named() | followed(d.fit.scatter),
+        "scatter": d.fit.scatter.named() | ({} if d.level is None else d.level.plain()),
         "parameters": parameters(d.fit, found, rig),
         "backbone": section(d.shape),
         "held_out": "every run in turn; in halves if a run has its own parameters",
@@ -100,21 +101,6 @@ def fitted_sections(d: Diagnosis, rig: Rig) -> tuple[dict[str, Any], Variables, 
         KEY: record(found),
     }  # fmt: skip
     return result, variables(d), found
-
-
-def followed(scatter: Scatter) -> dict[str, Any]:
-    """What the level of the strength follows: ``coordinate``, ``alike`` and ``text``, or nothing."""
-    if scatter.follows is None or scatter.named()["level"] < NUMERIC:  # an effect may have taken its place
-        return {}
-    size, (coordinate, *others) = scatter.named(), (scatter.follows.coordinate, *scatter.follows.alike)
-    unit = "s" if coordinate == "time" else "m"
-    like = f" (or {' or '.join(others)}: these data cannot tell)" if others else ""
-    text = (
-        f"From event to event the strength wanders by {100 * size['level']:.2g} % along {coordinate}{like}, with a "
-        f"length of {shown(size['length'], unit, 2)}; {100 * size['strength']:.2g} % are an event's own. "
-        "All effects are tried on top of this."
-    )
-    return {"coordinate": coordinate, "alike": others, "text": text}
 
 
 def error(residual: Array, d: Diagnosis, where: np.ndarray | None = None) -> float:
@@ -240,7 +226,7 @@ def failures(j: Judged, done: Round) -> list[str]:
 
 def reasons(d: Diagnosis) -> list[str]:
     """What the naming of each effect rests on."""
-    out = []
+    out = [] if d.level is None else [d.level.reason]
     for done in d.named.values():
         if done.close:
             j = done.close[0]
@@ -284,7 +270,7 @@ def verdict_text(d: Diagnosis) -> str:
         alike = f" These data cannot distinguish this from {' or '.join(v.set)}." if v.set else ""
         return f"{found} No effect predicts unseen runs better than that.{alike}"
     before, after = (error(r.unseen, d) for r in (base, last) if r.unseen is not None)
-    parts = []
+    parts = [] if d.level is None else [d.level.text]
     if d.named:
         amounts = []
         for tag in d.named:
@@ -342,15 +328,15 @@ def _of_shape(d: Diagnosis) -> tuple[Law, ...]:
 
 def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
     """For effects that these data cannot tell apart: what the catalogue knows to separate them."""
-    sets = _sets(d)
-    if not sets:
-        return None
-    made = []
+    sets, made = _sets(d), []
     for close in sets:
         a, b = close[:2]
         known = catalogue.alike(a).get(b)
         text = known or "add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s"
         made.append({"text": text, "separates": close})
+    made += [] if d.level is None or d.level.experiment is None else [d.level.experiment]
+    if not made:
+        return None
     return {**made[0], "others": made[1:]} if len(made) > 1 else made[0]
 
 

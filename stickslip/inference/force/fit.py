@@ -346,6 +346,12 @@ def wandering(found: Fit) -> Fit:
     return replace(best, evaluations=found.evaluations + best.evaluations)
 
 
+def independent(found: Fit) -> Fit:
+    """The fit with strengths of events that do not follow each other."""
+    own = replace(found, scatter=found.scatter.independent(), known=found.known.following(None))
+    return adapted(refit(found.problem, found.point, own))
+
+
 def at(problem: Problem, point: Point, scatter: Scatter, base: Fit) -> Fit:
     """A model at a point, with what is known of the noise as in another fit of the same data."""
     return _like(base, problem, point, problem.forces(point), scatter, 1)

@@ -106,6 +106,14 @@ class Scatter:
         sizes[0] += np.log(0.6)
         return replace(self, sizes=sizes, follows=follows)
 
+    def independent(self) -> Scatter:
+        """The same with strengths of events that do not follow each other, and differ as much."""
+        if self.follows is None:
+            return self
+        sizes = self.sizes[: len(NAMES)].copy()
+        sizes[0] = np.logaddexp(2.0 * sizes[0], 2.0 * self.sizes[_LEVEL]) / 2.0
+        return Scatter(sizes)
+
     def unexpected(self) -> dict[str, float]:
         """Phase -> misfit (share of the strength) that lies beyond two standard deviations of what is expected."""
         beyond = self.sizes[_PHASE] > CENTRES[_PHASE] + 2.0 * WIDTHS[_PHASE]
@@ -199,8 +207,8 @@ class Known:
         """The same with other points left out: a variance (N^2) that takes their weight, shape (E, n)."""
         return self._with(replace(self, dropped=dropped))
 
-    def following(self, chain: Chain) -> Known:
-        """The same with levels that go on along a chain."""
+    def following(self, chain: Chain | None) -> Known:
+        """The same with levels that go on along a chain, or with none."""
         return self._with(replace(self, chain=chain))
 
     def _with(self, other: Known) -> Known:
