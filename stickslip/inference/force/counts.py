@@ -22,6 +22,22 @@ def counted(readings: Array, count: float) -> bool:
     return bool(np.abs(steps - np.round(steps)).max() < ON_GRID)
 
 
+def of_mean(way: Array, count: float, spread: float) -> Array:
+    """Variance of what rounding to counts adds to the mean of readings over an even way (m^2), shape as ``way``.
+
+    Over whole counts nothing is left, over a part of one as much as a twelfth of its square. Where on the count the way
+    begins is not known.
+
+    Args:
+        way: (m).
+        count: (m).
+        spread: standard deviation of the noise before the rounding (m).
+    """
+    k = np.arange(1, TERMS + 1)
+    sizes = count / np.pi / k * np.exp(-2.0 * (np.pi * k * spread / count) ** 2)
+    return np.asarray((0.5 * sizes**2 * np.sinc(np.abs(way)[..., None] / count * k) ** 2).sum(axis=-1))
+
+
 def rounding(x: Array, count: float, spread: Array | float) -> Array:
     """Mean of what rounding to counts adds where a reading without it would be (m), shape as ``x``.
 

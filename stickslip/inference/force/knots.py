@@ -17,7 +17,7 @@ from scipy.sparse import coo_array, csr_array
 
 from ...data.segment import Event, Segmentation
 from ...data.trace import Trace
-from .counts import counted, rounding
+from .counts import counted, of_mean, rounding
 from .inserted_knots import Inserted
 from .kernels import band, kernels
 from .mains import hum
@@ -130,7 +130,8 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     breaks = np.searchsorted(t, trace.drive.breakpoints)
     arrests = (np.array([e.t_arrest for e in found.events]) - t[0]) * rate
     hums = hum(t, x, trace, found, times.slip, times.hum)
-    x = unrounded(x, hums, trace.resolution or 0.0, noise, rate, times, arrests)
+    count = trace.resolution if trace.resolution and counted(x, trace.resolution) else 0.0
+    x = unrounded(x, hums, count, noise, rate, times, arrests)
     followed, speed, smoother = smoothed(x, noise, rate, times, arrests)
     steady, raw = speed, x
     step = max(trace.resolution or 0.0, 2.0 * noise, UNSTEADY * unsteady(x, t, found.events, rate))
@@ -158,13 +159,13 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     if n - edge > 4 * h:
         last = len(events)
         pieces.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, speed)
-    return pieces.made(trace, t, x, (phi, first, second), events, noise, times, smoother)
+    return pieces.made(trace, t, x, (phi, first, second), events, noise, times, smoother, count)
 
 
 def unrounded(
     readings: Array, hums: Array, count: float, noise: float, rate: float, times: Scales, arrests: Array
 ) -> Array:
-    """Readings (m) without the hum and, if they are counts, what rounding adds in the mean where the motion is."""
+    """Readings (m) without the hum and, if they are counts (m), what rounding adds in the mean where the motion is."""
     x = readings - hums
     if not counted(readings, count):
         return x
@@ -262,7 +263,7 @@ class _Pieces:
 
     def made(
         self, trace: Trace, t: Array, samples: Array, weights: tuple[Array, Array, Array], events: tuple[Event, ...],
-        noise: float, times: Scales, smoother: Smoother,
+        noise: float, times: Scales, smoother: Smoother, count: float,
     ) -> Knots:  # fmt: skip
         assert trace.drive is not None
         knot_t, seen = np.concatenate(self.t), np.concatenate(self.x)
@@ -274,7 +275,7 @@ class _Pieces:
         made_of = csr_array(one_way - one_way @ bowed)  # values in the middles from means
         x = made_of @ seen
         v, slow = np.concatenate(self.v), np.concatenate(self.slow)
-        v = self._velocity(knot_t, x, v, np.asarray(trace.drive.breakpoints), events, times)
+        v = slope = self._velocity(knot_t, x, v, np.asarray(trace.drive.breakpoints), events, times)
         inner = np.arange(2, v.size - 2)
         bends = np.zeros(v.size)
         bends[inner] = (v[inner + 2] - v[inner - 2]) / (knot_t[inner + 2] - knot_t[inner - 2])
@@ -337,7 +338,8 @@ class _Pieces:
         d, x, v = (inserted.joined(y, own) for y, own in ((d, inserted.between(d)), (x, inserted.x), (v, inserted.v)))
         knot_t = inserted.joined(knot_t, inserted.between(knot_t))
         event = event[inserted.source]
-        told = Reading.of(samples, inserted.rows(reading), moving[0], moving[1])
+        louder = self._louder(t.size, slope, noise, count, 1.0 / rate)
+        told = Reading.of(samples, inserted.rows(reading), moving[0], moving[1], louder)
         knots_made = Knots(
             trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
             made["at"], phase, of, made["rate"], made["acceleration"], told,
@@ -346,6 +348,18 @@ class _Pieces:
             np.zeros(of.size), band(second, rate), told.sums(times.hum.at(t)), trace.walk, 1.0 / rate,
         )  # fmt: skip
         return selected(knots_made, keep)
+
+    def _louder(self, size: int, v: Array, noise: float, count: float, step: float) -> Array:
+        """Variance of every sample's noise over that of one by itself: within a window rounding errs alike, (N,)."""
+        out = np.ones(size)
+        if not count > 0.0:
+            return out
+        spread = np.sqrt(max(noise**2 - count**2 / 12.0, 0.0))
+        for knot, edges in self.window:
+            length = np.diff(edges)
+            added = of_mean(v[knot] * length * step, count, spread)
+            out[edges[0] : edges[-1]] += np.repeat(added * length / noise**2, length)
+        return out
 
     def _velocity(self, t: Array, x: Array, v: Array, breaks: Array, events: tuple[Event, ...], times: Scales) -> Array:
         """At the knots (m/s), where the means over the windows tell it and where the smoothed record does."""

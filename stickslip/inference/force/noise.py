@@ -85,7 +85,7 @@ def noise(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Arr
     first = 0
     for run, rows in zip(problem.runs, carried, strict=True):
         own = slice(first, first + run.at.size)
-        scaled = rows @ dia_array((np.sqrt(run.reading.count), 0), shape=(rows.shape[1],) * 2)
+        scaled = rows @ dia_array((np.sqrt(run.reading.variance), 0), shape=(rows.shape[1],) * 2)
         pairs = (scaled @ scaled.T).tocoo()
         i, j = pairs.coords
         together = event[own][i] == event[own][j]
@@ -107,7 +107,7 @@ def reading_errors(problem: Problem, rows: Sequence[csr_array], weighted: Array,
     out, first = [], 0
     for run, row in zip(problem.runs, rows, strict=True):
         own = slice(first, first + run.at.size)
-        samples = -((white * run.noise) ** 2) * run.reading.count * (row.T @ weighted[own])
+        samples = -((white * run.noise) ** 2) * run.reading.variance * (row.T @ weighted[own])
         out.append(run.reading.displacement @ samples)
         first += run.at.size
     return out

@@ -27,6 +27,7 @@ class Reading:
         displacement: (n, g) from one sample of each group to the displacement at the knots.
         rate, acceleration: (p, g) the same for rate and acceleration at the points.
         count: samples in each group, shape (g,).
+        variance: of the sum of a group's errors over that of one sample, shape (g,).
     """
 
     samples: Array
@@ -35,17 +36,25 @@ class Reading:
     rate: csr_array
     acceleration: csr_array
     count: Array
+    variance: Array
 
     @classmethod
-    def of(cls, samples: Array, displacement: csr_array, rate: csr_array, acceleration: csr_array) -> Reading:
-        """From matrices with a column for each sample."""
+    def of(
+        cls, samples: Array, displacement: csr_array, rate: csr_array, acceleration: csr_array,
+        louder: Array | None = None,
+    ) -> Reading:  # fmt: skip
+        """From matrices with a column for each sample.
+
+        Errors that are alike in a window make the variance of each of its samples ``louder``, shape (N,).
+        """
         every = csc_array(vstack([displacement, rate, acceleration]))
         every.sort_indices()
         begins = ~_as_before(every)
         first = np.flatnonzero(begins)
         group = np.cumsum(begins) - 1
         at_knots, rate, acceleration = (csr_array(m[:, first]) for m in (displacement, rate, acceleration))
-        return cls(samples, group, at_knots, rate, acceleration, np.bincount(group).astype(float))
+        count = np.bincount(group).astype(float)
+        return cls(samples, group, at_knots, rate, acceleration, count, np.bincount(group, louder).astype(float))
 
     def sums(self, values: Array) -> Array:
         """Sums over each group, shape (g, ...), of a value for each sample, shape (N, ...)."""
