@@ -12,6 +12,7 @@ from stickslip.inference.force.kernels import kernels
 from stickslip.inference.force.knots import CREEP, _between, bow, knots
 from stickslip.inference.force.reading import Reading
 from stickslip.inference.force.smoothing import onward
+from stickslip.inference.force.windows import passing
 
 RATE = 1e4
 
@@ -216,3 +217,15 @@ def test_samples_that_count_alike_are_one_group():
     for found, whole in zip((made.displacement, made.rate, made.acceleration), dense, strict=True):
         np.testing.assert_allclose(found @ made.sums(other), whole @ other, atol=1e-13)
         np.testing.assert_allclose((found * made.count) @ found.T.toarray(), whole @ whole.T, atol=1e-13)
+
+
+@pytest.mark.parametrize("count", [2e-9, 8e-9])
+def test_the_fast_part_begins_where_a_count_is_passed_in_half_a_test_function(count):
+    """A velocity that grows evenly from rest: passed from where it is a count in so many samples."""
+    h, gain = 20, 1e-13  # m a sample, per sample
+    x = 0.5 * gain * np.arange(6000.0) ** 2
+    begin = passing(100, 5000, count * np.round(x / count), count, h)
+    assert begin == pytest.approx(count / h / gain, rel=0.15)
+    assert passing(100, 5000, x, 0.0, h) == 100  # a sensor without counts
+    assert passing(3000, 5000, x, count, h) == max(3000, begin) or begin > 3000
+    assert passing(5000, 4990, x, count, h) == 5000

@@ -25,7 +25,7 @@ from .reading import Reading
 from .sampling import even
 from .scales import Scales
 from .smoothing import Smoother, crept, onward, smoothed, unsteady
-from .windows import apart, edges_of, fast, hasty, thin
+from .windows import apart, edges_of, fast, hasty, passing, thin
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -147,7 +147,7 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     events = found.events
     for e, event in enumerate(events):
         begin, end = fast(events, e, times, rate, n, t, h)
-        begin = max(begin, edge + 1)
+        begin = max(passing(begin, event.i_onset - 2 * h, raw, count, h), edge + 1)
         pieces.windows(apart(edges_of(edge, begin, event.i_onset, breaks), raw, step, breaks), e, t, x, d)
         if end <= begin:
             continue

@@ -30,6 +30,19 @@ def fast(events: tuple[Event, ...], e: int, times: Scales, rate: float, n: int, 
     return max(int(begin), 0), min(int(end), n)
 
 
+def passing(low: int, high: int, x: Array, count: float, h: int) -> int:
+    """First sample from which the block passes a count of the sensor (m) within half a test function (samples).
+
+    Before, what rounding adds goes with the position as slowly as what is sought.
+    """
+    if not count > 0.0 or high <= low:
+        return low
+    total = np.cumsum(np.insert(x[low - h : high + h], 0, 0.0))
+    mean = (total[h:] - total[:-h]) / h
+    slow = np.flatnonzero(np.abs(mean[h:] - mean[:-h]) < count)
+    return low + int(slow[-1]) + 1 if slow.size else low
+
+
 def edges_of(low: int, high: int, onset: int, breaks: Index) -> Index:
     """Edges of the windows between two samples, some evenly and some towards the onset, none shorter than two."""
     if high - low < 4:
