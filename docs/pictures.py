@@ -50,3 +50,25 @@ def damaged(found: dict[str, Any]) -> Figure:
     ax.set(xlabel="damaged files", yticks=[], xlim=(0, left))
     made.legend(loc="outside upper center", ncols=2)
     return made
+
+
+@styled
+def challenged(found: dict[str, Any]) -> Figure:
+    """What a sealed run said, by what was hidden (``sealed.json``)."""
+    kinds = {"nothing": "nothing", "one": "one effect", "two": "two effects", "outside": "outside the catalogue"}
+    rows = [k for k in kinds if found["by_kind"].get(k, {}).get("exact", {}).get("of")]
+    made, axes = figure(width=7.0, height=0.8 + 0.45 * len(rows))
+    ax = axes[0, 0]
+    for y, kind in enumerate(reversed(rows)):
+        row, left = found["by_kind"][kind], 0.0
+        total = row["exact"]["of"]
+        exact, right = row["exact"]["count"], row["right"]["count"]
+        for width, color in ((exact, DARK), (right - exact, MIDDLE), (total - right, LIGHT)):
+            ax.barh(y, width, left=left, color=color)
+            left += width
+    for color, name in ((DARK, "exact"), (MIDDLE, "right: with others in a set"), (LIGHT, "missed")):
+        ax.barh(0, 0, color=color, label=name)
+    ax.set(xlabel="campaigns", yticks=range(len(rows)), yticklabels=[kinds[k] for k in reversed(rows)])
+    ax.xaxis.get_major_locator().set_params(integer=True)
+    made.legend(loc="outside upper center", ncols=3)
+    return made

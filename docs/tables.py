@@ -143,7 +143,7 @@ def sealed(found: dict[str, Any]) -> str:
         times = f"one or two effects, {b['from']:g} to {b['to']:g} times detection"
         rows.append([times, *(rate(b[s]) for s in shares)])
     sizes, alarms = rate(found["amplitude"]["all"]), rate(found["false_alarms"])
-    head = ["hidden (times detection)", "answer", "named, or the set", "right", "error on unseen runs / floors"]
+    head = ["hidden (times detection)", "answer", "named, and the set", "right", "error on unseen runs / floors"]
     parts = [
         table(["hidden", *shares], [row for row in rows if any(row[1:])]),
         f"Amplitudes within a factor of two: {sizes}. False alarms: {alarms}.",
@@ -163,7 +163,7 @@ def _sealed_case(case: dict[str, Any]) -> list[object]:
     hidden = [f"{e['tag']} ({e['multiple']:.3g})" if e["multiple"] else e["tag"] for e in case["hidden"]]
     errors = [f"{e:.2f}" for e in (case["heldout_base"], case["heldout_final"]) if e is not None]
     return [
-        ", ".join(hidden) or "nothing", f"`{case['answer']}`", ", ".join(case["set"] or case["named"]),
+        ", ".join(hidden) or "nothing", f"`{case['answer']}`", ", ".join(dict.fromkeys([*case["named"], *case["set"]])),
         "yes" if case["right"] else "no", " → ".join(errors),
     ]  # fmt: skip
 

@@ -29,7 +29,7 @@ def off(motion: Moved) -> np.ndarray:
         late |= (run.t > 0.5 * (before.t_arrest + event.t_onset)) & (run.t < event.t_onset)
     true = motion.course(run.t, 1)
     own = late & (true > 1e-6) & (true < 3e-5)
-    assert own.sum() > 80
+    assert own.sum() > 60
     return run.v[own] / true[own] - 1.0
 
 
@@ -37,7 +37,7 @@ def test_a_slow_velocity_is_found_through_the_counts_of_the_sensor(motion, monke
     error = off(motion)
     assert np.sqrt(np.mean(error**2)) < 0.12 and abs(np.mean(error)) < 0.06
     monkeypatch.setattr(smoothing, "STEPS", np.inf)  # over two periods of the ringing, and from window to window
-    assert np.sqrt(np.mean(off(motion) ** 2)) > 0.3
+    assert np.sqrt(np.mean(off(motion) ** 2)) > 2.0 * np.sqrt(np.mean(error**2))
 
 
 def test_a_polynomial_has_its_own_slope_and_a_stretch_ends_it():
