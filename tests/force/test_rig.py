@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from stickslip.inference.diagnose.decide import Judge
+from stickslip.inference.diagnose.engine import Round, Rung, Search
 from stickslip.inference.force.fit import fit
-from stickslip.inference.force.rig import SPRING, slips_finding, spring_freed
+from stickslip.inference.force.rig import SPRING, slips_finding, spring_freed, within_knowledge
 from stickslip.system.units import shown
 
 from .conftest import Case
@@ -46,3 +47,26 @@ def test_a_stiffness_that_is_right_is_left_alone(small):
 
 def test_a_spring_that_is_free_already_has_no_rival(begun):
     assert spring_freed(fit(begun.problem, begun.point, rounds=1)) is None
+
+
+@pytest.mark.parametrize(("factor", "near"), [(1.003, True), (0.996, True), (1.03, False)])
+def test_what_springs_are_not_known_better_than_is_no_wrong_entry(small, factor, near):
+    base = stated(small, factor)
+    freed = spring_freed(base)
+    assert freed is not None
+    assert within_knowledge(base, freed) == near
+
+
+def test_then_the_last_round_begins_anew_with_the_spring_that_the_slips_want(small):
+    base = stated(small, 1.003)
+    freed = spring_freed(base)
+    assert freed is not None
+    ladder = [Rung.of(("static", "inertia"), "inertia", base)]
+    search = Search(base, ladder, 1, lambda text, share: None, lambda: True, None)
+    search.rounds.append(Round(base, (), (), ()))
+    text = search.free_spring(freed)
+    true = small.truth["rig"]["spring_stiffness"]
+    assert search.base.values[SPRING] == pytest.approx(true, rel=1e-3)
+    assert shown(1.003 * true, "N/m", 4) in text and shown(search.base.values[SPRING], "N/m", 4) in text
+    assert search.rounds == [] and search.ladder[-1].fit is search.base
+    assert spring_freed(search.base) is None  # which is said once

@@ -16,6 +16,7 @@ from ...data.segment import Segmentation, segment
 from ...data.trace import Trace
 from ...errors import InputError
 from ...physics.effects import catalogue
+from ...system.units import shown
 from ..force.candidates import Candidate, every_form, from_end
 from ..force.fit import Fit, deviations, fit, fit_base
 from ..force.heldout import apart
@@ -24,7 +25,7 @@ from ..force.point import Point
 from ..force.prescribed import applies
 from ..force.problem import Problem
 from ..force.residual import Structure, structures
-from ..force.rig import slips_finding, spring_freed
+from ..force.rig import EXACT, SPRING, slips_finding, spring_freed, within_knowledge
 from ..force.signatures import Explained
 from ..force.valleys import LEVEL, widened
 from .checkpoints import Store, kept, name_of
@@ -232,7 +233,9 @@ def diagnose(
         verdict = Verdict("unknown")
     while verdict is None:
         done = search.round([t for t in tags if t not in search.named and t not in search.gone])
-        if done.doubt is not None:
+        if done.doubt is not None and within_knowledge(done.base, done.doubt.fit) and in_time():
+            dropped.append(search.free_spring(done.doubt.fit))
+        elif done.doubt is not None:
             wrong = (*wrong, slips_finding(done.base, done.doubt.fit))
             tied = done.close and as_well(done.doubt, done.close[0])
             alike = tuple(j.tag for j in done.close) if tied else ()
@@ -271,6 +274,7 @@ class Search:
     """
 
     _left: Round | None = None  # of a round whose effect was not kept, what else it tried
+    _spring = ""  # what names the rounds once the spring is free
 
     def __init__(
         self, base: Fit, ladder: list[Rung], jobs: int, tell: Tell, in_time: Callable[[], bool], store: Store | None
@@ -287,10 +291,25 @@ class Search:
             done, self._left = self._left, None
             self.rounds[-1] = done
             return done
-        name = f"round {len(self.rounds) + 1}"
+        name = f"round {len(self.rounds) + 1}{self._spring}"
         done = self._tried(self.base, tags, name)
         self.rounds.append(done)
         return done
+
+    def free_spring(self, freed: Fit) -> str:
+        """Begin the last round anew with another spring than stated, where that is as near as springs are known."""
+        self.rounds.pop()
+        stated, self._spring = self.base.values[SPRING], " with its own spring"
+        self.base = kept(
+            self._store, f"round{len(self.rounds) + 1}-spring", freed.problem,
+            lambda: fit(freed.problem, freed.point, freed.scatter.unbound(), first=True),
+        )  # fmt: skip
+        last = self.ladder[-1]
+        self.ladder[-1] = Rung.of(last.model, last.added, self.base, last.removed)
+        return (
+            f"spring: {shown(self.base.values[SPRING], 'N/m', 4)} as the slips want, not {shown(stated, 'N/m', 4)} as "
+            f"stated: springs are not known better than to {100 * EXACT:g} %"
+        )
 
     def add(self, done: Round) -> None:
         """Take up what a round named, and try again each effect named before.

@@ -11,11 +11,10 @@ from ...data.segment import Segmentation
 from ...data.trace import Trace
 from ...errors import StickslipError
 from ..force.fit import fit_base
-from ..force.rig import slips_finding, spring_freed
+from ..force.rig import slips_finding, spring_freed, within_knowledge
 from .decide import Judge
 from .prepare import prepare
 
-EXACT = 1e-3  # share of its value by which no spring and no mass is stated better
 OR_ELSE = (
     " An effect on the spring's force (a nonlinear spring, tilt, the spring's own inertia) makes much the same: "
     "stickslip diagnose compares them."
@@ -37,7 +36,7 @@ def spring_finding(campaign: Campaign, traces: Sequence[Trace], found: Sequence[
         freed = spring_freed(base)
         if freed is None or not Judge(base, 1).beside(freed, 1).seen:
             return None
-        if abs(freed.values["rig.spring_stiffness"] / rig.spring_stiffness - 1.0) < EXACT:
+        if within_knowledge(base, freed):
             return None
     except StickslipError:  # too little for a fit: inspect has said so already
         return None

@@ -17,6 +17,7 @@ from .fit import Fit, adapted, refit
 from .point import Point
 
 SPRING = "rig.spring_stiffness"
+EXACT = 5e-3  # share of its value by which no spring is known better
 WIDEST = 10.0  # factor on the stated stiffness within which it is sought
 
 
@@ -43,6 +44,11 @@ def spring_freed(base: Fit) -> Fit | None:
     problem = base.problem.with_composition(replace(composition, free=free, fixed=fixed))
     point: Point = replace(base.point, z=np.insert(base.point.z, first, spring.inward(stated)))
     return adapted(refit(problem, point, base))
+
+
+def within_knowledge(base: Fit, freed: Fit) -> bool:
+    """Whether the stiffness that the slips want is as near to the stated one as that is known."""
+    return abs(freed.values[SPRING] / base.values[SPRING] - 1.0) < EXACT
 
 
 def slips_finding(base: Fit, freed: Fit) -> Finding:
