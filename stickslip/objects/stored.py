@@ -18,6 +18,7 @@ from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at
 from ..inference.force.heldout import apart
 from ..inference.force.problem import Problem
+from ..inference.force.rig import SPRING, with_free_spring
 from ..inference.force.stored import fit_arrays, fit_of
 from ..physics.effects import catalogue
 from ..physics.params import specs, variants
@@ -38,11 +39,13 @@ def packed(fit: Fit, keep: Callable[[ForceFit, Arrays], str]) -> dict[str, Any]:
         keep: is given every model and its arrays, and returns the name under which they are found again.
     """
     done = fit._climbed
+    fixed = done.prepared.problem.composition.fixed
     rungs = [
         {
             "model": list(rung.model),
             "added": rung.added,
             "removed": rung.removed,
+            "spring_freed": SPRING in fixed and SPRING not in rung.fit.problem.composition.fixed,
             "effects": [_effect(e) for e in rung.fit.problem.composition.effects],
             "arrays": keep(rung.fit, fit_arrays(rung.fit)),
         }
@@ -69,7 +72,10 @@ def unpacked(campaign: Campaign, kept: Mapping[str, Any], load: Callable[[str], 
     ladder: list[Rung] = []
     problem = prepared.problem
     for row in kept["rungs"]:
-        problem = _with(prepared.problem, row["effects"])
+        problem = prepared.problem
+        if row.get("spring_freed"):
+            problem = with_free_spring(problem) or problem
+        problem = _with(problem, row["effects"])
         found = fit_of(problem, load(row["arrays"]))
         if not ladder:
             ladder.append(Rung(("static",), None, static_residual(found), None, None))

@@ -8,8 +8,10 @@ import pytest
 
 from stickslip.inference.diagnose.decide import Judge
 from stickslip.inference.diagnose.engine import Round, Rung, Search
+from stickslip.inference.force.candidates import with_start
 from stickslip.inference.force.fit import fit
-from stickslip.inference.force.rig import SPRING, slips_finding, spring_freed, within_knowledge
+from stickslip.inference.force.rig import SPRING, slips_finding, spring_freed, with_free_spring, within_knowledge
+from stickslip.physics.effects.viscous_drag import ViscousDrag
 from stickslip.system.units import shown
 
 from .conftest import Case
@@ -70,3 +72,15 @@ def test_then_the_last_round_begins_anew_with_the_spring_that_the_slips_want(sma
     assert shown(1.003 * true, "N/m", 4) in text and shown(search.base.values[SPRING], "N/m", 4) in text
     assert search.rounds == [] and search.ladder[-1].fit is search.base
     assert spring_freed(search.base) is None  # which is said once
+
+
+def test_a_free_spring_stands_before_effects_whenever_it_was_freed(small):
+    """So that a model is the same that is built again from what is kept of it."""
+    drag = ViscousDrag()
+    early = with_start(with_free_spring(small.problem), drag, {"drag": 0.01})[0]
+    late = with_free_spring(with_start(small.problem, drag, {"drag": 0.01})[0])
+    for problem in (early, late):
+        assert SPRING not in problem.composition.fixed
+    names = [f.name for f in early.composition.shared]
+    assert names == [f.name for f in late.composition.shared]
+    assert all(name.startswith("viscous-drag.") for name in names[names.index(SPRING) + 1 :])

@@ -252,13 +252,17 @@ def fit_base(problem: Problem, point: Point) -> Fit:
     errors = reading_errors(found.problem, rows, weighted, found.scatter.named()["white"])
     problem = found.problem.adjusted(errors, found.point)
     found = again(problem, found.point, found.scatter, found.dropped, found.around, found.evaluations)
-    with portion(ADJUSTED, 1.0):
+    with portion(ADJUSTED, 0.9):
         other = adapted(refit(problem, found.point, found))
-        while len(other.problem.jumps) < MOST_JUMPS and (event := jumping(other._system)) is not None:
+    for tried in range(MOST_JUMPS):
+        if (event := jumping(other._system)) is None:
+            break
+        with portion(*(0.9 + 0.08 * np.array([tried, tried + 1]) / MOST_JUMPS)):
             after = _jumped(other, event)
-            if other.cost - after.cost < FAR**2:
-                break
-            other = after
+        if other.cost - after.cost < FAR**2:
+            break
+        other = after
+    with portion(0.98, 1.0):
         other = wandering(other)
     if not any(run.prescribed for run in problem.runs):
         rows = by_reading(other.problem, other.around, other.problem.evaluate(other.around))

@@ -15,6 +15,7 @@ from ...system.units import shown
 from ..fit.parameters import Free
 from .fit import Fit, adapted, refit
 from .point import Point
+from .problem import Problem
 
 SPRING = "rig.spring_stiffness"
 EXACT = 5e-3  # share of its value by which no spring is known better
@@ -23,27 +24,29 @@ WIDEST = 10.0  # factor on the stated stiffness within which it is sought
 
 def spring_freed(base: Fit) -> Fit | None:
     """The same model with the stiffness of the spring free; None where it is free already, or runs have their own."""
-    composition = base.problem.composition
+    problem = with_free_spring(base.problem)
+    if problem is None:
+        return None
+    ((first, spring),) = [(i, f) for i, f in enumerate(problem.composition.shared) if f.name == SPRING]
+    point: Point = replace(base.point, z=np.insert(base.point.z, first, spring.inward(spring.start)))
+    return adapted(refit(problem, point, base))
+
+
+def with_free_spring(problem: Problem) -> Problem | None:
+    """The same with a free stiffness, after the other parameters of the base; None as above."""
+    composition = problem.composition
     stated = composition.fixed.get(SPRING)
-    if stated is None or any(k.stiffness is not None for k in base.problem.runs):
+    if stated is None or any(k.stiffness is not None for k in problem.runs):
         return None
     spring = Free(
-        SPRING,
-        "N/m",
-        "log",
-        stated,
-        stated,
-        np.inf,
-        stated / WIDEST,
-        stated * WIDEST,
+        SPRING, "N/m", "log", stated, stated, np.inf, stated / WIDEST, stated * WIDEST,
         "stiffness of the driving spring",
-    )
+    )  # fmt: skip
     fixed = {name: value for name, value in composition.fixed.items() if name != SPRING}
-    first = len(composition.shared)
-    free = (*composition.shared, spring, *composition.phases)
-    problem = base.problem.with_composition(replace(composition, free=free, fixed=fixed))
-    point: Point = replace(base.point, z=np.insert(base.point.z, first, spring.inward(stated)))
-    return adapted(refit(problem, point, base))
+    tags = {e.tag for e in composition.effects}
+    own = [f for f in composition.shared if f.name.partition(".")[0] not in tags]
+    rest = composition.shared[len(own) :]
+    return problem.with_composition(replace(composition, free=(*own, spring, *rest, *composition.phases), fixed=fixed))
 
 
 def within_knowledge(base: Fit, freed: Fit) -> bool:
