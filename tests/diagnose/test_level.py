@@ -26,7 +26,7 @@ EVENTS = 24
         (Verdict("complete"), Verdict("missing", (TAG,), (TAG,))),
         (Verdict("missing", ("wear",), ("wear",)), Verdict("missing", (TAG, "wear"), (TAG, "wear"))),
         (Verdict("ambiguous", ("wear",), ("wear", "tilt")), Verdict("ambiguous", (TAG, "wear"), ("wear", "tilt"))),
-        (Verdict("unknown"), Verdict("unknown", (TAG,))),
+        (Verdict("unknown"), Verdict("unknown")),
     ],
 )
 def test_it_is_one_effect_more(before, after):

@@ -465,8 +465,11 @@ def _end(named: Mapping[str, Round], last: Round) -> Verdict:
 
 
 def with_level(verdict: Verdict, level: Level | None) -> Verdict:
-    """The answer with a level of friction that wanders, on top of which all else was found."""
-    if level is None:
+    """The answer with a level of friction that wanders, on top of which all else was found.
+
+    It has no name where something else is missing that has none: the level may stand for that.
+    """
+    if level is None or verdict.kind == "unknown":
         return verdict
     effects = (TAG, *verdict.effects)
     if verdict.kind in ("complete", "missing"):

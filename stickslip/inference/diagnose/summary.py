@@ -226,7 +226,7 @@ def failures(j: Judged, done: Round) -> list[str]:
 
 def reasons(d: Diagnosis) -> list[str]:
     """What the naming of each effect rests on."""
-    out = [] if d.level is None else [d.level.reason]
+    out = [d.level.reason] if d.level is not None and TAG in d.verdict.effects else []
     for done in d.named.values():
         if done.close:
             j = done.close[0]
