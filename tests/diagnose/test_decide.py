@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -20,6 +20,8 @@ from stickslip.inference.diagnose.decide import (
     out_of_range,
     standard_error,
 )
+from stickslip.inference.diagnose.engine import Round
+from stickslip.inference.diagnose.summary import failures
 from stickslip.inference.fit.parameters import effect_parameters
 from stickslip.inference.force.candidates import Candidate
 from stickslip.physics.effects import catalogue
@@ -112,6 +114,16 @@ def test_what_only_its_bound_keeps_from_being_seen_stops_a_name():
     assert out_of_range([right, bound]) is bound
     assert named([right, bound]) == []
     assert out_of_range([bound]) is bound
+
+
+def test_and_the_answer_says_what_keeps_each_from_being_named():
+    bound = replace(judged("rate-and-state", 600.0, 12.0), amplitude=-0.02, std=0.0)
+    right, base = judged("wear", 300.0, 8.0), cast("Any", None)
+    done = Round(base, (right, bound), (), ())
+    assert done.beyond is bound
+    assert failures(right, done) == ["rate-and-state predicts unseen runs better, but at its bound"]
+    assert "not inside its bounds" in failures(bound, done)[0]
+    assert Round(base, (right,), (), (right,)).beyond is None
 
 
 @pytest.mark.parametrize("change", [{"chance": 2.0 * CHANCE}, {"spread": 100.0}, {"nearer": -1.0}])
