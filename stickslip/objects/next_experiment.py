@@ -10,7 +10,8 @@ import numpy as np
 
 from ..inference.diagnose.climb import Climbed
 from ..inference.diagnose.engine import Diagnosis as Found
-from ..inference.diagnose.engine import Round, Rung
+from ..inference.diagnose.rounds import Round
+from ..inference.diagnose.search import Rung
 from .campaign import Campaign
 from .experiments import Setting, Telling, practicable, scenario, tell_apart
 from .fit import Fit

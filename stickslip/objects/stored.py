@@ -12,7 +12,8 @@ import numpy as np
 
 from ..errors import InputError, RunFolderError, StickslipError
 from ..inference.diagnose.climb import Climbed
-from ..inference.diagnose.engine import Rung, static_residual
+from ..inference.diagnose.engine import static_residual
+from ..inference.diagnose.search import Rung
 from ..inference.force.candidates import with_start
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at

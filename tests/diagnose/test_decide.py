@@ -20,8 +20,8 @@ from stickslip.inference.diagnose.decide import (
     out_of_range,
     standard_error,
 )
-from stickslip.inference.diagnose.engine import Round
-from stickslip.inference.diagnose.summary import failures
+from stickslip.inference.diagnose.rounds import Round
+from stickslip.inference.diagnose.summary import failures, nearest_text
 from stickslip.inference.fit.parameters import effect_parameters
 from stickslip.inference.force.candidates import Candidate
 from stickslip.physics.effects import catalogue
@@ -124,6 +124,11 @@ def test_and_the_answer_says_what_keeps_each_from_being_named():
     assert failures(right, done) == ["rate-and-state predicts unseen runs better, but at its bound"]
     assert "not inside its bounds" in failures(bound, done)[0]
     assert Round(base, (right,), (), (right,)).beyond is None
+
+
+def test_the_answer_says_which_law_comes_nearest_and_with_which_amplitude():
+    text = nearest_text(replace(judged("sensor-drift", 600.0, 12.0), amplitude=2e-8, std=0.0))
+    assert "sensor-drift comes nearest, with sensor-drift.rate = 20 nm/s, at its bound" in text
 
 
 @pytest.mark.parametrize("change", [{"chance": 2.0 * CHANCE}, {"spread": 100.0}, {"nearer": -1.0}])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import defaultdict
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -10,10 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.inference.diagnose import engine
-from stickslip.inference.diagnose.decide import Compared, Judged
+from stickslip.inference.diagnose import search as module
+from stickslip.inference.diagnose.decide import Compared, Judged, named
+from stickslip.inference.diagnose.rounds import Round
 from stickslip.inference.force.candidates import Candidate
 from stickslip.inference.force.composition import Composition
+from stickslip.physics.effects import catalogue
+from stickslip.physics.effects.wear import Wear
 
 EVENTS = 30
 
@@ -27,13 +31,16 @@ def judged(tag: str, each: float) -> Judged:
 
 
 class Model(SimpleNamespace):
-    """A stand-in for a fit: the tags of its effects."""
+    """A stand-in for a fit: the tags of its effects, all with one amplitude."""
 
-    def __init__(self, tags: tuple[str, ...]) -> None:
+    def __init__(self, tags: tuple[str, ...], amplitude: float = 0.01, deviation: float = 0.001) -> None:
         composition = SimpleNamespace(shared=(), phases=(), without=self._without)
         problem = SimpleNamespace(composition=composition, with_composition=lambda made: made)
         point = SimpleNamespace(z=np.zeros(0), phases=np.zeros((0, 1)))
-        super().__init__(tags=tags, problem=problem, point=point, scatter=SimpleNamespace(unbound=dict), dropped=None)
+        super().__init__(
+            tags=tags, problem=problem, point=point, scatter=SimpleNamespace(unbound=dict), dropped=None,
+            values=defaultdict(lambda: amplitude), std=lambda: defaultdict(lambda: deviation),
+        )  # fmt: skip
 
     def _without(self, tag: str) -> Model:
         return Model(tuple(t for t in self.tags if t != tag))
@@ -44,26 +51,26 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A search whose rounds are looked up by the model they stand on and what is left to try."""
     table: dict[tuple[str, ...], dict[str, float]] = {}
 
-    def one_round(base: Any, tags: Sequence[str], *_: Any) -> engine.Round:
+    def one_round(base: Any, tags: Sequence[str], *_: Any) -> Round:
         found = [judged(t, each) for t, each in table[base.tags].items() if t in tags]
-        return engine.Round(base, tuple(found), tuple(j.candidate for j in found), tuple(engine.named(found)))
+        return Round(base, tuple(found), tuple(j.candidate for j in found), tuple(named(found)))
 
     def replace(made: Any, **changes: Any) -> Any:
-        return dataclasses.replace(made, **changes) if isinstance(made, Candidate) else made
+        return dataclasses.replace(made, **changes) if isinstance(made, Candidate | Judged) else made
 
-    monkeypatch.setattr(engine, "one_round", one_round)
-    monkeypatch.setattr(engine, "replace", replace)
-    monkeypatch.setattr(engine, "fit", lambda problem, *_, **__: problem)
+    monkeypatch.setattr(module, "one_round", one_round)
+    monkeypatch.setattr(module, "replace", replace)
+    monkeypatch.setattr(module, "fit", lambda problem, *_, **__: problem)
     worse: list[tuple[str, ...]] = []
-    monkeypatch.setattr(engine, "foretells", lambda before, after: after.tags not in worse)
-    monkeypatch.setattr(engine, "settled", lambda base, c, *_: Model((*base.tags, c.tag)))
+    monkeypatch.setattr(module, "foretells", lambda before, after: after.tags not in worse)
+    monkeypatch.setattr(module, "settled", lambda base, c, *_: Model((*base.tags, c.tag)))
     monkeypatch.setattr(
-        engine.Rung,
+        module.Rung,
         "of",
-        lambda model, added, fit, removed=None: engine.Rung(model, added, np.zeros(0), None, fit, removed),
+        lambda model, added, fit, removed=None: module.Rung(model, added, np.zeros(0), None, fit, removed),
     )
-    ladder = [engine.Rung.of(("static", "inertia"), "inertia", Model(()))]
-    made = engine.Search(Model(()), ladder, 1, lambda *_: None, lambda: True, None)
+    ladder = [module.Rung.of(("static", "inertia"), "inertia", Model(()))]
+    made = module.Search(Model(()), ladder, 1, lambda *_: None, lambda: True, None)
     made.table, made.worse = table, worse
     return made
 
@@ -123,7 +130,26 @@ def test_an_effect_that_foretells_less_once_it_has_settled_is_not_kept(search):
     grown(search, ["wear"])
     assert not search.named
     assert not search.base.tags
-    assert {c.tag: c.note for c in search.rounds[-1].candidates} == {"wear": engine.TAKEN_OUT}
+    assert {c.tag: c.note for c in search.rounds[-1].candidates} == {"wear": module.TAKEN_OUT}
+
+
+def test_an_effect_that_settles_at_its_bound_is_not_kept_and_stops_a_name(search, monkeypatch):
+    """Tilt is seen too, but the wear that is out of range predicts better than it."""
+    search.table |= {(): {"wear": 20.0, "tilt": 10.0}}
+    monkeypatch.setattr(module, "settled", lambda base, c, *_: Model((c.tag,), catalogue.amplitude(Wear).upper, 0.0))
+    grown(search, ["wear", "tilt"])
+    assert not search.named and not search.base.tags
+    done = search.rounds[-1]
+    assert done.beyond.tag == "wear" and done.beyond.amplitude == catalogue.amplitude(Wear).upper
+    assert len(search.rounds) == 1 and len(search.ladder) == 1
+
+
+def test_but_what_predicts_as_well_inside_its_range_is_named_instead(search, monkeypatch):
+    search.table |= {(): {"wear": 20.0, "tilt": 19.99}, ("tilt",): {}}
+    at_bound = Model(("wear",), catalogue.amplitude(Wear).upper, 0.0)
+    monkeypatch.setattr(module, "settled", lambda base, c, *_: at_bound if c.tag == "wear" else Model((c.tag,)))
+    grown(search, ["wear", "tilt"])
+    assert list(search.named) == ["tilt"] and search.gone == {"wear"}
 
 
 @pytest.mark.parametrize("each", [0.5, -0.5])
@@ -132,8 +158,8 @@ def test_a_model_is_kept_by_the_likelihood_of_unseen_runs_alone(each, monkeypatc
     before: Any = Model(())
     after: Any = Model(("sensor-low-pass",))
     found = Compared(after, 1.0, 1e-9, np.full(EVENTS, each), -np.ones(EVENTS))
-    monkeypatch.setattr(engine, "Judge", lambda base, tried: SimpleNamespace(beside=lambda *_, **__: found))
-    assert engine.foretells(before, after) is (each > 0.0)
+    monkeypatch.setattr(module, "Judge", lambda base, tried: SimpleNamespace(beside=lambda *_, **__: found))
+    assert module.foretells(before, after) is (each > 0.0)
 
 
 def test_a_model_without_an_effect_has_none_of_its_parameters():

@@ -21,9 +21,11 @@ from ..force.valleys import LEVEL, held, widened
 from ..uncertainty import Profile, profile
 from .confirm import Confirmation, confirm
 from .decide import DISPERSION
-from .engine import Diagnosis, Rung, Verdict, leading, settled, static_residual, without
+from .engine import Diagnosis, Verdict, leading, static_residual
+from .finals import settled
 from .level import level_of
 from .prepare import Prepared
+from .search import Rung, without
 from .shape import shape_of, unshaped
 from .trials import Tell
 

@@ -1,4 +1,4 @@
-"""The best effects of a round once more: each settled by itself, and then all compared on the same points.
+"""The best effects of a round once more: each fitted by itself, and then all compared on the same points.
 
 A few points that lie far off and are left in hold all parameters where they are least far off, and which these are only
 a model can say that has the effect. So each effect finds outliers of its own, and then all leave out those of all.
@@ -18,8 +18,9 @@ from ...errors import StickslipError
 from ..force.candidates import Candidate
 from ..force.fit import Fit, fit
 from ..force.scatter import Scatter
+from ..force.valleys import widened
 from .checkpoints import Store, kept, name_of
-from .decide import CHANCE, Judged, best_forms
+from .decide import CHANCE, DISPERSION, Judged, best_forms
 
 MOST = 4  # of a round
 HALF = 0.5  # of what the best one gains
@@ -82,4 +83,20 @@ def alone(base: Fit, candidate: Candidate, store: Store | None, name: str) -> Fi
     key = f"{name}-alone-{name_of(candidate.tag, candidate.form)}"
     return kept(
         store, key, found.problem, lambda: fit(found.problem, found.point, Scatter.wide().within(base.scatter))
+    )  # fmt: skip
+
+
+def settled(base: Fit, candidate: Candidate, store: Store | None = None, name: str = "round") -> Fit:
+    """The model with an effect, fitted as the base was, and the deviations of its effects' amplitudes.
+
+    What lies far off is found anew too: outliers of a model that lacks an effect are others than those of one that has
+    it.
+    """
+    found = candidate.fit
+    assert found is not None
+    key = f"{name}-settled-{name_of(candidate.tag, candidate.form)}"
+    amplitudes = [f.name for f in found.free if f.amplitude]
+    return kept(
+        store, key, found.problem,
+        lambda: widened(alone(base, candidate, store, name), amplitudes, DISPERSION),
     )  # fmt: skip

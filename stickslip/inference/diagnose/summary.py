@@ -22,11 +22,13 @@ from ..force.linearised import Array
 from ..force.prescribed import placeholders
 from ..force.residual import coordinates
 from .decide import CHANCE, ERRORS, Judged, best_forms
-from .engine import Diagnosis, Round, Rung
+from .engine import Diagnosis
 from .fitted import fitted_model
 from .free_errors import errors
 from .free_words import cautions, free_variables, left_out
 from .level import TAG
+from .rounds import Round
+from .search import Rung
 from .shape import Law, named_text, section
 
 Variables = dict[str, Any]
@@ -203,6 +205,15 @@ def _not_ranked(tag: str, form: dict[str, str], note: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def nearest_text(j: Judged) -> str:
+    """That an effect explains the data best, but not in its range."""
+    amount = shown(j.amplitude, catalogue.amplitude(catalogue.get(j.tag)).unit, 3)
+    return (
+        f"Something is missing that no effect of the catalogue explains in its range: {j.tag} comes nearest, with "
+        f"{j.candidate.name} = {amount}, at its bound or known no better than its distance from it."
+    )
+
+
 def failures(j: Judged, done: Round) -> list[str]:
     """Why an effect is not named, in words; nothing where it is."""
     if any(j is c for c in done.close):
@@ -287,12 +298,7 @@ def verdict_text(d: Diagnosis) -> str:
     if v.kind == "ambiguous":
         parts.append("These data cannot distinguish " + "; nor ".join(" from ".join(s) for s in _sets(d)) + ".")
     if v.beyond is not None:
-        j = v.beyond
-        amount = shown(j.amplitude, catalogue.amplitude(catalogue.get(j.tag)).unit, 3)
-        parts.append(
-            f"Something is missing that no effect of the catalogue explains in its range: {j.tag} comes nearest, with "
-            f"{j.candidate.name} = {amount}, at its bound or known no better than its distance from it."
-        )
+        parts.append(nearest_text(v.beyond))
     if v.kind == "unknown" and v.structure is not None:
         parts.append(
             f"Something is missing that no effect of the catalogue explains: the residual force depends on the "

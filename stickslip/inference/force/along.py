@@ -29,8 +29,8 @@ class Way(NamedTuple):
         t, x, v: time (s), displacement (m) and velocity (m/s) of the block.
         drive: the load point as the drive was told (m).
         strength, stretch: factors on caps and on yield displacements of all elements, which vary from event to event.
-        shape: power of an element's yield displacement, over the mean of all, by which it is stretched besides; of every
-            event, shape (e,), for powers are slow and a thousand knots have the same.
+        shape: power of an element's yield displacement, over the mean of all, by which it is stretched besides, of
+            every event, shape (e,): powers are slow, and hundreds of knots have the same.
         of: event of each knot, whose ``shape`` it has.
         load: normal load over its median, 1 where it was not measured.
         force: that was measured to pull the block where no spring does (N).
