@@ -298,7 +298,7 @@ class Model(Parametrised):
 
 
 def total(values: Array) -> Array:
-    """Sum over the last axis, by halves: what a compiler may do with many numbers at a time."""
+    """Sum over the last axis, by halves: one by one, in an order that a compiler must keep, it takes longer."""
     n = values.shape[-1]
     while n > 8 and n % 2 == 0:
         n //= 2

@@ -254,7 +254,7 @@ class Problem:
         return Slopes(**vars(found), shared=shared)
 
     def forces(self, point: Point) -> Forces:
-        """Residuals and derivatives in what is an event's own, in a third of the time of all derivatives."""
+        """Residuals and derivatives in what is an event's own, in less time than all derivatives."""
         return self._evaluated(point, False)[0]
 
     def _evaluated(self, point: Point, whole: bool) -> tuple[Forces, Array]:
