@@ -162,9 +162,10 @@ class Search:
 
 
 def ended(judged: Judged, fit: Fit) -> Judged:
-    """What was judged, as it is once it has settled."""
-    value, std = (each[judged.candidate.name] for each in (fit.values, fit.std()))
-    return replace(judged, fit=fit, candidate=replace(judged.candidate, fit=fit), amplitude=value, std=std)
+    """What was judged, as it is once it has settled, with a deviation as the others have: without its valleys."""
+    name, straight = judged.candidate.name, replace(fit, valleys=())
+    candidate = replace(judged.candidate, fit=fit)
+    return replace(judged, fit=fit, candidate=candidate, amplitude=fit.values[name], std=straight.std()[name])
 
 
 def foretells(before: Fit, after: Fit) -> bool:
