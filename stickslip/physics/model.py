@@ -260,7 +260,7 @@ class Model(Parametrised):
             given = 0.5 * jnp.sum(state.force**2 * (_compliance(stiffness) - _compliance(state.stiffness)))
         forces = Forces(
             spring=jnp.asarray(motion.pull),
-            contact=total(force),
+            contact=jnp.sum(force),
             viscous=self.block.damping * motion.v,
             body=body,
             dissipated=flow + jnp.sum(slid * _compliance(stiffness) * mean_cap),
@@ -295,15 +295,6 @@ class Model(Parametrised):
     def stored(self, state: State) -> Array:
         """Kinetic energy plus what is stored in the Jenkins elements (J)."""
         return 0.5 * self.mass() * state.v**2 + jnp.sum(0.5 * state.force**2 * _compliance(state.stiffness))
-
-
-def total(values: Array) -> Array:
-    """Sum over the last axis, by halves: one by one, in an order that a compiler must keep, it takes longer."""
-    n = values.shape[-1]
-    while n > 8 and n % 2 == 0:
-        n //= 2
-        values = values[..., :n] + values[..., n:]
-    return jnp.sum(values, axis=-1)
 
 
 def _held_back(trial: Array, cap: Array) -> Array:

@@ -17,7 +17,7 @@ from jax import Array
 from ...physics.contact import Bank
 from ...physics.effects.base import Contact, Drive, Memory, Motion, Sensor
 from ...physics.effects.lag import slope
-from ...physics.model import Model, State, total
+from ...physics.model import Model, State
 
 PASSES = 4  # of undoing a sensor by what it shows
 
@@ -117,7 +117,10 @@ def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
         sticks = jnp.abs(state.force) < state.cap * (1.0 - 1e-6)
         apiece = jnp.stack([jnp.where(sticks, state.stiffness, 0.0), jnp.where(sticks, 0.0, state.force)])
         here = _Rows(
-            jnp.stack([forces.body, forces.contact]), jnp.append(total(apiece), state.psi), state.force * share, ~sticks
+            jnp.stack([forces.body, total(state.force)]),
+            jnp.append(total(apiece), state.psi),
+            state.force * share,
+            ~sticks,
         )
         return state, _Rows(*(a.at[i].set(b) for a, b in zip(rows, here, strict=True)))
 
@@ -129,6 +132,15 @@ def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
     rows = jax.lax.fori_loop(1, n if knots is None else knots, step, (start, first))[1]
     (body, held), (tangent, sliding, psi) = rows.forces.T, rows.state.T
     return Held(pull, body, held, rows.elements, tangent, rows.slides, sliding, psi)
+
+
+def total(values: Array) -> Array:
+    """Sum over the last axis, by halves: one by one, in an order that a compiler must keep, it takes longer."""
+    n = values.shape[-1]
+    while n > 8 and n % 2 == 0:
+        n //= 2
+        values = values[..., :n] + values[..., n:]
+    return jnp.sum(values, axis=-1)
 
 
 def departures(bank: Bank) -> Array:
