@@ -116,7 +116,8 @@ class Judged(Compared):
     @property
     def inside(self) -> bool:
         """Whether the amplitude is off its bounds by more than its deviation; what stands at a bound has none."""
-        return inside(self.tag, self.amplitude, self.std)
+        spec = specs(catalogue.get(self.tag))[catalogue.get(self.tag).amplitude]
+        return 0.0 < self.std < min(self.amplitude - spec.lower, spec.upper - self.amplitude)
 
     @property
     def seen(self) -> bool:
@@ -127,13 +128,6 @@ class Judged(Compared):
     def out_of_range(self) -> bool:
         """Whether nothing but its bound keeps it from being seen."""
         return super().seen and not self.inside
-
-
-def inside(tag: str, amplitude: float, std: float) -> bool:
-    """Whether the amplitude of an effect is off its bounds by more than its deviation; at a bound it has none."""
-    cls = catalogue.get(tag)
-    spec = specs(cls)[cls.amplitude]
-    return 0.0 < std < min(amplitude - spec.lower, spec.upper - amplitude)
 
 
 def odd(fit: Fit, tag: str) -> dict[str, float]:
