@@ -57,3 +57,18 @@ def test_where_a_value_usually_lies_is_kept_and_older_records_do_not_have_it():
     for entry in section["free"]:
         del entry["usual"]
     assert {f.usual for f in from_record(section).composition.free} == {None}
+
+
+def test_a_kept_model_is_the_same_to_the_last_digit():
+    """A logarithm and back is not always: what is simulated from a run folder must be what was simulated before it."""
+    strength = next(f for f in composition().free if f.name == "contact.strength")
+    tried = np.random.default_rng(5).uniform(-1.5, -1.2, 100_000)
+    odd = [z for z in tried if strength.outward(strength.inward(strength.outward(z))) != strength.outward(z)]
+    assert odd
+    at = composition().free.index(strength)
+    for value in odd[:10]:
+        z = truth()
+        z[at] = value
+        made = replace(kept(), z=z)
+        again = from_record(json.loads(json_text(record(made))))
+        assert np.array_equal(again.z, z) and again.values == made.values

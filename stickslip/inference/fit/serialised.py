@@ -116,6 +116,7 @@ def record(found: Fitted) -> dict[str, Any]:
         "friction_coefficient": found.friction,
         "fixed": dict(c.fixed),
         "free": [{**asdict(f), "value": values[f.name], "std": std[f.name]} for f in c.free],
+        "search": [float(z) for z in found.z],
         "covariance": np.asarray(found.covariance),
         "effects": [_effect_record(e) for e in found.effects()],
         "runs": [asdict(run) for run in found.runs],
@@ -158,7 +159,11 @@ def from_record(section: Mapping[str, Any]) -> Fitted:
         tuple(_effect(entry) for entry in section["effects"]),
     )
     load, friction = (section.get(key) for key in ("normal_force", "friction_coefficient"))
-    return Fitted(composition, vector(free), covariance, runs, load, friction)
+    # a logarithm and back is another number in its last digit, and another simulation in its seventh
+    z = np.array(section["search"], float) if "search" in section else vector(free)
+    if z.shape != (len(free),):
+        raise ValueError(f"{z.size} values on the search scale of {len(free)} parameters")
+    return Fitted(composition, z, covariance, runs, load, friction)
 
 
 def _free(entry: Mapping[str, Any]) -> Free:
