@@ -27,7 +27,10 @@ from .cache import folder_for
 
 PACKAGE = Path(__file__).parents[1]
 MADE_WITH = ("jax", "jaxlib", "diffrax", "equinox", "lineax", "optimistix", "numpy")  # and with this package's code
-WIDEST = 512  # bits of a vector, where the processor has them; XLA itself takes half
+OPTIONS = {
+    "xla_cpu_prefer_vector_width": 512,  # bits, where the processor has them; XLA itself takes half
+    "xla_cpu_use_fusion_emitters": False,  # which take half as long again to compile, for the same speed
+}
 FORGOTTEN = 30 * 86400.0  # s after which traces of other versions are removed
 _DIGEST = hashlib.sha256().digest_size
 _IMPORTED = time.time()
@@ -85,7 +88,7 @@ class Program:
 
 
 def _compiled(function: Callable[..., Any]) -> Any:
-    return jax.jit(function, compiler_options={"xla_cpu_prefer_vector_width": WIDEST})
+    return jax.jit(function, compiler_options=OPTIONS)
 
 
 def of_this_package(structure: Any) -> bool:

@@ -107,7 +107,8 @@ def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray, knots: int = KNOTS) -> W
     ones = np.ones(knots)
     return Way(
         *map(jnp.asarray, (t, x, v, np.interp(t, TIMES, POSITIONS), ones, ones)),
-        shape=0.0 * ones,
+        shape=jnp.zeros(1),
+        of=jnp.zeros(knots, int),
         load=ones,
         force=0.0 * ones,
         bend=jnp.concatenate([jnp.zeros(1), -0.5 * jnp.diff(t) * jnp.diff(v)]),

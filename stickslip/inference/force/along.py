@@ -29,7 +29,9 @@ class Way(NamedTuple):
         t, x, v: time (s), displacement (m) and velocity (m/s) of the block.
         drive: the load point as the drive was told (m).
         strength, stretch: factors on caps and on yield displacements of all elements, which vary from event to event.
-        shape: power of an element's yield displacement, over the mean of all, by which it is stretched besides.
+        shape: power of an element's yield displacement, over the mean of all, by which it is stretched besides, of
+            every event, shape (e,): powers are slow, and hundreds of knots have the same.
+        of: event of each knot, whose ``shape`` it has.
         load: normal load over its median, 1 where it was not measured.
         force: that was measured to pull the block where no spring does (N).
         bend: of the path from the knot before (m), see :class:`~stickslip.physics.effects.base.Motion`; None where
@@ -43,6 +45,7 @@ class Way(NamedTuple):
     strength: Any
     stretch: Any
     shape: Any
+    of: Any
     load: Any
     force: Any
     bend: Any = None
@@ -72,6 +75,15 @@ class Held(NamedTuple):
     psi: Array
 
 
+class _Rows(NamedTuple):
+    """What a loop writes for each knot: as few arrays as there can be, for each costs as much as an element's law."""
+
+    forces: Array
+    state: Array
+    elements: Array
+    slides: Array
+
+
 def lead(model: Model, t: Array, drive: Array) -> Array:
     """Displacement of the load point (m), effects on the drive included; shape as ``t``."""
     return drive + sum((e.lead(t, drive) for e in model.effects if isinstance(e, Drive)), jnp.zeros(()))
@@ -83,39 +95,52 @@ def along(model: Model, way: Way, knots: Array | int | None = None) -> Held:
     Args:
         model: its load point is not used; the motion brings its own.
         way: what moves.
-        knots: number of those that count; the rest is padding, costs nothing and is zero in the result. Default all.
+        knots: number of those that count; the rest is padding, which costs nothing and means nothing. Default all.
     """
     bank = model.shaped()
     led = lead(model, way.t, way.drive)
+    pull = jax.vmap(model.pull)(led - way.x)
     mass = model.mass()
     start = model.rest(way.t[0], way.x[0], way.v[0])
     dt, dx = jnp.diff(way.t, prepend=way.t[:1]), jnp.diff(way.x, prepend=way.x[:1])
-    items = (way.t, dt, way.x, dx, way.v, led, way.strength, way.stretch, way.shape, way.load)
-    apart = departures(bank)
+    items = (way.t, dt, way.x, dx, way.v, led, way.strength, way.stretch, way.of, way.load)
+    stiffness = bank.stiffness * jnp.exp(-way.shape[:, None] * departures(bank))
     share = 1.0 / jnp.where(bank.strength > 0.0, bank.strength, 1.0)
 
-    def step(i: Array, carry: tuple[State, Array, Held]) -> tuple[State, Array, Held]:
-        state, pull, held = carry
-        t, dt, x, dx, v, at, strength, stretch, shape, load = (a[i] for a in items)
-        own = Bank(bank.stiffness * jnp.exp(jnp.log(strength / stretch) - shape * apart), bank.strength * strength)
-        contact = Contact(state.force, own.stiffness, own.strength, pull, state.cap, mass)
+    def step(i: Array, carry: tuple[State, _Rows]) -> tuple[State, _Rows]:
+        state, rows = carry
+        t, dt, x, dx, v, at, strength, stretch, of, load = (a[i] for a in items)
+        own = Bank(stiffness[of] * (strength / stretch), bank.strength * strength)
+        contact = Contact(state.force, own.stiffness, own.strength, pull[i - 1], state.cap, mass)
         motion = Motion(t, dt, x, v, None if way.bend is None else way.bend[i], dx, at, load=load)
         state, forces = model.advance(state, own, contact, motion)
         sticks = jnp.abs(state.force) < state.cap * (1.0 - 1e-6)
-        tangent = jnp.sum(jnp.where(sticks, state.stiffness, 0.0))
-        sliding = jnp.sum(jnp.where(sticks, 0.0, state.force))
-        here = Held(
-            forces.spring, forces.body, forces.contact, state.force * share, tangent, ~sticks, sliding, state.psi
+        apiece = jnp.stack([jnp.where(sticks, state.stiffness, 0.0), jnp.where(sticks, 0.0, state.force)])
+        here = _Rows(
+            jnp.stack([forces.body, total(state.force)]),
+            jnp.append(total(apiece), state.psi),
+            state.force * share,
+            ~sticks,
         )
-        return state, forces.spring, Held(*(a.at[i].set(b) for a, b in zip(held, here, strict=True)))
+        return state, _Rows(*(a.at[i].set(b) for a, b in zip(rows, here, strict=True)))
 
-    n, none = way.t.size, jnp.zeros(way.t.size)
-    pull = model.pull(led[0] - way.x[0])
-    first = Held(
-        none.at[0].set(pull), none, none, jnp.zeros((n, share.size)), none.at[0].set(jnp.sum(bank.stiffness)),
-        jnp.zeros((n, share.size), bool), none, none.at[0].set(1.0),
+    n, k = way.t.size, share.size
+    still = jnp.append(jnp.sum(bank.stiffness), jnp.array([0.0, 1.0]))
+    first = _Rows(
+        jnp.zeros((n, 2)), jnp.zeros((n, 3)).at[0].set(still), jnp.zeros((n, k)), jnp.zeros((n, k), bool)
     )  # fmt: skip
-    return jax.lax.fori_loop(1, n if knots is None else knots, step, (start, pull, first))[2]
+    rows = jax.lax.fori_loop(1, n if knots is None else knots, step, (start, first))[1]
+    (body, held), (tangent, sliding, psi) = rows.forces.T, rows.state.T
+    return Held(pull, body, held, rows.elements, tangent, rows.slides, sliding, psi)
+
+
+def total(values: Array) -> Array:
+    """Sum over the last axis, by halves: one by one, in an order that a compiler must keep, it takes longer."""
+    n = values.shape[-1]
+    while n > 8 and n % 2 == 0:
+        n //= 2
+        values = values[..., :n] + values[..., n:]
+    return jnp.sum(values, axis=-1)
 
 
 def departures(bank: Bank) -> Array:

@@ -23,15 +23,17 @@ EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
 
 
 class Own(NamedTuple):
-    """What differs from event to event, at the knots of a run, shape (n, 4) each, in the order of :data:`LOCAL`.
+    """What differs from event to event in one run.
 
     Attributes:
-        value: of the event that a knot belongs to, zero where it belongs to none.
-        moves: 1 where it belongs to one, else 0.
+        value: of every event, in the order of :data:`LOCAL`, shape (e, 4); the last row is of none, and zero.
+        moves: 1 for an event, else 0, shape (e,).
+        of: at each knot the event of each, shape (n, 4).
     """
 
     value: Any
     moves: Any
+    of: Any
 
 
 @lru_cache(maxsize=PROGRAMS)
@@ -46,7 +48,7 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
 
     def forces(
         z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, spring: Any,
-        way: Way, knots: Any,
+        way: Way, knots: Any, of: Any,
     ) -> Any:  # fmt: skip
         si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
         values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
@@ -65,7 +67,7 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
             seen, ahead = jax.jvp(before, (way.v,), (jnp.ones_like(way.v),))
             delay = jnp.sum(ahead.x) / way.x.size  # a reading that is late is taken ahead by its rate
         shift = seen.x - way.x
-        held = along(model, of_events(seen, event), knots)
+        held = along(model, of_events(seen, event, of), knots)
         steep = jax.vmap(jax.grad(model.pull))(lead(model, way.t, way.drive) - seen.x)
         # how much the displacement changes where the reading does
         steps = jnp.diff(way.x)
@@ -83,10 +85,10 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
 
         def moved(row: Any) -> Any:
             def f(z: Any, turn: Any, event: Any) -> Any:
-                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots)
+                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots, own.of)
 
             # all events are moved at once: each acts on its own points only
-            step = own.moves * row[a + b :]
+            step = own.moves[:, None] * row[a + b :]
             return jax.jvp(f, (z, turn, own.value), (row[:a], row[a : a + b] * turn_scale, step), has_aux=True)
 
         out, slope, aux = jax.vmap(moved, out_axes=(None, 0, None))(jnp.eye(a + b + OWN)[0 if whole else a + b :])
@@ -117,8 +119,9 @@ def _set(effect: Effect, values: dict[str, Any]) -> Effect:
     return effect
 
 
-def of_events(way: Way, event: Any) -> Way:
-    """The way with what differs from event to event, shape (n, 4)."""
+def of_events(way: Way, event: Any, of: Any) -> Way:
+    """The way with what differs from event to event, shapes (e, 4) and (n, 4)."""
+    strength, stretch, _, offset = (event[of[:, i], i] for i in range(OWN))
     return way._replace(
-        x=way.x + event[:, 3], strength=jnp.exp(event[:, 0]), stretch=jnp.exp(event[:, 1]), shape=event[:, 2]
+        x=way.x + offset, strength=jnp.exp(strength), stretch=jnp.exp(stretch), shape=event[:, 2], of=of[:, 2]
     )

@@ -30,6 +30,7 @@ from .scatter import Blocks, Follows
 Array = NDArray[np.float64]
 CREEPING = PHASES.index("creep")
 LEAST_ROOM = 1024  # knots
+LEAST_EVENTS = 32
 JUMP = 5e-8  # m, usual size of a jump of the reading: some speckle, less than a fringe
 LEVEL = 1e-4  # e-folds of strength by which runs may differ whatever the law, and below which nothing is claimed
 ALONG = ("time", "slip path", "place")  # what a level may follow
@@ -80,7 +81,8 @@ class Problem:
         self.elapsed = np.concatenate([k.elapsed for k in runs])
         self.lasting = np.concatenate([k.lasting[: k.events] for k in runs])
         self.begins = np.isin(np.arange(self.events), self.first)
-        self._events = tuple(_events(k, room, int(f)) for k, f in zip(runs, first[:-1], strict=True))
+        most = _room(max(k.events for k in runs) + 1, LEAST_EVENTS)
+        self._own = tuple(_own(k, room, most) for k in runs)
         virgin = np.isin(self.of, [f for f, k in zip(first[:-1], runs, strict=True) if k.virgin])
         hats = _hats(self.place)
         # quantisation and filters leave about as much alike in all cycles as the noise of one sample is
@@ -232,10 +234,13 @@ class Problem:
         return {**c.fixed, "rig.mass": c.mass, **to_si(c.shared, point.z)}
 
     def own(self, point: Point) -> list[Own]:
-        """What differs from event to event, at the knots of every run."""
-        events = np.concatenate([point.events, np.zeros((1, OWN))])
-        columns = np.arange(OWN)
-        return [Own(events[index, columns], (index >= 0).astype(float)) for index in self._events]
+        """What differs from event to event in every run."""
+        out = []
+        for first, run, own in zip(self.first, self.runs, self._own, strict=True):
+            value = np.zeros(own.value.shape)
+            value[: run.events] = point.events[first : first + run.events]
+            out.append(own._replace(value=value))
+        return out
 
     def run_arguments(self, point: Point) -> list[tuple[Any, ...]]:
         """Of every run: its own spring (N/m), way, number of knots, and what differs from event to event."""
@@ -249,7 +254,7 @@ class Problem:
         return Slopes(**vars(found), shared=shared)
 
     def forces(self, point: Point) -> Forces:
-        """Residuals and derivatives in what is an event's own, in a third of the time of all derivatives."""
+        """Residuals and derivatives in what is an event's own, in less time than all derivatives."""
         return self._evaluated(point, False)[0]
 
     def _evaluated(self, point: Point, whole: bool) -> tuple[Forces, Array]:
@@ -380,9 +385,9 @@ def _mean(k: Knots, values: Array) -> Array:
     return np.asarray(k.mean @ values / (k.mean @ np.ones(values.size)))
 
 
-def _room(size: int) -> int:
+def _room(size: int, least: int = LEAST_ROOM) -> int:
     """Knots that a compiled program has room for: few different numbers, so that campaigns share programs."""
-    return int(max(LEAST_ROOM, 2 ** int(np.ceil(np.log2(size)))))
+    return int(max(least, 2 ** int(np.ceil(np.log2(size)))))
 
 
 def _padded(k: Knots, n: int, load: float | None) -> Way:
@@ -391,7 +396,7 @@ def _padded(k: Knots, n: int, load: float | None) -> Way:
 
     return Way(
         grown(k.t, 1e-3), grown(k.x), np.concatenate([k.v, np.zeros(n - k.v.size)]), grown(k.drive),
-        np.ones(n), np.ones(n), np.zeros(n), np.ones(n) if load is None else grown(k.load / load),
+        np.ones(n), np.ones(n), np.zeros(1), np.zeros(n, int), np.ones(n) if load is None else grown(k.load / load),
         grown(k.force),
     )  # fmt: skip
 
@@ -401,9 +406,9 @@ def _hats(place: Array) -> Array:
     return np.stack([np.interp(place, NODES, row) for row in np.eye(len(NODES))], axis=1)
 
 
-def _events(k: Knots, n: int, first: int) -> NDArray[np.intp]:
-    """Of each knot the event of each of :data:`LOCAL`, shape (n, 4); the last one of all, -1, stands for none."""
-    out = np.full((n, OWN), -1)
+def _own(k: Knots, n: int, most: int) -> Own:
+    """Of each knot the event of each of :data:`LOCAL`; the last one of all stands for none."""
+    of = np.full((n, OWN), most - 1)
     for column, event in enumerate((k.event, k.event, k.event, k.arrest)):
-        out[: k.t.size, column] = np.where((event >= 0) & (event < k.events), event + first, -1)
-    return out
+        of[: k.t.size, column] = np.where((event >= 0) & (event < k.events), event, most - 1)
+    return Own(np.zeros((most, OWN)), (np.arange(most) < k.events).astype(float), of)

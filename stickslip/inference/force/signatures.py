@@ -104,7 +104,7 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
             if any(isinstance(e, Sensor) for e in model.effects):
                 force = model.block.spring_stiffness * (moving.drive - moving.x) + moving.force
                 seen = undone(model, moving, force, knots)
-            held = along(model, of_events(seen, own.value), knots)
+            held = along(model, of_events(seen, own.value, own.of), knots)
             return held.pull + held.body - held.contact, seen.x - way.x, model.mass()
 
         return jax.jvp(forces, (values[names[place]],), (jnp.ones(()),))[1]
