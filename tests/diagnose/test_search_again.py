@@ -152,6 +152,24 @@ def test_but_what_predicts_as_well_inside_its_range_is_named_instead(search, mon
     assert list(search.named) == ["tilt"] and search.gone == {"wear"}
 
 
+def test_what_drives_an_earlier_effect_to_its_bound_is_not_kept(search, monkeypatch):
+    """The wear is named, and goes to its bound once the tilt is there."""
+    search.table |= {
+        (): {"wear": 20.0, "tilt": 15.0}, ("wear",): {"tilt": 9.0}, ("tilt",): {"wear": 19.0}, ("wear", "tilt"): {},
+    }  # fmt: skip
+
+    def settled(base: Any, c: Candidate, *_: Any) -> Model:
+        made = Model((*base.tags, c.tag))
+        if c.tag == "tilt":
+            made.values[f"wear.{Wear.amplitude}"] = catalogue.amplitude(Wear).upper
+        return made
+
+    monkeypatch.setattr(module, "settled", settled)
+    grown(search, ["wear", "tilt"])
+    assert list(search.named) == ["wear"] and search.gone == {"tilt"}
+    assert search.base.tags == ("wear",) and len(search.ladder) == 2
+
+
 @pytest.mark.parametrize("each", [0.5, -0.5])
 def test_a_model_is_kept_by_the_likelihood_of_unseen_runs_alone(each, monkeypatch):
     """Where a sensor is undone the measured forces are others, and a larger residual may be less of an error."""

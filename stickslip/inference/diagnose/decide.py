@@ -8,7 +8,8 @@
    of unseen runs with all events alike does not rise by more than its standard error: a law may describe the forces
    within events better, and leave what is foretold of an event worse.
 2. *Named*: the seen effect that predicts unseen runs best. It is kept if the model that it leads to, settled and
-   without what it has made superfluous, still predicts them better than the one before.
+   without what it has made superfluous, still predicts them better than the one before, with all amplitudes inside
+   their bounds.
 3. *A set*: those seen that predict the unseen runs as well, within 2.5 standard errors of the difference. A law that
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
@@ -31,7 +32,6 @@ import numpy as np
 from scipy.special import chdtrc
 
 from ...physics.effects import catalogue
-from ...physics.params import specs
 from ..fit.parameters import Free
 from ..force.candidates import Candidate
 from ..force.fit import Fit, deviations
@@ -115,9 +115,8 @@ class Judged(Compared):
 
     @property
     def inside(self) -> bool:
-        """Whether the amplitude is off its bounds by more than its deviation; what stands at a bound has none."""
-        spec = specs(catalogue.get(self.tag))[catalogue.get(self.tag).amplitude]
-        return 0.0 < self.std < min(self.amplitude - spec.lower, spec.upper - self.amplitude)
+        """Whether the amplitude lies in its range: see :func:`inside`."""
+        return inside(self.tag, self.amplitude, self.std)
 
     @property
     def seen(self) -> bool:
@@ -128,6 +127,12 @@ class Judged(Compared):
     def out_of_range(self) -> bool:
         """Whether nothing but its bound keeps it from being seen."""
         return super().seen and not self.inside
+
+
+def inside(tag: str, amplitude: float, std: float) -> bool:
+    """Whether an effect's amplitude is off its bounds by more than its deviation; what stands at a bound has none."""
+    spec = catalogue.amplitude(catalogue.get(tag))
+    return 0.0 < std < min(amplitude - spec.lower, spec.upper - amplitude)
 
 
 def odd(fit: Fit, tag: str) -> dict[str, float]:

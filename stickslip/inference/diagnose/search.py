@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from ...physics.effects import catalogue
 from ...system.units import shown
 from ..force.fit import Fit, fit
 from ..force.heldout import apart
@@ -14,7 +15,7 @@ from ..force.point import Point
 from ..force.problem import Problem
 from ..force.rig import EXACT, SPRING
 from .checkpoints import Store, kept
-from .decide import Judge, Judged, best_forms, named
+from .decide import Judge, Judged, best_forms, inside, named
 from .finals import settled
 from .rounds import Round, one_round
 from .trials import Tell
@@ -102,8 +103,8 @@ class Search:
         """Take up what a round named, and try again each effect named before.
 
         What settles at a bound is not taken up: it is out of range as what is there from the beginning. All is undone
-        where unseen runs lose by it: an effect is named on top of another one, and may foretell less once it has
-        displaced that one.
+        where unseen runs lose by it, or an effect beside it is driven to its bound: an effect is named on top of
+        another one, and may foretell less once it has displaced that one.
         """
         best, key = done.close[0], f"round{len(self.rounds)}"
         tag = best.tag
@@ -118,7 +119,7 @@ class Search:
         for earlier in list(self.named)[:-1]:
             if self._in_time():
                 self._again(earlier, tag)
-        if not foretells(before[0], self.base):
+        if not (foretells(before[0], self.base) and in_range(self.base, self.named)):
             self.base, self.ladder[:], self.named, self.gone = before
             self._give_up(done)
 
@@ -166,6 +167,13 @@ def ended(judged: Judged, fit: Fit) -> Judged:
     name, straight = judged.candidate.name, replace(fit, valleys=())
     candidate = replace(judged.candidate, fit=fit)
     return replace(judged, fit=fit, candidate=candidate, amplitude=fit.values[name], std=straight.std()[name])
+
+
+def in_range(fit: Fit, tags: Collection[str]) -> bool:
+    """Whether the amplitudes of these effects of a model are off their bounds, with deviations as :func:`ended` has."""
+    std = replace(fit, valleys=()).std()
+    names = {tag: f"{tag}.{catalogue.get(tag).amplitude}" for tag in tags}
+    return all(inside(tag, fit.values[name], std[name]) for tag, name in names.items())
 
 
 def foretells(before: Fit, after: Fit) -> bool:
