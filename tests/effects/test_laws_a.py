@@ -1,5 +1,6 @@
 """The laws of contact, friction and geometry, each against its analytic or an independent value."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -7,6 +8,7 @@ from marching import bank_of, march, spread_out, still_model
 from scipy.integrate import solve_ivp
 
 from stickslip.physics.contact import mixture, power_law_backbone, power_law_bank
+from stickslip.physics.effects import contact_renewal
 from stickslip.physics.effects.adhesion import Adhesion
 from stickslip.physics.effects.contact_ageing import ContactAgeing
 from stickslip.physics.effects.contact_damping import ContactDamping
@@ -271,37 +273,62 @@ def test_residual_load_keeps_its_share_after_a_slip_only():
     assert creep == pytest.approx(plain, rel=1e-3)
 
 
+def renewed_steadily(ratio, step):
+    """Forces (in caps) at the end of long sliding; yield displacement over the mean life, and step over the former."""
+    reach = float(ONE.threshold[0])
+    n = round(30 * max(1, 1 / ratio) / step)
+    march_of = march(ONE, [ContactRenewal(rate=ratio / reach)], 1e-3, np.full(n, step * reach / 1e-3))
+    return total(march_of[0])[-round(1 + 1 / step) :] / STRENGTH
+
+
 @pytest.mark.parametrize("ratio", [0.02, 0.2, 1.0, 3.0])
 def test_renewal_steady_force(ratio):
-    """The cap times (l/u_y)(1 - exp(-u_y/l)), whatever the step."""
-    reach = float(ONE.threshold[0])
-    effect = ContactRenewal(rate=ratio / reach)
+    """The cap times (l/u_y)(1 - exp(-u_y/l)), whatever the step; in short ones the grid of places leaves an error."""
     expected = -np.expm1(-ratio) / ratio
-    for step in (0.02, 0.5):  # in units of the threshold
-        n = round(30 * max(1, 1 / ratio) / step)
-        force = total(march(ONE, [effect], 1e-3, np.full(n, step * reach / 1e-3))[0])[-1]
-        assert force / STRENGTH == pytest.approx(expected, rel=1e-6)
+    for step in (0.5, 2.0):  # in units of the threshold
+        assert renewed_steadily(ratio, step) == pytest.approx(expected, rel=1e-6)
+    assert renewed_steadily(ratio, 0.02) == pytest.approx(expected, abs=1e-5 * min(ratio, 1.0))
 
 
-def test_renewal_through_a_rebound_against_many_junctions():
-    """Virgin peak, loss of coherence, rebound and return; the reference has 20000 junctions with random lives."""
+def test_renewal_converges_with_the_places_of_birth(monkeypatch):
+    """Third order: the distance between two places, cubed."""
+    errors = []
+    for nodes in (4, 8, 16):
+        monkeypatch.setattr(contact_renewal, "NODES", nodes)
+        jax.clear_caches()
+        errors.append(np.abs(renewed_steadily(1.0, 0.013) + np.expm1(-1.0)).max())
+    jax.clear_caches()
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(3.0, abs=0.2)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(3.0, abs=0.2)
+
+
+REBOUND = [(1.0, -0.2, 20), (1.0, 3.0, 150)]
+RINGING = [(1.0, s * 0.3, 20) for s in (-1.0, 1.0) * 15] + [(1.0, 3.0, 150)]
+
+
+@pytest.mark.parametrize(("back", "life", "number"), [(REBOUND, 2.0, 200_000), (RINGING, 30.0, 500_000)])
+def test_renewal_against_many_junctions(back, life, number):
+    """Virgin peak, loss of coherence, then a rebound, or ringing on whose way a fourth of all are replaced, and return.
+
+    The reference has junctions with random lives, each a slider of its own.
+    """
     reach, k = float(ONE.threshold[0]), 1e6
-    life = 2.0 * reach
+    life = life * reach
     rng = np.random.default_rng(3)
-    parts = [(1.0, 4 * reach, 200), (1.0, -0.2 * reach, 20), (1.0, 3 * reach, 150)]
+    parts = [(t, v * reach, n) for t, v, n in [(1.0, 4.0, 200), *back]]
     dt, v = spread_out(parts)
     force = total(march(ONE, [ContactRenewal(rate=1 / life)], dt, v)[0])
-    f = np.zeros(20000)
+    f = np.zeros(number)
     mean = []
     for dx in dt * v:
         f = np.clip(f + k * dx, -STRENGTH, STRENGTH)
-        dies = rng.random(f.size) < -np.expm1(-abs(dx) / life)
-        f[dies] = k * dx * rng.random(dies.sum())
+        dies = np.flatnonzero(rng.random(f.size) < -np.expm1(-abs(dx) / life))
+        f[dies] = k * dx * rng.random(dies.size)
         mean.append(f.mean())
-    # half a class of age: 1/14 of a threshold, in which 1/28 of the junctions die
-    assert np.max(np.abs(force - mean)) < STRENGTH / 28
+    chance = 4.0 * 0.5 / np.sqrt(number)  # of the reference's mean, whose junctions differ by half a cap at most
+    assert np.max(np.abs(force - mean)) < chance * STRENGTH
     plain = total(march(ONE, [ContactRenewal(rate=0.0)], dt, v)[0])
-    assert np.max(np.abs(plain - mean)) > 6 * STRENGTH / 28
+    assert np.max(np.abs(plain - mean)) > 40 * chance * STRENGTH
 
 
 # --- forces on the block ---------------------------------------------------------------------------------------------
