@@ -14,9 +14,10 @@
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
    effect predicts unseen runs better than it, nothing is named.
-5. *Out of range*: where an effect that only its bound keeps from being seen predicts unseen runs better than all that
-   are seen, nothing is named: what is there acts like it, and is stronger than such effects are.
-6. *Unknown*: nothing more is seen, but an effect is out of range; or the residual force is a function of a variable,
+5. *Held back*: where an effect that only its bound, or only the error with all events alike, keeps from being seen
+   predicts unseen runs better than all that are seen, nothing is named: what is there acts like it, and is stronger
+   than such effects are, or is not all that is there.
+6. *Unknown*: nothing more is seen, but an effect is held back; or the residual force is a function of a variable,
    and that would explain more than half of what the named effects do; or the misfit within events is larger than is
    expected of any law.
 7. *Wandering friction* is named where the last model still needs a level that goes on between events (:mod:`.level`),
@@ -82,9 +83,14 @@ class Compared:
         return float(self.nearer.sum()) >= -float(np.sqrt(self.nearer.size) * np.std(self.nearer))
 
     @property
+    def likely(self) -> bool:
+        """Whether the likelihood rises beyond chance, that of unseen runs as well."""
+        return self.chance < CHANCE and self.better > ERRORS * self.error
+
+    @property
     def seen(self) -> bool:
         """Rule 1."""
-        return self.chance < CHANCE and self.better > ERRORS * self.error and self.no_farther
+        return self.likely and self.no_farther
 
 
 @dataclass(frozen=True)
@@ -124,9 +130,9 @@ class Judged(Compared):
         return super().seen and self.inside
 
     @property
-    def out_of_range(self) -> bool:
-        """Whether nothing but its bound keeps it from being seen."""
-        return super().seen and not self.inside
+    def held_back(self) -> bool:
+        """Whether nothing but its bound, or nothing but the error with all events alike, keeps it from being seen."""
+        return self.likely and self.inside != self.no_farther
 
 
 def inside(tag: str, amplitude: float, std: float) -> bool:
@@ -217,7 +223,7 @@ def best_forms(judged: Sequence[Judged]) -> list[Judged]:
 def named(judged: Sequence[Judged]) -> list[Judged]:
     """The effect to be named, and behind it those that these data cannot tell from it; nothing where none is seen."""
     seen = [j for j in best_forms(judged) if j.seen]
-    if not seen or out_of_range(judged) is not None:
+    if not seen or held_back(judged) is not None:
         return []
     best = max(seen, key=lambda j: j.better)
     close = [best, *(j for j in seen if j is not best and as_well(best, j))]
@@ -226,10 +232,10 @@ def named(judged: Sequence[Judged]) -> list[Judged]:
     return simple or close
 
 
-def out_of_range(judged: Sequence[Judged]) -> Judged | None:
-    """The effect out of range that predicts unseen runs better than all that are seen (rule 5)."""
+def held_back(judged: Sequence[Judged]) -> Judged | None:
+    """The effect held back that predicts unseen runs better than all that are seen (rule 5)."""
     seen = [j for j in judged if j.seen]
-    beyond = [j for j in judged if j.out_of_range and not any(as_well(j, s) for s in seen)]
+    beyond = [j for j in judged if j.held_back and not any(as_well(j, s) for s in seen)]
     return max(beyond, key=lambda j: j.better, default=None)
 
 

@@ -9,7 +9,7 @@ from ..force.candidates import Candidate, every_form, from_end
 from ..force.fit import Fit
 from ..force.rig import spring_freed
 from .checkpoints import Store
-from .decide import Compared, Judge, Judged, as_well, named, out_of_range
+from .decide import Compared, Judge, Judged, as_well, held_back, named
 from .finals import Finals, finalists
 from .trials import Tell, trials
 
@@ -42,7 +42,7 @@ class Round:
     @property
     def beyond(self) -> Judged | None:
         """The effect that would have to be stronger than such effects are, where that keeps all from being named."""
-        return None if self.close else out_of_range(self.judged)
+        return None if self.close else held_back(self.judged)
 
 
 def one_round(

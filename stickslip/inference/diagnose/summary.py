@@ -32,6 +32,7 @@ from .search import Rung
 from .shape import Law, named_text, section
 
 Variables = dict[str, Any]
+FARTHER = "the error of unseen runs with all events alike rises"
 LISTED = 6  # effects whose smallest visible amplitude is said in the verdict
 
 
@@ -206,11 +207,17 @@ def _not_ranked(tag: str, form: dict[str, str], note: str) -> dict[str, Any]:
 
 
 def nearest_text(j: Judged) -> str:
-    """That an effect explains the data best, but not in its range."""
+    """That an effect explains the data best, but not in its range, or not what all events have in common."""
     amount = shown(j.amplitude, catalogue.amplitude(catalogue.get(j.tag)).unit, 3)
+    nearest = f"{j.tag} comes nearest, with {j.candidate.name} = {amount}"
+    if j.inside:
+        return (
+            f"Something is missing that no effect of the catalogue explains alone: {nearest}, which makes the forces "
+            "within events more likely, but events that are left out are foretold worse with it."
+        )
     return (
-        f"Something is missing that no effect of the catalogue explains in its range: {j.tag} comes nearest, with "
-        f"{j.candidate.name} = {amount}, at its bound or known no better than its distance from it."
+        f"Something is missing that no effect of the catalogue explains in its range: {nearest}, at its bound or known "
+        "no better than its distance from it."
     )
 
 
@@ -223,13 +230,16 @@ def failures(j: Judged, done: Round) -> list[str]:
         out.append(f"a gain of this size occurs by chance with probability {j.chance:.2g}")
     if j.better <= ERRORS * j.error:
         out.append(f"unseen runs are not predicted better by more than {ERRORS:g} standard errors")
-    if j.out_of_range:
+    if j.likely and not j.inside:
         out.append("its amplitude is not inside its bounds by more than its standard deviation")
+    if j.likely and not j.no_farther:
+        out.append(FARTHER)
     if out and j.odd:
         out.append(f"{' and '.join(j.odd)} would be outside {'its' if len(j.odd) == 1 else 'their'} usual range")
     beyond = done.beyond
     if not out and beyond is not None:
-        out.append(f"{beyond.tag} predicts unseen runs better, but at its bound")
+        reason = FARTHER if beyond.inside else "at its bound"
+        out.append(f"{beyond.tag} makes unseen runs more likely, but {reason}")
     if not out and done.close:
         out.append(f"{done.close[0].tag} predicts unseen runs better")
     return out
