@@ -14,8 +14,8 @@ from .base import Contact, Flow, Memory, Motion, Threshold
 from .catalogue import register
 from .sliding import filled
 
-NODES = 8  # places of birth within the mean yield displacement
-SLOTS = 64  # places that are kept, half of them on either side of the block
+NODES = 24  # places of birth within the mean yield displacement
+SLOTS = 144  # places that are kept, half of them on either side of the block
 FAR = 1e3  # m, beyond any record
 
 
