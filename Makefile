@@ -7,7 +7,7 @@ WORKERS ?= 2
 # a path, not an import hook: else a script beside the clone would take the folder for the package
 PLAIN = --config-settings editable_mode=compat
 
-.PHONY: demo test test-slow test-newest fuzz lint types layers bench docs clean
+.PHONY: demo test test-slow test-long test-newest fuzz lint types layers bench docs clean
 
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "stickslip needs Python 3.11 or newer: make PYTHON=python3.12 ..."; exit 1; }
@@ -23,7 +23,10 @@ test: lint types layers
 	$(BIN)/python -m pytest -n $(WORKERS)
 
 test-slow: $(STAMP)
-	$(BIN)/python -m pytest -m slow -n $(WORKERS)
+	$(BIN)/python -m pytest -m "slow and not long" -n $(WORKERS)
+
+test-long: $(STAMP)
+	$(BIN)/python -m pytest -m long -n $(WORKERS)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

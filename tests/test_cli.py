@@ -306,6 +306,7 @@ def test_the_exit_does_not_wait_for_a_timer_that_an_interrupted_library_left():
     assert found.stderr == ""
 
 
+@pytest.mark.slow
 def test_a_signal_ends_the_program_cleanly(scenario, tmp_path):
     command = [
         sys.executable,
@@ -499,6 +500,7 @@ def test_memory_that_runs_out_in_a_library_is_one_message(monkeypatch, capsys, k
         run([])
 
 
+@pytest.mark.slow
 def test_a_picture_of_an_effect(tmp_path, capsys):
     picture = tmp_path / "drift.png"
     assert run(["effects", "sensor-drift", "--picture", str(picture)]) == 0
@@ -517,6 +519,7 @@ def test_values_of_an_effect_have_their_unit():
     assert _given(catalogue.get("viscous-drag"), {"drag": 0.012, "exponent": 2.0}) == "drag = 12 mN, exponent = 2"
 
 
+@pytest.mark.slow
 def test_a_terminal_shows_both_traces_beside_the_explanation(capsys, monkeypatch):
     assert run(["effects", "residual-load"]) == 0
     piped = capsys.readouterr().out.splitlines()
@@ -547,6 +550,7 @@ def test_linear_algebra_takes_one_thread_unless_told_otherwise(chosen):
     assert found.stderr == f"threads: {min(int(chosen or 1), cores)}\n"
 
 
+@pytest.mark.slow
 def test_compiled_code_is_kept_and_can_be_switched_off(scenario, tmp_path_factory):
     home = tmp_path_factory.mktemp("cache")
     set_here = ("JAX_", "STICKSLIP_", "EQX_")

@@ -230,6 +230,7 @@ def test_paper_s_alignment_is_an_option(capsys):
     assert results[1]["fits"][0]["h_rms"] > 1.5 * results[0]["fits"][0]["h_rms"]
 
 
+@pytest.mark.slow
 def test_inertial_fit_of_a_generated_campaign(capsys):
     from stickslip.blind.generator import Run, make_campaign
 
@@ -350,6 +351,7 @@ BAD = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [("inspect",), ("fit", "--model", "static"), ("fit",), ("diagnose",)], ids=" ".join)
 @pytest.mark.parametrize("case", BAD, ids=lambda case: case.__name__)
 def test_bad_input_is_one_message(capsys, case, command):

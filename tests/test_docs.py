@@ -242,7 +242,7 @@ def test_every_picture_has_a_script() -> None:
         assert re.search(rf"\b{picture.stem}\b", scripts), f"no script makes {picture.name}"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_readmes_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)

@@ -121,6 +121,7 @@ def test_a_block_ahead_of_its_drive_is_pointed_out(tmp_path, factor):
         assert found[0].value == pytest.approx(1 / factor, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mass", "off"), [("26 g", False), ("100 g", False), ("26 kg", True), ("26 mg", True)])
 def test_a_mass_wrong_by_a_thousand_is_pointed_out(tmp_path, capsys, mass, off):
     """Slips of 40 ms on 168 N/m are those of 27 g."""

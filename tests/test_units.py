@@ -30,6 +30,7 @@ def test_plain_units_are_read_as_pint_reads_them(unit):
 ASK = "from stickslip.system.units import to_si; print(to_si('3 mm per minute', 'm/s'))"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["whole", "another installation", "cut", "garbage"])
 def test_what_pint_keeps_of_another_installation_or_in_pieces_does_no_harm(tmp_path, damage):
     """Its cache names files of the installation it was made by, which may be gone."""

@@ -110,7 +110,7 @@ def test_every_effect_has_a_detection_and_what_is_dealt_can_be_seen() -> None:
     assert all(detection(EFFECTS[tag], form) <= EFFECTS[tag].high for tag, form in dealt)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_detection_is_what_five_standard_deviations_need() -> None:
     rig = Reference(1)
     limit = rig.limit("contact-ageing", EFFECTS["contact-ageing"].forms[0].name)
@@ -136,6 +136,7 @@ def test_runs_of_a_case() -> None:
         assert holds.pieces[-1][1] > 0
 
 
+@pytest.mark.slow
 def test_making_is_deterministic_sealed_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seal = make_challenge(tmp_path / "first", 3, 11, grouped=True, jobs=1)
     first = tmp_path / "first"

@@ -73,6 +73,7 @@ def started(log: Path) -> list[tuple[str, int]]:
     return [(name, int(pid)) for name, pid in lines]
 
 
+@pytest.mark.slow
 def test_local_cluster_runs_every_case_once_and_keeps_failures(tmp_path: Path) -> None:
     folder, log = challenge(tmp_path / "c"), tmp_path / "log"
     told: list[Progress] = []
@@ -111,6 +112,7 @@ def test_local_cluster_runs_every_case_once_and_keeps_failures(tmp_path: Path) -
     assert next(c["failed_before"] for c in score["list"] if c["case"] == "case-003") == 1
 
 
+@pytest.mark.slow
 def test_some_cases_first(tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, log = challenge(tmp_path / "c"), tmp_path / "log"
     told: list[Progress] = []
@@ -148,6 +150,7 @@ def test_some_cases_first(tmp_path: Path, capsys: pytest.CaptureFixture, monkeyp
     assert "2 diagnosed, 0 failed, 4 open" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_other_code_goes_on_and_is_written_down(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, log = challenge(tmp_path / "c", NAMES[:4]), tmp_path / "log"
     path = folder / RUNS / PROTOCOL
@@ -183,6 +186,7 @@ def test_other_code_goes_on_and_is_written_down(tmp_path: Path, monkeypatch: pyt
     assert path.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_protocol_from_before_codes_were_written_is_taken_up(tmp_path: Path) -> None:
     folder, log = challenge(tmp_path / "c", NAMES[:2]), tmp_path / "log"
     failing = invented_diagnosis(log, failing=NAMES[1])
@@ -227,6 +231,7 @@ def test_a_scheduler_without_workers_is_told_and_waited_for(tmp_path: Path, monk
     assert noted == ["2 of 2 cases to do, 0 workers", f"no worker is connected to {address}; waiting"]
 
 
+@pytest.mark.slow
 def test_failures_add_up(tmp_path: Path) -> None:
     folder, log = challenge(tmp_path / "c", NAMES[:1]), tmp_path / "log"
     failing = invented_diagnosis(log, failing=NAMES[0])
@@ -235,6 +240,7 @@ def test_failures_add_up(tmp_path: Path) -> None:
         assert len(failures(folder / RUNS, NAMES[0])) == times
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on(tmp_path: Path) -> None:
     folder, log = challenge(tmp_path / "c", NAMES[:3]), tmp_path / "log"
 
@@ -252,6 +258,7 @@ def test_an_interrupted_run_goes_on(tmp_path: Path) -> None:
     assert sorted(name for name, _ in started(log)) == sorted(set(NAMES[:3]) - set(finished))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_case_that_kills_its_workers_is_recorded_and_the_others_go_on(tmp_path: Path, workers: int) -> None:
     folder, log = challenge(tmp_path / "c"), tmp_path / "log"
@@ -266,6 +273,7 @@ def test_a_case_that_kills_its_workers_is_recorded_and_the_others_go_on(tmp_path
     assert run_challenge(folder, workers=1, retry=True, diagnosis=invented_diagnosis(log))["done"] == 6
 
 
+@pytest.mark.slow
 def test_three_killers_do_not_take_the_others_down_with_them(tmp_path: Path) -> None:
     folder, log = challenge(tmp_path / "c"), tmp_path / "log"
     found = run_challenge(folder, workers=1, diagnosis=invented_diagnosis(log, dying="case-001 case-002 case-003"))
@@ -273,6 +281,7 @@ def test_three_killers_do_not_take_the_others_down_with_them(tmp_path: Path) -> 
     assert [bool(failures(folder / RUNS, name)) for name in NAMES] == [True] * 3 + [False] * 3
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_worker_that_is_slow_to_come_back_is_waited_for(tmp_path: Path) -> None:
     folder, log = challenge(tmp_path / "c", NAMES[:2]), tmp_path / "log"
@@ -290,6 +299,7 @@ def test_two_clusters_on_one_machine_do_not_speak_of_ports() -> None:
             assert one.submit(os.environ.get, "MALLOC_TRIM_THRESHOLD_").result() is None
 
 
+@pytest.mark.slow
 def test_a_diagnosis_without_a_result_is_a_failure(tmp_path: Path) -> None:
     folder = challenge(tmp_path / "c", NAMES[:1])
     found = run_challenge(folder, workers=1, diagnosis=lambda campaign, out: None)
@@ -344,6 +354,7 @@ def wait_for(what: Callable[[], Any], patience: float = 30.0) -> Any:
     raise TimeoutError
 
 
+@pytest.mark.slow
 def test_a_worker_killed_on_the_way_loses_nothing(tmp_path: Path) -> None:
     """A scheduler and two workers as separate processes; one is killed in the middle of a case."""
     folder, log = challenge(tmp_path / "c"), tmp_path / "log"
@@ -374,7 +385,7 @@ def test_a_worker_killed_on_the_way_loses_nothing(tmp_path: Path) -> None:
     assert score_challenge(folder)["finished"] == 6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_real_diagnosis_from_making_to_the_score(tmp_path: Path) -> None:
     folder = str(tmp_path / "c")
     assert run(["challenge", "make", folder, "--cases", "2", "--seed", "3", "--grouped", "--jobs", "1"]) == 0

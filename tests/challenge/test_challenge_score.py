@@ -373,6 +373,7 @@ def test_a_set_of_four_says_too_much_for_two_effects_as_well(tmp_path: Path) -> 
     assert [line["right"] for line in score_challenge(folder)["list"]] == [True, False, False]
 
 
+@pytest.mark.slow
 def test_what_was_not_run_or_is_damaged_counts_as_wrong(folder: Path) -> None:
     before = score_challenge(folder)
     (folder / RUNS / "a1" / "result.json").unlink()
@@ -384,6 +385,7 @@ def test_what_was_not_run_or_is_damaged_counts_as_wrong(folder: Path) -> None:
     assert run(["challenge", "score", str(folder)]) == 3
 
 
+@pytest.mark.slow
 def test_command_writes_text_json_and_pictures(folder: Path, capsys: pytest.CaptureFixture) -> None:
     assert run(["challenge", "score", str(folder)]) == 0
     text = capsys.readouterr().out
@@ -408,6 +410,7 @@ def test_command_writes_text_json_and_pictures(folder: Path, capsys: pytest.Capt
     assert (folder / "score" / "notes.txt").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_score_that_does_not_fit_leaves_nothing(
     folder: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

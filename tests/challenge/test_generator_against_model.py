@@ -12,6 +12,8 @@ from dataclasses import replace
 import pytest
 from same_springs import SLIPS, Compared, compare, gap, generated, springs
 
+pytestmark = pytest.mark.slow
+
 VELOCITIES = (5e-5, 4e-4)
 
 

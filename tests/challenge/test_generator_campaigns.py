@@ -114,6 +114,7 @@ def test_new_lines_change_from_event_to_event(tmp_path: Path) -> None:
     assert np.ptp(sizes[True]) > 5 * np.ptp(sizes[False])
 
 
+@pytest.mark.slow
 def test_no_line_comes_twice_however_many_slips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pools: list[int] = []
     real = campaigns.make_bank
@@ -147,6 +148,7 @@ def test_drawn_rigs_stick_and_slip_at_every_velocity() -> None:
     assert len({setup.rig.spring_stiffness for setup in setups}) == 20
 
 
+@pytest.mark.slow
 def test_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert main([str(tmp_path / "x"), "--effect", "contact-aging"]) == 2
     assert "contact-ageing" in capsys.readouterr().err

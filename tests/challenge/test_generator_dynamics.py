@@ -29,6 +29,7 @@ def effect(**slots: float) -> np.ndarray:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("groups", "new_lines"), [(64, False), (None, False), (None, True)])
 def test_energy_balance_is_of_second_order_in_the_step(groups: int | None, new_lines: bool) -> None:
     """In groups and with every spring by itself (some 2000), and where each slip gets new lines."""
@@ -221,6 +222,7 @@ def test_direct_effect_in_steady_sliding(bank: Bank, form: float, law) -> None:
     assert r.contact_force[-1] / Rig().capacity == pytest.approx(1 + 0.01 * law(4e-4 / 1e-8), rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("form", "x", "share"),
     [(0.0, x, -np.expm1(-x) / x) for x in (0.2, 1.0, 3.0)] + [(1.0, x, 1.0 - x / 2) for x in (0.2, 0.5, 0.9)],

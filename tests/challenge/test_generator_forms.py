@@ -67,6 +67,7 @@ def test_the_whole_catalogue_is_there_and_a_third_has_own_forms() -> None:
     assert len({effect.tag for effect in inside if any(form.own for form in effect.forms)}) >= 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tag", "form"), FORMS)
 def test_zero_amplitude_is_the_base_bit_for_bit(base: tuple, tag: str, form: str) -> None:
     _, result, read = make([(tag, 0.0, form)])
@@ -75,6 +76,7 @@ def test_zero_amplitude_is_the_base_bit_for_bit(base: tuple, tag: str, form: str
     assert np.array_equal(read, base[2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tag", "form"), FORMS)
 def test_plausible_amplitude_can_be_seen_and_still_slips(base: tuple, tag: str, form: str) -> None:
     effect = EFFECTS[tag]
@@ -85,6 +87,7 @@ def test_plausible_amplitude_can_be_seen_and_still_slips(base: tuple, tag: str, 
     assert difference.max() >= (1 if effect.decoy else 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tag", "form"), [pair for pair in FORMS if pair[0] in PASSIVE])
 def test_contacts_never_give_energy(tag: str, form: str) -> None:
     effect = EFFECTS[tag]
@@ -92,6 +95,7 @@ def test_contacts_never_give_energy(tag: str, form: str) -> None:
     assert np.diff(result.dissipated).min() > -1e-8 * result.dissipated[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tag", "form"),
     [pair for pair in FORMS if pair[0] not in ("sensor-drift", "sensor-high-pass", "sensor-low-pass", "sensor-gain")],

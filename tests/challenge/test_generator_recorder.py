@@ -17,6 +17,8 @@ from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.trace import Trace
 from stickslip.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 RUNS = (
     Run("v200", 2e-4, events=4),
     Run("v400", 4e-4, events=6),

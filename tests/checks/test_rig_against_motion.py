@@ -32,6 +32,7 @@ def changed(folder: Path, kind: str, run: str, factor: float = 1.0) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", ["v050", "v400", "holds"])
 @pytest.mark.parametrize(
     ("kind", "what"), [("velocity", "drive velocity"), ("scale", "displacement scale"), ("clock", "time")]
@@ -84,6 +85,7 @@ def test_a_scale_that_all_runs_share_is_told_beyond_what_a_sensor_may_have(made)
             assert found[0].value == pytest.approx(factor, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "effects", "options"),
     [
@@ -100,6 +102,7 @@ def test_nothing_is_said_where_nothing_is_wrong(tmp_path, seed, effects, options
     assert findings(tmp_path / "case" / "campaign.toml") == ()
 
 
+@pytest.mark.slow
 def test_a_wrong_velocity_stops_the_name(made):
     path = changed(made, "velocity", "v100", 1.2)
     result = diagnose_campaign(path, made / "stopped", jobs=1)

@@ -143,6 +143,7 @@ def test_stiffness_exponent(H, exponent):
     assert exponents(H, 4096, 100)[1] == pytest.approx(exponent, abs=0.05)
 
 
+@pytest.mark.slow
 def test_saturation_warns_above_half_contact():
     with pytest.warns(SaturationWarning, match="line_length L"):
         creep_curve(H=0.3, h_rms=0.35e-6)

@@ -8,6 +8,7 @@ from stickslip.physics.contact import default_loads
 from tests.benchmark import static
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [static.numpy_plain, static.numpy_careful, static.numba_loops])
 def test_steps_follow_the_closed_form(way):
     z = static.heights(5, 512)

@@ -56,6 +56,7 @@ def test_closed_form_is_the_sum_over_springs(name):
     assert np.abs(np.asarray(force) - exact).max() < 1e-12 * MU * 0.31
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", profiles())
 def test_displacement_inverts_force(name):
     contact = static_contact(indentation(profiles()[name]), 0.31, MU)
@@ -74,6 +75,7 @@ def test_stiffness_is_the_first_slope_and_u_max_is_where_it_ends():
     assert (np.asarray(contact.force(0.999 * contact.u_max)) < contact.strength).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n, springs", [(0.3, 2_000_000), (1.0, 4000), (2.0, 4000), (8.0, 40000)])
 def test_power_law_profiles(n, springs):
     profile = power_law(L / 2, springs, n, 1e-6 / (L / 2) ** n)
@@ -94,6 +96,7 @@ def sphere_error(n_springs, width):
     return np.abs(contact.force(w * u_max) / (MU * load) - (1 - (1 - w) ** 1.5)).max()
 
 
+@pytest.mark.slow
 def test_sphere_is_cattaneo_mindlin_with_order_two():
     widths = np.linspace(1.2, 1.25, 11)  # the error depends on where between two springs the contact ends
     coarse, fine = (np.mean([sphere_error(n, width) for width in widths]) for n in (200, 2000))
@@ -132,6 +135,7 @@ def test_smaller_H_breaks_loose_more_suddenly():
     assert [late[0], late[2], late[4]] == pytest.approx([0.75, 0.825, 0.895], abs=0.02)
 
 
+@pytest.mark.slow
 def test_normal_force_does_not_change_the_normalised_curve():
     """While neither a few springs nor the whole line carries it; 16384 springs are many enough down to 0.03 N."""
     at = lambda force: mean_w(0.3, 2.46e-6, force, 0.5, 16384, 400)  # noqa: E731

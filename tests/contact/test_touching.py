@@ -29,6 +29,7 @@ def rough(H=0.3, springs=1024, h_rms=2.46e-6):
     return from_heights(h_rms * np.asarray(rough_lines(H, 12, springs, seed=4)), L / springs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [1e-9, 1e-3, 0.31, 3.0, 60.0], ids=str)
 @pytest.mark.parametrize(
     "profile", [rough(), rough(0.8), sphere(30e-6, 5000, 1e-3), exponential_gaps(1e-7, 3000, 1e-8)]
@@ -77,6 +78,7 @@ def test_a_highest_spring_between_the_thinned_ones():
     assert part.gaps.shape == (64,)
 
 
+@pytest.mark.slow
 def test_traced_and_known_curves_are_the_same():
     known = creep_curve(lines=6, n_springs=1024)
     traced = jax.jit(lambda H: creep_curve(H, lines=6, n_springs=1024))(0.3)

@@ -17,6 +17,7 @@ def measured(model, rate, noise, seed, period=2e-3):
     return measure([trace], [segment(trace)], ring_period=period)
 
 
+@pytest.mark.slow
 def test_noise_of_slip_times_is_noise_over_velocity(stick_slip):
     """The scatter of 60 records that differ in their noise alone, against the stated standard deviation."""
     model = stick_slip(events=3)

@@ -215,6 +215,7 @@ def test_any_floats_come_back_as_they_were_written(tmp_path_factory, table):
     assert np.array_equal(np.column_stack(list(columns.data.values())), np.array(table))
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(st.binary(max_size=400))
 def test_any_bytes_are_read_or_refused_but_never_crash(tmp_path_factory, content):

@@ -57,6 +57,7 @@ def test_a_rig_on_a_measured_surface_says_where_the_heights_are():
     assert "GitHub" in SURFACE.read_text(encoding="utf-8").partition("schema")[0]
 
 
+@pytest.mark.slow
 def test_a_rig_slips_on_a_line_of_a_measured_surface(tmp_path, real_data):
     path = shutil.copy(SURFACE, tmp_path)
     shutil.copy(real_data / "topographies" / "matrix-3.txt", tmp_path)

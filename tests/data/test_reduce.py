@@ -116,7 +116,7 @@ def numbers(script: str, path: Path) -> list[float]:
     return [float(word) for word in subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("ending", "seconds"), [("npy", 15), ("csv", 45)])
 def test_ten_million_samples(tmp_path, stick_slip, ending, seconds):
     """Read, segmented and reduced in seconds of processor time and less than 1 GB; inspected likewise."""

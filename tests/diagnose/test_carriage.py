@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from cloudpickle import dumps
 
 from stickslip.inference.diagnose.carriage import Carriage
@@ -12,6 +13,7 @@ from stickslip.inference.force.signatures import Explained
 from tests.force.conftest import made
 
 
+@pytest.mark.slow
 def test_candidates_arrive_as_they_were_upon_the_base_that_is_there(tmp_path):
     case = made(tmp_path / "case", 3)
     here = Carriage.packed(fit(case.problem, case.point), tmp_path / "base")

@@ -172,7 +172,7 @@ def test_the_terminal_says_every_step_of_the_ladder_and_every_experiment(tmp_pat
     assert "next experiment (wear or thermal-creep): hold the drive\n" in said
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_shipped_campaign_is_diagnosed(tmp_path):
     from stickslip.system.runstore import read_result
 

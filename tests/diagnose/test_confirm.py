@@ -27,6 +27,8 @@ from tests.force.conftest import made, seen
 
 from .free_runs import AGED, BASE, prepared
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):

@@ -39,7 +39,7 @@ def test_the_orders_are_different_and_none_is_the_true_one():
     assert len({*orders, (0, 1, 2, 3)}) == len(orders) + 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("order", ORDERS.values(), ids=ORDERS)
 def test_velocities_shuffled_between_traces_give_no_name(tmp_path, order):
@@ -54,7 +54,7 @@ def test_velocities_shuffled_between_traces_give_no_name(tmp_path, order):
     assert verdict["set"] == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(3600)
 def test_nor_do_velocities_so_close_that_the_base_can_be_fitted_and_effects_are_ranked(tmp_path):
     """Half a per cent from run to run, the slowest now the fastest: 1.5 %."""

@@ -58,7 +58,7 @@ def files(tmp_path, monkeypatch, request):
     sys.modules.pop("surface_finish", None)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_it_is_fitted(files, tmp_path):
     own, campaign = files
     out = tmp_path / "fit"
@@ -73,7 +73,7 @@ def test_it_is_fitted(files, tmp_path):
     assert abs(size["value"] - SIZE) < 4 * size["std"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_it_is_fitted_beside_another(files, tmp_path):
     own, campaign = files
     out = tmp_path / "fit"
@@ -86,7 +86,7 @@ def test_it_is_fitted_beside_another(files, tmp_path):
     assert abs(rate["value"]) < 4 * rate["std"]  # which is not in the data
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_it_is_diagnosed_by_other_processes(files, tmp_path):
     own, campaign = files
     out = tmp_path / "diagnosis"

@@ -17,6 +17,8 @@ from stickslip.inference.force.problem import Problem
 from stickslip.inference.force.scatter import Blocks
 from stickslip.inference.force.whitening import Whitening
 
+pytestmark = pytest.mark.slow
+
 RUNS = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4))
 
 

@@ -61,6 +61,7 @@ def test_laws_show_their_values_with_units() -> None:
     assert "mass=f64[]" in seen[0]
 
 
+@pytest.mark.slow
 def test_a_users_effect_takes_part(tmp_path: Path, no_user_effects: None) -> None:
     assert len(MY_EFFECT.strip().splitlines()) < 20
     (cls,) = catalogue.load_file(write(tmp_path / "my_effect.py", MY_EFFECT))

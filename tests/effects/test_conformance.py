@@ -57,6 +57,7 @@ def test_the_catalogue_is_complete() -> None:
     assert sorted(catalogue.tags()) == sorted(TAGS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tags", GROUPS, ids=lambda tags: "+".join(tags))
 def test_effects_conform(tags: list[str]) -> None:
     findings = check_effects([catalogue.get(tag) for tag in tags])
@@ -126,6 +127,7 @@ class Branch(Threshold):
         return 1.0 + self.size if motion.v > 0 else jnp.ones(())
 
 
+@pytest.mark.slow
 def test_wrong_effects_are_found() -> None:
     findings = check_effects([Push, Reset, Rough, Offset], full_metadata=False)
     found = {(f.tag, f.check) for f in findings}

@@ -69,6 +69,7 @@ def steady_pull(effect, v):
     return trajectory.steps.spring_force[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["shifted", "asinh"])
 def test_direct_effect_in_steady_sliding_of_the_block(form):
     """The spring shows F_s (1 + a ln(v/v*)); a decade of velocity is worth a ln(10)."""
@@ -304,6 +305,7 @@ REBOUND = [(1.0, -0.2, 20), (1.0, 3.0, 150)]
 RINGING = [(1.0, s * 0.3, 20) for s in (-1.0, 1.0) * 15] + [(1.0, 3.0, 150)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("back", "life", "number"), [(REBOUND, 2.0, 200_000), (RINGING, 30.0, 500_000)])
 def test_renewal_against_many_junctions(back, life, number):
     """Virgin peak, loss of coherence, then a rebound, or ringing on whose way a fourth of all are replaced, and return.
@@ -342,6 +344,7 @@ def test_drag_is_a_power_of_the_speed(q):
     assert body[3] == 0.0
 
 
+@pytest.mark.slow
 def test_contact_damping_of_a_stuck_block_is_exponential():
     """Free ringing far below every threshold decays at eta k/(2 m)."""
     stiff = bank_of([5e5, 5e5], [1.0, 1.0])

@@ -79,6 +79,7 @@ def test_it_is_known_by_its_tag(installed, name):
             catalogue.get(name)
 
 
+@pytest.mark.slow
 def test_it_keeps_the_rules_and_is_simulated(installed):
     installed("humming = humming_friction:Humming")
     assert check_effect(catalogue.get("humming"), full_metadata=False) == []

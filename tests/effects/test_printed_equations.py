@@ -207,6 +207,7 @@ def test_papers_are_named_from_which_the_laws_are() -> None:
     assert r"Baumberger \& Caroli" in words.latex()
 
 
+@pytest.mark.slow
 def test_one_symbol_one_meaning() -> None:
     """In every model of two effects, whatever their forms, also where two LaTeX commands print the same letter."""
     block, weakening = Block(), Weakening()
@@ -284,6 +285,7 @@ def test_symbols_are_found_and_written_otherwise() -> None:
     assert distinct([catalogue.make("tilt"), catalogue.make("wear")]) == [{}, {}]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", TOLD, ids="-".join)
 def test_every_formula_can_be_shown(key: tuple[str, ...]) -> None:
     """As text and as LaTeX: the overview, the law of the form, and the model it stands in, symbols made distinct."""

@@ -155,6 +155,7 @@ def compare(law, *, ratio, spring, damping, positions, times, d_c=1e-5, v_star=1
     return t, lead, (steps.x, steps.v), reference.run(np.array([0.0, 0.0, phi]), times[1:], t)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_slide_hold_slide(law):
     """A spring stiff enough for steady sliding; holds of 1 s and 10 s: spring force, and what the longer hold adds."""

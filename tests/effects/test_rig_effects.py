@@ -77,6 +77,7 @@ def test_filters_at_their_nulls_have_the_right_derivative() -> None:
     assert float(value) == 1e-6 and float(slope) == pytest.approx(area - 1e-6 * 1e-3, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_low_pass_and_high_pass_over_a_slip() -> None:
     """The readings of a run are those of the filters' differential equations on the run's displacement."""
     tau, cutoff = 1e-3, 2.0
@@ -102,6 +103,7 @@ def test_low_pass_and_high_pass_over_a_slip() -> None:
     assert np.max(np.abs(high.x - high.reading - filtered(2 * np.pi * cutoff))) < 2e-4 * np.max(low.x)
 
 
+@pytest.mark.slow
 def test_sensors_leave_the_motion_alone() -> None:
     plain = pulled((), 0.2)
 
@@ -182,6 +184,7 @@ def test_series_compliance_while_friction_falls() -> None:
     assert 0.01 * share * full < np.max(error) < 0.1 * share * full
 
 
+@pytest.mark.slow
 def test_series_compliance_lowers_the_ring_frequency() -> None:
     """Free ringing of the stuck block around zero at small amplitude: (k_t/(1 + k_t/k_m) + c_s)/m."""
     compliance = 3e-7
@@ -241,6 +244,7 @@ def test_a_contact_that_is_pulled_open_carries_nothing(others: int) -> None:
     assert float(forces.contact) == 0.0
 
 
+@pytest.mark.slow
 def test_tilt_by_the_springs_force_sets_the_breakaway() -> None:
     """Slow loading at constant friction: F = F_s (1 + kappa F/F_s), hence F = (F_s + c v)/(1 - kappa) with damping."""
     for kappa in (-0.2, 0.1):
@@ -259,6 +263,7 @@ def test_ripple_starts_at_rest_and_repeats_with_the_pitch() -> None:
     assert np.ptp(lead) == pytest.approx(4e-7, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_base_vibration_shakes_a_stuck_block_as_a_spring() -> None:
     """Far below resonance the block follows quasi-statically: x = -m a_b sin(wt)/(k_t + c_s), up to microslip."""
     effect = make("base-vibration", acceleration=0.01, frequency=5.0)
@@ -286,6 +291,7 @@ def test_load_modulation_and_inertia_scale_what_they_say() -> None:
     assert float(model.mass()) == pytest.approx(0.105, rel=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["quadratic", "cubic"])
 def test_nonlinear_spring_moves_the_breakaway(form: str) -> None:
     """Steady sliding at constant friction: the spring holds F_s + c v, wherever its law puts the block."""

@@ -40,6 +40,7 @@ def test_draws_are_independent_and_normal():
     assert np.mean(w**4) / np.mean(w**2) ** 2 == pytest.approx(3.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_its_course_is_no_law_to_fit():
     assert every_form(["wandering-friction"]) == []
     with pytest.raises(InputError, match="random process"):
@@ -72,6 +73,7 @@ def test_every_form_goes_with_its_own():
     assert np.ptp(found["time"][30:50]) > 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("along", "coordinate"), [("place", "place"), ("slip", "slip path"), ("time", "time")])
 def test_what_is_simulated_is_found_in_the_levels_of_the_slips(tmp_path, along, coordinate):
     """Size and length of the wander from the forces at onset and arrest, by the forecast's law."""

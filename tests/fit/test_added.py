@@ -65,6 +65,7 @@ def test_an_effect_that_takes_nothing_off_is_said_to():
     assert said[1].startswith("wear takes nothing off the cost")
 
 
+@pytest.mark.slow
 def test_the_added_mass_is_fitted_and_kept():
     rng = np.random.default_rng(1)
     traces = [

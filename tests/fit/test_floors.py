@@ -15,7 +15,7 @@ from stickslip.inference.fit.start import ring_period
 
 from .scatter_floors import floors, scatter_factor
 
-pytestmark = pytest.mark.slow  # eight campaigns
+pytestmark = pytest.mark.long  # eight campaigns
 
 SEEDS = (21, 22, 23, 24)
 

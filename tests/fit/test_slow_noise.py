@@ -10,6 +10,8 @@ from stickslip.inference.features.measurement import MAINS, Measurement
 from . import synthetic
 from .scatter_floors import floors
 
+pytestmark = pytest.mark.slow
+
 TRIALS = 40
 
 

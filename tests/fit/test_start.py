@@ -138,6 +138,7 @@ def coloured(rng, size, slope):
     return np.fft.irfft(5e-9 * np.sqrt(size / 2) * spectrum * weight, size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("events", [1, 2, 5])
 @pytest.mark.parametrize("noise", ["white", "counts", "1/f", "1/f^2", "drift"])
 def test_noise_of_any_colour_rings_in_less_than_one_record_of_a_hundred(tmp_path, noise, events):

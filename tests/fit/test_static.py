@@ -42,6 +42,7 @@ def test_table_agrees_with_lines_sorted_for_these_parameters(hurst, h_rms):
     assert np.abs(table.displacement(RIG, hurst, h_rms) - exact).max() < 1.5e-3 * exact.max()
 
 
+@pytest.mark.slow
 def test_27_processes_come_back_in_two_seconds():
     rng = np.random.default_rng(1)
     truth = [(rng.uniform(0.1, 0.85), float(np.exp(rng.uniform(np.log(1e-6), np.log(5e-6))))) for _ in range(27)]

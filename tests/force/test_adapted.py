@@ -10,6 +10,8 @@ import pytest
 from stickslip.inference.force.fit import adapted, fit, refit
 from stickslip.inference.force.scatter import NAMES, Scatter
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def fitted(small):

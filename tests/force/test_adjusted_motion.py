@@ -14,6 +14,8 @@ from stickslip.physics.effects.contact_damping import ContactDamping
 
 from .counted import moved, read
 
+pytestmark = pytest.mark.slow
+
 READINGS = 6
 
 

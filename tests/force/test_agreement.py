@@ -30,6 +30,17 @@ def slips(name: str) -> driven.Slips:
     return driven.simulated(driven.effects_with(law, SHARES.get(law[0], 0.1)))
 
 
+QUICK = {"contact-ageing", "viscous-drag", "position-dependent-friction wave"}
+
+
+def every_law(laws):
+    """Parameters of a test, those that take long to compile marked as slow."""
+    names = [driven.named(law) for law in laws]
+    return pytest.mark.parametrize(
+        "name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in names]
+    )
+
+
 def wrong(found: driven.Slips, until: int | None = None, bends: bool = True) -> float:
     """Largest difference of the two forces, over the strength."""
     apart = driven.held(found, bends).contact - found.steps.contact_force
@@ -56,7 +67,7 @@ def test_bends_within_a_step_are_all_that_is_missing(base):
     assert wrong(finer, bends=False) < 0.3 * wrong(base, bends=False)
 
 
-@pytest.mark.parametrize("name", [driven.named(law) for law in driven.LAWS])
+@every_law(driven.LAWS)
 def test_every_law_holds_what_the_solver_found(name):
     found = slips(name)
     assert found.steps.x[-1] > 140e-6  # it slips
@@ -66,7 +77,7 @@ def test_every_law_holds_what_the_solver_found(name):
     np.testing.assert_allclose(pull, found.steps.spring_force, rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize("name", [driven.named(law) for law in driven.LAWS if not catalogue.get(law[0]).measured])
+@every_law([law for law in driven.LAWS if not catalogue.get(law[0]).measured])
 def test_the_law_is_in_the_force(name, base):
     """Every law does something along the base's motion, but those of the sensor, which move nothing."""
     found = slips(name)

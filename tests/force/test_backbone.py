@@ -11,6 +11,7 @@ from stickslip.physics.contact import power_law_bank
 STRENGTH, U_MAX, P, CONTACTS = 0.26, 0.95e-6, 3.3, 3
 
 
+@pytest.mark.slow
 def test_the_law_scatters_by_the_deviations_it_states():
     u = np.linspace(0.02, 1.6, 60) * 1e-6
     true = np.asarray(power_law_bank(STRENGTH, U_MAX, P, 0.15, contacts=CONTACTS, n=96).backbone(u))

@@ -75,6 +75,7 @@ def disagreement(problem, point, part, index, unit, exact) -> float:
     return best
 
 
+@pytest.mark.slow
 def test_shared_parameters(placed):
     problem, point, slopes = placed
     for i, f in enumerate(problem.composition.shared):
@@ -161,6 +162,7 @@ def shared_by_two(problem) -> np.ndarray:
     return np.concatenate(reaches)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", [0, 1, 2, 3], ids=LOCAL)
 def test_an_event_moves_its_own_points_alone(placed, which):
     """The derivative in an event's own number, but for the few points that lie in two events."""
@@ -183,6 +185,7 @@ def test_an_event_moves_its_own_points_alone(placed, which):
         assert leaks < 1e-3
 
 
+@pytest.mark.slow
 def test_a_common_error_leaves_the_other_derivatives_as_they_are(placed):
     """In a search: what carries it to a force stays as it is."""
     problem, point, slopes = placed

@@ -24,6 +24,8 @@ from stickslip.inference.force.geometry import Laws, geometry_laws, in_logarithm
 from stickslip.inference.force.rough_contacts import RoughContacts, rough_contacts
 from stickslip.physics.contact import Bank, rough_bank, rough_table, static_contact
 
+pytestmark = pytest.mark.slow
+
 HURST, HEIGHT, LOAD, FRICTION, CONTACTS = 0.3, 2.46e-6, 0.31, 0.21, 4
 KNOWN = {"contacts": CONTACTS, "normal_force": LOAD, "friction_coefficient": FRICTION, "line_length": 20e-6}
 STATED = {"H": HURST, "h_rms": HEIGHT}

@@ -17,6 +17,8 @@ from stickslip.physics.effects import catalogue
 from stickslip.simulation.conformance.rig import base_model
 from stickslip.simulation.solve import Tolerance, integrate
 
+pytestmark = pytest.mark.slow
+
 SPEED, RATE, END = 4e-4, 1e4, 1.4  # m/s, Hz, s
 RIG = {"mass": "0.0894 kg", "spring_stiffness": "1056.62 N/m", "contacts": 4, "normal_force": "0.31 N"}
 

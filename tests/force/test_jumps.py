@@ -42,6 +42,7 @@ def jumped(case, size: float):
     return problem, fit_base(problem, point)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_jump_is_found_with_its_size(longer, sign):
     begun, base = jumped(longer, sign * SIZE)
@@ -56,6 +57,7 @@ def test_a_jump_is_found_with_its_size(longer, sign):
         np.testing.assert_allclose(kept.residual, base.residual, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_speckle_of_the_generator_is_found(tmp_path):
     """Means of 20 ms before and after the first slip of the second run differ by 53 nm from the true motion."""
     _, base = jumped(campaign(tmp_path, 12), 0.0)
@@ -63,6 +65,7 @@ def test_a_speckle_of_the_generator_is_found(tmp_path):
     assert base.point.common[-1] == pytest.approx(5.3e-8, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_where_nothing_jumps_nothing_is_found(longer):
     _, base = jumped(longer, 0.0)
     assert base.problem.jumps == ()

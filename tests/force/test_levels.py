@@ -49,6 +49,7 @@ def sizes(level: float = LEVEL, length: float = LENGTH, bend: float = BEND) -> n
     return np.append(true(), np.log([level, length, bend]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", BOTH)
 def test_the_likelihood_is_that_of_the_dense_covariance(way):
     known, rng = levelled(way), np.random.default_rng(5)
@@ -128,6 +129,7 @@ def test_given_strengths_and_marginalised_ones_have_the_same_least_cost(way):
         assert cost(events + 1e-6 * way_off * np.abs(events)) >= least * (1.0 - 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", BOTH)
 def test_slopes_are_those_of_the_cost(way):
     known = levelled(way)
@@ -151,6 +153,7 @@ def drawn(at: np.ndarray, known: Known, seed: int) -> np.ndarray:
     return np.where(known.there, (np.linalg.cholesky(dense(at, known)) @ draws).reshape(EVENTS, POINTS), 0.0)
 
 
+@pytest.mark.slow
 def test_size_and_length_are_found_in_what_was_drawn_from_them():
     """As far off as their information says: standard deviations of one."""
     known, found = levelled("onward"), []
@@ -167,6 +170,7 @@ def test_size_and_length_are_found_in_what_was_drawn_from_them():
     assert inside.min() > 0.8, inside
 
 
+@pytest.mark.slow
 def test_no_wander_is_none():
     """Independent strengths: a level gains no more than its two parameters cost."""
     known, gains = levelled("onward"), []

@@ -17,6 +17,8 @@ from stickslip.inference.force.problem import Problem
 
 from .conftest import made
 
+pytestmark = pytest.mark.slow
+
 SIZE = 3e-9  # m
 LONG = (Run("v050", 5e-5, 5), Run("v100", 1e-4, 5))
 SHORT = (Run("v600", 6e-4, 6), Run("v700", 7e-4, 6))  # what is left of a stick is shorter than a period of the mains

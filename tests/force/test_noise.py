@@ -37,6 +37,7 @@ def still(tmp_path_factory):
     return replace(case, traces=traces, problem=problem, point=fit(problem, case.point).point)
 
 
+@pytest.mark.slow
 def test_noise_of_the_samples_reaches_the_force_as_stated(still):
     """Draws, whitened with what is stated, event by event: near the contact's resonance spring and inertia undo each
     other, creep counts from the start, windows that go back share a mean, and slip takes friction away."""
@@ -117,6 +118,7 @@ def test_an_element_remembers_where_it_last_slid():
     np.testing.assert_allclose(found, wanted)
 
 
+@pytest.mark.slow
 def test_the_path_weakens_as_the_law_of_friction_says():
     """A step of the reading at each knot in turn, through the law itself: at rest, in creep and in fast slip."""
     rng = np.random.default_rng(7)

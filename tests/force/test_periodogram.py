@@ -42,6 +42,7 @@ def longest(base):
     return max(float(np.ptp(k.t)) for k in base.problem.runs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frequency", [2.3, 17.13, 47.77, 83.4])
 def test_a_wave_laid_over_the_residuals_is_found(base, frequency):
     phases = np.array([0.4, -2.1])
@@ -74,6 +75,7 @@ def test_a_trend_has_no_period():
     assert waves(cls(form="wave")) and not waves(cls(form="trend"))
 
 
+@pytest.mark.slow
 def test_a_modulated_load_of_the_generator_is_found_with_its_period(tmp_path):
     case = made(tmp_path / "case", 11, [seen("load-modulation", "sine", 10.0)], spring_known=True)
     base = fit(case.problem, case.point)

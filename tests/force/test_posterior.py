@@ -10,6 +10,8 @@ import stickslip as ss
 from stickslip.inference.force.descent import SETTLED
 from stickslip.inference.force.posterior import walked
 
+pytestmark = pytest.mark.slow
+
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 
 
@@ -48,7 +50,7 @@ def test_beyond_a_bound_it_falls_steeply(way):
     assert way.at(far)[1] < way.at(np.zeros(way.size))[1] - 1e3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_draws_have_the_deviations_of_the_fit(aged):
     """Where the density is nearly normal, a sampler and the curvature must agree (five minutes)."""
     found = aged.sample(draws=150, tune=100, chains=2, seed=1)

@@ -89,6 +89,7 @@ def test_every_stroke_and_every_rest_is_a_stretch_of_its_own():
     assert sum(not s.moving for s in found) >= 5
 
 
+@pytest.mark.slow
 def test_the_backbone_of_the_bank_is_measured():
     runs = [thinned(with_motion(record(seed, rate=8.0 * RATE))) for seed in (1, 2, 3)]
     curve = backbone(fit(*begin(Rig(), runs)))
@@ -112,6 +113,7 @@ def test_what_the_bank_leaves_is_small(plain):
     assert np.sqrt(np.mean(plain.marginal**2)) < 2e-3 * CAPS.sum()
 
 
+@pytest.mark.slow
 def test_a_count_that_is_wider_than_the_stiffest_elements_yield_does_not_make_the_contact_weaker():
     """After every turn the reading stands still while the force falls by a half."""
     count, runs = 1e-5, []
@@ -185,6 +187,7 @@ def test_what_a_part_of_a_stroke_has_not_made_slide_is_not_compared():
     assert np.sqrt(np.mean(whole.marginal**2)) < 2e-3 * CAPS.sum()
 
 
+@pytest.mark.slow
 def test_an_uneven_fixture_is_found_with_its_size():
     runs = [thinned(with_motion(record(seed, BEND))) for seed in (1, 2, 3)]
     base = fit(*begin(Rig(), runs))
@@ -199,6 +202,7 @@ def test_an_even_fixture_has_no_uneven_part(plain):
     assert abs(found.fit.values["uneven-compliance.bend"]) < 0.03 * BEND
 
 
+@pytest.mark.slow
 def test_friction_follows_the_load_that_was_measured_beside_it():
     runs = []
     for seed in (1, 2, 3):
@@ -255,6 +259,7 @@ def test_nothing_is_run_freely_and_the_report_says_so_in_words(plain):
     assert "Error" not in found.notes[0]
 
 
+@pytest.mark.slow
 def test_what_the_rig_lacks_is_no_parameter_of_it(plain):
     """Nothing but the prescribed motion pulls; the numbers that stand for a spring and a mass are not "given"."""
     assert placeholders(plain.problem, Rig()) == ("rig.spring_stiffness", "rig.mass")

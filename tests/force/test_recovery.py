@@ -47,6 +47,7 @@ def test_a_fit_with_unknown_spring_finds_it(tmp_path):
     assert_recovered(case, found)
 
 
+@pytest.mark.slow
 def test_a_record_that_begins_under_load_finds_what_it_can(begun):
     """The strength is not known there, for nothing says what the spring held at first: drop and strength make one."""
     found, true = fit(begun.problem, begun.point), truth(begun)
@@ -65,7 +66,8 @@ def gains(case):
     return {tag: base.cost - c.fit.cost for tag, c in tried.items() if c.fit is not None}, tried
 
 
-@pytest.mark.parametrize("hidden", ["contact-ageing logarithm", pytest.param("wear linear", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("hidden", ["contact-ageing logarithm", pytest.param("wear linear", marks=pytest.mark.long)])
 def test_what_is_hidden_gains_most(tmp_path, hidden):
     tag, form = hidden.split()
     gain, tried = gains(made(tmp_path / "case", 11, [seen(tag, form, 10.0)], runs=RUNS, spring_known=True))

@@ -13,6 +13,8 @@ from stickslip.inference.force.signatures import Explained
 
 from .conftest import Case, made, seen
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def free(begun: Case):

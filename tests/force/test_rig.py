@@ -25,6 +25,7 @@ def stated(case: Case, factor: float):
     return fit(case.problem.with_composition(replace(composition, fixed=fixed)), case.point)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.05, 0.9])
 def test_a_stiffness_that_is_wrong_is_found_with_the_true_one(small, factor):
     base = stated(small, factor)
@@ -52,6 +53,7 @@ def test_a_spring_that_is_free_already_has_no_rival(begun):
     assert spring_freed(fit(begun.problem, begun.point, rounds=1)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "near"), [(1.003, True), (0.996, True), (1.03, False)])
 def test_what_springs_are_not_known_better_than_is_no_wrong_entry(small, factor, near):
     base = stated(small, factor)

@@ -8,6 +8,8 @@ import pytest
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.problem import LEVEL
 
+pytestmark = pytest.mark.slow
+
 SHIFT = 2.0 * LEVEL
 
 

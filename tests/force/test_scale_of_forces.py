@@ -11,6 +11,8 @@ from stickslip.inference.force.candidates import Start, _at, with_start
 from stickslip.inference.force.fit import fit_base, refit
 from stickslip.physics.effects.inertia import AddedMass
 
+pytestmark = pytest.mark.slow
+
 SHARE = 0.2
 
 

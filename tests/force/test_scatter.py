@@ -89,6 +89,7 @@ def drawn(sizes: np.ndarray, known: Known, seed: int) -> np.ndarray:
     return np.where(known.there, residual, 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("short", [False, True])
 def test_whitened_residuals_are_those_of_the_covariance(short):
     """Against its solution by a dense factorisation, with derivatives in the events' own other than those it knew."""
@@ -149,6 +150,7 @@ def test_every_size_has_its_own_part():
             assert np.array_equal(grown, known.phase == PHASES.index(name))
 
 
+@pytest.mark.slow
 def test_sizes_are_found_in_what_was_drawn_from_them():
     """As far off as their information says, to neither side: standard deviations of one, none above 0.4 e-folds."""
     known, found, stated = events(short=True), [], []

@@ -63,6 +63,7 @@ def test_making_room_takes_no_more_of_the_strength_than_a_step_may(small):
         refit(found.problem, nothing, found)
 
 
+@pytest.mark.slow
 def test_an_effect_is_begun_where_it_stood(base):
     """In a model with another effect more, whose parameters go between; also where it could not be fitted by itself."""
     names, stood = ("tilt", "viscous-drag"), base
@@ -77,6 +78,7 @@ def test_an_effect_is_begun_where_it_stood(base):
     assert from_end(drag.fit, again, stood).fit.cost <= again.fit.cost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tag", ["tilt", "inertia", "sensor-gain"])
 def test_a_refit_ends_no_higher_than_the_first_look_promises(base, tag):
     cls = catalogue.get(tag)
@@ -84,6 +86,7 @@ def test_a_refit_ends_no_higher_than_the_first_look_promises(base, tag):
         assert base.cost - found.fit.cost > 0.7 * found.promise - 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tag", ["tilt", "inertia", "sensor-gain"])
 def test_a_refit_ends_no_higher_than_it_began(base, tag):
     """What is not there gains nothing and costs nothing: a tilt once ended 43 above the model without it."""
@@ -114,6 +117,7 @@ def test_derivatives_that_no_covariance_holds_end_a_search_in_words(base):
         descend(base.problem, base.point, bad, base.scatter, base.known, base.blocks, 4)
 
 
+@pytest.mark.slow
 def test_what_gains_nothing_small_is_found_from_a_large_amplitude(tmp_path, monkeypatch):
     """The base has taken its part of a sensor that is two thirds of a millisecond late; a small one makes it worse."""
     case = made(tmp_path / "case", 11, [seen("sensor-low-pass", "first order", 10.0)], spring_known=True)

@@ -109,6 +109,7 @@ def test_without_sensors_nothing_is_done(moved):
     assert undone(moved.model, moved.way, moved.way.x) is moved.way
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tag", ["sensor-gain", "sensor-drift", "sensor-low-pass", "sensor-high-pass"])
 def test_what_is_read_along_a_motion_is_what_the_solver_read(tag):
     """One chain of sensors in the simulation and along its motion."""

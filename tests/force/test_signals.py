@@ -43,6 +43,7 @@ def assert_recovered(found, rig, within):
         assert std[name] < within * value, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [2e3, 5e4])
 def test_displacement_at_any_usual_rate(tmp_path, rate):
     rig, campaign, traces = recorded(tmp_path / "c", rate)
@@ -51,6 +52,7 @@ def test_displacement_at_any_usual_rate(tmp_path, rate):
     assert_recovered(found, rig, 0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signal", ["spring force", "velocity"])
 def test_spring_force_or_velocity_alone(tmp_path, signal):
     rig, campaign, traces = recorded(tmp_path / "c", 1e4)
@@ -68,6 +70,7 @@ def test_spring_force_or_velocity_alone(tmp_path, signal):
     assert_recovered(found, rig, 0.15 if signal == "velocity" else 0.03)
 
 
+@pytest.mark.slow
 def test_samples_too_far_apart_for_inertia_are_said(tmp_path):
     _, campaign, traces = recorded(tmp_path / "c", 5e3)
     sparse = [t.replace(time=t.time[::20], displacement=t.displacement[::20]) for t in traces]

@@ -6,6 +6,7 @@ import io
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from stickslip.inference.diagnose.checkpoints import kept, load_candidate, save_candidate
 from stickslip.inference.force.candidates import try_effect
@@ -16,6 +17,7 @@ from stickslip.inference.force.stored import fit_arrays, fit_of
 from stickslip.inference.force.valleys import LEVEL, widened
 
 
+@pytest.mark.slow
 def test_a_kept_fit_is_the_same(begun):
     found = widened(fit_base(begun.problem, begun.point), [LEVEL], 3.0)
     assert found.valleys
@@ -42,6 +44,7 @@ def test_an_interruption_changes_nothing(begun):
     np.testing.assert_array_equal(again.residual, first.residual)
 
 
+@pytest.mark.slow
 def test_what_events_may_not_differ_by_is_kept(begun):
     """A law that is added may not let events differ more than its base does, also after an interruption."""
     base = fit(begun.problem, begun.point)

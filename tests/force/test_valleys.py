@@ -9,6 +9,8 @@ from stickslip.inference.force.descent import SETTLED
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.valleys import LEVEL, _variance, held, widened
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def virgin(small):

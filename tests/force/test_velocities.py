@@ -12,6 +12,8 @@ from stickslip.inference.force.smoothing import crept
 
 from .counted import Moved, moved, read
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def motion() -> Moved:

@@ -32,6 +32,7 @@ def gain(base, tag):
     return base.cost - found.fit.cost
 
 
+@pytest.mark.slow
 def test_the_level_is_found_and_a_wave_that_is_not_there_gains_little(prepared, monkeypatch):
     base = fitting.fit_base(prepared.problem, prepared.start)
     size = base.scatter.named()

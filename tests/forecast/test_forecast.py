@@ -92,6 +92,7 @@ def known():
     return past, laws
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [None, 0.0, 0.5])
 def test_on_a_known_law_the_intervals_hold_what_they_should(known, at):
     past, _ = known
@@ -104,6 +105,7 @@ def test_on_a_known_law_the_intervals_hold_what_they_should(known, at):
     assert all(own["crps"] < scores[name]["crps"] for name in scores if name != "wandering strength")
 
 
+@pytest.mark.slow
 def test_the_law_chosen_from_the_data_does_nearly_as_well(known):
     past, laws = known
     own = roll(past, laws[0].law).score()["wandering strength"]
@@ -112,6 +114,7 @@ def test_the_law_chosen_from_the_data_does_nearly_as_well(known):
     assert own["coverage_90"] == pytest.approx(0.9, abs=0.04)
 
 
+@pytest.mark.slow
 def test_the_rise_of_late_tells_of_the_onset(known):
     past, _ = known
     with_it = roll(past, LAW, 0.5).score()["wandering strength"]
@@ -157,6 +160,7 @@ def signal(kind: str) -> Trace:
     return Trace.from_arrays(kind, time=trace.time, spring_force=trace.spring_force, drive_position=noisy)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["force", "displacement", "measured load point", "force and load point"])
 def test_no_forecast_changes_when_the_future_does(kind):
     """Bit by bit, with settings, events, levels and what is learned found anew from the changed record."""
@@ -205,6 +209,7 @@ def write(folder, trace: Trace) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 def test_the_command_says_what_the_object_says(tmp_path, capsys):
     path = write(tmp_path, record(150, 7))
     assert run(["forecast", path, "--at", "0.5", "--json"]) == 0
@@ -222,6 +227,7 @@ def test_the_command_says_what_the_object_says(tmp_path, capsys):
         assert len(picture.axes) == 2
 
 
+@pytest.mark.slow
 def test_the_command_keeps_a_run_folder(tmp_path, capsys):
     path = write(tmp_path, record(150, 7))
     out = tmp_path / "kept"
@@ -235,6 +241,7 @@ def test_the_command_keeps_a_run_folder(tmp_path, capsys):
     assert "exists" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -269,6 +276,7 @@ def test_without_a_slip_or_a_load_point_nothing_is_forecast():
         ss.Campaign.from_traces([still]).forecast()
 
 
+@pytest.mark.slow
 def test_a_force_without_a_load_point_is_forecast_in_seconds_of_loading():
     trace = record(120, 9)
     bare = Trace.from_arrays("bare", time=trace.time, spring_force=trace.spring_force)

@@ -41,6 +41,7 @@ def course(length: float, seed: int):
     return lambda s: np.sqrt(2 / 40) * np.sum(np.cos(q * s + turn))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("follows", ["place", "slip path", "time"])
 def test_what_strokes_follow(follows):
     w = course({"place": 4e-5, "slip path": 6e-3, "time": 50.0}[follows], 4)
@@ -89,6 +90,7 @@ def test_strokes_that_share_no_place_have_no_level():
     assert found is None
 
 
+@pytest.mark.slow
 def test_a_motion_read_as_a_velocity_or_as_the_stage_serves_as_well():
     trace = loops(60, lambda place, path, time: LEVEL * (1.0 + 1e-4 * time))
     x = trace.displacement

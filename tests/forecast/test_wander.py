@@ -140,6 +140,7 @@ def test_ten_thousand_slips_cost_seconds():
     assert time.process_time() - began < 20.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coordinate", ["time", "slip path"])
 def test_the_coordinate_is_named(coordinate):
     """Time and slip path part where the recurrence changes at the same slip: here it is 1 s and 2 s in turn."""
@@ -150,6 +151,7 @@ def test_the_coordinate_is_named(coordinate):
     assert "motion back over the same track separates them" in found["text"]
 
 
+@pytest.mark.slow
 def test_a_way_back_decides_between_place_and_slip_path():
     law = LAWS["place"]
     arrays = series(240, law, 8, (10.0, 3.0))
@@ -165,6 +167,7 @@ def test_a_way_back_decides_between_place_and_slip_path():
     assert found["coordinate"] == "place" and "separates them" not in found["text"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [9, 20])
 def test_scatter_alone_names_no_coordinate(seed):
     arrays = series(200, LAWS["none"], seed, (10.0, 3.0))

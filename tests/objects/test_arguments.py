@@ -49,6 +49,7 @@ def test_an_argument_of_the_other_model_is_refused(campaign, arguments):
     assert "leave it out" in refused.value.hint
 
 
+@pytest.mark.slow
 def test_a_single_name_is_not_read_letter_by_letter(campaign, tmp_path):
     assert [k.name for k in campaign.prepare("v050").runs] == [k.name for k in campaign.prepare(["v050"]).runs]
     assert "v050" not in [k.name for k in campaign.prepare("v050").runs]
@@ -63,6 +64,7 @@ def test_a_single_name_is_not_read_letter_by_letter(campaign, tmp_path):
                 ask(name)
 
 
+@pytest.mark.slow
 def test_a_fit_takes_a_single_name(campaign):
     fit = campaign.fit()
     with pytest.raises(InputError, match=r"weakening\.dorp"):

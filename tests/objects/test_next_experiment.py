@@ -19,6 +19,8 @@ from stickslip.objects.experiments import Setting, telling
 from stickslip.objects.next_experiment import next_experiment
 from stickslip.system.progress import Cancelled
 
+pytestmark = pytest.mark.slow
+
 SET = ("contact-ageing", "viscous-drag")
 FORM = "logarithm"
 KNOWN = {"text": "holds of 1 s and 10 s", "separates": list(SET)}

@@ -14,6 +14,8 @@ from stickslip.inference.diagnose.decide import Judge
 from stickslip.inference.force.problem import Problem
 from stickslip.system.runstore import read_result
 
+pytestmark = pytest.mark.slow
+
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 RIG = {"mass": "89.4 g", "spring_stiffness": "980.2 N/m", "contacts": 4, "normal_force": "0.31 N",
        "friction_coefficient": 0.21}  # fmt: skip

@@ -26,6 +26,7 @@ def terminal(monkeypatch, kind=Terminal):
     return made
 
 
+@pytest.mark.slow
 def test_a_terminal_shows_a_bar_by_default(monkeypatch):
     screen, campaign = terminal(monkeypatch), ss.load_campaign(SHIPPED)
     assert "reading" in screen.getvalue()
@@ -37,6 +38,7 @@ def test_a_terminal_shows_a_bar_by_default(monkeypatch):
     assert "adding contact-ageing" in screen.getvalue()
 
 
+@pytest.mark.slow
 def test_a_simulation_shows_one_too(monkeypatch):
     screen = terminal(monkeypatch)
     ss.simulate(ss.make_scenario(RIG))
@@ -63,6 +65,7 @@ def test_a_script_is_silent(monkeypatch):
     assert log.getvalue() == ""
 
 
+@pytest.mark.slow
 def test_a_fit_and_a_sample_tell_their_share_as_they_go():
     heard = []
     fit = ss.load_campaign(SHIPPED).fit(progress=lambda text, share: heard.append(share))

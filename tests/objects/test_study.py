@@ -11,6 +11,7 @@ from stickslip.errors import InputError
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 
 
+@pytest.mark.slow
 def test_a_study_has_the_numbers_of_the_fits_and_says_what_failed(tmp_path):
     broken = tmp_path / "broken.toml"
     broken.write_text('schema = 1\n[[trace]]\nfile = "none.csv"\nsampling_rate = "1 kHz"\n')
@@ -31,6 +32,7 @@ def test_a_study_has_the_numbers_of_the_fits_and_says_what_failed(tmp_path):
     assert told[-1][1] == 1.0 and {t for t, _ in told} == {"shipped", "broken"}
 
 
+@pytest.mark.slow
 def test_a_single_campaign_and_a_single_effect_stand_for_themselves():
     found = ss.study(SHIPPED, "waer", workers=1)
     assert list(found.campaign.values) == ["hidden-effect"] and "'waer'" in str(found.note.values[0])

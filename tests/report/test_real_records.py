@@ -62,6 +62,7 @@ def test_paper_slider_s_gain_is_found_and_named(real_data, program):
     assert any("identifies nothing" in line for line in found["cannot"])
 
 
+@pytest.mark.slow
 def test_paper_slider_is_no_static_contact(real_data, program):
     found = program(PAPER.format(data=real_data), "fit", "--model", "static", "--v-lim", "10 um/s")
     assert any("sensor-gain of +11" in note or "sensor-gain of +10" in note for note in found["notes"])

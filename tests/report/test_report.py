@@ -233,6 +233,7 @@ def browser(tmp_path):
     return call
 
 
+@pytest.mark.slow
 def test_a_browser_shows_it(tmp_path, browser):
     from matplotlib.image import imread
 

@@ -33,6 +33,7 @@ def backbone(bank: Bank, u):
     return np.minimum(k * np.atleast_1d(u)[:, None], cap).sum(axis=1)
 
 
+@pytest.mark.slow
 def test_a_drive_that_stands_still_moves_nothing():
     trajectory, _ = integrate(model((1.0, 0.0)), 10.0)
     s = trajectory.steps
@@ -117,6 +118,7 @@ def test_a_mass_so_large_that_it_never_sticks():
     assert trajectory.at(t).x == pytest.approx(want, abs=2e-3 * kinetic / SPRING)
 
 
+@pytest.mark.slow
 def test_a_drive_that_turns_follows_masing():
     """Slowly there and back, constant friction: on the way back twice the virgin curve at half the distance."""
     v = 1e-6
@@ -130,6 +132,7 @@ def test_a_drive_that_turns_follows_masing():
     assert at.contact_force[-1] < 0.0
 
 
+@pytest.mark.slow
 def test_a_load_that_swings_through_zero():
     """Depth one: each period the caps fall to zero and the block follows the spring; laws and books hold."""
     wobble = LoadModulation(depth=1.0, frequency=5.0)

@@ -53,7 +53,7 @@ def marched(rig: Rig) -> Callable:
     return elements
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(1800)
 def test_several_effects_anywhere_in_their_ranges():
     rig = Rig(EFFECTS)
@@ -88,7 +88,7 @@ def test_several_effects_anywhere_in_their_ranges():
     assert ends["at the end"] > 10 * ends["out of steps"], ends
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(1800)
 def test_all_effects_at_once():
     """Each at a fiftieth of its range: a model may hold any set, so also the whole catalogue."""

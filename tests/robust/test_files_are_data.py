@@ -136,6 +136,7 @@ def test_a_campaign_does_not_leave_its_folder_unsaid(tmp_path, capsys, name):
     assert "outside the campaign folder" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_scenario_says_what_it_reads_from_outside(tmp_path, capsys):
     inside = tmp_path / "inside"
     inside.mkdir()

@@ -103,6 +103,7 @@ def test_an_existing_result_is_never_overwritten(files, tmp_path, capsys, name):
     capsys.readouterr()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["simulate", "series", "creep", "inspect"])
 def test_force_replaces_the_whole(files, tmp_path, capsys, name):
     out = tmp_path / "out"
@@ -190,6 +191,7 @@ def test_a_read_only_folder(files, tmp_path):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_link_in_a_read_only_folder_leads_to_where_one_may_write(files, tmp_path):
     (tmp_path / "open").mkdir()
     (tmp_path / "shut").mkdir()
@@ -235,6 +237,7 @@ def on_a_full_disk(arguments: list[str], out: Path, limit: int) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "limit"), [("creep", 100), ("creep", 3000), ("inspect", 100), ("inspect", 3000), ("simulate", 60_000)]
 )
@@ -244,7 +247,7 @@ def test_a_full_disk(files, tmp_path, name, limit):
     assert sorted(p.name for p in tmp_path.iterdir()) == (["in"] if refused else ["in", "out"])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(1800)
 def test_a_full_disk_under_long_work(tmp_path):
     """Fits, a diagnosis and a comparison of the shipped campaign: refused in words, and done once there is room."""
@@ -311,6 +314,7 @@ def every_command(files, tmp_path):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("unshare") is None, reason="needs unshare")
 def test_every_command_on_a_read_only_disk(every_command, tmp_path):
     made = challenge(tmp_path / "made", 1, small_campaign)
@@ -322,6 +326,7 @@ def test_every_command_on_a_read_only_disk(every_command, tmp_path):
     assert there == ["made"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("unshare") is None, reason="needs unshare")
 def test_every_command_on_a_disk_that_is_full(every_command, tmp_path):
     """Eight kilobytes are left: enough to begin, and for nothing that a command writes."""
@@ -363,6 +368,7 @@ def run_piecewise(folder: Path, limit: int = 0) -> subprocess.Popen:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [4_000, 12_000], ids=["the pieces do not fit", "the result does not fit"])
 def test_a_challenge_on_a_full_disk_stops_in_words_and_goes_on(tmp_path, limit):
     """A full disk is no failure of a case: with room again, all are done, as if nothing had been."""
@@ -411,6 +417,7 @@ def test_a_report_that_does_not_fit_is_no_failure_of_the_case(tmp_path, monkeypa
     assert do_case("c.toml", str(runs), "case-001", diagnosis, "session")["state"] == "done"
 
 
+@pytest.mark.slow
 def test_a_second_run_of_a_challenge_is_refused_while_the_first_is_at_work(tmp_path, capsys):
     folder = challenge(tmp_path / "c", 4)
     first = run_piecewise(folder)
@@ -425,6 +432,7 @@ def test_a_second_run_of_a_challenge_is_refused_while_the_first_is_at_work(tmp_p
     assert [p.name for p in sorted((folder / "runs").iterdir()) if p.is_dir()] == names
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("name", ["creep", "inspect"])
 def test_a_full_disk_behind_the_standard_output(files, name):

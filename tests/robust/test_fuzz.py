@@ -21,6 +21,7 @@ def _imported(tmp_path_factory):
     prepare(tmp_path_factory.mktemp("valid"))
 
 
+@pytest.mark.slow
 def test_the_seeds_are_valid(tmp_path):
     """Else nothing would be fuzzed but the first check of each reader."""
     for name, content in seeds():
@@ -37,6 +38,7 @@ def test_every_input_can_be_made_again():
     assert len({inputs(5, n)[1] for n in range(200)}) > 190
 
 
+@pytest.mark.slow
 def test_damaged_files_are_read_or_refused():
     """In another process, because compiled readers crash; none of these kinds of fault may come out."""
     found = campaign(seed=7, first=0, number=500, seconds=240.0, tell=print, commands=True)
@@ -48,6 +50,7 @@ def test_damaged_files_are_read_or_refused():
         assert found["counts"][f"through {command}"] > 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["5.mat", "4.nc"])
 def test_a_file_that_would_take_the_program_down_is_refused(tmp_path, monkeypatch, name):
     """Found by fuzzing: scipy crashes on the one, HDF5 loops for ever on the other (one bit was flipped)."""

@@ -85,6 +85,7 @@ def all_sound(folder: Path) -> None:
             assert path.is_dir() or path.suffix in (".part", ".lock"), f"{path.name}: nobody says whether it is whole"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("force", [False, True], ids=["new", "replacing"])
 def test_piecewise_work_killed_again_and_again(tmp_path, force):
     """Kills at seeded moments, until it comes to its end."""
@@ -134,6 +135,7 @@ def test_a_folder_of_the_users_with_a_like_name_is_left_alone(tmp_path):
     assert (tmp_path / "run.old" / "result.json").read_text() == "{}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["cut", "zeroed", "empty"])
 def test_a_damaged_piece_is_made_again(tmp_path, damage):
     """As a power failure may leave it, which writing aside does not help against."""
@@ -167,7 +169,7 @@ def diagnosis(folder: Path, out: Path, jobs: int) -> list[str]:
     ]  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_diagnosis_killed_at_twenty_random_moments(tmp_path, jobs):
@@ -248,17 +250,18 @@ def _check_challenge(whole: Path, cut: Path, cases: int, diagnosis: str, kills: 
     assert _answers(cut) == want
 
 
+@pytest.mark.slow
 def test_a_challenge_killed_with_its_workers_goes_on(tmp_path):
     _check_challenge(challenge(tmp_path / "whole"), challenge(tmp_path / "cut"), 4, "invented", 2)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(1800)
 def test_a_challenge_killed_at_twenty_random_moments(tmp_path):
     _check_challenge(challenge(tmp_path / "whole"), challenge(tmp_path / "cut"), 4, "invented", 20)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(3600)
 def test_a_challenge_of_real_diagnoses_killed_at_twenty_random_moments(tmp_path):
     whole, cut = (challenge(tmp_path / name, 2, small_campaign) for name in ("whole", "cut"))

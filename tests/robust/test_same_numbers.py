@@ -36,6 +36,7 @@ def same(first: Path, second: Path) -> None:
         assert a[name].values.tobytes() == b[name].values.tobytes(), name
 
 
+@pytest.mark.slow
 def test_simulate_twice(tmp_path):
     """Once with what the compilation cache keeps and once compiled anew."""
     (tmp_path / "s.toml").write_text(SCENARIO.replace('"0.5 s"', '"2 s"') + SENSOR)
@@ -49,6 +50,7 @@ def test_simulate_twice(tmp_path):
     assert read_result(tmp_path / "out1")["events"] == read_result(tmp_path / "out3")["events"]
 
 
+@pytest.mark.slow
 def test_fit_static_twice(tmp_path):
     small_campaign(tmp_path)
     for n in (1, 2):
@@ -56,7 +58,7 @@ def test_fit_static_twice(tmp_path):
     same(tmp_path / "out1", tmp_path / "out2")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(1800)
 def test_fit_inertial_twice(tmp_path):
     """Once with what the compilation cache keeps and once compiled anew."""
@@ -66,7 +68,7 @@ def test_fit_inertial_twice(tmp_path):
     same(tmp_path / "out1", tmp_path / "out2")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(3600)
 def test_diagnose_twice(tmp_path):
     small_campaign(tmp_path)

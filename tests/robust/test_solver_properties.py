@@ -102,6 +102,7 @@ def imbalance(model: Model, s) -> float:
     return float(np.max(np.abs(np.cumsum(np.where(leap, 0.0, gap)))) / scale) if scale > 0 else 0.0
 
 
+@pytest.mark.slow
 def test_the_laws_hold_wherever_the_solver_gets_which_is_most_of_the_range():
     finished: list[bool] = []
     excused: list[bool] = []
@@ -162,6 +163,7 @@ def test_the_laws_hold_wherever_the_solver_gets_which_is_most_of_the_range():
     assert np.mean(coarse) < 0.05, (np.mean(finished), np.mean(excused), np.mean(coarse))
 
 
+@pytest.mark.slow
 @settings(max_examples=100, **EXAMPLES)
 @given(
     mass=decades(*_spec(Block, "mass")),
@@ -197,6 +199,7 @@ class _Never(Weakening):
         return super().strength(psi) + jnp.where(psi < 1.0, jnp.nan, 0.0)
 
 
+@pytest.mark.slow
 def test_steps_that_are_refused_for_ever_end_in_words_at_once():
     times = jnp.asarray([0.0, 1.0, 2.0, 3.0])
     bank = Bank(jnp.full(N, 1e5), jnp.full(N, 0.02))

@@ -9,7 +9,7 @@ from stickslip.physics.effects import catalogue
 from stickslip.simulation.scenario.demonstration import typical_amplitude, with_and_without
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("tag", catalogue.tags())
 def test_the_trace_with_an_effect_differs_from_the_one_without(tag):

@@ -116,6 +116,7 @@ def test_a_parameter_is_set_by_the_name_that_the_fit_gives_it(folder):
             back.scenario([f"{name}=0.2"])
 
 
+@pytest.mark.slow
 def test_and_so_in_a_series(folder, capsys):
     assert run(["simulate", str(folder), "--sweep", "rig.mass=0.08,0.1", "--set", "drive.events=2", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
@@ -191,6 +192,7 @@ def test_equations_hold_the_fitted_values(folder):
     assert r"u_{\mathrm{max}}" in words.latex()
 
 
+@pytest.mark.slow
 def test_simulate_takes_a_run_folder(folder, tmp_path, capsys):
     out = tmp_path / "out"
     words = ["simulate", str(folder), "--set", "drive.velocity=400um/s", "--set", "drive.events=2", "--out", str(out)]

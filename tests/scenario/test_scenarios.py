@@ -47,6 +47,7 @@ def outcome(tmp_path_factory):
     return get
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_it_runs_and_writes_a_whole_folder(outcome, name):
     out, result = outcome(name)
@@ -62,6 +63,7 @@ def test_it_runs_and_writes_a_whole_folder(outcome, name):
     assert not list(out.glob("*.part"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in RUNS if load_scenario(FOLDER / f"{name}.toml").file.output.trace])
 def test_what_it_measures_can_be_read_back(outcome, name):
     out, _ = outcome(name)
@@ -87,12 +89,14 @@ def test_recurrence_falls_with_velocity(outcome):
     assert (outcome("velocity_sweep")[0] / "series.csv").read_text().startswith("value [m/s],events [1]")
 
 
+@pytest.mark.slow
 def test_inertia_and_weakening_matter_more_at_speed(outcome):
     _, result = outcome("static_vs_inertial")
     creep = [run["events"][0]["creep_before_slip"] for run in result["runs"]]
     assert creep[1] > 1.02 * creep[0]
 
 
+@pytest.mark.slow
 def test_slips_grow_with_the_logarithm_of_the_hold(outcome):
     _, result = outcome("slide_hold_slide")
     slips = {round(event["recurrence"] or 0): event["slip"] for event in result["events"]}
@@ -104,6 +108,7 @@ def test_slips_grow_with_the_logarithm_of_the_hold(outcome):
     assert (after[2] - after[1]) > 0.8 * (after[1] - after[0])
 
 
+@pytest.mark.slow
 def test_paper_slider_has_the_published_size(outcome):
     _, result = outcome("paper_slider")
     later = result["events"][1:]

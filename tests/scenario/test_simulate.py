@@ -29,6 +29,7 @@ UNIT_OF = {
 }
 
 
+@pytest.mark.slow
 def test_every_variable_has_its_unit(stick_slip):
     assert {name: stick_slip[name].attrs["units"] for name in stick_slip.data_vars} == UNIT_OF
     assert stick_slip["time"].attrs["units"] == "s"
@@ -132,6 +133,7 @@ def test_too_short_a_run_says_how_long_loading_takes():
     assert "full friction only after about 1.3" in data.attrs["verdict"]
 
 
+@pytest.mark.slow
 def test_a_hold_and_a_reversal():
     pieces = [
         {"velocity": 2e-4, "duration": 1.6},

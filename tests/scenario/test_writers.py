@@ -31,6 +31,7 @@ def test_an_unknown_ending_is_refused(tmp_path):
         write_trace(tmp_path / "a.xls", {"time": (np.arange(3.0), "s")})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_a_simulated_run_is_read_back_as_a_measurement(tmp_path, ending):
     """Counter wraps are undone; what comes back is the truth to one count."""
@@ -47,6 +48,7 @@ def test_a_simulated_run_is_read_back_as_a_measurement(tmp_path, ending):
     assert trace.drive.speed == pytest.approx(2e-4)
 
 
+@pytest.mark.slow
 def test_clears_are_handed_over(tmp_path):
     content = rig(sensor={"clear_at_arrest": True}, output={"sampling_rate": "5 kHz", "trace": "run.csv"})
     scenario = make_scenario(content)
@@ -57,6 +59,7 @@ def test_clears_are_handed_over(tmp_path):
     assert np.ptp(data["reading"].values) < 0.7 * np.ptp(trace.displacement)
 
 
+@pytest.mark.slow
 def test_holds_channels_and_rig_are_handed_over(tmp_path):
     pieces = [{"velocity": 2e-4, "duration": 1.6}, {"velocity": 0, "duration": 0.5}]
     output = {"sampling_rate": "5 kHz", "trace": "run.mat", "channels": ["spring_force", "velocity"]}

@@ -30,6 +30,7 @@ def test_energy_balance_at_the_default_tolerance():
     assert np.max(np.abs(imbalance(made.trajectory.steps))) < 5e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drift", [0.4, -0.4])
 def test_energy_balance_closes_while_wear_changes_the_stiffness(drift):
     """What loaded elements store more or less because their stiffness changed is in the books."""

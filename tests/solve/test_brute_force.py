@@ -22,13 +22,14 @@ def test_brute_force_is_right_about_a_free_oscillation():
     assert path.x == pytest.approx(exact, abs=1e-5 * np.max(exact))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [DEFAULT, tighter(10.0)], ids=["default", "tight"])
 def test_events_and_creep_agree_for_a_rough_line(tolerance):
     """One line, all its springs on the one side, 128 elements on the other."""
     _agree(pair(*rough_contact(1, 512, 0.7, 1e-6, bins=128), 7.2, tolerance))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_events_and_creep_agree_for_the_rig():
     """Four contacts of 4096 springs each; 256 elements, because the last springs of a single line slide one by one."""
     _agree(pair(*rough_contact(4, 4096, 0.3, 2.46e-6, bins=256), 7.2, tighter(10.0)))

@@ -23,6 +23,7 @@ def test_second_order_within_a_slip():
     assert errors[0] < 2e-8
 
 
+@pytest.mark.slow
 def test_second_order_from_slip_to_slip_wherever_in_a_step_elements_stick():
     steps = (5e-5, 2.5e-5, 1.25e-5)
     errors = np.array([later_onsets(step) for step in steps])
@@ -31,7 +32,7 @@ def test_second_order_from_slip_to_slip_wherever_in_a_step_elements_stick():
     assert np.all(errors.std(axis=1)[0] < 1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_event_quantities_converge_with_the_tolerance():
     exact = second_event(factor=3000.0)
     errors = np.abs(np.array([second_event(factor=f) for f in (1.0, 10.0, 100.0)]) / exact - 1.0)
@@ -40,7 +41,7 @@ def test_event_quantities_converge_with_the_tolerance():
     assert np.all(errors[2] < 0.2 * errors[0])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_event_quantities_converge_with_the_number_of_elements():
     exact = second_event(2048, 30.0)
     coarse = np.abs(second_event(32, 30.0) / exact - 1.0)
@@ -50,7 +51,7 @@ def test_event_quantities_converge_with_the_number_of_elements():
     assert np.all(np.abs(second_event(128, 30.0) / exact - 1.0) < 5e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_undamped_ringing_decides_the_onset():
     """A kick too small to matter, of another phase at each onset: milliseconds without damping, none with it."""
     kicks = np.linspace(0.0, 2e-6, 6)

@@ -58,6 +58,7 @@ def test_creep_and_onset_hold_on_coarser_rungs():
         assert seen == pytest.approx(exact[smooth, :2] / scale, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_creep_curve_with_adaptive_steps():
     function = creep_displacements(DEFAULT, (2.0, 4.0))
     exact = _columns(function)

@@ -31,6 +31,7 @@ def shortly_before():
     return state, integrate(rig(), 5.3, t0=5.14, state=state)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("field", "rising"), [("onset", True), ("arrest", False)])
 def test_an_event_of_diffrax_ends_the_integration_there(field, rising, shortly_before):
     state, trajectory = shortly_before
@@ -63,6 +64,7 @@ def test_times_and_peaks_lie_between_the_steps():
     assert max(low) > 1e-5
 
 
+@pytest.mark.slow
 def test_durations_and_sizes_are_known_far_below_a_step():
     """Duration and slip against brute force with 0.25 us: a fiftieth of a step, and better with the tolerance."""
     expected = brute_slips(np.zeros(10), 2.5e-7)

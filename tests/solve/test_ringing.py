@@ -8,6 +8,7 @@ import pytest
 from .ringing import frequency, microslip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("amplitude", [20e-9, 50e-9])
 def test_microslip_alone_damps_hyperbolically(amplitude):
     ringing, law = microslip(amplitude)

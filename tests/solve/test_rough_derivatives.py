@@ -61,7 +61,7 @@ def marched(theta: np.ndarray) -> dict[str, np.ndarray]:
     return table(path_slips(path, SPEED))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_derivatives_in_the_roughness_agree_with_differences_by_brute_force():
     values, columns = slip_derivatives(build, np.zeros(4), END, tolerance=tighter(1000.0), refine=2)
     expected, seen = marched(np.zeros(4)), table(columns)

@@ -16,11 +16,13 @@ from .rig import tighter
 from .slip_differences import END, SHOWN, brute_differences, brute_slips, errors, on_tied_steps, solved, table
 
 
+@pytest.mark.slow
 def test_brute_force_gives_smooth_differences():
     """The reference: two rungs agree although each event moves by milliseconds between them."""
     assert all(error < 3e-3 for error in errors(brute_differences(3e-3), brute_differences(1e-3)).values())
 
 
+@pytest.mark.slow
 def test_slips_are_those_of_brute_force():
     seen, expected = solved()[0], table(brute_slips(np.zeros(len(BASE))))
     assert seen["slip"].shape == expected["slip"].shape == (3,)
@@ -41,20 +43,24 @@ def test_derivatives_of_every_slip_in_every_parameter_agree_with_differences_by_
     assert seen["recurrence"][stiffness] == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_the_tied_steps():
     """The same discrete solution on the same steps. Between differences of 1e-5 and 1e-3 a single grid ripples."""
     _climb(10.0, 1, (1e-5, 0.01), (1e-6, 2e-3), (1e-7, 1e-3))
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_finer_tied_steps_more_closely():
     _climb(30.0, 1, (1e-5, 5e-3), (1e-6, 1e-3), (1e-7, 1e-4))
 
 
+@pytest.mark.slow
 def test_shifted_grids_take_the_ripple_out():
     """By one grid alone the rung of 3e-4 was 2 % off with one release of JAX and 3.3 % with another."""
     _climb(10.0, GRIDS, (3e-4, 0.03), (1e-4, 0.02), (1e-5, 0.01))
 
 
+@pytest.mark.slow
 def test_derivatives_summed_along_a_path_are_the_difference_of_its_ends():
     """Over longer steps the derivative ripples by 2 % and more: its mean over 16 places is what a difference tells."""
     slips, seen = on_tied_steps(10.0, 2, 1), solved(10.0, 2, 1)[1]
@@ -82,14 +88,14 @@ def _climb(factor, grids, *rungs):
                 assert difference == pytest.approx(seen[name][k], abs=within * np.max(np.abs(seen[name][k])))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_derivatives_converge_with_the_steps():
     expected = brute_differences(1e-3)
     coarse, fine = errors(solved(0.1, 1, 1)[1], expected), errors(solved()[1], expected)
     assert all(fine[name] < 0.1 * coarse[name] for name in SHOWN)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pulling_the_other_way_gives_the_same_derivatives():
     def mirrored(theta):
         model = build(theta)
@@ -103,6 +109,7 @@ def test_pulling_the_other_way_gives_the_same_derivatives():
     assert np.diff(columns.onset) == pytest.approx(derivatives["recurrence"], rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_steps_of_the_default_tolerance_will_do_for_two_per_cent():
     """Steps of a millisecond at an arrest: each element sticks within one of them."""
     assert all(error < 0.02 for error in errors(solved(1.0, 1, GRIDS)[1], brute_differences(1e-3)).values())

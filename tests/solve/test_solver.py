@@ -148,6 +148,7 @@ def test_steps_that_lead_nowhere_are_given_up_at_once():
     assert len(seen) < 4
 
 
+@pytest.mark.slow
 def test_the_trace_of_a_run_is_kept_unless_a_law_is_not_of_this_package(monkeypatch):
     """Code of one's own may change between two starts under the same name."""
     module, names = importlib.import_module("stickslip.simulation.solve.integrate"), []
@@ -166,6 +167,7 @@ def test_the_trace_of_a_run_is_kept_unless_a_law_is_not_of_this_package(monkeypa
     assert own is None
 
 
+@pytest.mark.slow
 def test_a_single_jump_in_time_is_stepped_over():
     trajectory, _ = integrate(rig(effects=(_Push(),)), 2.0)
     s = trajectory.steps

@@ -13,7 +13,10 @@ from .conftest import campaign_in, numbers
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
-pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver")
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver"),
+    pytest.mark.slow,
+]
 CAUGHT = 1.0  # floors: the error on unseen runs with the hidden effect in the model
 QUICK = 300.0  # ms in which the quickest of some moves is drawn on a machine that does other things too; the aim: 100
 PAUSE = 0.3  # s between two moves
@@ -177,7 +180,7 @@ def test_a_fit_is_cancelled_and_a_locked_parameter_stays(browser):
     browser.press("button", "Base")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_crash(tmp_path):
     path = campaign_in(tmp_path)
     served = Served(path)
@@ -259,7 +262,7 @@ def test_the_missing_effect_is_found_switched_on_undone_and_comes_back_after_a_c
         served.end()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_diagnosis_goes_on_beside_and_can_be_cancelled(tmp_path):
     served = Served(campaign_in(tmp_path))
     browser = Browser(str(CHROMIUM), str(DRIVER))
@@ -302,7 +305,7 @@ def test_a_diagnosis_goes_on_beside_and_can_be_cancelled(tmp_path):
         served.end()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["fit", "diagnosis"])
 def test_a_server_that_is_killed_in_the_midst_of_long_work_comes_back_with_what_was_open(tmp_path, what):
     path = campaign_in(tmp_path)

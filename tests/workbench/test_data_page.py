@@ -106,6 +106,7 @@ def test_every_axis_has_its_unit(campaign):
     assert all("/ s" in f.xaxis.axis_label and "/ " in f.yaxis.axis_label for f in event.figures.values())
 
 
+@pytest.mark.slow
 def test_a_spring_force_that_nobody_measured_follows_from_the_stated_stiffness(campaign, base, monkeypatch):
     session = Session(campaign=campaign)
     made = Signals(session)
@@ -168,6 +169,7 @@ def test_a_file_like_the_others_is_taken_as_they_are(campaign, folder):
     assert found.sampling_rate == "10000 Hz" and found.virgin
 
 
+@pytest.mark.slow
 def test_a_dropped_file_is_stored_and_the_campaign_grows(own, folder):
     session = Session(campaign=own)
     form, content = Form(session), (folder / "v200.csv").read_bytes()
@@ -285,6 +287,7 @@ def test_a_file_that_is_too_large_is_refused_by_the_server(own, monkeypatch):
     assert form.dropped[0] == "run.csv" and list(form.drop.value) == ["run.csv"]
 
 
+@pytest.mark.slow
 def test_a_file_that_is_dropped_where_nothing_is_open_begins_a_campaign(folder, base, tmp_path, monkeypatch):
     monkeypatch.setattr(Campaign, "fit", lambda self, effects=(): base)
     with closing(Session(home=tmp_path)) as session:
@@ -335,6 +338,7 @@ def test_a_table_more_leaves_the_file_byte_for_byte():
         assert new.startswith(old) and new.endswith(b"[[trace]]" + end + b"file = 'x'" + end)
 
 
+@pytest.mark.slow
 def test_events_are_listed_in_the_unit_and_to_the_place_of_their_deviations(campaign):
     found = data_page.Looked(campaign, campaign.events, campaign.inspect())
     heads, rows = data_page.event_rows(found, "v050")
@@ -348,6 +352,7 @@ def test_events_are_listed_in_the_unit_and_to_the_place_of_their_deviations(camp
     assert rows[0][heads.index(next(h for h in heads if h.startswith("recurrence / s")))] == "-"
 
 
+@pytest.mark.slow
 def test_what_the_data_tell_is_said(campaign):
     session = Session(campaign=campaign)
     assert data_page.page(session) is not None

@@ -22,6 +22,8 @@ from stickslip.workbench.sweep_view import SweepView
 
 from .conftest import numbers
 
+pytestmark = pytest.mark.slow
+
 SCRIPT = "<script>alert(1)</script>"
 
 

@@ -10,7 +10,10 @@ from .browser import Browser, Served
 from .conftest import campaign_in
 from .test_browser import CHROMIUM, DRIVER
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver")
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver"),
+    pytest.mark.slow,
+]
 WIDTHS = (1200, 1440, 1920, 2560)
 PAGES = ("Data", "Model", "missing", "Simulate", "Keep")
 SETTLED = 1.0  # s after a change of the window until all lies where it stays

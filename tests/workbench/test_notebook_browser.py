@@ -20,6 +20,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="ther
 PAGES = ("Data", "Model against measurement", "What is missing", "Simulate", "Keep")
 
 
+@pytest.mark.slow
 def test_the_output_of_a_cell_holds_the_pages(campaign, base, monkeypatch, tmp_path):
     """As a notebook puts it into its page: nothing but what the object gives for HTML."""
     monkeypatch.setattr(type(campaign), "fit", lambda self, **_: base)
@@ -47,7 +48,7 @@ def test_the_output_of_a_cell_holds_the_pages(campaign, base, monkeypatch, tmp_p
         browser.close()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_effect_that_is_saved_in_the_editor_is_fitted_anew_in_the_window(tmp_path):
     campaign, path = campaign_in(tmp_path), Path(tmp_path / "own_effect.py")
     path.write_text(EFFECT)

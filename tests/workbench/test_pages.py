@@ -42,6 +42,8 @@ from stickslip.workbench.watching import Place
 
 from .outline import OUTLINE, outline
 
+pytestmark = pytest.mark.slow
+
 LISTED = ("contact-ageing", "drive-ripple", "sensor-drift", "viscous-drag")
 
 

@@ -11,7 +11,10 @@ from .browser import Browser, Served
 from .conftest import SCENARIO, campaign_in
 from .test_browser import CHROMIUM, DRIVER
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver")
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver"),
+    pytest.mark.slow,
+]
 MARKUP = "<img src=x onerror=window.hit=1>.csv"
 SAID = "return seen('.line, .work .said').map((e) => e.textContent).join('|')"
 RUNS = "return seen('tbody tr').map((e) => e.cells[0].textContent)"

@@ -60,6 +60,7 @@ def session(campaign, base, monkeypatch):
     return made
 
 
+@pytest.mark.slow
 def test_fields_page_zoom_and_the_chosen_effect_come_back(campaign, session):
     before = Shown(session)
     untouched = before.told()
@@ -75,6 +76,7 @@ def test_fields_page_zoom_and_the_chosen_effect_come_back(campaign, session):
         assert again.view == session.view
 
 
+@pytest.mark.slow
 def test_who_turns_to_a_page_before_the_history_is_read_stays_there(campaign, session):
     app.tabs(session).active = 2
     session.keep()
@@ -85,12 +87,14 @@ def test_who_turns_to_a_page_before_the_history_is_read_stays_there(campaign, se
         assert (first.active, turned.active) == (2, 3)
 
 
+@pytest.mark.slow
 def test_what_nobody_filled_in_is_not_kept(session):
     Shown(session)
     session.run, session.event = "v400", 2
     assert not set(session.view) & {"simulate", "sweep", "rivals", "residual", "page"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",
     [
@@ -105,6 +109,7 @@ def test_what_is_damaged_or_of_another_version_is_left_alone(session, damage):
     assert Shown(session).told() == plain
 
 
+@pytest.mark.slow
 def test_nothing_is_written_over_a_history_that_was_not_read_yet(campaign, session):
     session.remember("page", "keep_page")
     again = Session(campaign=campaign)

@@ -28,6 +28,8 @@ from stickslip.workbench.session import Note, Session
 from .browser import Served
 from .conftest import SCENARIO
 
+pytestmark = pytest.mark.slow
+
 EFFECT = '''"""An effect of one's own."""
 
 from jax import Array

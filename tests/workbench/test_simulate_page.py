@@ -40,6 +40,7 @@ def undecided(campaign):
     return Diagnosis(campaign, None, {"verdict": verdict, "next_experiment": proposed}, {})
 
 
+@pytest.mark.slow
 def test_what_is_left_empty_is_as_in_the_measured_run(base):
     mine = experiments.run(experiments.scenario(base, Setting("v400")))
     theirs = base.simulate(run="v400")
@@ -69,6 +70,7 @@ def test_velocity_spring_and_mass_are_taken_with_their_units(base):
             experiments.scenario(base, wrong)
 
 
+@pytest.mark.slow
 def test_a_hold_begins_amid_a_stick(base):
     made = experiments.scenario(base, Setting("v100", "100 um/s", "5 s"))
     first, hold, last = made.file.drive.piece
@@ -80,6 +82,7 @@ def test_a_hold_begins_amid_a_stick(base):
     assert not np.any((onsets < begin) & (arrests > begin)), "the load point halts while the block sticks"
 
 
+@pytest.mark.slow
 def test_a_simulation_is_shown_beside_the_measurement(session):
     simulate_page.page(session)
     asked = Asked(session)
@@ -117,6 +120,7 @@ def test_without_a_model_it_is_said(campaign):
     assert "no model yet" in beside(session, "simulation").said
 
 
+@pytest.mark.slow
 def test_a_simulation_can_be_cancelled(base):
     asked = []
 
@@ -175,6 +179,7 @@ def test_a_synthetic_record_can_be_opened(campaign, base, folder):
             synthetic.write(base, Setting("v400"), campaign, name, _silent)
 
 
+@pytest.mark.slow
 def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(session, base, campaign, undecided):
     session.diagnosis = undecided
     assert _undecided(undecided) == [(RIVALS, "holds of 1 s and 10 s")]
@@ -217,6 +222,7 @@ def test_practicable_experiments_change_one_thing_each(base):
     assert made["a spring half as stiff"].block.spring_stiffness == pytest.approx(500.0)
 
 
+@pytest.mark.slow
 def test_a_load_and_a_way_back_are_simulated(base):
     loaded = experiments.scenario(base, Setting("v400", "400 um/s", events=2, load="2")).file
     plain = experiments.scenario(base, Setting("v400", "400 um/s", events=2)).file
@@ -234,6 +240,7 @@ def test_a_load_and_a_way_back_are_simulated(base):
         experiments.scenario(base, Setting("v400", load="-1"))
 
 
+@pytest.mark.slow
 def test_models_that_differ_in_a_hold_only_are_told_apart(base):
     """As the sensor reads it: a drift shows in no motion of the block."""
     setting = Setting("v400", "400 um/s", hold="2 s")

@@ -85,7 +85,7 @@ def test_a_part_of_a_million_samples_is_reduced_within_a_redraw(long_curve, what
     assert _least(answer, 8) < FRAME
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver")
 def test_five_runs_of_a_million_samples_are_panned_and_zoomed_smoothly(tmp_path):
     served, seen, _, _ = opened(long_campaign(tmp_path / "long"))

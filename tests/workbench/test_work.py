@@ -171,6 +171,7 @@ def _lingers(tell):
     return "done"
 
 
+@pytest.mark.slow
 def test_a_process_that_does_not_end_after_its_answer_is_ended():
     found: list[str] = []
     search = Search(_lingers, (), lambda *a: None, found.append, lambda text: None)
