@@ -13,12 +13,14 @@ import stickslip as ss
 from stickslip.inference.force import inserted_knots
 from stickslip.inference.force.along import along
 from stickslip.inference.force.inserted_knots import Inserted
+from stickslip.inference.force.later_ringing import Turns
 from stickslip.physics.effects import catalogue
 from stickslip.simulation.conformance.rig import base_model
 from stickslip.simulation.solve import Tolerance, integrate
 
 pytestmark = pytest.mark.slow
 
+NONE = Turns(*(np.zeros(0) for _ in range(4)))  # it rings no more
 SPEED, RATE, END = 4e-4, 1e4, 1.4  # m/s, Hz, s
 RIG = {"mass": "0.0894 kg", "spring_stiffness": "1056.62 N/m", "contacts": 4, "normal_force": "0.31 N"}
 
@@ -73,7 +75,7 @@ def parabola(arrest: float = 0.503, rate: float = 1e2):
 
 def test_knots_lie_on_the_motion_and_become_close_before_it_stands():
     t, x, v = parabola()
-    found = Inserted.of(t, x, v, np.zeros(t.size, bool), np.array([0.5]), 0.2)
+    found = Inserted.of(t, x, v, np.zeros(t.size, bool), np.array([0.5]), 0.2, NONE)
     at = found.between(t)
     assert found.x == pytest.approx(1.0 - (at - 0.503) ** 2, abs=1e-12)
     assert found.v == pytest.approx(-2.0 * (at - 0.503), abs=1e-12)
@@ -89,5 +91,5 @@ def test_knots_lie_on_the_motion_and_become_close_before_it_stands():
 
 def test_windows_have_no_knots_between():
     t, x, v = parabola()
-    found = Inserted.of(t, x, v, np.ones(t.size, bool), np.array([0.5]), 0.2)
+    found = Inserted.of(t, x, v, np.ones(t.size, bool), np.array([0.5]), 0.2, NONE)
     assert found.before.size == 0 and found.size == t.size

@@ -1,4 +1,4 @@
-"""Knots between two samples: where the block turns, and where it comes to rest after a slip.
+"""Knots between two others: where the block turns, and where it comes to rest after a slip.
 
 A law of the velocity changes most where the block stands. What slid with a cap that follows the velocity lets go of it
 at rest and unloads from there. What it holds then is decided while the velocity falls to zero, within a few samples.
@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 from scipy.sparse import csr_array
+
+from .later_ringing import Turns
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -40,8 +42,10 @@ class Inserted:
     source: Index
 
     @classmethod
-    def of(cls, t: Array, x: Array, v: Array, slow: NDArray[np.bool_], arrests: Array, period: float) -> Inserted:
-        """Between knots that are samples (not ``slow``).
+    def of(
+        cls, t: Array, x: Array, v: Array, slow: NDArray[np.bool_], arrests: Array, period: float, later: Turns
+    ) -> Inserted:
+        """Between knots that are samples (not ``slow``), and where the block goes on to ring between the others.
 
         Where the velocity has two signs the block stands between them, by a constant deceleration. The last quarter of
         a period before the first such place at or after an arrest (or before the arrest, where the block does not go
@@ -52,6 +56,7 @@ class Inserted:
             slow: whether they are means over windows.
             arrests: of the events (s).
             period: of the ringing, or the time within which a slip comes to rest (s).
+            later: where the block turns after the last sample that is followed.
         """
         both = ~slow[:-1] & ~slow[1:]
         along = v[:-1] / np.where(v[:-1] == v[1:], 1.0, v[:-1] - v[1:])
@@ -59,7 +64,8 @@ class Inserted:
         turning = np.flatnonzero(both & (v[:-1] * v[1:] < 0.0) & (along > NEAR) & (along < 1.0 - NEAR))
         stands = t[turning] + along[turning] * np.diff(t)[turning]
         found = [
-            (turning, along[turning], x[turning] + 0.5 * (stands - t[turning]) * v[turning], np.zeros(turning.size))
+            (turning, along[turning], x[turning] + 0.5 * (stands - t[turning]) * v[turning], np.zeros(turning.size)),
+            later.knots(t, x, slow, period),
         ]
         for arrest in arrests:
             later = np.flatnonzero((stands >= arrest - LAST * period) & (stands <= arrest + LAST * period))

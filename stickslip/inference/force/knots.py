@@ -20,6 +20,7 @@ from ...data.trace import Trace
 from .counts import counted, of_mean, rounding
 from .inserted_knots import Inserted
 from .kernels import band, kernels
+from .later_ringing import Turns, later_turns
 from .mains import hum
 from .reading import Reading
 from .sampling import even
@@ -143,6 +144,7 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     pieces = _Pieces(step)
     pieces.start(t, x, d)
     edge = 1
+    stretches: list[tuple[int, int]] = []  # from the last sample that is followed to the first that is again
     n = t.size
     events = found.events
     for e, event in enumerate(events):
@@ -155,11 +157,16 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
         pieces.windows(hasty(begin, onset, steady, noise, rate, h), e, t, x, d, speed)
         pieces.samples(thin(onset, end, event, times, rate, h), t, followed, speed, d, events, e)
         pieces.compare(begin + h, end - h, h, t, x, event, e, times, (phi, first, second), noise)
+        if edge > 1:
+            stretches.append((edge - 1, begin))
         edge = end
     if n - edge > 4 * h:
         last = len(events)
         pieces.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, speed)
-    return pieces.made(trace, t, x, (phi, first, second), events, noise, times, smoother, count)
+    if edge > 1:
+        stretches.append((edge - 1, n))
+    later = later_turns(t, x, stretches, times.ring, noise)
+    return pieces.made(trace, t, x, (phi, first, second), events, noise, times, smoother, count, later)
 
 
 def unrounded(
@@ -263,7 +270,7 @@ class _Pieces:
 
     def made(
         self, trace: Trace, t: Array, samples: Array, weights: tuple[Array, Array, Array], events: tuple[Event, ...],
-        noise: float, times: Scales, smoother: Smoother, count: float,
+        noise: float, times: Scales, smoother: Smoother, count: float, later: Turns,
     ) -> Knots:  # fmt: skip
         assert trace.drive is not None
         knot_t, seen = np.concatenate(self.t), np.concatenate(self.x)
@@ -319,7 +326,8 @@ class _Pieces:
             p += size
         # between windows the velocity is a mean, which tells no turning point
         arrests = np.array([e.t_arrest for e in events])
-        inserted = Inserted.of(knot_t, x, np.where(slow, 0.0, v), slow, arrests, times.ring or times.slip)
+        still = np.where(slow, 0.0, v)
+        inserted = Inserted.of(knot_t, x, still, slow, arrests, times.ring or times.slip, later)
         shape = (p, inserted.size)
         flat = bowed[_joined(columns_window)].tocoo()
         r = np.concatenate([*rows[0], *rows_window, _joined(rows_window)[flat.coords[0]]])
