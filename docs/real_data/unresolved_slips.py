@@ -55,5 +55,5 @@ def classroom(data: Path, work: Path) -> dict[str, Any]:
     return {
         "slips": int(sizes.size), "size_s": [float(sizes.mean()), float(sizes.std())],
         "levels": found["levels"], "coordinate": found["coordinate"]["text"], "methods": found["methods"],
-        "gains": found["gains"], "train": found["train"],
+        "gains": found["gains"], "train": found["train"], "chosen": found["chosen"],
     }  # fmt: skip
