@@ -69,6 +69,10 @@ class InputError(StickslipError):
         return text
 
 
+class ArgumentError(InputError):
+    """An argument that cannot be used; ``key`` is its name. A command says the option that stands for it."""
+
+
 class SolveError(StickslipError):
     """The equation of motion could not be integrated; says at what time and what to change."""
 

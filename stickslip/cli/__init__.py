@@ -17,7 +17,7 @@ from types import FrameType
 from cyclopts import App, CycloptsError, MissingArgumentError
 
 from .. import __version__
-from ..errors import InputError, StickslipError, nearest
+from ..errors import ArgumentError, InputError, StickslipError, nearest
 from ..system import process
 
 # module and function in it -> what it does, in one line
@@ -36,6 +36,7 @@ COMMANDS = {
 }
 
 INTERRUPTED = 130
+OPTIONS = {"effects": "add", "profiles": "profile"}  # those called otherwise than the argument
 
 
 def make_app() -> App:
@@ -111,6 +112,9 @@ def run(arguments: Sequence[str]) -> int:
         return result if isinstance(result, int) else 0
     except CycloptsError as error:
         return _fail(_usage(error))
+    except ArgumentError as error:
+        name = str(error.key)
+        return _fail(error.but(key=f"--{OPTIONS.get(name, name).replace('_', '-')}"))
     except StickslipError as error:
         return _fail(error)
     except KeyboardInterrupt as error:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data.checks import stopping
-from ..errors import InputError, RunFolderError, nearest
+from ..errors import ArgumentError, InputError, RunFolderError, nearest
 from ..inference.diagnose.checkpoints import Store
 from ..inference.diagnose.climb import Climbed
 from ..inference.diagnose.engine import Diagnosis as Found
@@ -297,23 +297,23 @@ def check_counts(max_effects: int, jobs: int | None = None, time_limit: float | 
     """Refuse numbers that a diagnosis could only fail on after its first fit.
 
     Raises:
-        InputError: fewer than one effect or process, or no time (s).
+        ArgumentError: fewer than one effect or process, or no time (s).
     """
     for key, value, wrong, allowed, hint in (
-        ("--max-effects", max_effects, max_effects < 1, "1 or more",
+        ("max_effects", max_effects, max_effects < 1, "1 or more",
          "leave it out for up to 4; stickslip fit fits the base model alone"),
-        ("--jobs", jobs, jobs is not None and jobs < 1, "1 or more", "leave it out for one process a core"),
-        ("--time-limit", time_limit, time_limit is not None and not time_limit > 0.0, "more than 0 s",
+        ("jobs", jobs, jobs is not None and jobs < 1, "1 or more", "leave it out for one process a core"),
+        ("time_limit", time_limit, time_limit is not None and not time_limit > 0.0, "more than 0 s",
          "leave it out for no limit"),
     ):  # fmt: skip
         if wrong:
-            raise InputError("out of range", key=key, value=value, allowed=allowed, hint=hint)
+            raise ArgumentError("out of range", key=key, value=value, allowed=allowed, hint=hint)
 
 
 def _check_candidates(tags: Sequence[str]) -> None:
     """All that is wrong with a choice of effects, at once."""
     if not any(tags):
-        raise InputError("no effect is named", key="--candidates", hint="leave it out, and all effects are tried")
+        raise ArgumentError("no effect is named", key="candidates", hint="leave it out, and all effects are tried")
     known = catalogue.tags()
     wrong = [tag for tag in tags if tag not in known]
     if wrong:
@@ -321,8 +321,8 @@ def _check_candidates(tags: Sequence[str]) -> None:
         every = nearest("", known)  # said once, not for each that is near none
         hints = [f"{tag}: {hint}" if len(wrong) > 1 else hint for tag, hint in named.items() if hint != every]
         hints += [every] if every in named.values() else []
-        raise InputError(
+        raise ArgumentError(
             f"there is no effect {' and no effect '.join(repr(tag) for tag in wrong)}",
-            key="--candidates",
+            key="candidates",
             hint="\n  ".join([*hints, catalogue.OWN]),
         )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, nearest
+from ..errors import ArgumentError, InputError, nearest
 from ..inference.diagnose.climb import Climbed, chosen, climb, extended, replaced, shortened
 from ..inference.diagnose.confirm import Confirmation
 from ..inference.diagnose.fitted import fitted_model
@@ -473,6 +473,6 @@ def fit(
     known = [f.name for f in prepared.problem.composition.shared] + own
     for name in profiles:
         if name not in known:
-            raise InputError("no free parameter of that name", key="--profile", value=name, hint=nearest(name, known))
+            raise ArgumentError("no free parameter of that name", key="profiles", value=name, hint=nearest(name, known))
     with telling("fitting", progress) as tell:
         return Fit(campaign, climb(prepared, forms, tell))

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError
+from stickslip.cli import run
+from stickslip.errors import ArgumentError, InputError
 from stickslip.objects.fitted_run import FittedRun
 from stickslip.objects.picture import FitPlots
 from stickslip.objects.posterior import sample
@@ -97,3 +98,12 @@ def test_a_package_that_is_missing_is_named_with_how_to_install_it(campaign, mon
     with pytest.raises(InputError, match=f"needs {missing}, which is not installed") as refused:
         ask(campaign)
     assert refused.value.hint == f"pip install 'stickslip[{extra}]'"
+
+
+def test_an_argument_is_called_by_its_name_in_python_and_by_its_option_on_the_command_line(campaign, capsys):
+    with pytest.raises(ArgumentError, match=r"^max_effects: out of range"):
+        campaign.diagnose(max_effects=0)
+    with pytest.raises(ArgumentError, match=r"^effects: the effect only changes the shape"):
+        campaign.fit("roll-off")
+    assert run(["diagnose", str(SHIPPED), "--max-effects", "0"]) == 2
+    assert "--max-effects: out of range" in capsys.readouterr().err

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import FitError, InputError
+from ...errors import ArgumentError, FitError, InputError
 from ...physics.effects import catalogue
 from ...physics.effects.base import Effect
 from ...physics.params import specs, variants
@@ -169,14 +169,14 @@ def replaced(done: Climbed, found: Fit) -> Climbed:
 def _acts(tag: str, form: Mapping[str, str]) -> None:
     """Refuse what only gives the backbone another shape, and what is drawn at random."""
     if catalogue.get(tag).drawn:
-        raise InputError(
+        raise ArgumentError(
             "this effect is a random process, of which only size and length can be measured",
-            key="--add", value=tag, hint="stickslip forecast estimates both; events may differ in any model",
+            key="effects", value=tag, hint="stickslip forecast estimates both; events may differ in any model",
         )  # fmt: skip
     if shapes_backbone(catalogue.get(tag)(**form)):
-        raise InputError(
+        raise ArgumentError(
             "the effect only changes the shape of the backbone, which the fit measures directly",
-            key="--add",
+            key="effects",
             value=":".join([tag, *(f"{name}={value}" for name, value in form.items())]),
             hint="leave it out: its part is in the backbone already",
         )

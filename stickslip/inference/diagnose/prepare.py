@@ -13,7 +13,7 @@ from ...data.prescribed import prescribed, with_motion
 from ...data.segment import Segmentation
 from ...data.shorten import first_cycles, shares
 from ...data.trace import Trace
-from ...errors import InputError, nearest
+from ...errors import ArgumentError, InputError, nearest
 from ...physics.effects.base import Effect
 from ...system.units import shown
 from ..features.measurement import Measurement, doubts, measure
@@ -108,7 +108,7 @@ def prepare(
     names = [t.name for t in traces]
     for name in holdout:
         if name not in names:
-            raise InputError("no run of this name to hold out", key="--holdout", value=name, hint=nearest(name, names))
+            raise ArgumentError("no run of this name to hold out", key="holdout", value=name, hint=nearest(name, names))
     used, given, dropped, kept_aside = [], [], [], []
     for trace, found in zip(traces, segmentations, strict=True):
         aside = trace.name in holdout or (not holdout and trace.role == "held-out")

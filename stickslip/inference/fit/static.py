@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ...errors import FitError, InputError
+from ...errors import ArgumentError, FitError, InputError
 from .creep_process import CreepProcess
 from .static_table import HURST, StaticRig, StaticTable, VirtualCurve, static_table, virtual_curve
 
@@ -108,7 +108,7 @@ def fit_static(
         InputError: no process, or an unknown option.
     """
     if align not in ("consistent", "paper"):
-        raise InputError("unknown alignment", key="--align", value=align, allowed="consistent, paper")
+        raise ArgumentError("unknown alignment", key="align", value=align, allowed="consistent, paper")
     if not processes:
         raise InputError(
             "there is no creep process to fit", hint="`stickslip inspect` says why every stick was left out"

@@ -43,7 +43,7 @@ class Inserted:
 
     @classmethod
     def of(
-        cls, t: Array, x: Array, v: Array, slow: NDArray[np.bool_], arrests: Array, period: float, later: Turns
+        cls, t: Array, x: Array, v: Array, slow: NDArray[np.bool_], arrests: Array, period: float, turns: Turns
     ) -> Inserted:
         """Between knots that are samples (not ``slow``), and where the block goes on to ring between the others.
 
@@ -56,7 +56,7 @@ class Inserted:
             slow: whether they are means over windows.
             arrests: of the events (s).
             period: of the ringing, or the time within which a slip comes to rest (s).
-            later: where the block turns after the last sample that is followed.
+            turns: where the block goes on to ring after the last sample that is followed.
         """
         both = ~slow[:-1] & ~slow[1:]
         along = v[:-1] / np.where(v[:-1] == v[1:], 1.0, v[:-1] - v[1:])
@@ -65,7 +65,7 @@ class Inserted:
         stands = t[turning] + along[turning] * np.diff(t)[turning]
         found = [
             (turning, along[turning], x[turning] + 0.5 * (stands - t[turning]) * v[turning], np.zeros(turning.size)),
-            later.knots(t, x, slow, period),
+            turns.knots(t, x, slow, period),
         ]
         for arrest in arrests:
             later = np.flatnonzero((stands >= arrest - LAST * period) & (stands <= arrest + LAST * period))

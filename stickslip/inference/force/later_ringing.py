@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 PART = 3  # periods of which an amplitude is told
 HEARD = 3.0  # deviations by which it stands out
 LAST = 0.05  # of the amplitude where the samples end, down to which the ringing goes on
@@ -33,7 +34,7 @@ class Turns(NamedTuple):
     t: Array
     away: Array
 
-    def knots(self, t: Array, x: Array, slow: NDArray[np.bool_], period: float) -> tuple[Array, Array, Array, Array]:
+    def knots(self, t: Array, x: Array, slow: NDArray[np.bool_], period: float) -> tuple[Index, Array, Array, Array]:
         """Those where the block turns, between knots that are means over windows.
 
         Args:

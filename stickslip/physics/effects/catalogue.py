@@ -24,7 +24,7 @@ from .base import Effect, Memory
 if TYPE_CHECKING:
     import pandas
 
-OWN = "one of your own needs --effect FILE.py"
+OWN = "one of your own needs --effect FILE.py (in Python: load_file)"
 FAMILIES = ("contact", "friction", "block", "geometry", "drive", "sensor")
 
 _TAG = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
