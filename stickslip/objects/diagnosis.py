@@ -61,13 +61,13 @@ class Diagnosis(Savable):
 
     @property
     def next_experiment(self) -> dict[str, Any] | None:
-        """What would tell apart what these data cannot: ``text`` and the effects it ``separates``."""
+        """The experiment that would identify the effect, as ``text``, and the effects it ``separates``."""
         found = self.result["next_experiment"]
         return None if found is None else dict(found)
 
     @property
     def experiments(self) -> pandas.DataFrame:
-        """A row for each experiment that was simulated to tell the first set apart, the best first.
+        """A row for each experiment that was simulated to separate the first set, the best first.
 
         ``information`` about which effect is the true one is expected of it (nat, at most the logarithm of their
         number); ``margin`` is the expected logarithm of the likelihood ratio of the true one over another one, the

@@ -152,13 +152,16 @@ class Fit(Savable):
 
     @property
     def residuals(self) -> xarray.DataArray:
-        """Residual force over its floor at every point (1): one standard deviation where the model is right."""
+        """Residual force over the floor of this fit at every point (1), near 1 if the model is right."""
         found = (self.force.residual / self.force.floor).rename("residual")
         return found.assign_attrs(units="1", long_name="residual force / floor")
 
     @cached_property
     def errors(self) -> pandas.DataFrame:
-        """Root mean square of the residual force over its floor: a row for each phase of the cycle, a column a run."""
+        """Rms of the residual force over the floor of this fit, with a row for each phase and a column for each run.
+
+        The floor is what noise and scatter of this model cause. Models are compared in :attr:`ladder`.
+        """
         return self._errors(self.force_fit.marginal, error)
 
     @cached_property
@@ -198,7 +201,9 @@ class Fit(Savable):
 
     @cached_property
     def ladder(self) -> pandas.DataFrame:
-        """A row for each model on the way here: fitted and unseen error in floors, and by how much its effect helps.
+        """A row for each model on the way here, with its fitted and unseen error and by how much its effect helps.
+
+        All errors are in floors of the last model, so that they can be compared with one another.
 
         ``error std`` and ``unseen std`` are their standard deviations, by how much events differ.
         """
@@ -402,7 +407,7 @@ class Fit(Savable):
 
     @property
     def force_fit(self) -> ForceFit:
-        """The numbers behind it: an optimum, or where parameters were set by hand."""
+        """The numbers behind it, an optimum or where parameters were set by hand."""
         return self._climbed.fit if self._moved is None else self._moved
 
     @property
