@@ -27,7 +27,7 @@ def test_energy_balance_closes():
 
 def test_energy_balance_at_the_default_tolerance():
     made = run(rig(), 5.6)
-    assert np.max(np.abs(imbalance(made.trajectory.steps))) < 5e-4
+    assert np.max(np.abs(imbalance(made.trajectory.steps))) < 2e-5
 
 
 @pytest.mark.slow
