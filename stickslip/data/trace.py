@@ -282,8 +282,8 @@ class Trace(Shown, _Rebuilt):
 
     @classmethod
     def from_arrays(
-        cls, name: str = "run", *, time: Any, displacement: Any = None, velocity: Any = None, spring_force: Any = None,
-        drive_velocity: float | str | None = None, drive_position: Any = None,
+        cls, name: str = "run", *, time: Any = None, displacement: Any = None, velocity: Any = None,
+        spring_force: Any = None, drive_velocity: float | str | None = None, drive_position: Any = None,
         drive: Sequence[tuple[float | str, float | str]] | None = None, resolution: float | str | None = None,
         noise: float | str | None = None, spring_stiffness: float | str | None = None, virgin: bool = False,
         role: str = "",
@@ -293,7 +293,8 @@ class Trace(Shown, _Rebuilt):
         Args:
             name: unique within its campaign.
             time: s, shape (n,). Arrays, lists, pandas Series and xarray DataArrays are taken; those of xarray may have
-                ``attrs["units"]``, all others are in SI.
+                ``attrs["units"]``, all others are in SI. Default the index of the first signal that is a Series (but
+                not one that only counts samples), or its coordinate if it is a DataArray; dates count from the first.
             displacement, velocity, spring_force: of the block (m, m/s, N), shape (n,); at least one.
             drive_velocity: of the load point, a number in m/s or text such as ``"50 um/s"``; or
             drive: until when and how fast, piece by piece: ``[("4.3 s", "100 um/s"), ("5.3 s", 0), ...]``; or
@@ -304,14 +305,14 @@ class Trace(Shown, _Rebuilt):
             virgin, role: as of the class.
 
         Raises:
-            InputError: no signal, lengths that differ, times that do not increase, values that are not finite, two
-                ways of giving the drive, a unit that cannot be read.
+            InputError: no signal, no times, lengths that differ, times that do not increase, values that are not
+                finite, two ways of giving the drive, a unit that cannot be read.
         """
         given = {"displacement": displacement, "velocity": velocity, "spring_force": spring_force}
         arrays: dict[str, Any] = {
             key: _si_array(v, SIGNALS[key], f"{name}: {key}") for key, v in given.items() if v is not None
         }
-        t = _si_array(time, "s", f"{name}: time")
+        t = _si_array(_times(given) if time is None else time, "s", f"{name}: time")
         if sum(way is not None for way in (drive_velocity, drive_position, drive)) > 1:
             hint = "keep one of drive_velocity, drive_position, drive"
             raise InputError(f"trace '{name}': the drive is given more than once", hint=hint)
@@ -394,6 +395,23 @@ class Trace(Shown, _Rebuilt):
             for name, values in self.channels.items()
         }
         return [facts(what), facts(ranges), *map(str, self.repairs), *self.warnings]
+
+
+def _times(signals: Mapping[str, Any]) -> Any:
+    """Times that the first of the signals carries: of dates the seconds since the first one."""
+    first: Any = next((values for values in signals.values() if values is not None), None)
+    found: Any = None
+    if hasattr(first, "coords"):
+        found = next((first.coords[dim] for dim in first.dims if dim in first.coords), None)
+    elif hasattr(first, "index") and hasattr(first, "iloc") and type(first.index).__name__ != "RangeIndex":
+        found = first.index
+    if found is None:
+        hint = "give time, a Series with times as its index, or a DataArray with a coordinate of times"
+        raise InputError("no times are given", key="time", hint=hint)
+    if found.dtype.kind in "mM":
+        moments = np.asarray(found)
+        found = (moments - moments[0]) / np.timedelta64(1, "s")
+    return found
 
 
 def _si_array(values: Any, unit: str, what: str) -> Array:

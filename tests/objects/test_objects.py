@@ -237,6 +237,23 @@ def test_arrays_that_cannot_be_used_are_refused_in_words(arrays, said):
         ss.Trace.from_arrays(**arrays)
 
 
+def test_times_are_those_that_the_signal_carries():
+    x = np.array([0.0, 1.0, 3.0, 4.0]) * 1e-6
+    seconds = 0.5 * np.arange(4)
+    dates = pd.Timestamp("2026-01-01") + pd.to_timedelta(seconds, unit="s")
+    in_ms = {"t": ("t", 1e3 * seconds, {"units": "ms"})}
+    for signal in (
+        pd.Series(x, index=seconds), pd.Series(x, index=dates), pd.Series(x, index=pd.to_timedelta(seconds, unit="s")),
+        xr.DataArray(x, dims="t", coords=in_ms), xr.DataArray(x, dims="t", coords={"t": dates}),
+    ):  # fmt: skip
+        made = ss.Trace.from_arrays(displacement=signal, resolution=1e-6, noise=1e-7)
+        np.testing.assert_allclose(made.time, seconds, atol=1e-12)
+        np.testing.assert_array_equal(made.displacement, x)
+    for signal in (x, list(x), pd.Series(x), xr.DataArray(x, dims="t")):
+        with pytest.raises(InputError, match="time: no times are given"):
+            ss.Trace.from_arrays(displacement=signal)
+
+
 def test_a_rig_that_cannot_be_used_is_refused_in_words(campaign):
     with pytest.raises(InputError, match="unknown key 'masss'"):
         ss.Campaign.from_traces(campaign.traces, {"masss": "1 kg"})
