@@ -15,7 +15,7 @@ from stickslip.inference.diagnose.finals import settled
 from stickslip.inference.diagnose.free_errors import contradiction, errors, predicted, summed
 from stickslip.inference.diagnose.free_words import cautions, free_variables
 from stickslip.inference.force.candidates import try_effect
-from stickslip.inference.force.fit import fit
+from stickslip.inference.force.fit import fit_base
 from stickslip.inference.force.heldout import halves, points
 from stickslip.inference.force.knots import NUCLEATION
 from stickslip.inference.force.linearised import moved
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.slow
 def plain(tmp_path_factory):
     """Nothing hidden: the data, and the base fitted."""
     case = made(tmp_path_factory.mktemp("plain") / "case", 11, spring_known=True)
-    return prepared(case), fit(case.problem, case.point)
+    return prepared(case), fit_base(case.problem, case.point)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def aged(tmp_path_factory):
     """Contact ageing hidden, ten times what can be seen: the data, the base, and the model with it."""
     folder = tmp_path_factory.mktemp("aged") / "case"
     case = made(folder, 11, (seen("contact-ageing", "logarithm", 10.0),), spring_known=True)
-    base = fit(case.problem, case.point)
+    base = fit_base(case.problem, case.point)
     form = next(iter(catalogue.forms(catalogue.get("contact-ageing"))))
     return prepared(case), base, settled(base, try_effect(base, Explained(base), "contact-ageing", [form])[0])
 
@@ -187,7 +187,7 @@ def test_finished_pieces_are_taken_up_for_the_same_fit_only(plain, confirmed, mo
 
 def test_a_record_that_begins_with_a_stretched_spring_is_followed(tmp_path):
     case = made(tmp_path / "case", 11, spring_known=False, virgin=False)
-    base = fit(case.problem, case.point)
+    base = fit_base(case.problem, case.point)
     c = confirm({BASE: base}, BASE, prepared(case))
     found = of_all(c, BASE)
     assert found["missed"] == 0
