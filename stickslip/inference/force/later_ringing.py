@@ -1,7 +1,7 @@
 """The ringing that goes on where samples are not followed any more: the block turns twice a period, at known places.
 
-In windows a reading is its mean, and the way that the block rings in them is lost. It is short of a nanometre a swing
-and adds up: where junctions are replaced along the path, or the contact is weakened by it, it is much of the path
+In windows a reading is its mean, and the way that the block rings in them is lost. It is some nanometres a swing and
+adds up: where junctions are replaced along the path, or the contact is weakened by it, it is much of the path
 between two slips.
 """
 
