@@ -148,6 +148,7 @@ def test_the_readme_tells_of_the_run_in_its_picture() -> None:
     for value in story["fitted"] + story["unseen"]:
         assert (f"{value:.2g}" if value < 99.5 else f"{value:.0f}") in shown
     assert all(effect in shown for effect in story["effects"])
+    assert f"falls from {story['unseen'][0]:.2g} to {story['unseen'][-1]:.2g} floors" in text
     words = (DOCS / "images" / "diagnosis.txt").read_text(encoding="utf-8")
     assert all(model in words for model in story["models"]) and story["verdict"] in words
 

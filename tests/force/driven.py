@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -9,8 +10,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
+import stickslip as ss
+from stickslip.data.segment import Event
 from stickslip.inference.force.along import Held, Way, along
+from stickslip.inference.force.problem import Problem
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Effect
 from stickslip.physics.model import Model
@@ -23,6 +28,11 @@ TIMES, POSITIONS = np.array([0.0, 0.13, 0.2, 2.2]), np.array([0.0, 0.13e-3, 0.13
 END = 1.7  # s; three slips
 KNOTS = 4096  # one size for all, so that one program serves all
 DAMPING, HEALING = 15.0, 0.02  # N s/m, s; so that it sticks again after every slip
+SPEED = 4e-4  # m/s
+SAMPLED = {
+    "mass": "0.0894 kg", "spring_stiffness": "1056.62 N/m", "contacts": 4, "normal_force": "0.31 N",
+    "friction_coefficient": {"guess": 0.21, "lower": 0.15, "upper": 0.3},
+}  # fmt: skip
 COARSE = Tolerance(5e-3, 5e-11, 5e-8)
 
 LAWS = [(tag, form) for tag in catalogue.tags() for form in catalogue.forms(catalogue.get(tag))]
@@ -96,6 +106,28 @@ def simulated(effects: tuple[Effect, ...], tolerance: Tolerance = COARSE, knots:
     s = trajectory.steps
     i = np.flatnonzero(s.v[1:] * s.v[:-1] < 0.0)
     return Slips(model, s, way_of(s.t, s.x, s.v, knots), int(i[0]) + 1 if i.size else s.t.size)
+
+
+def slipping(effect: Effect, end: float, tolerance: Tolerance) -> tuple[Model, Steps]:
+    """The rig of :data:`SAMPLED` with an effect, pulled at :data:`SPEED` until ``end`` (s), and the solver's steps."""
+    model = eqx.tree_at(
+        lambda m: (
+            m.load_point.times, m.load_point.positions, m.block.damping, m.weakening.healing_time, m.block.mass,
+            m.block.spring_stiffness,
+        ),
+        base_model((effect,)),
+        tuple(jnp.asarray(a) for a in (np.array([0.0, 2.0]), np.array([0.0, 2.0 * SPEED]), 5.0, 0.01, 0.0894, 1056.62)),
+    )  # fmt: skip
+    return model, integrate(model, end, tolerance=tolerance, largest_step=4e-3)[0].steps
+
+
+def sampled(steps: Steps, rate: float) -> tuple[Problem, Sequence[Event]]:
+    """The motion of the steps as it is read without noise at a rate (Hz), as a fit begins with it, and its slips."""
+    t = np.arange(0.0, steps.t[-1], 1.0 / rate)
+    x = CubicHermiteSpline(steps.t, steps.x, steps.v)(t)
+    trace = ss.Trace.from_arrays("run", time=t, displacement=x, drive_velocity=SPEED, resolution=1e-12, noise=1e-12)
+    campaign = ss.Campaign.from_traces([trace], SAMPLED)
+    return campaign.prepare().problem, campaign.events[0].events
 
 
 def way_of(t: np.ndarray, x: np.ndarray, v: np.ndarray, knots: int = KNOTS) -> Way:

@@ -7,22 +7,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline
 
-import stickslip as ss
 from stickslip.inference.force import inserted_knots
 from stickslip.inference.force.along import along
 from stickslip.inference.force.inserted_knots import Inserted
 from stickslip.inference.force.later_ringing import Turns
 from stickslip.physics.effects import catalogue
-from stickslip.simulation.conformance.rig import base_model
-from stickslip.simulation.solve import Tolerance, integrate
+from stickslip.simulation.solve import Tolerance
+
+from . import driven
 
 pytestmark = pytest.mark.slow
 
 NONE = Turns(*(np.zeros(0) for _ in range(4)))  # it rings no more
-SPEED, RATE, END = 4e-4, 1e4, 1.4  # m/s, Hz, s
-RIG = {"mass": "0.0894 kg", "spring_stiffness": "1056.62 N/m", "contacts": 4, "normal_force": "0.31 N"}
+RATE, END = 1e4, 1.4  # Hz, s
 
 
 @pytest.fixture(scope="module")
@@ -31,32 +29,18 @@ def slips():
     law = eqx.tree_at(
         lambda e: (e.drop, e.velocity), catalogue.get("velocity-weakening")(), (jnp.asarray(0.12), jnp.asarray(2.2e-4))
     )
-    model = eqx.tree_at(
-        lambda m: (
-            m.load_point.times, m.load_point.positions, m.block.damping, m.weakening.healing_time, m.block.mass,
-            m.block.spring_stiffness,
-        ),
-        base_model((law,)),
-        tuple(jnp.asarray(a) for a in (np.array([0.0, 2.0]), np.array([0.0, 2.0 * SPEED]), 5.0, 0.01, 0.0894, 1056.62)),
-    )  # fmt: skip
-    return model, integrate(model, END, tolerance=Tolerance(1e-4, 1e-12, 1e-9), largest_step=4e-3)[0].steps
+    return driven.slipping(law, END, Tolerance(1e-4, 1e-12, 1e-9))
 
 
 def after_arrests(slips) -> float:
     """By how much the law along the sampled motion holds too much in the first millisecond of rest (share of all)."""
     model, steps = slips
-    t = np.arange(0.0, steps.t[-1], 1.0 / RATE)
-    x = CubicHermiteSpline(steps.t, steps.x, steps.v)(t)
-    trace = ss.Trace.from_arrays("run", time=t, displacement=x, drive_velocity=SPEED, resolution=1e-12, noise=1e-12)
-    campaign = ss.Campaign.from_traces(
-        [trace], {**RIG, "friction_coefficient": {"guess": 0.21, "lower": 0.15, "upper": 0.3}}
-    )
-    problem = campaign.prepare().problem
+    problem, events = driven.sampled(steps, RATE)
     run, way = problem.runs[0], problem.ways[0]
     held = np.asarray(jax.jit(along)(model, way).contact)[: run.t.size]
     off = held - np.interp(run.t, steps.t, steps.contact_force)
     strength = float(jnp.sum(model.bank.strength))
-    arrests = [e.t_arrest for e in campaign.events[0].events[1:]]
+    arrests = [e.t_arrest for e in events[1:]]
     assert len(arrests) >= 2
     return max(abs(float(off[(run.t > a) & (run.t < a + 1e-3)].mean())) for a in arrests) / strength
 

@@ -9,20 +9,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline
 
-import stickslip as ss
 from stickslip.inference.force import later_ringing
 from stickslip.inference.force.along import along
 from stickslip.inference.force.inserted_knots import Inserted
 from stickslip.inference.force.later_ringing import later_turns
 from stickslip.physics.effects import catalogue
-from stickslip.simulation.conformance.rig import base_model
-from stickslip.simulation.solve import Tolerance, integrate
+from stickslip.simulation.solve import Tolerance
+
+from . import driven
 
 RATE, PERIOD, DECAY = 1e4, 1.83e-3, 40.0  # Hz, s, 1/s
-SPEED, END = 4e-4, 0.9  # m/s, s
-RIG = {"mass": "0.0894 kg", "spring_stiffness": "1056.62 N/m", "contacts": 4, "normal_force": "0.31 N"}
+END = 0.9  # s
 
 
 def ringing(amplitude: float, noise: float, seed: int = 0, phase: float = 0.4):
@@ -77,31 +75,16 @@ def test_where_the_block_creeps_faster_than_it_rings_it_does_not_turn():
 def replaced():
     """A block whose junctions are replaced along its way, and its steps."""
     law = eqx.tree_at(lambda e: e.rate, catalogue.get("contact-renewal")(), jnp.asarray(2e4))
-    model = eqx.tree_at(
-        lambda m: (
-            m.load_point.times, m.load_point.positions, m.block.damping, m.weakening.healing_time, m.block.mass,
-            m.block.spring_stiffness,
-        ),
-        base_model((law,)),
-        tuple(jnp.asarray(a) for a in (np.array([0.0, 2.0]), np.array([0.0, 2.0 * SPEED]), 5.0, 0.01, 0.0894, 1056.62)),
-    )  # fmt: skip
-    return model, integrate(model, END, tolerance=Tolerance(1e-6, 1e-14, 1e-11), largest_step=4e-3)[0].steps
+    return driven.slipping(law, END, Tolerance(1e-6, 1e-14, 1e-11))
 
 
 def before_onsets(replaced) -> float:
     """By how much the law along the sampled motion holds too much before an onset, in shares of what renewal takes."""
     model, steps = replaced
-    t = np.arange(0.0, steps.t[-1], 1.0 / RATE)
-    x = CubicHermiteSpline(steps.t, steps.x, steps.v)(t)
-    trace = ss.Trace.from_arrays("run", time=t, displacement=x, drive_velocity=SPEED, resolution=1e-12, noise=1e-12)
-    campaign = ss.Campaign.from_traces(
-        [trace], {**RIG, "friction_coefficient": {"guess": 0.21, "lower": 0.15, "upper": 0.3}}
-    )
-    problem = campaign.prepare().problem
+    problem, events = driven.sampled(steps, RATE)
     run, way = problem.runs[0], problem.ways[0]
     without = eqx.tree_at(lambda m: m.effects[0].rate, model, jnp.asarray(0.0))
     held, kept = (np.asarray(jax.jit(along)(m, way).contact)[: run.t.size] for m in (model, without))
-    events = campaign.events[0].events
     late = np.zeros(run.t.size, bool)
     for before, event in pairwise(events):
         late |= (run.t > 0.5 * (before.t_arrest + event.t_onset)) & (run.t < event.t_onset - 0.1 * event.duration)
