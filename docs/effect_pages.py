@@ -80,7 +80,7 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         "## In a measurement",
         f"{prose(cls.signature[:1].upper() + cls.signature[1:])}.",
         "| similar to | the experiment that separates the two |\n|---|---|\n"
-        + "\n".join(f"| [{tag}]({tag}.md) | {cell(text)} |" for tag, text in catalogue.alike(cls.tag).items()),
+        + "\n".join(f"| [{tag}]({tag}.md) | {cell(text)} |" for tag, text in catalogue.confused(cls.tag).items()),
         "## Source",
         f"{prose(cls.source.rstrip('.'))}.",
     ]

@@ -87,7 +87,7 @@ def test_every_effect_has_its_page(pages: ModuleType, written: Path, tag: str) -
         assert f"${spec.symbol}$" in row and (spec.unit == "1" or spec.unit in row)
     for name, choices in variants(cls).items():
         assert f"`{name}`" in text and all(f"`{choice}`" in text for choice in choices)
-    for other in catalogue.alike(cls.tag):
+    for other in catalogue.confused(cls.tag):
         assert f"({other}.md)" in text and (written / f"{other}.md").exists()
     assert f"({tag}.png)" in text and (written / f"{tag}.png").exists()
     assert "**Acts on** the" in text or "**Acts on** what" in text

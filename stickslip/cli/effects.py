@@ -96,15 +96,15 @@ def _catalogue(known: dict[str, type[Effect]]) -> str:
 
 
 def _explained(cls: type[Effect]) -> str:
-    from ..physics.effects.catalogue import alike, roles
+    from ..physics.effects.catalogue import confused, roles
 
     lines = [f"{cls.tag} ({cls.family}): {cls.summary}", "", *_formula(cls.equation), ""]
     lines += ["parameters:", *(f"  {line}" for line in _parameters(cls)), *_forms(cls)]
     lines += ["", f"acts as: {', '.join(roles(cls))}", *_wrapped("signature", cls.signature)]
-    confused = alike(cls.tag)
-    if confused:
+    others = confused(cls.tag)
+    if others:
         lines.append("confused with:")
-        for other, experiment in confused.items():
+        for other, experiment in others.items():
             lines += _wrapped(f"  {other}", experiment)
     return "\n".join([*lines, *_wrapped("source", cls.source)])
 

@@ -18,12 +18,12 @@ from ..inference.diagnose.engine import Diagnosis as Found
 from ..inference.diagnose.engine import diagnose as search
 from ..inference.diagnose.summary import summary
 from ..physics.effects import catalogue
-from ..show.report import abilities
 from ..show.report.excerpts import trace_sections
 from ..simulation.conformance import try_laws
 from ..system.progress import telling
 from ..system.runstore import Run, json_text, open_run, refuse_existing, versions
 from ..system.shown import facts, table
+from .abilities import abilities
 from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .fit import Fit

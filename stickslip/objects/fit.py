@@ -145,8 +145,8 @@ class Fit(Savable):
     def force(self) -> xarray.Dataset:
         """Measured force of the contact and the model's at every point (N), with where and when it was.
 
-        ``residual`` is measured less model with all events alike, ``floor`` the standard deviation that noise and the
-        scatter of events make.
+        ``residual`` is measured less model with the random effects of events at zero, ``floor`` the standard
+        deviation that noise and the scatter of events make.
         """
         return contact_force(self, self._where, self._floor)
 
@@ -286,7 +286,7 @@ class Fit(Savable):
         with _told("fitting", f"without {effect}"):
             return Fit(self.campaign, shortened(self.climbed, effect))
 
-    # what it foretells
+    # what it predicts
 
     def predict(self, progress: Tell | None = None) -> pandas.DataFrame:
         """Errors of the model run freely, from arrest to arrest, through runs it was not fitted to.

@@ -86,8 +86,9 @@ def inspect(campaign: Campaign, progress: Tell | None = None) -> Inspection:
     """See :meth:`Campaign.inspect`."""
     from ..data.checks import rig_against_motion, stopping
     from ..inference.diagnose.spring import spring_finding
-    from ..show.report import abilities, describe_trace, trace_pieces
+    from ..show.report import describe_trace, trace_pieces
     from ..show.report.ripple import stick_ripple
+    from .abilities import abilities
 
     rows: list[dict[str, Any]] = []
     variables: dict[str, tuple] = {}

@@ -1,4 +1,4 @@
-"""The experiment that would tell apart what a campaign cannot, simulated for each of the effects."""
+"""The experiment that would separate effects that a campaign cannot, simulated for each of them."""
 
 from __future__ import annotations
 

@@ -173,7 +173,7 @@ def _gains(known: dict[str, Any]) -> dict[str, Any]:
 def _empty(tag: str, chosen: str) -> dict[str, Any]:
     cls = catalogue.get(tag) if tag in catalogue.tags() else None
     words = cls.summary or (cls.__doc__ or "").strip().partition("\n")[0] if cls is not None else ""
-    others = list(catalogue.alike(tag)) if cls is not None else []
+    others = list(catalogue.confused(tag)) if cls is not None else []
     return {
         "tag": tag, "form": tag, "words": words, "share": 0.0, "gain": "", "unseen": "", "amplitude": "",
         "alike": f"similar to {', '.join(others[:3])}" if others else "", "picture": [], "on": False,

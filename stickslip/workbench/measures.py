@@ -44,6 +44,6 @@ def cells(values: dict[str, tuple[float, float, int]]) -> list[str]:
     out = []
     for key, unit in MEASURES.items():
         mean, std, count = values.get(key, (np.nan, np.nan, 0))
-        alike = f"{shown(mean, unit, 4)} all alike"
-        out.append("-" if not count else shown_with(mean, std, unit) if std > SAME * abs(mean) else alike)
+        equal = f"{shown(mean, unit, 4)} all equal"
+        out.append("-" if not count else shown_with(mean, std, unit) if std > SAME * abs(mean) else equal)
     return out

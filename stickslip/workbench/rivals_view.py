@@ -1,4 +1,4 @@
-"""Rival effects in every experiment that is easily made, so that one sees which would tell them apart."""
+"""Rival effects in every experiment that is easily made, so that one sees which would separate them."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .parts import Table, head, progress, starter
 from .remembering import Remembered
 from .session import Session, watch
 
-RIVALS = 8  # effects that are told apart at once
+RIVALS = 8  # effects that are compared at once
 FALLBACK = 1e-4  # m/s, where a run has no velocity of its own
 UNSEEN = "Choose effects; those with the largest expected gain are offered once What is missing is evaluated."
 DONE = "Each is fitted and simulated in experiments that are easily made."
 
 
 def _undecided(diagnosis: Diagnosis | None) -> list[tuple[tuple[str, ...], str]]:
-    """Sets of effects that the data cannot tell apart, each with the experiment that would."""
+    """Sets of effects that the data cannot distinguish, each with the experiment that would."""
     found = None if diagnosis is None else diagnosis.next_experiment
     if not found:
         return []
@@ -37,7 +37,7 @@ def _undecided(diagnosis: Diagnosis | None) -> list[tuple[tuple[str, ...], str]]
 
 
 class Rivals:
-    """Rival effects in every experiment that is easily made, so that one sees which would tell them apart."""
+    """Rival effects in every experiment that is easily made, so that one sees which would separate them."""
 
     def __init__(self, session: Session, asked: Asked) -> None:
         self._session, self._asked = session, asked
@@ -162,7 +162,7 @@ class Rivals:
 
 
 def _difference(telling: Telling) -> str:
-    """By how much an experiment tells the models apart, in words."""
+    """How clearly an experiment separates the models, in words."""
     words = f"After {telling.words} the true one is expected to be {telling.tells} as any other."
     if telling.measure:
         place = experiments.where(telling.measure, telling.slip)

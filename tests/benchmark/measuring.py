@@ -52,9 +52,13 @@ def last_table() -> dict[str, Any]:
 
 
 def keep(part: str, only: str, **found: Any) -> None:
-    """Write a part among the results that docs/performance draws from, with version, date and processors."""
+    """Write a part among the results that docs/performance draws from, with version, date and processors.
+
+    What was kept before stays as bare times, under ``earlier``.
+    """
     known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
-    for line in slower(known.get(part, {}), found):
+    before = known.get(part, {})
+    for line in slower(before, found):
         print(line, flush=True)
     known[part] = {
         "version": __version__,
@@ -62,9 +66,15 @@ def keep(part: str, only: str, **found: Any) -> None:
         "machine": f"{os.cpu_count()} processors",
         "command": f"python -m tests.benchmark --only {only}",
         **found,
+        "earlier": [*before.get("earlier", []), *former(before)],
     }
     RESULTS.parent.mkdir(exist_ok=True)
     RESULTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def former(part: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The times of a part that is measured anew, with version and date; empty where there is none."""
+    return [{"version": part["version"], "date": part.get("date"), "times": times(part)}] if part else []
 
 
 def slower(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:

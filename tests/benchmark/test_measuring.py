@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+
+from . import measuring
 from .measuring import slower, times
 
 TABLE = {
@@ -26,3 +29,12 @@ def test_only_what_became_slower_than_the_rest_is_said():
     (line,) = slower(TABLE, {**TABLE, "rows": twice})
     assert "two, processor s, 0.5 -> 4 s (4.0 times" in line
     assert slower({}, TABLE) == []
+
+
+def test_former_times_stay_when_a_part_is_measured_anew(tmp_path, monkeypatch):
+    monkeypatch.setattr(measuring, "RESULTS", tmp_path / "performance.json")
+    for first in ("2.0", "3.0", "4.0"):
+        measuring.keep("part", "part", columns=["way", "processor s"], rows=[["one", first]])
+    kept = json.loads(measuring.RESULTS.read_text())["part"]
+    assert [old["times"] for old in kept["earlier"]] == [{"one, processor s": 2.0}, {"one, processor s": 3.0}]
+    assert kept["rows"] == [["one", "4.0"]] and times(kept) == {"one, processor s": 4.0}

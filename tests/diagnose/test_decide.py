@@ -141,7 +141,7 @@ def test_what_only_the_error_of_events_keeps_from_being_seen_stops_a_name_as_wel
     assert done.beyond is farther
     assert failures(other, done) == ["wear makes unseen runs more likely, but " + FARTHER]
     assert failures(farther, done) == [FARTHER]
-    assert "foretold worse" in nearest_text(farther) and "wear comes nearest" in nearest_text(farther)
+    assert "predicted worse" in nearest_text(farther) and "wear comes nearest" in nearest_text(farther)
 
 
 def test_and_does_not_stop_what_predicts_them_as_well():

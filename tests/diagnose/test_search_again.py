@@ -62,7 +62,7 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(module, "replace", replace)
     monkeypatch.setattr(module, "fit", lambda problem, *_, **__: problem)
     worse: list[tuple[str, ...]] = []
-    monkeypatch.setattr(module, "foretells", lambda before, after: after.tags not in worse)
+    monkeypatch.setattr(module, "predicts_better", lambda before, after: after.tags not in worse)
     monkeypatch.setattr(module, "settled", lambda base, c, *_: Model((*base.tags, c.tag)))
     monkeypatch.setattr(
         module.Rung,
@@ -111,7 +111,7 @@ def test_what_another_replaces_is_exchanged(search):
     assert set(search.ladder[-1].model) == {"static", "inertia", "tilt", "wear"}
 
 
-def test_what_takes_the_place_of_another_and_foretells_less_is_not_kept(search):
+def test_what_takes_the_place_of_another_and_predicts_worse_is_not_kept(search):
     search.table |= {
         (): {"wear": 20.0, "tilt": 15.0}, ("wear",): {"tilt": 9.0, "sensor-gain": 8.0}, ("tilt",): {},
         ("sensor-gain",): {"wear": 19.0}, ("wear", "sensor-gain"): {},
@@ -124,7 +124,7 @@ def test_what_takes_the_place_of_another_and_foretells_less_is_not_kept(search):
     assert len(search.rounds) == 3  # what the second round tried besides is not tried again
 
 
-def test_an_effect_that_foretells_less_once_it_has_settled_is_not_kept(search):
+def test_an_effect_that_predicts_worse_once_it_has_settled_is_not_kept(search):
     search.table |= {(): {"wear": 20.0}}
     search.worse.append(("wear",))
     grown(search, ["wear"])
@@ -177,7 +177,7 @@ def test_a_model_is_kept_by_the_likelihood_of_unseen_runs_alone(each, monkeypatc
     after: Any = Model(("sensor-low-pass",))
     found = Compared(after, 1.0, 1e-9, np.full(EVENTS, each), -np.ones(EVENTS))
     monkeypatch.setattr(module, "Judge", lambda base, tried: SimpleNamespace(beside=lambda *_, **__: found))
-    assert module.foretells(before, after) is (each > 0.0)
+    assert module.predicts_better(before, after) is (each > 0.0)
 
 
 def test_a_model_without_an_effect_has_none_of_its_parameters():

@@ -99,7 +99,7 @@ def test_a_load_that_is_put_in_is_known_to_one_per_cent(pair, monkeypatch):
 
 
 def test_information_of_an_experiment():
-    """Nothing where models foretell the same, all where they differ much, a bit for two by a coin's toss."""
+    """Nothing where models predict the same, all where they differ much, a bit for two by a coin's toss."""
     assert information(np.zeros((3, 3))) == pytest.approx(0.0, abs=1e-12)
     assert information(1e3 * (1.0 - np.eye(3))) == pytest.approx(np.log(3.0))
     apart = np.array([[0.0, 1e3, 0.0], [1e3, 0.0, 1e3], [0.0, 1e3, 0.0]])  # the first and the last are alike

@@ -167,12 +167,12 @@ def test_the_catalogue_is_a_table_to_choose_from() -> None:
 
 def test_what_is_confused_is_confused_both_ways() -> None:
     for tag in catalogue.tags():
-        for other, experiment in catalogue.alike(tag).items():
-            assert tag in catalogue.alike(other), (tag, other)
+        for other, experiment in catalogue.confused(tag).items():
+            assert tag in catalogue.confused(other), (tag, other)
             own = catalogue.get(tag).confused_with
             assert experiment == own.get(other, catalogue.get(other).confused_with.get(tag))
     assert "viscoelastic-contact" not in catalogue.get("sensor-drift").confused_with
-    assert "hold" in catalogue.alike("sensor-drift")["viscoelastic-contact"]
+    assert "hold" in catalogue.confused("sensor-drift")["viscoelastic-contact"]
 
 
 def test_forms_start_with_the_default() -> None:

@@ -288,7 +288,7 @@ def test_a_fit_says_which_parameters_are_tied(base):
         assert "tied" not in repr(base)
 
 
-def test_fits_are_compared_by_what_they_foretell(campaign, base, aged):
+def test_fits_are_compared_by_what_they_predict(campaign, base, aged):
     found = ss.compare({"base": base, "aged": aged})
     assert list(found.index) == ["aged", "base"] and found.loc["aged", ["behind", "+-"]].tolist() == [0.0, 0.0]
     columns = ["error", "error std", "unseen error", "unseen std"]  # all in floors of the better one, as its ladder has

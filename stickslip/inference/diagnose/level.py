@@ -69,7 +69,7 @@ class Level:
 
     @property
     def experiment(self) -> dict[str, Any] | None:
-        """What would tell the coordinates apart."""
+        """What would separate the coordinates."""
         if not self.alike:
             return None
         names = [f"{TAG} along {name}" for name in (self.coordinate, *self.alike)]

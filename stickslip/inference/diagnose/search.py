@@ -104,7 +104,7 @@ class Search:
 
         What settles at a bound is not taken up: it is out of range as what is there from the beginning. All is undone
         where unseen runs lose by it, or an effect beside it is driven to its bound: an effect is named on top of
-        another one, and may foretell less once it has displaced that one.
+        another one, and may predict worse once it has displaced that one.
         """
         best, key = done.close[0], f"round{len(self.rounds)}"
         tag = best.tag
@@ -119,7 +119,7 @@ class Search:
         for earlier in list(self.named)[:-1]:
             if self._in_time():
                 self._again(earlier, tag)
-        if not (foretells(before[0], self.base) and in_range(self.base, self.named)):
+        if not (predicts_better(before[0], self.base) and in_range(self.base, self.named)):
             self.base, self.ladder[:], self.named, self.gone = before
             self._give_up(done)
 
@@ -176,7 +176,7 @@ def in_range(fit: Fit, tags: Collection[str]) -> bool:
     return all(inside(tag, fit.values[name], std[name]) for tag, name in names.items())
 
 
-def foretells(before: Fit, after: Fit) -> bool:
+def predicts_better(before: Fit, after: Fit) -> bool:
     """Whether a model predicts unseen runs better than another.
 
     By their likelihood alone: where the model undoes a sensor the measured forces are others, and so are their errors.

@@ -32,7 +32,7 @@ from .search import Rung
 from .shape import Law, named_text, section
 
 Variables = dict[str, Any]
-FARTHER = "the error of unseen runs with all events alike rises"
+FARTHER = "the error of unseen runs rises where the random effects of events are zero"
 LISTED = 6  # effects whose smallest visible amplitude is said in the verdict
 
 
@@ -213,7 +213,7 @@ def nearest_text(j: Judged) -> str:
     if j.inside:
         return (
             f"Something is missing that no effect of the catalogue explains alone: {nearest}, which makes the forces "
-            "within events more likely, but events that are left out are foretold worse with it."
+            "within events more likely, but events that are left out are predicted worse with it."
         )
     return (
         f"Something is missing that no effect of the catalogue explains in its range: {nearest}, at its bound or known "
@@ -332,7 +332,7 @@ def verdict_text(d: Diagnosis) -> str:
 
 
 def _sets(d: Diagnosis) -> list[list[str]]:
-    """Tags of effects that these data cannot tell apart."""
+    """Tags of effects that these data cannot distinguish."""
     every = [*([j.tag for j in r.close] for r in d.named.values()), [law.tag for law in _of_shape(d)]]
     return [tags for tags in every if len(tags) > 1]
 
@@ -343,11 +343,11 @@ def _of_shape(d: Diagnosis) -> tuple[Law, ...]:
 
 
 def next_experiment(d: Diagnosis) -> dict[str, Any] | None:
-    """For effects that these data cannot tell apart: what the catalogue knows to separate them."""
+    """For effects that these data cannot distinguish: what the catalogue knows to separate them."""
     sets, made = _sets(d), []
     for close in sets:
         a, b = close[:2]
-        known = catalogue.alike(a).get(b)
+        known = catalogue.confused(a).get(b)
         text = known or "add what this campaign lacks: another velocity (a factor of 4), holds of 1 s and 10 s"
         made.append({"text": text, "separates": close})
     made += [] if d.level is None or d.level.experiment is None else [d.level.experiment]

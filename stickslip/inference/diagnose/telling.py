@@ -1,4 +1,4 @@
-"""How well an experiment would tell models apart: what they hold along its motion, over what is known of either.
+"""How well an experiment would separate models: what they hold along its motion, over what is known of either.
 
 Along the motion of an experiment two models hold forces that differ by ``d``. With ``S`` the covariance of the
 residual force there (noise, scatter of events, and what the campaign leaves unknown of the parameters of both),

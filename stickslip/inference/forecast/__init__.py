@@ -1,4 +1,4 @@
-"""Slips that are not alike: how their level wanders, and how well the next one can be foretold."""
+"""Slips that vary: how the level of friction wanders, and how well the next slip can be predicted."""
 
 from .levels import levels, wandering
 from .scoring import crps

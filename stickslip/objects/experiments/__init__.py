@@ -1,4 +1,4 @@
-"""What the model as it stands foretells: one run under another drive or rig, a sweep, and rivals in one experiment."""
+"""What the present model predicts: one run under another drive or rig, a sweep, and rivals in one experiment."""
 
 from .events import MEASURES, Simulated, measured, part, run, simulated, spread, steady_runs
 from .setting import Setting, changes, practicable, scenario

@@ -108,7 +108,7 @@ class Effect(Parametrised):
             equations side by side have ``,\\quad`` between them.
         symbols: meaning, with the unit, of symbols of the equations that are neither parameters nor of the base model.
         signature: what it does to a measured trace.
-        confused_with: tags whose signature is alike, each with the experiment that separates the two.
+        confused_with: tags with a similar signature, each with the experiment that separates the two.
         source: paper or book.
         amplitude: name of the parameter whose null value makes the effect vanish.
         generalises: tags of effects that this law contains as special cases; where both describe the data, the special

@@ -147,8 +147,8 @@ def get(tag: str) -> type[Effect]:
     return everything[tag]
 
 
-def alike(tag: str) -> dict[str, str]:
-    """Tag of every effect that this one may be taken for -> the experiment that separates the two; by either."""
+def confused(tag: str) -> dict[str, str]:
+    """Tag of every effect with which this one can be confused -> the experiment that separates the two; by either."""
     told = {other: cls.confused_with[tag] for other, cls in all().items() if tag in cls.confused_with}
     own = get(tag).confused_with
     return own | {other: text for other, text in told.items() if other not in own}

@@ -13,7 +13,7 @@ from .catalogue import register
 
 @register
 class ContactAgeing(Memory, Threshold):
-    """The age grows with time and is lost over a slip distance; its logarithm strengthens all caps alike."""
+    """The age grows with time and is lost over a slip distance; its logarithm strengthens all caps equally."""
 
     tag = "contact-ageing"
     summary = "contacts at rest grow stronger with the logarithm of time"

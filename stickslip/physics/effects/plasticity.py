@@ -14,7 +14,7 @@ from .quantiles import powered, scaled
 
 @register
 class Plasticity(Geometry):
-    """Thresholds level off as they near the hardness limit; the load they lose goes to all alike.
+    """Thresholds level off as they near the hardness limit; the load they lose is shared equally by all.
 
     ``hardness_ratio`` is what the deepest element would carry elastically over what hardness allows. The bank is that
     of a run-in contact: it has yielded in loading and is elastic from then on.

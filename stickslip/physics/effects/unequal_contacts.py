@@ -1,4 +1,4 @@
-"""Several contacts that do not carry, or are not rough, alike."""
+"""Several contacts with different loads or different roughness."""
 
 from __future__ import annotations
 

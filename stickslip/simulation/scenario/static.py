@@ -38,7 +38,7 @@ def static_creep(
 ) -> StaticCreep:
     """The static creep curve of virgin contacts under the scenario's drive, inertia and weakening left out.
 
-    Rough lines that are all alike are averaged over ``contact.lines`` lines, whatever their realisation is.
+    Rough lines of one kind are averaged over ``contact.lines`` lines, whatever their realisation is.
 
     Args:
         scenario: its contact, spring and first drive velocity count.

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...data.prescribed import prescribed
-from ...data.segment import LAWS, Segmentation, Shapes, event_shapes
-from ...data.trace import Trace
-from ...inference.fit.creep_process import V_LIM, creep_processes
-from ...inference.fit.normalised import is_ramp
-from ...system.units import shown
+from ..data.prescribed import prescribed
+from ..data.segment import LAWS, Segmentation, Shapes, event_shapes
+from ..data.trace import Trace
+from ..inference.fit.creep_process import V_LIM, creep_processes
+from ..inference.fit.normalised import is_ramp
+from ..system.units import shown
 
 _RING_RATE = 5000.0  # Hz: a contact resonance of some 500 Hz needs ten samples a period
 _NEAR = 1.25  # drive velocities closer than this factor count as one

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from stickslip.show.report.abilities import _slow_noise
+from stickslip.objects.abilities import _slow_noise
 
 
 def test_slow_noise_is_asked_for_where_it_is_not_stated():
