@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip.blind.generator.campaigns import Run, make_campaign
+from stickslip.blind.generator import Run, make_campaign
 from stickslip.errors import InputError
 from stickslip.objects.diagnosis import diagnose_campaign
 

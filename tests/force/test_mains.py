@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.blind.generator.campaigns import Run
+from stickslip.blind.generator import Run
 from stickslip.blind.generator.rigs import draw_setup
 from stickslip.blind.generator.sensor import SILENT
 from stickslip.inference.force.fit import fit

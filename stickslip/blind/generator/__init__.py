@@ -4,11 +4,12 @@ It shares no law, no contact and no solver with the package's model, so that a d
 """
 
 from .bank import Bank, make_bank
-from .campaigns import Run, make_campaign
+from .campaigns import make_campaign
 from .dynamics import Drive, Result, Rig, simulate
 from .forms import CATALOGUED, EFFECTS, OUTSIDE, Setup, hide
 from .lines import Surface
 from .rigs import draw_setup
+from .runs import Run
 
 __all__ = [
     "CATALOGUED",

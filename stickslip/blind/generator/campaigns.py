@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from .dynamics import Drive, Result, simulate
 from .forms import Setup, hide
 from .recorder import record
 from .rigs import draw_setup
+from .runs import DEFAULT_RUNS, Run
 from .sensor import counts, spot
 from .write import write_campaign
 
@@ -25,25 +26,6 @@ OVERSAMPLING = 4
 LONGEST = 16.0  # s
 MOST_SLIPS = 25  # of a run with holds, at first
 OTHER_CASE = "a smaller amplitude, or another seed"
-
-
-@dataclass(frozen=True)
-class Run:
-    """One run to be made: a steady ``velocity`` (m/s) until ``events`` slips, or ``pieces`` of (until s, m/s)."""
-
-    name: str
-    velocity: float
-    events: int = 7
-    pieces: tuple[tuple[float, float], ...] = ()
-
-
-DEFAULT_RUNS = (
-    Run("v050", 5e-5),
-    Run("v100", 1e-4),
-    Run("v200", 2e-4),
-    Run("v400", 4e-4),
-    Run("holds", 1e-4, pieces=((4.3, 1e-4), (5.3, 0.0), (7.6, 1e-4), (12.6, 0.0), (15.2, 1e-4))),
-)
 
 
 def make_campaign(

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .campaigns import Run
-    from .forms import Setup
-    from .recorder import Recorded
+from .forms import Setup
+from .recorder import Recorded
+from .runs import Run
 
 
 def write_campaign(
