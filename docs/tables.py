@@ -200,13 +200,13 @@ def experiments(found: dict[str, Any]) -> str:
             made = c["experiment"] or "none of the drive alone" if "experiment" in c else "not made"
             rows.append([f"`{c['hidden']}`", others + within, made, left])
     made, alone, left = found["made"], found["alone"], len(rows) - found["made"]
-    interval = binomtest(alone, made).proportion_ci(0.95, method="wilson")
+    low, high = (100 * end for end in binomtest(alone, made).proportion_ci(0.95, method="wilson"))
     told = (
-        f"Of {found['campaigns']} campaigns {len(rows)} end with a set. For {made} of them such an experiment "
-        f"is proposed and made. In {alone} of these only the hidden effect remains: {100 * alone / made:.0f} %, with "
-        f"Wilson's interval at 95 % from {100 * interval.low:.0f} to {100 * interval.high:.0f} %; the target is 80 %. For "
-        f"the other {left} the set is without the hidden effect, or no proposed experiment changes only the drive (they "
-        "change mass, spring or load, which this test does not make)."
+        f"Of {found['campaigns']} campaigns {len(rows)} end with a set. For {made} of them such an experiment is proposed "
+        f"and made. In {alone} of these only the hidden effect remains: {100 * alone / made:.0f} %, with Wilson's "
+        f"interval at 95 % from {low:.0f} to {high:.0f} %; the target is 80 %. For the other {left} the set is without "
+        "the hidden effect, or no proposed experiment changes only the drive (they change mass, spring or load, which "
+        "this test does not make)."
     )
     return f"{told}\n\n{table(['hidden', 'others in the set', 'proposed experiment', 'named with its run'], rows)}"
 
