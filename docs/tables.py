@@ -203,7 +203,7 @@ def experiments(found: dict[str, Any]) -> str:
     low, high = (100 * end for end in binomtest(alone, made).proportion_ci(0.95, method="wilson"))
     told = (
         f"Of {found['campaigns']} campaigns {len(rows)} end with a set. For {made} of them such an experiment is "
-        f"proposed and made. In {alone} of these only the hidden one remains: {100 * alone / made:.0f} %, with Wilson's "
+        f"proposed and made. In {alone} of these only this one remains: {100 * alone / made:.0f} %, with Wilson's "
         f"interval at 95 % from {low:.0f} to {high:.0f} %; the target is 80 %. For the other {left} the set is without "
         "the hidden effect, or no proposed experiment changes only the drive (they change mass, spring or load, which "
         "this test does not make)."
