@@ -19,7 +19,7 @@ LENGTH, FORCE = ("displacement", "m", None), ("force", "N", None)
 PICTURES: dict[str, tuple[str, Any, Any]] = {
     "reciprocating-loops": ("real-reciprocating-loops", LENGTH, FORCE),
     "friction-damper": ("real-friction-damper", LENGTH, ("force", "kN", 1e-3)),
-    "drill-string": ("real-drill-string", ("angle", "rad", 1.0), ("torque", "N m", 1.0)),
+    "drill-string": ("real-drill-string", ("angle", "rad", 1e3), ("torque", "N m", 1e-3)),
     "robot-joint": ("real-robot-joint", ("angle", "deg", 1e3), ("torque", "N m", 1.0)),
     "robot-joint-2": ("real-robot-joint-2", ("angle", "deg", 1e3), ("torque", "N m", 1.0)),
     "robot-loops": ("real-robot-loops", ("angle", "deg", 1e3), ("torque", "N m", 1.0)),

@@ -89,6 +89,25 @@ def test_every_stroke_and_every_rest_is_a_stretch_of_its_own():
     assert sum(not s.moving for s in found) >= 5
 
 
+def test_the_velocity_after_a_step_is_known_where_single_samples_are_noise():
+    """Windows of 10 ms, in which the motion goes on by less than its noise, as in a velocity step of rock."""
+    rng = np.random.default_rng(5)
+    time = np.arange(0.0, 20.0, 0.01)
+    clean = 3e-6 * time + 7e-6 * np.maximum(time - 10.0, 0.0)
+    force = 1.0 + 0.01 * np.tanh((time - 10.0) / 0.3) + 1e-4 * rng.normal(size=time.size)
+
+    def speeds(noise):
+        knots = thinned(Trace.from_arrays("step", time=time, displacement=clean + noise, spring_force=force))
+        away = np.abs(knots.at - 10.0) > 0.05
+        return knots.rate[away], np.where(knots.at < 10.0, 3e-6, 1e-5)[away]
+
+    found, true = speeds(0.17e-6 * rng.normal(size=time.size))
+    assert np.abs(found / true - 1.0).max() < 0.4
+    assert np.sqrt(np.mean((found / true - 1.0) ** 2)) < 0.1
+    found, true = speeds(np.zeros(time.size))
+    np.testing.assert_allclose(found, true, rtol=1e-3)
+
+
 @pytest.mark.slow
 def test_the_backbone_of_the_bank_is_measured():
     runs = [thinned(with_motion(record(seed, rate=8.0 * RATE))) for seed in (1, 2, 3)]

@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 AFTER, EVEN = 24, 24  # windows of a stretch: spaced as the logarithm of the time from its start, and evenly
 FASTER = 1.5  # times the speed: another stretch, where the motion has few speeds
+KNOWN = 10.0  # times the error of a position, over which the velocity is taken
 STILL = 0.05  # of the usual speed: the motion rests
 SETTLED = 0.75  # of a stretch's way, after which all elements are taken to slide and the next event begins
 BOTH = 0.1  # of the force one way, which it takes the other way at least
@@ -113,8 +114,9 @@ def thinned(trace: Trace) -> Knots:
     knots_force = (eye - bowed) @ (means @ force)
     begins = _begins(parts, t, x, trace.virgin)
     event = np.searchsorted(begins[1:], at, side="right")
-    rate, bend = _rates(at, knots_x, piece)
     unread = max(noise, count or 0.0)
+    moving = np.array([s.moving for s in parts])[piece]
+    rate, bend = _rates(at, knots_x, piece, moving, noise / np.sqrt(sizes))
     stiffest = steepest(knots_x, knots_force, piece, unread)
     compared = np.arange(1, at.size)
     compared = compared[(event[compared] > 0) | trace.virgin]
@@ -169,16 +171,32 @@ def _begins(parts: Sequence[Stretch], t: Array, x: Array, virgin: bool) -> Array
     return np.array(out)
 
 
-def _rates(t: Array, x: Array, piece: Index) -> tuple[Array, Array]:
-    """Velocity and acceleration at the knots, of every stretch by itself."""
-    rate, bend = np.zeros(t.size), np.zeros(t.size)
+def _rates(t: Array, x: Array, piece: Index, moving: NDArray[np.bool_], error: Array) -> tuple[Array, Array]:
+    """Velocity and acceleration at the knots, of every stretch by itself.
+
+    The velocity is the slope over as many knots on both sides as it takes to know it to a tenth, from positions that
+    are known to ``error`` (m). A stretch of one knot rests, or has that between its neighbours.
+    """
+    rate, bend = np.gradient(x, t) * moving, np.zeros(t.size)
     for own in np.split(np.arange(t.size), np.flatnonzero(np.diff(piece)) + 1):
         if own.size > 2:
-            rate[own] = np.gradient(x[own], t[own])
+            rate[own] = _slopes(t[own], x[own], error[own])
             bend[own] = np.gradient(rate[own], t[own])
         elif own.size == 2:
             rate[own] = np.diff(x[own]) / np.diff(t[own])
     return rate, bend
+
+
+def _slopes(t: Array, x: Array, error: Array) -> Array:
+    slope = np.gradient(x, t)
+    for i in range(t.size):
+        for k in range(1, t.size):
+            a, b = max(i - k, 0), min(i + k + 1, t.size)
+            if abs(x[b - 1] - x[a]) >= KNOWN * np.hypot(error[a], error[b - 1]):
+                break
+        if k > 1:
+            slope[i] = np.polynomial.Polynomial.fit(t[a:b], x[a:b], 1, w=1.0 / error[a:b]).deriv()(t[i])
+    return slope
 
 
 def steepest(x: Array, force: Array, piece: Index, noise: float) -> float:
