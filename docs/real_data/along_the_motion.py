@@ -48,16 +48,24 @@ def told(name: str, made: Diagnosis) -> dict[str, Any]:
         "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
         "says": f"{verdict['kind']}: {verdict['text']}",
         "scatter": made.result["scatter"],
-        "ladder": [
-            {
-                "model": rung.added, "fitted": rms(rung.residual) / level, "unseen": rms(rung.unseen) / level,
-                "gain": None if rung.fit is fits[0] else last.fit.cost - rung.fit.cost,
-                "floors": [told["train_error"], told["heldout_error"]],
-            }
-            for last, rung, told in zip([rungs[0], *rungs], rungs, made.result["ladder"][1:], strict=False)
-        ],
+        "ladder": ladder(made),
         "where": [{k: v / level for k, v in where(rung.fit, rung.unseen).items()} for rung in (rungs[0], rungs[-1])],
     }  # fmt: skip
+
+
+def ladder(made: Diagnosis) -> list[dict[str, Any]]:
+    """Errors of every model on the way to the last one."""
+    assert made.found is not None
+    rungs = [rung for rung in made.found.ladder if rung.fit is not None]
+    base, level = rungs[0].fit, strength(rungs[0].fit)
+    return [
+        {
+            "model": rung.added, "fitted": rms(rung.residual) / level, "unseen": rms(rung.unseen) / level,
+            "gain": None if rung.fit is base else last.fit.cost - rung.fit.cost,
+            "floors": [told["train_error"], told["heldout_error"]],
+        }
+        for last, rung, told in zip([rungs[0], *rungs], rungs, made.result["ladder"][1:], strict=False)
+    ]  # fmt: skip
 
 
 def strength(fit: Any) -> float:
