@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
@@ -59,11 +60,11 @@ def _simple(text: str, unit: str) -> float | None:
     return number * _READ[prefix]
 
 
-def to_si(value: float | int | str, unit: str, *, key: str | None = None, file: object = None) -> float:
+def to_si(value: Real | float | str, unit: str, *, key: str | None = None, file: object = None) -> float:
     """Read a quantity as an SI float.
 
     Args:
-        value: a number (taken as SI) or text such as ``"0.05 mm/s"``.
+        value: a number of Python or NumPy (taken as SI) or text such as ``"0.05 mm/s"``.
         unit: the SI unit it must be compatible with (``"m/s"``, ``"1"`` for a pure number).
         key, file: where it stands, for the message.
 
@@ -71,7 +72,7 @@ def to_si(value: float | int | str, unit: str, *, key: str | None = None, file: 
         InputError: text without a unit, an unknown unit, a wrong dimension, or not a finite number.
     """
     where = {"key": key, "file": str(file) if file else None}
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+    if isinstance(value, bool) or not isinstance(value, (Real, str)):
         raise InputError("not a quantity", value=value, allowed=_allowed(unit), **where)
     if isinstance(value, str):
         number = _parse(value, unit, where)
