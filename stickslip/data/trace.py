@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
@@ -19,6 +20,8 @@ from .resolution import estimate_resolution, noise_level
 Array = NDArray[np.float64]
 SIGNALS = {"displacement": "m", "velocity": "m/s", "spring_force": "N"}
 CHANNELS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
+ROLES = ("", "train", "held-out")
+SIZES = ("resolution", "noise", "walk", "hum", "spring_stiffness", "minimum_slip")  # of a trace: numbers, not negative
 
 
 @dataclass(frozen=True)
@@ -237,7 +240,8 @@ class Trace(Shown, _Rebuilt):
         repairs, warnings, provenance: what was mended, what looks odd, where it came from.
 
     Raises:
-        InputError: no signal, lengths that differ, time that does not increase, values that are not finite.
+        InputError: no signal, lengths that differ, time that does not increase, values that are not finite, a role that
+            is none, a size that is no number in SI.
     """
 
     name: str
@@ -279,6 +283,14 @@ class Trace(Shown, _Rebuilt):
             if not np.isfinite(array).all():
                 raise InputError(f"trace '{self.name}': {name} holds values that are not finite")
             object.__setattr__(self, name, array)
+        if self.role not in ROLES:
+            what, allowed = f"trace '{self.name}': there is no such role", '"train", "held-out", or "" for undecided'
+            raise InputError(what, key="role", value=self.role, allowed=allowed)
+        for name in SIZES:
+            value = getattr(self, name)
+            if value is not None and (isinstance(value, str) or not 0.0 <= value < math.inf):
+                what = f"trace '{self.name}': {name} is not possible"
+                raise InputError(what, key=name, value=value, allowed="a number in SI, 0 or more; None: not known")
 
     @classmethod
     def from_arrays(
@@ -306,7 +318,7 @@ class Trace(Shown, _Rebuilt):
 
         Raises:
             InputError: no signal, no times, lengths that differ, times that do not increase, values that are not
-                finite, two ways of giving the drive, a unit that cannot be read.
+                finite, two ways of giving the drive, a unit that cannot be read, a role that is none.
         """
         given = {"displacement": displacement, "velocity": velocity, "spring_force": spring_force}
         arrays: dict[str, Any] = {

@@ -50,6 +50,21 @@ def test_trace_refuses(arguments, word):
         Trace("a", **{key: np.array(value) for key, value in arguments.items()})
 
 
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"role": "heldout"}, '(?s)no such role.*"held-out"'),  # it would have taken part in the fit
+        ({"resolution": "8 nm"}, "resolution is not possible.*'8 nm'"),
+        ({"noise": -1e-9}, "noise is not possible"),
+        ({"spring_stiffness": np.nan}, "spring_stiffness is not possible"),
+    ],
+)
+def test_trace_refuses_roles_and_sizes_that_are_none(change, word):
+    trace = Trace("a", np.arange(3.0), displacement=np.arange(3.0), role="held-out", noise=None, hum=0.0)
+    with pytest.raises(InputError, match=word):
+        trace.replace(**change)
+
+
 def test_drive_of_pieces_has_the_integral_of_its_velocities():
     drive = Drive.from_pieces([2.0, 5.0, 6.0], [1e-3, 0.0, -2e-3], start=1.0)
     t = np.linspace(1, 6, 1001)
