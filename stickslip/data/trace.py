@@ -390,6 +390,31 @@ class Trace(Shown, _Rebuilt):
         """A copy with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
+    def between(self, start: float | str | None = None, stop: float | str | None = None) -> Trace:
+        """The part of the record from ``start`` to ``stop`` (s or text), both included; times stay what they are.
+
+        It counts as virgin only where nothing is left out at its beginning. What was left out is among its repairs.
+
+        Raises:
+            InputError: less than two samples are left.
+        """
+        first = 0 if start is None else int(np.searchsorted(self.time, to_si(start, "s", key="start")))
+        end = float(self.time[-1]) if stop is None else to_si(stop, "s", key="stop")
+        last = int(np.searchsorted(self.time, end, side="right"))
+        if last - first < 2:
+            allowed = f"{shown(float(self.time[0]), 's')} to {shown(float(self.time[-1]), 's')}"
+            what = f"trace '{self.name}': less than two samples are left"
+            raise InputError(what, key="start, stop", value=(start, stop), allowed=allowed)
+        if last - first == self.time.size:
+            return self
+        cut = Repair("cut", self.time.size - (last - first), "all channels", "outside of what was asked for")
+        time = self.time[first:last]
+        return self.replace(
+            **{name: values[first:last] for name, values in self.channels.items()},
+            time=time, virgin=self.virgin and first == 0, repairs=(*self.repairs, cut),
+            missing=tuple(t for t in self.missing if time[0] <= t < time[-1]),
+        )  # fmt: skip
+
     def _parts(self) -> list[str]:
         speed, spring = self.drive_velocity, self.spring_stiffness
         what = {

@@ -65,6 +65,22 @@ def test_trace_refuses_roles_and_sizes_that_are_none(change, word):
         trace.replace(**change)
 
 
+def test_a_part_of_a_trace_is_a_record_of_its_own():
+    t = np.arange(0.0, 10.0, 0.5)
+    whole = Trace(
+        "a", t, displacement=t**2, normal_load=t + 1.0, drive=Drive.constant(2.0), virgin=True, missing=(1.0, 6.0)
+    )
+    part = whole.between("2000 ms", 7.5)
+    assert part.time[0] == 2.0 and part.time[-1] == 7.5  # both ends, as in a campaign file and in xarray
+    assert np.array_equal(part.displacement, part.time**2) and np.array_equal(part.normal_load, part.time + 1.0)
+    assert part.drive is whole.drive and part.missing == (6.0,)
+    assert not part.virgin and whole.between(stop=5.0).virgin
+    assert [(r.kind, r.count) for r in part.repairs] == [("cut", 8)]
+    assert whole.between() is whole
+    with pytest.raises(InputError, match=r"(?s)less than two samples.*allowed: 0 s to 9.5 s"):
+        whole.between(20.0)
+
+
 def test_drive_of_pieces_has_the_integral_of_its_velocities():
     drive = Drive.from_pieces([2.0, 5.0, 6.0], [1e-3, 0.0, -2e-3], start=1.0)
     t = np.linspace(1, 6, 1001)
