@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,9 @@ from ..errors import InputError
 from ..system.shown import Shown, facts
 from ..system.units import factor_to_si, shown, to_si
 from .resolution import estimate_resolution, noise_level
+
+if TYPE_CHECKING:
+    import xarray
 
 Array = NDArray[np.float64]
 SIGNALS = {"displacement": "m", "velocity": "m/s", "spring_force": "N"}
@@ -389,6 +392,19 @@ class Trace(Shown, _Rebuilt):
     def replace(self, **changes: object) -> Trace:
         """A copy with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Every channel, and the load point of the drive, over ``time`` (s); SI units in ``attrs["units"]``.
+
+        :meth:`from_arrays` takes its variables back; its own ``to_dataframe`` and ``to_netcdf`` make tables and files.
+        No array is copied, so none can be changed.
+        """
+        import xarray
+
+        known = {name: ("time", values, {"units": CHANNELS[name]}) for name, values in self.channels.items()}
+        if self.drive is not None:
+            known["load_point"] = ("time", self.drive.position(self.time), {"units": "m"})
+        return xarray.Dataset(known, coords={"time": ("time", self.time, {"units": "s"})}, attrs={"title": self.name})
 
     def between(self, start: float | str | None = None, stop: float | str | None = None) -> Trace:
         """The part of the record from ``start`` to ``stop`` (s or text), both included; times stay what they are.

@@ -81,6 +81,21 @@ def test_a_part_of_a_trace_is_a_record_of_its_own():
         whole.between(20.0)
 
 
+def test_a_trace_goes_to_xarray_and_back():
+    t = np.arange(0.0, 3.0, 0.5)
+    trace = Trace("a", t, displacement=t**2, normal_load=t + 1.0, drive=Drive.constant(2.0))
+    found = trace.to_xarray()
+    assert set(found) == {"displacement", "normal_load", "load_point"} and found.attrs["title"] == "a"
+    assert {name: found[name].attrs["units"] for name in found.variables} == {
+        "time": "s", "displacement": "m", "normal_load": "N", "load_point": "m"
+    }  # fmt: skip
+    np.testing.assert_array_equal(found.load_point, 2.0 * t)
+    again = Trace.from_arrays(displacement=found.displacement, drive_position=found.load_point)
+    assert np.array_equal(again.time, t) and np.array_equal(again.displacement, trace.displacement)
+    with pytest.raises(ValueError, match="read-only"):
+        found["displacement"][0] = 1.0
+
+
 def test_drive_of_pieces_has_the_integral_of_its_velocities():
     drive = Drive.from_pieces([2.0, 5.0, 6.0], [1e-3, 0.0, -2e-3], start=1.0)
     t = np.linspace(1, 6, 1001)
