@@ -69,7 +69,7 @@ class Provenance(_Rebuilt):
         object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Drive(_Rebuilt):
     """The load point's position against time, piecewise linear.
 
@@ -78,6 +78,22 @@ class Drive(_Rebuilt):
         positions: load-point positions there, m, shape (k,).
 
     Beyond its ends the drive goes on with the velocity of its first and last piece.
+
+    Raises:
+        InputError: fewer than two times, other than as many positions, times that do not increase, values that are not
+            finite.
+
+    Examples:
+        A drive that is halted for a second:
+
+        >>> from stickslip.data.trace import Drive
+        >>> drive = Drive.from_pieces([4.0, 5.0, 9.0], [50e-6, 0.0, 50e-6])
+        >>> drive
+        Drive(from 0 s: 50 µm/s until 4 s, 0 m/s until 5 s, 50 µm/s until 9 s)
+        >>> drive.holds(0.0, 9.0)
+        [(4.0, 5.0)]
+        >>> round(float(drive.position(7.0)), 9)  # m
+        0.0003
     """
 
     times: Array
@@ -92,6 +108,13 @@ class Drive(_Rebuilt):
             raise InputError("the times of a drive must be finite and increase", hint="check the drive's 'until' times")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
+
+    def __repr__(self) -> str:
+        ends, speeds = self.times[1:].tolist(), self.velocities.tolist()
+        pieces = [f"{shown(v, 'm/s')} until {shown(end, 's')}" for v, end in zip(speeds[:5], ends[:5], strict=True)]
+        if len(ends) > len(pieces):
+            pieces.append(f"... {len(ends)} pieces until {shown(ends[-1], 's')}")
+        return f"{type(self).__name__}(from {shown(float(self.times[0]), 's')}: {', '.join(pieces)})"
 
     @classmethod
     def constant(cls, velocity: float, start: float = 0.0, stop: float | None = None) -> Drive:
@@ -322,6 +345,18 @@ class Trace(Shown, _Rebuilt):
         Raises:
             InputError: no signal, no times, lengths that differ, times that do not increase, values that are not
                 finite, two ways of giving the drive, a unit that cannot be read, a role that is none.
+
+        Examples:
+            >>> import numpy as np
+            >>> import stickslip as ss
+            >>> t = np.arange(0.0, 2.0, 1e-3)
+            >>> x = 1e-5 * np.floor(2.0 * t)
+            >>> ss.Trace.from_arrays("v050", time=t, displacement=x, drive_velocity="20 um/s", noise="8 nm")
+            <Trace>
+            <BLANKLINE>
+            run: v050; samples: 2000; length: 1.999 s; sampling: 1 kHz; drive: 20 µm/s
+            <BLANKLINE>
+            displacement: 0 m to 30 µm
         """
         given = {"displacement": displacement, "velocity": velocity, "spring_force": spring_force}
         arrays: dict[str, Any] = {

@@ -108,6 +108,13 @@ def test_drive_of_pieces_has_the_integral_of_its_velocities():
     assert drive.position([0.0, 7.0]) == pytest.approx([-1e-3, -3e-3])
 
 
+def test_a_drive_shows_its_velocities_and_not_its_arrays():
+    assert repr(Drive.constant(-50e-6, 1.0, 3.0)) == "Drive(from 1 s: -50 µm/s until 3 s)"
+    t = np.arange(0.0, 1e3)
+    rough = repr(Drive(t, np.random.default_rng(3).random(t.size)))
+    assert rough.endswith("... 999 pieces until 999 s)") and len(rough) < 200
+
+
 def test_velocity_at_a_breakpoint_is_that_of_the_next_piece():
     drive = Drive.from_pieces([2.0, 5.0], [1e-3, 0.0])
     assert drive.velocity([2.0 - 1e-9, 2.0]) == pytest.approx([1e-3, 0.0])
