@@ -14,6 +14,7 @@ from stickslip.errors import InputError, SolveError
 from stickslip.physics.contact import Bank
 from stickslip.physics.effects.base import BodyForce
 from stickslip.physics.effects.inertia import AddedMass
+from stickslip.physics.model import LoadPoint
 from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
 from stickslip.simulation.solve.integrate import step_control
 from stickslip.system.traced import Program
@@ -174,3 +175,20 @@ def test_a_single_jump_in_time_is_stepped_over():
     moved = trajectory.at(np.array([0.99, 1.2])).x
     assert np.diff(moved)[0] > 0.01 / 1.2e6
     assert s.t[-1] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("times", "positions", "word"),
+    [
+        ([0.0], [0.0], "two times or more"),
+        ([0.0, 1.0, 2.0], [0.0, 1e-4], r"as many positions \(got \(\(3,\), \(2,\)\)\)"),
+        ([0.0, 2.0, 2.0], [0.0, 1e-4, 2e-4], "times of the load point must increase"),
+    ],
+)
+def test_a_load_point_refuses_what_is_no_motion(times, positions, word):
+    with pytest.raises(InputError, match=word):
+        LoadPoint(jnp.array(times), jnp.array(positions))
+
+
+def test_a_load_point_of_lists_moves():
+    assert float(LoadPoint([0.0, 2.0], [0.0, 1e-4])(jnp.array(1.0))) == 5e-5
