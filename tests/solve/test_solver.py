@@ -13,13 +13,14 @@ import pytest
 from stickslip.errors import InputError, SolveError
 from stickslip.physics.contact import Bank
 from stickslip.physics.effects.base import BodyForce
+from stickslip.physics.effects.catalogue import make
 from stickslip.physics.effects.inertia import AddedMass
 from stickslip.physics.model import LoadPoint
 from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
 from stickslip.simulation.solve.integrate import step_control
 from stickslip.system.traced import Program
 
-from .rig import rig
+from .rig import bank, rig
 
 
 @pytest.fixture(scope="module")
@@ -192,3 +193,24 @@ def test_a_load_point_refuses_what_is_no_motion(times, positions, word):
 
 def test_a_load_point_of_lists_moves():
     assert float(LoadPoint([0.0, 2.0], [0.0, 1e-4])(jnp.array(1.0))) == 5e-5
+
+
+@pytest.mark.parametrize(
+    ("asked", "word"),
+    [
+        ({"t1": 0.0}, "t1: the end of a run must be after its start"),
+        ({"t1": np.nan}, "t1: the end"),
+        ({"t1": 1.0, "t0": 2.0}, r"(?s)t1: the end .*allowed: above 2 s"),
+        ({"t1": 1.0, "largest_step": 0.0}, "largest_step: the longest step must be positive"),
+    ],
+)
+def test_a_run_without_a_length_is_refused(asked, word):
+    with pytest.raises(InputError, match=word):
+        integrate(rig(), **asked)
+
+
+def test_a_state_of_another_model_is_refused():
+    other = rig(effects=(make("contact-ageing"),))
+    for state in (other.rest(), rig(springs=bank(7)).rest()):
+        with pytest.raises(InputError, match=r"(?s)state is not one of this model.*model.rest"):
+            integrate(rig(), 0.01, state=state)

@@ -163,15 +163,25 @@ def integrate(
         The trajectory and the state at ``t1``.
 
     Raises:
-        InputError: mass, spring, damping, weakening or an element of the contact is outside its range.
+        InputError: mass, spring, damping, weakening or an element of the contact is outside its range; the end is not
+            after the start, the longest step is not positive, or the state is that of a model of another form.
         SolveError: the steps became too small to get anywhere or a number was lost; says when and what to change.
     """
     began = time.perf_counter()
     tolerance = Tolerance() if tolerance is None else tolerance
     bank = model.shaped()
     least = LEAST_ADVANCE / PIECE * _refuse_impossible(model, bank)
+    if not t0 < t1 < np.inf:
+        raise InputError("the end of a run must be after its start", key="t1", value=t1, allowed=f"above {t0:g} s")
+    if not largest_step > 0.0:
+        raise InputError(
+            "the longest step must be positive", key="largest_step", value=largest_step, allowed="above 0 s"
+        )
     state = model.rest(t0) if state is None else state
     kind = jax.tree.structure(state)
+    if len(state.memory) != len(model.effects) or np.shape(state.force) != np.shape(bank.strength):
+        what = "the state is not one of this model: its effects or the number of its elements are others"
+        raise InputError(what, key="state", hint="begin with model.rest(), or go on with the model the state is of")
     kinks = sorted({float(s) for s in stops if t0 < s < t1} | {float(t1)})
     pieces: list[Steps] = []
     accepted = rejected = 0
