@@ -214,3 +214,20 @@ def test_a_state_of_another_model_is_refused():
     for state in (other.rest(), rig(springs=bank(7)).rest()):
         with pytest.raises(InputError, match=r"(?s)state is not one of this model.*model.rest"):
             integrate(rig(), 0.01, state=state)
+
+
+def test_a_trajectory_says_what_it_is_and_has_units(first_event):
+    text, s = repr(first_event), first_event.steps
+    assert len(text) < 400 and f"steps: {first_event.stats.steps}" in text and "to: 5.6 s" in text and "mN" in text
+    found = first_event.to_xarray()
+    assert [found[name].attrs["units"] for name in ("time", "x", "v", "psi", "friction_work")] == [
+        "s",
+        "m",
+        "m/s",
+        "1",
+        "J",
+    ]
+    assert np.array_equal(found.time, s.t) and np.array_equal(found.x, s.x)
+    assert found.attrs["energy_error"] == first_event.stats.energy_error
+    later = first_event.to_xarray([5.0, 99.0])
+    assert later.x[0] == first_event.at(np.array([5.0])).x[0] and later.x[1] == s.x[-1]  # beyond its end: the end
