@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..system.shown import Shown, facts
-from ..system.units import factor_to_si, shown, to_si
+from ..system.units import ends, factor_to_si, shown, to_si
 from .resolution import estimate_resolution, noise_level
 
 if TYPE_CHECKING:
@@ -478,10 +478,7 @@ class Trace(Shown, _Rebuilt):
             "contact": "virgin" if self.virgin else None,
             "role": self.role,
         }
-        ranges = {
-            name: " to ".join(shown(float(end), CHANNELS[name]) for end in (values.min(), values.max()))
-            for name, values in self.channels.items()
-        }
+        ranges = {name: ends(values, CHANNELS[name]) for name, values in self.channels.items()}
         return [facts(what), facts(ranges), *map(str, self.repairs), *self.warnings]
 
 

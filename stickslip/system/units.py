@@ -112,6 +112,13 @@ def shown(value: float, unit: str, digits: int = 4) -> str:
     return f"{_digits(value / 10.0**power, digits)} {PREFIXES[power]}{unit}"
 
 
+def ends(values: Any, unit: str) -> str:
+    """The least and the largest of an array in SI, as people write them; what is rounding beside the other is zero."""
+    low, high = float(values.min()), float(values.max())
+    rounding = 1e-12 * max(abs(low), abs(high))
+    return " to ".join(shown(end if abs(end) > rounding else 0.0, unit) for end in (low, high))
+
+
 def shown_with(value: float, std: float, unit: str = "1") -> str:
     """A quantity with its standard deviation, in one unit and to the same place: ``1.72 ± 0.10 µm``."""
     if not (math.isfinite(value) and math.isfinite(std) and std > 0.0):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...system.shown import Shown, facts
-from ...system.units import shown
+from ...system.units import ends, shown
 from .stepper import hermite
 
 if TYPE_CHECKING:
@@ -82,17 +82,13 @@ class Trajectory(Shown):
 
     def _parts(self) -> list[str]:
         s, stats = self.steps, self.stats
-        ends = {"from": s.t[0], "to": s.t[-1]}
         cost = {
-            "steps": stats.steps, "rejected": stats.rejected, "energy error": f"{stats.energy_error:.1e}",
+            "from": shown(float(s.t[0]), "s"), "to": shown(float(s.t[-1]), "s"), "steps": stats.steps,
+            "rejected": stats.rejected, "energy error": f"{stats.energy_error:.1e}",
             "wall time": shown(stats.seconds, "s", 3),
         }  # fmt: skip
-        ranges = {
-            name: " to ".join(shown(float(end), UNITS[name]) for end in (np.min(values), np.max(values)))
-            for name, values in s._asdict().items()
-            if name in ("x", "v", "spring_force", "contact_force")
-        }
-        return [facts({key: shown(float(t), "s") for key, t in ends.items()} | cost), facts(ranges)]
+        told = ("x", "v", "spring_force", "contact_force")
+        return [facts(cost), facts({name: ends(getattr(s, name), UNITS[name]) for name in told})]
 
     def at(self, t: ArrayLike) -> Steps:
         """Everything at the times ``t`` (s), shape (m,): cubic in the displacement, its derivative in the velocity
