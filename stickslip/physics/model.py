@@ -171,6 +171,20 @@ class Model(Parametrised):
         weakening: the base law of friction.
         load_point: where the spring is pulled to.
         effects: what else acts, in the order of application (those of the sensor by their place in its chain).
+
+    Examples:
+        Nothing in a model changes; a part is given anew to a copy:
+
+        >>> from dataclasses import replace
+        >>> import stickslip as ss
+        >>> drive = ss.LoadPoint([0.0, 1.0], [0.0, 50e-6])
+        >>> model = ss.Model(ss.Block(mass=0.05), ss.power_law_bank(0.26, 1e-6, 2.0), ss.Weakening(), drive)
+        >>> aged = replace(model, effects=(ss.make_effect("contact-ageing", rate=0.02),))
+        >>> stiff = replace(aged, block=replace(aged.block, spring_stiffness=5e3))
+        >>> stiff.block
+        Block(mass=50 g, spring_stiffness=5 kN/m, damping=10 N s/m)
+        >>> [effect.tag for effect in stiff.effects]
+        ['contact-ageing']
     """
 
     block: Block
