@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 from ..errors import RunFolderError, StickslipError
 from ..system.extras import need
 from ..system.lifeline import end_with
+from ..system.progress import Tell
 from ..system.runstore import Run, json_text, open_run, versions
 from ..system.threads import processors
 from .mix import MIX, Case, case_seed, plan
@@ -22,7 +23,6 @@ from .seal import CASES, TRUTH, make_seal
 ATTEMPTS = 8
 SAME = 3  # attempts before the effects are made weaker
 MADE = "made"
-Tell = Callable[[str, float], None]
 
 
 def make_challenge(
