@@ -74,7 +74,13 @@ class ArgumentError(InputError):
 
 
 class SolveError(StickslipError):
-    """The equation of motion could not be integrated; says at what time and what to change."""
+    """The equation of motion could not be integrated; says at what time and what to change.
+
+    Attributes:
+        trajectory: of `integrate`: the motion up to there, in which the fault can be looked for; else None.
+    """
+
+    trajectory: Any = None
 
 
 class FitError(StickslipError):

@@ -103,6 +103,7 @@ def test_importing_the_package_imports_nothing():
 def test_a_notebook_keeps_what_it_compiles_where_it_is_asked_to(tmp_path):
     code = (
         "import stickslip as ss; folder = ss.keep_compiled(); import jax, jax.numpy as jnp;"
+        "assert ss.keep_compiled() == folder;"  # the cell is run again
         "jax.jit(lambda x: x + 1.0)(jnp.ones(3)).block_until_ready(); print(folder, len([*folder.iterdir()]))"
     )
     own = {k: v for k, v in os.environ.items() if not k.startswith(("JAX_", "STICKSLIP_"))}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import doctest
+import importlib
 import importlib.util
 import json
 import re
@@ -303,6 +305,17 @@ def test_the_page_of_the_api_has_what_public_functions_take_and_return() -> None
     }
     tables = {word for word in own if word.endswith("Table")}  # of a scenario's file, which have a page of their own
     assert {(name, word) for name, word in asked if word in own - tables and word not in told} == set()
+
+
+EXAMPLES = [path for path in sorted((ROOT / "stickslip").rglob("*.py")) if ">>> " in path.read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_in_docstrings_give_what_they_show(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    module = importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    failed, tried = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert tried > 0 and failed == 0
 
 
 def test_the_page_of_the_api_has_every_public_name() -> None:

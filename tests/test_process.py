@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
 import pytest
+
+from stickslip.system.threads import processors
 
 FAULTS = """
 import resource, sys
@@ -28,3 +31,15 @@ def test_freed_memory_is_kept_and_not_cleared_anew():
         return int(made.stdout)
 
     assert faults("begun") < 0.1 * faults("plain")
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system gives every process all processors")
+def test_only_processors_that_were_given_to_the_process_count(monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 64)  # those of a cluster's node, of which a job has a few
+    given = os.sched_getaffinity(0)
+    assert processors() == len(given)
+    os.sched_setaffinity(0, {min(given)})
+    try:
+        assert processors() == 1
+    finally:
+        os.sched_setaffinity(0, given)

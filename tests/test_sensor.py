@@ -187,3 +187,31 @@ def test_effects_of_the_sensor_stand_in_the_order_of_the_instrument():
         state = eqx.tree_at(lambda s: s.memory, model.rest(), tuple(states.get(tag, ()) for tag in tags))
         motion = Motion(*map(jnp.asarray, (t, 1e-3, x, 0.0, 0.0, 0.0, 0.0)))
         assert float(model.read(state, motion, jnp.asarray(force))) == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("settings", "key"),
+    [
+        ({"resolution": -8e-9}, "sensor.resolution"),
+        ({"low_pass": np.nan}, "sensor.low_pass"),
+        ({"white": -1e-12}, "sensor.white"),
+        ({"clock_error": -1.0}, "sensor.clock_error"),
+        ({"resolution": 0.0, "counter_steps": 4096}, "sensor.resolution: a counter needs a resolution"),
+    ],
+)
+def test_an_impossible_vibrometer_is_refused_where_it_is_made(settings, key):
+    with pytest.raises(InputError, match=key):
+        Vibrometer(**settings)
+
+
+def test_a_vibrometer_shows_what_was_chosen():
+    assert repr(Vibrometer(drift=-1e-9, dither=True)) == "Vibrometer(drift=-1e-09, dither=True)"
+    chosen = Vibrometer(clears=(0.5,), white=2e-12)
+    assert eval(repr(chosen)) == chosen  # noqa: S307
+
+
+@pytest.mark.parametrize("times", [[0.0, 0.1, 0.5, 0.6], [0.5, 0.1], [0.0, np.nan, 0.2], [1.0, 1.0]])
+def test_a_vibrometer_refuses_times_of_another_sampling(times):
+    """Its filters and noise are those of one rate."""
+    with pytest.raises(InputError, match="do not increase evenly"):
+        measure(Vibrometer(), ramp, np.array(times))

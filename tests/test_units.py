@@ -7,9 +7,11 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from stickslip.errors import InputError
+from stickslip.simulation.scenario.overrides import si_value
 from stickslip.system.units import _simple, shown, shown_with, to_si, unit_registry
 
 UNITS = ("m", "s", "kg", "N", "Pa", "Hz", "m/s", "N/m", "N s/m", "m/Hz**0.5", "m/s**0.5", "1/m", "m**2", "kg/s", "K")
@@ -122,3 +124,17 @@ def test_quantities_are_shown_with_the_prefix_that_suits(value, unit, text):
 )
 def test_a_value_and_its_deviation_have_one_unit_and_end_at_one_place(value, std, unit, text):
     assert shown_with(value, std, unit) == text
+
+
+@pytest.mark.parametrize("number", [np.float32(0.5), np.float64(0.5), np.int64(3), np.uint8(3)])
+def test_numbers_of_numpy_are_numbers(number):
+    """As a row of a table, or a step of a loop over ``np.arange``, gives them."""
+    found = to_si(number, "m/s")
+    assert type(found) is float and found == number
+    assert type(si_value(number, "drive.velocity")) is float
+
+
+@pytest.mark.parametrize("other", [True, np.True_, 1j, None, [0.5], np.array([0.5, 1.0])])
+def test_what_is_no_number_is_no_quantity(other):
+    with pytest.raises(InputError, match="not a quantity"):
+        to_si(other, "m/s")

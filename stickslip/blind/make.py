@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,15 @@ from typing import Any
 from ..errors import RunFolderError, StickslipError
 from ..system.extras import need
 from ..system.lifeline import end_with
+from ..system.progress import Tell
 from ..system.runstore import Run, json_text, open_run, versions
+from ..system.threads import processors
 from .mix import MIX, Case, case_seed, plan
 from .seal import CASES, TRUTH, make_seal
 
 ATTEMPTS = 8
 SAME = 3  # attempts before the effects are made weaker
 MADE = "made"
-Tell = Callable[[str, float], None]
 
 
 def make_challenge(
@@ -43,7 +44,7 @@ def make_challenge(
         cases, seed: see :func:`stickslip.blind.mix.plan`.
         own: cases of one's own in place of the mix.
         grouped: join springs of about the same threshold: ten times faster, slips a little beside (docs/challenge).
-        jobs: parallel processes; default the number of cores.
+        jobs: parallel processes; default the number of processors that this process may use.
         tell: told the case that was finished and the share done.
 
     Returns:
@@ -60,7 +61,7 @@ def make_challenge(
     need("the generator of the challenge", "challenge", "numba")
     planned = plan(cases, seed) if own is None else list(own)
     with open_run(folder, resume=True) as run:
-        made = _make_all(run, planned, seed, grouped, os.cpu_count() or 1 if jobs is None else jobs, tell)
+        made = _make_all(run, planned, seed, grouped, processors() if jobs is None else jobs, tell)
         truth = {
             "schema": 1,
             "seed": seed,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from .segment import Segmentation
 from .trace import Trace
 
@@ -16,9 +14,8 @@ def first_cycles(trace: Trace, found: Segmentation, most: int) -> tuple[Trace, S
     events = found.events
     if len(events) <= most:
         return trace, found
-    end = int(np.searchsorted(trace.time, 0.5 * (events[most - 1].t_arrest + events[most].t_onset)))
-    short = {name: values[:end] for name, values in trace.channels.items()}
-    return trace.replace(time=trace.time[:end], **short), replace(found, events=events[:most])
+    middle = 0.5 * (events[most - 1].t_arrest + events[most].t_onset)
+    return trace.between(stop=middle), replace(found, events=events[:most])
 
 
 def shares(counts: Sequence[int], most: int) -> list[int]:

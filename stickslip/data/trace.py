@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..system.shown import Shown, facts
-from ..system.units import factor_to_si, shown, to_si
+from ..system.units import ends, factor_to_si, shown, to_si
 from .resolution import estimate_resolution, noise_level
+
+if TYPE_CHECKING:
+    import xarray
 
 Array = NDArray[np.float64]
 SIGNALS = {"displacement": "m", "velocity": "m/s", "spring_force": "N"}
 CHANNELS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
+ROLES = ("", "train", "held-out")
+SIZES = ("resolution", "noise", "walk", "hum", "spring_stiffness", "minimum_slip")  # of a trace: numbers, not negative
 
 
 @dataclass(frozen=True)
@@ -63,7 +69,7 @@ class Provenance(_Rebuilt):
         object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Drive(_Rebuilt):
     """The load point's position against time, piecewise linear.
 
@@ -72,6 +78,22 @@ class Drive(_Rebuilt):
         positions: load-point positions there, m, shape (k,).
 
     Beyond its ends the drive goes on with the velocity of its first and last piece.
+
+    Raises:
+        InputError: fewer than two times, other than as many positions, times that do not increase, values that are not
+            finite.
+
+    Examples:
+        A drive that is halted for a second:
+
+        >>> from stickslip.data.trace import Drive
+        >>> drive = Drive.from_pieces([4.0, 5.0, 9.0], [50e-6, 0.0, 50e-6])
+        >>> drive
+        Drive(from 0 s: 50 µm/s until 4 s, 0 m/s until 5 s, 50 µm/s until 9 s)
+        >>> drive.holds(0.0, 9.0)
+        [(4.0, 5.0)]
+        >>> round(float(drive.position(7.0)), 9)  # m
+        0.0003
     """
 
     times: Array
@@ -86,6 +108,13 @@ class Drive(_Rebuilt):
             raise InputError("the times of a drive must be finite and increase", hint="check the drive's 'until' times")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
+
+    def __repr__(self) -> str:
+        ends, speeds = self.times[1:].tolist(), self.velocities.tolist()
+        pieces = [f"{shown(v, 'm/s')} until {shown(end, 's')}" for v, end in zip(speeds[:5], ends[:5], strict=True)]
+        if len(ends) > len(pieces):
+            pieces.append(f"... {len(ends)} pieces until {shown(ends[-1], 's')}")
+        return f"{type(self).__name__}(from {shown(float(self.times[0]), 's')}: {', '.join(pieces)})"
 
     @classmethod
     def constant(cls, velocity: float, start: float = 0.0, stop: float | None = None) -> Drive:
@@ -237,7 +266,8 @@ class Trace(Shown, _Rebuilt):
         repairs, warnings, provenance: what was mended, what looks odd, where it came from.
 
     Raises:
-        InputError: no signal, lengths that differ, time that does not increase, values that are not finite.
+        InputError: no signal, lengths that differ, time that does not increase, values that are not finite, a role that
+            is none, a size that is no number in SI.
     """
 
     name: str
@@ -279,6 +309,14 @@ class Trace(Shown, _Rebuilt):
             if not np.isfinite(array).all():
                 raise InputError(f"trace '{self.name}': {name} holds values that are not finite")
             object.__setattr__(self, name, array)
+        if self.role not in ROLES:
+            what, allowed = f"trace '{self.name}': there is no such role", '"train", "held-out", or "" for undecided'
+            raise InputError(what, key="role", value=self.role, allowed=allowed)
+        for name in SIZES:
+            value = getattr(self, name)
+            if value is not None and (isinstance(value, str) or not 0.0 <= value < math.inf):
+                what = f"trace '{self.name}': {name} is not possible"
+                raise InputError(what, key=name, value=value, allowed="a number in SI, 0 or more; None: not known")
 
     @classmethod
     def from_arrays(
@@ -306,7 +344,19 @@ class Trace(Shown, _Rebuilt):
 
         Raises:
             InputError: no signal, no times, lengths that differ, times that do not increase, values that are not
-                finite, two ways of giving the drive, a unit that cannot be read.
+                finite, two ways of giving the drive, a unit that cannot be read, a role that is none.
+
+        Examples:
+            >>> import numpy as np
+            >>> import stickslip as ss
+            >>> t = np.arange(0.0, 2.0, 1e-3)
+            >>> x = 1e-5 * np.floor(2.0 * t)
+            >>> ss.Trace.from_arrays("v050", time=t, displacement=x, drive_velocity="20 um/s", noise="8 nm")
+            <Trace>
+            <BLANKLINE>
+            run: v050; samples: 2000; length: 1.999 s; sampling: 1 kHz; drive: 20 µm/s
+            <BLANKLINE>
+            displacement: 0 m to 30 µm
         """
         given = {"displacement": displacement, "velocity": velocity, "spring_force": spring_force}
         arrays: dict[str, Any] = {
@@ -378,6 +428,44 @@ class Trace(Shown, _Rebuilt):
         """A copy with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
+    def to_xarray(self) -> xarray.Dataset:
+        """Every channel, and the load point of the drive, over ``time`` (s); SI units in ``attrs["units"]``.
+
+        :meth:`from_arrays` takes its variables back; its own ``to_dataframe`` and ``to_netcdf`` make tables and files.
+        No array is copied, so none can be changed.
+        """
+        import xarray
+
+        known = {name: ("time", values, {"units": CHANNELS[name]}) for name, values in self.channels.items()}
+        if self.drive is not None:
+            known["load_point"] = ("time", self.drive.position(self.time), {"units": "m"})
+        return xarray.Dataset(known, coords={"time": ("time", self.time, {"units": "s"})}, attrs={"title": self.name})
+
+    def between(self, start: float | str | None = None, stop: float | str | None = None) -> Trace:
+        """The part of the record from ``start`` to ``stop`` (s or text), both included; times stay what they are.
+
+        It counts as virgin only where nothing is left out at its beginning. What was left out is among its repairs.
+
+        Raises:
+            InputError: less than two samples are left.
+        """
+        first = 0 if start is None else int(np.searchsorted(self.time, to_si(start, "s", key="start")))
+        end = float(self.time[-1]) if stop is None else to_si(stop, "s", key="stop")
+        last = int(np.searchsorted(self.time, end, side="right"))
+        if last - first < 2:
+            allowed = f"{shown(float(self.time[0]), 's')} to {shown(float(self.time[-1]), 's')}"
+            what = f"trace '{self.name}': less than two samples are left"
+            raise InputError(what, key="start, stop", value=(start, stop), allowed=allowed)
+        if last - first == self.time.size:
+            return self
+        cut = Repair("cut", self.time.size - (last - first), "all channels", "outside of what was asked for")
+        time = self.time[first:last]
+        return self.replace(
+            **{name: values[first:last] for name, values in self.channels.items()},
+            time=time, virgin=self.virgin and first == 0, repairs=(*self.repairs, cut),
+            missing=tuple(t for t in self.missing if time[0] <= t < time[-1]),
+        )  # fmt: skip
+
     def _parts(self) -> list[str]:
         speed, spring = self.drive_velocity, self.spring_stiffness
         what = {
@@ -390,10 +478,7 @@ class Trace(Shown, _Rebuilt):
             "contact": "virgin" if self.virgin else None,
             "role": self.role,
         }
-        ranges = {
-            name: " to ".join(shown(float(end), CHANNELS[name]) for end in (values.min(), values.max()))
-            for name, values in self.channels.items()
-        }
+        ranges = {name: ends(values, CHANNELS[name]) for name, values in self.channels.items()}
         return [facts(what), facts(ranges), *map(str, self.repairs), *self.warnings]
 
 

@@ -279,18 +279,8 @@ class Campaign(Shown, Mapping[str, Trace]):
         return forecast(self, run, train, at, progress)
 
     def to_xarray(self, run: str) -> xarray.Dataset:
-        """Signals of a run over time (s), SI units in the attributes."""
-        import xarray
-
-        from ..data.trace import SIGNALS
-
-        trace = self[run]
-        units = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
-        signals = {key: ("time", getattr(trace, key), {"units": unit}) for key, unit in units.items()}
-        known = {key: v for key, v in signals.items() if v[1] is not None}
-        if trace.drive is not None:
-            known["load_point"] = ("time", trace.drive.position(trace.time), {"units": "m"})
-        return xarray.Dataset(known, coords={"time": ("time", trace.time, {"units": "s"})}, attrs={"title": run})
+        """Signals of a run; see :meth:`stickslip.Trace.to_xarray`."""
+        return self[run].to_xarray()
 
     @property
     def summary(self) -> pandas.DataFrame:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
+from ..system.progress import Tell as Tell
 from ..system.runstore import Run, open_run, versions
 from ..system.shown import Shown
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from .campaign import Campaign
     from .fit import Fit
 
-Tell = Callable[[str, float], None]
 Name = TypeVar("Name", bound=str | Path)
 
 

@@ -10,9 +10,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
+from ..errors import InputError
 from .contact import Bank
 from .effects.base import (
     BodyForce,
@@ -78,11 +81,23 @@ class LoadPoint(eqx.Module):
         times: nodes (s), shape (n,), increasing, n >= 2.
         positions: displacement at the nodes (m), shape (n,).
         stretch: elongation of the spring that a record begins with (m); effects on the drive do not see it.
+
+    Raises:
+        InputError: fewer than two nodes, other than as many positions, times that do not increase. Traced values are
+            not checked.
     """
 
-    times: Array
-    positions: Array
+    times: Array = eqx.field(converter=jnp.asarray)
+    positions: Array = eqx.field(converter=jnp.asarray)
     stretch: Any = 0.0
+
+    def __check_init__(self) -> None:
+        given = self.times.shape, self.positions.shape
+        if self.times.ndim != 1 or self.times.size < 2 or given[0] != given[1]:
+            what = "a load point needs two times or more, and as many positions"
+            raise InputError(what, key="load_point", value=given)
+        if not isinstance(self.times, jax.core.Tracer) and np.any(np.diff(np.asarray(self.times)) <= 0.0):
+            raise InputError("the times of the load point must increase", key="load_point.times")
 
     def __call__(self, t: Array) -> Array:
         """Displacement (m) at time ``t`` (s)."""
@@ -156,6 +171,20 @@ class Model(Parametrised):
         weakening: the base law of friction.
         load_point: where the spring is pulled to.
         effects: what else acts, in the order of application (those of the sensor by their place in its chain).
+
+    Examples:
+        Nothing in a model changes; a part is given anew to a copy:
+
+        >>> from dataclasses import replace
+        >>> import stickslip as ss
+        >>> drive = ss.LoadPoint([0.0, 1.0], [0.0, 50e-6])
+        >>> model = ss.Model(ss.Block(mass=0.05), ss.power_law_bank(0.26, 1e-6, 2.0), ss.Weakening(), drive)
+        >>> aged = replace(model, effects=(ss.make_effect("contact-ageing", rate=0.02),))
+        >>> stiff = replace(aged, block=replace(aged.block, spring_stiffness=5e3))
+        >>> stiff.block
+        Block(mass=50 g, spring_stiffness=5 kN/m, damping=10 N s/m)
+        >>> [effect.tag for effect in stiff.effects]
+        ['contact-ageing']
     """
 
     block: Block

@@ -21,7 +21,7 @@ def keep_compiled() -> Path | None:
     """Keep compiled code in the user's cache folder, and compile the same code where nothing can be kept.
 
     Commands, their workers and the workbench do so by themselves. In Python it is left to you, for it sets JAX for the
-    whole process: call it before anything is simulated or fitted.
+    whole process: call it before anything is simulated or fitted. A second call changes nothing.
 
     Returns:
         The folder, or None where it is switched off (``STICKSLIP_NO_CACHE=1``), cannot be written, or JAX has its own
@@ -30,11 +30,9 @@ def keep_compiled() -> Path | None:
     # a checked error inside compiled code calls back into Python, and such code cannot be kept and gives other last
     # digits; as nan it is found by the integrator's own check of every piece
     os.environ.setdefault("EQX_ON_ERROR", "nan")
-    if _off() or "JAX_COMPILATION_CACHE_DIR" in os.environ:
-        return None
-    folder = _folder()
-    if folder is None:
-        return None
+    folder, chosen = folder_for("compiled"), os.environ.get("JAX_COMPILATION_CACHE_DIR")
+    if folder is None or chosen is not None:
+        return folder if chosen == str(folder) else None
     settings = {
         "jax_compilation_cache_dir": str(folder),
         "jax_persistent_cache_min_compile_time_secs": 0.0,
@@ -101,15 +99,8 @@ def _unpack(content: bytes) -> None:
 
 def folder_for(name: str) -> Path | None:
     """A folder in the user's cache, made if need be; None where caches are switched off or nothing can be written."""
-    return None if _off() else _folder(name)
-
-
-def _off() -> bool:
-    return os.environ.get(OFF, "").strip() not in ("", "0")
-
-
-def _folder(name: str = "compiled") -> Path | None:
-    """The cache folder, made if need be; None where nothing can be written there."""
+    if os.environ.get(OFF, "").strip() not in ("", "0"):
+        return None
     import platformdirs
 
     folder = Path(platformdirs.user_cache_dir("stickslip", appauthor=False)) / name

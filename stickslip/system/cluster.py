@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from .extras import need
+from .threads import processors
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -33,7 +33,7 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
 
     Args:
         scheduler: address of a running one, ``tcp://host:8786``; None starts one here with processes of one thread.
-        workers: of the local cluster; default the number of cores.
+        workers: of the local cluster; default the number of processors that this process may use.
 
     Raises:
         InputError: no scheduler answers there, or dask.distributed is missing.
@@ -61,7 +61,7 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         _quiet(),
         dask.config.set(_SETTINGS),
         LocalCluster(
-            n_workers=workers or os.cpu_count() or 1,
+            n_workers=workers or processors(),
             threads_per_worker=1,
             processes=True,
             dashboard_address="127.0.0.1:0",  # no page, but a port of its own beside another run on this machine

@@ -16,7 +16,7 @@ PATIENCE = 1.0  # s before anything is shown
 LEAST = 0.05  # share of a stage that tells how long the rest takes
 REFRESH = 0.2  # s between two states of a bar under a cell
 EVERY = 30.0  # s between lines where there is no terminal
-Tell = Callable[..., None]
+Tell = Callable[[str, float], None]  # what is being done, and the share of it that is done (0 to 1)
 
 
 def silent(text: str, share: float | None = None) -> None:

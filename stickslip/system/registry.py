@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import entry_points
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 from ..errors import InputError, nearest
 
 T = TypeVar("T")
 
 
-class Registry(Generic[T]):
-    """Things by name: those registered here and those other packages offer in an entry point group.
+class Registry(Mapping[str, T]):
+    """Things by name, a mapping: those registered here and those other packages offer in an entry point group.
 
     Args:
         group: the entry point group, e.g. ``"stickslip.readers"``.
@@ -44,28 +44,30 @@ class Registry(Generic[T]):
         self._own[name] = thing
         return thing
 
-    def get(self, name: str) -> T:
+    def find(self, name: str) -> T:
         """The thing of that name; `InputError` naming the nearest where there is none."""
-        everything = dict(self)
-        if name not in everything:
-            raise InputError(f"there is no {self.what} '{name}'", hint=nearest(name, everything))
-        return everything[name]
+        if name not in self:
+            raise InputError(f"there is no {self.what} '{name}'", hint=nearest(name, self))
+        return self[name]
 
-    def items(self) -> Iterator[tuple[str, T]]:
-        """Name and thing, own ones first; an own name wins over a plug-in's."""
+    def _all(self) -> dict[str, T]:
+        """Own ones first; an own name wins over a plug-in's."""
         if self._plugged is None:
             self._plugged = self._load()
-        yield from self._own.items()
-        yield from ((name, thing) for name, thing in self._plugged.items() if name not in self._own)
+        return self._own | {name: thing for name, thing in self._plugged.items() if name not in self._own}
+
+    def __getitem__(self, name: str) -> T:
+        return self._all()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all())
+
+    def __len__(self) -> int:
+        return len(self._all())
 
     def names(self) -> list[str]:
         """All names, own ones first."""
-        return [name for name, _ in self.items()]
-
-    keys = names  # so that ``dict(registry)`` works
-
-    def __getitem__(self, name: str) -> T:
-        return self._own[name] if name in self._own else (self._plugged or {})[name]
+        return list(self)
 
     def packages(self) -> list[tuple[str, str]]:
         """Name and version of every installed distribution that offers something in the group, sorted."""

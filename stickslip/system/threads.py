@@ -26,9 +26,14 @@ def one_for_linear_algebra() -> None:
         os.environ.setdefault(name, "1")
 
 
+def processors() -> int:
+    """How many processors this process may use; a queue of jobs or ``taskset`` leaves it a few of the machine's."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 @lru_cache(maxsize=1)
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="side by side")
+    return ThreadPoolExecutor(processors(), thread_name_prefix="side by side")
 
 
 def side_by_side(call: Callable[[T], Found], items: Iterable[T], sizes: Sequence[int]) -> list[Found]:
@@ -45,10 +50,10 @@ def side_by_side(call: Callable[[T], Found], items: Iterable[T], sizes: Sequence
     return [found[i] for i in range(len(given))]
 
 
-_ALONE = (os.cpu_count() or 1) > 1
+_ALONE = processors() > 1
 
 
 def alone(yes: bool) -> None:
     """Say whether this process has the processors for itself."""
     global _ALONE
-    _ALONE = yes and (os.cpu_count() or 1) > 1
+    _ALONE = yes and processors() > 1

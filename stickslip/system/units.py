@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
@@ -59,11 +60,11 @@ def _simple(text: str, unit: str) -> float | None:
     return number * _READ[prefix]
 
 
-def to_si(value: float | int | str, unit: str, *, key: str | None = None, file: object = None) -> float:
+def to_si(value: Real | float | str, unit: str, *, key: str | None = None, file: object = None) -> float:
     """Read a quantity as an SI float.
 
     Args:
-        value: a number (taken as SI) or text such as ``"0.05 mm/s"``.
+        value: a number of Python or NumPy (taken as SI) or text such as ``"0.05 mm/s"``.
         unit: the SI unit it must be compatible with (``"m/s"``, ``"1"`` for a pure number).
         key, file: where it stands, for the message.
 
@@ -71,7 +72,7 @@ def to_si(value: float | int | str, unit: str, *, key: str | None = None, file: 
         InputError: text without a unit, an unknown unit, a wrong dimension, or not a finite number.
     """
     where = {"key": key, "file": str(file) if file else None}
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+    if isinstance(value, bool) or not isinstance(value, (Real, str)):
         raise InputError("not a quantity", value=value, allowed=_allowed(unit), **where)
     if isinstance(value, str):
         number = _parse(value, unit, where)
@@ -109,6 +110,13 @@ def shown(value: float, unit: str, digits: int = 4) -> str:
         value, unit = 1e3 * value, "g"
     power = power_for(value, digits)
     return f"{_digits(value / 10.0**power, digits)} {PREFIXES[power]}{unit}"
+
+
+def ends(values: Any, unit: str) -> str:
+    """The least and the largest of an array in SI, as people write them; what is rounding beside the other is zero."""
+    low, high = float(values.min()), float(values.max())
+    rounding = 1e-12 * max(abs(low), abs(high))
+    return " to ".join(shown(end if abs(end) > rounding else 0.0, unit) for end in (low, high))
 
 
 def shown_with(value: float, std: float, unit: str = "1") -> str:

@@ -7,6 +7,7 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.physics.contact import (
+    Bank,
     bank_from_backbone,
     bank_from_contact,
     binning_error,
@@ -182,3 +183,11 @@ def test_rough_bank_of_the_rig_and_its_derivatives():
 def test_a_bank_needs_elements():
     with pytest.raises(InputError):
         default_edges(0)
+
+
+def test_a_bank_refuses_elements_without_a_strength():
+    """One strength for all would be taken for that of each, and the total would be one element's."""
+    with pytest.raises(InputError, match=r"bank: every element .*\(\(3,\), \(1,\)\)"):
+        Bank(jnp.ones(3), jnp.ones(1))
+    lanes = jax.vmap(lambda k: Bank(k, 1e-6 * k).total_strength)(jnp.ones((5, 3)))  # traced banks are as before
+    np.testing.assert_allclose(lanes, 3e-6)

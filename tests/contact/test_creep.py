@@ -166,3 +166,13 @@ def test_bad_input_is_refused(change):
 def test_bad_sweep_is_refused():
     with pytest.raises(InputError, match=r"got 0\.0"):
         creep_displacements([0.3, 0.3], [1e-6, 0.0], 0.31, 0.21, [1.0], **SMALL)
+
+
+def test_a_curve_shows_its_ends_and_not_its_points():
+    curve = creep_curve(lines=2, n_springs=64)
+    text = repr(curve)
+    assert len(text) < 250 and "400 points; u: 0 m to " in text and "force: 0 N to 260.4 mN" in text
+    assert "n_springs: 64" in text and f"{1e9 * float(curve.u[-1]):.4g} nm" in text
+    seen = []
+    jax.jit(lambda c: seen.append(repr(c)) or c.u)(curve)
+    assert seen == ["CreepCurve(400 points, traced)"]

@@ -7,6 +7,7 @@ import pytest
 
 from stickslip.data.segment import PHASES, block_motion, choose_settings, segment, segment_motion, velocity
 from stickslip.data.trace import Drive, Trace
+from stickslip.errors import InputError
 
 LSB = 7.91e-9
 
@@ -286,6 +287,9 @@ def test_minimum_slip_is_obeyed(stick_slip):
     stated = segment(displacement(model, minimum_slip=1e-6))
     assert len(stated.events) == len(few.events)
     assert segment(displacement(model), minimum_slip=1e-3).events == ()
+    assert list(of(segment(displacement(model), minimum_slip="1 um"), "slip")) == list(of(few, "slip"))
+    with pytest.raises(InputError, match="minimum_slip: the unit 's' is not one of m"):
+        segment(displacement(model), minimum_slip="1 s")
 
 
 def test_irregular_events(stick_slip):

@@ -50,6 +50,52 @@ def test_trace_refuses(arguments, word):
         Trace("a", **{key: np.array(value) for key, value in arguments.items()})
 
 
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"role": "heldout"}, '(?s)no such role.*"held-out"'),  # it would have taken part in the fit
+        ({"resolution": "8 nm"}, "resolution is not possible.*'8 nm'"),
+        ({"noise": -1e-9}, "noise is not possible"),
+        ({"spring_stiffness": np.nan}, "spring_stiffness is not possible"),
+    ],
+)
+def test_trace_refuses_roles_and_sizes_that_are_none(change, word):
+    trace = Trace("a", np.arange(3.0), displacement=np.arange(3.0), role="held-out", noise=None, hum=0.0)
+    with pytest.raises(InputError, match=word):
+        trace.replace(**change)
+
+
+def test_a_part_of_a_trace_is_a_record_of_its_own():
+    t = np.arange(0.0, 10.0, 0.5)
+    whole = Trace(
+        "a", t, displacement=t**2, normal_load=t + 1.0, drive=Drive.constant(2.0), virgin=True, missing=(1.0, 6.0)
+    )
+    part = whole.between("2000 ms", 7.5)
+    assert part.time[0] == 2.0 and part.time[-1] == 7.5  # both ends, as in a campaign file and in xarray
+    assert np.array_equal(part.displacement, part.time**2) and np.array_equal(part.normal_load, part.time + 1.0)
+    assert part.drive is whole.drive and part.missing == (6.0,)
+    assert not part.virgin and whole.between(stop=5.0).virgin
+    assert [(r.kind, r.count) for r in part.repairs] == [("cut", 8)]
+    assert whole.between() is whole
+    with pytest.raises(InputError, match=r"(?s)less than two samples.*allowed: 0 s to 9.5 s"):
+        whole.between(20.0)
+
+
+def test_a_trace_goes_to_xarray_and_back():
+    t = np.arange(0.0, 3.0, 0.5)
+    trace = Trace("a", t, displacement=t**2, normal_load=t + 1.0, drive=Drive.constant(2.0))
+    found = trace.to_xarray()
+    assert set(found) == {"displacement", "normal_load", "load_point"} and found.attrs["title"] == "a"
+    assert {name: found[name].attrs["units"] for name in found.variables} == {
+        "time": "s", "displacement": "m", "normal_load": "N", "load_point": "m"
+    }  # fmt: skip
+    np.testing.assert_array_equal(found.load_point, 2.0 * t)
+    again = Trace.from_arrays(displacement=found.displacement, drive_position=found.load_point)
+    assert np.array_equal(again.time, t) and np.array_equal(again.displacement, trace.displacement)
+    with pytest.raises(ValueError, match="read-only"):
+        found["displacement"][0] = 1.0
+
+
 def test_drive_of_pieces_has_the_integral_of_its_velocities():
     drive = Drive.from_pieces([2.0, 5.0, 6.0], [1e-3, 0.0, -2e-3], start=1.0)
     t = np.linspace(1, 6, 1001)
@@ -60,6 +106,13 @@ def test_drive_of_pieces_has_the_integral_of_its_velocities():
     assert drive.holds(0, 10) == [(2.0, 5.0)]
     # beyond its ends it goes on
     assert drive.position([0.0, 7.0]) == pytest.approx([-1e-3, -3e-3])
+
+
+def test_a_drive_shows_its_velocities_and_not_its_arrays():
+    assert repr(Drive.constant(-50e-6, 1.0, 3.0)) == "Drive(from 1 s: -50 µm/s until 3 s)"
+    t = np.arange(0.0, 1e3)
+    rough = repr(Drive(t, np.random.default_rng(3).random(t.size)))
+    assert rough.endswith("... 999 pieces until 999 s)") and len(rough) < 200
 
 
 def test_velocity_at_a_breakpoint_is_that_of_the_next_piece():

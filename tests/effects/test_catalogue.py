@@ -52,7 +52,9 @@ def test_laws_show_their_values_with_units() -> None:
     assert text.startswith("RateAndState(") and "evolution=0.01, " in text and "slip_distance=30 µm" in text
     assert "law='slip'" in text and "f64" not in text
     assert "mass=50 g" in repr(Block(mass=0.05)) and "healing_time=20 ms" in repr(Weakening())
-    model = Model(Block(), power_law_bank(0.26, 1e-6, 3.6, n=24), Weakening(), LoadPoint(*jnp.eye(2)), (effect,))
+    model = Model(
+        Block(), power_law_bank(0.26, 1e-6, 3.6, n=24), Weakening(), LoadPoint(jnp.arange(2.0), jnp.ones(2)), (effect,)
+    )
     assert repr(Block()) in repr(model) and text in repr(model) and "stiffness=f64[24]" in repr(model)
     lanes = repr(Block(mass=jnp.ones(3)))  # as within vmap, and where it is traced
     assert "mass=f64[3]" in lanes and "damping=10 N s/m" in lanes

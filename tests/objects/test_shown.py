@@ -40,3 +40,12 @@ def test_events_that_were_found_are_a_table(run):
     assert text.startswith("<Segmentation>") and "Phase(" not in text and len(text) < 3000
     assert f"slips: {len(found.events)}" in text and "slip (m)" in text and f"{found.events[1].t_onset:.4g}" in text
     assert html.count("<table") == 1 and "regime: stick-slip" in html
+
+
+def test_events_are_a_table_to_go_on_with(run):
+    found = ss.find_events(run)
+    frame = found.to_dataframe()
+    assert list(frame.index) == list(range(1, len(found.events) + 1))
+    assert list(frame["slip (m)"]) == [event.slip for event in found.events]
+    np.testing.assert_allclose(frame["onset (s)"].diff(), frame["recurrence (s)"], rtol=1e-12)
+    assert ss.find_events(run, minimum_slip="1 mm").to_dataframe().empty

@@ -35,6 +35,7 @@ def test_mean_of_lines_is_the_mean_displacement_at_equal_load():
     table = contact(**ROUGH, realisation="mean", lines=20)
     built = build_contact(table)
     curve = static_creep(make_scenario(rig(contact={**ROUGH, "lines": 20})))
+    assert repr(curve).startswith("StaticCreep(400 points; u: 0 m to ") and len(repr(curve)) < 100
     inside = slice(1, -1)
     force = np.asarray(built.bank.backbone(curve.u))
     np.testing.assert_allclose(force[inside] / built.strength, curve.tau[inside], atol=2e-4)

@@ -181,6 +181,12 @@ def test_a_fault_in_an_override_is_placed_on_the_command_line(tmp_path, change, 
     assert words in str(caught.value)
 
 
+def test_a_single_override_may_stand_by_itself(tmp_path):
+    """Taken letter by letter it was 'not an assignment (got 'd')'."""
+    path = write(tmp_path, rig())
+    assert load_scenario(path, "drive.velocity=1e-4").file.drive.velocity == 1e-4
+
+
 def test_values_of_overrides_are_toml_or_text():
     assert parse_assignment("a.b=3") == ("a.b", 3)
     assert parse_assignment("a.b = true") == ("a.b", True)

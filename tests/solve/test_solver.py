@@ -13,12 +13,14 @@ import pytest
 from stickslip.errors import InputError, SolveError
 from stickslip.physics.contact import Bank
 from stickslip.physics.effects.base import BodyForce
+from stickslip.physics.effects.catalogue import make
 from stickslip.physics.effects.inertia import AddedMass
+from stickslip.physics.model import LoadPoint
 from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
 from stickslip.simulation.solve.integrate import step_control
 from stickslip.system.traced import Program
 
-from .rig import rig
+from .rig import bank, rig
 
 
 @pytest.fixture(scope="module")
@@ -118,8 +120,11 @@ class _Jump(BodyForce):
 
 
 def test_a_number_lost_on_the_way_is_reported_with_its_time():
-    with pytest.raises(SolveError, match=r"t = [1-3]\.\d+ s .*no longer a number|force that jumps"):
+    with pytest.raises(SolveError, match=r"t = [1-3]\.\d+ s .*no longer a number|force that jumps") as told:
         integrate(rig(effects=(_Lost(),)), 4.0)
+    way = told.value.trajectory  # up to where the fault is
+    assert way.steps.t[0] == 0.0 and way.stats.steps == way.steps.t.size - 1
+    assert np.nanmax(way.steps.x) == pytest.approx(1e-7, rel=0.05)
 
 
 class _Rattle(BodyForce):
@@ -174,3 +179,58 @@ def test_a_single_jump_in_time_is_stepped_over():
     moved = trajectory.at(np.array([0.99, 1.2])).x
     assert np.diff(moved)[0] > 0.01 / 1.2e6
     assert s.t[-1] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("times", "positions", "word"),
+    [
+        ([0.0], [0.0], "two times or more"),
+        ([0.0, 1.0, 2.0], [0.0, 1e-4], r"as many positions \(got \(\(3,\), \(2,\)\)\)"),
+        ([0.0, 2.0, 2.0], [0.0, 1e-4, 2e-4], "times of the load point must increase"),
+    ],
+)
+def test_a_load_point_refuses_what_is_no_motion(times, positions, word):
+    with pytest.raises(InputError, match=word):
+        LoadPoint(jnp.array(times), jnp.array(positions))
+
+
+def test_a_load_point_of_lists_moves():
+    assert float(LoadPoint([0.0, 2.0], [0.0, 1e-4])(jnp.array(1.0))) == 5e-5
+
+
+@pytest.mark.parametrize(
+    ("asked", "word"),
+    [
+        ({"t1": 0.0}, "t1: the end of a run must be after its start"),
+        ({"t1": np.nan}, "t1: the end"),
+        ({"t1": 1.0, "t0": 2.0}, r"(?s)t1: the end .*allowed: above 2 s"),
+        ({"t1": 1.0, "largest_step": 0.0}, "largest_step: the longest step must be positive"),
+    ],
+)
+def test_a_run_without_a_length_is_refused(asked, word):
+    with pytest.raises(InputError, match=word):
+        integrate(rig(), **asked)
+
+
+def test_a_state_of_another_model_is_refused():
+    other = rig(effects=(make("contact-ageing"),))
+    for state in (other.rest(), rig(springs=bank(7)).rest()):
+        with pytest.raises(InputError, match=r"(?s)state is not one of this model.*model.rest"):
+            integrate(rig(), 0.01, state=state)
+
+
+def test_a_trajectory_says_what_it_is_and_has_units(first_event):
+    text, s = repr(first_event), first_event.steps
+    assert len(text) < 400 and f"steps: {first_event.stats.steps}" in text and "to: 5.6 s" in text and "mN" in text
+    found = first_event.to_xarray()
+    assert [found[name].attrs["units"] for name in ("time", "x", "v", "psi", "friction_work")] == [
+        "s",
+        "m",
+        "m/s",
+        "1",
+        "J",
+    ]
+    assert np.array_equal(found.time, s.t) and np.array_equal(found.x, s.x)
+    assert found.attrs["energy_error"] == first_event.stats.energy_error
+    later = first_event.to_xarray([5.0, 99.0])
+    assert later.x[0] == first_event.at(np.array([5.0])).x[0] and later.x[1] == s.x[-1]  # beyond its end: the end

@@ -88,7 +88,7 @@ def find_reader(path: str | Path, name: str | None = None) -> Reader:
     if not head.strip():
         raise InputError("the file is empty", file=path, hint="export it again")
     if name is not None:
-        return _TEXT if name == _TEXT.name else READERS.get(name)
+        return _TEXT if name == _TEXT.name else READERS.find(name)
     for _, reader in READERS.items():
         if _knows(reader, path, head):
             return reader

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...system.units import shown
+from ...system.units import shown, to_si
 from ..resolution import noise_level
 from ..trace import Drive, Trace
 from .choose import choose_settings
@@ -50,17 +50,27 @@ _ACCIDENTAL = ((0.3, 30.0), (0.1, 100.0))
 def segment(
     trace: Trace,
     *,
-    spring_stiffness: float | None = None,
-    minimum_slip: float | None = None,
+    spring_stiffness: float | str | None = None,
+    minimum_slip: float | str | None = None,
     settings: Settings | None = None,
 ) -> Segmentation:
     """Events and phases of a trace.
 
     Args:
-        spring_stiffness: N/m, for traces of spring force alone; default the trace's, else from the rate of loading.
-        minimum_slip: m; smaller slips are left out (default: 10 noise levels, and a tenth of the large slips).
+        trace: with at least one signal of the block.
+        spring_stiffness: N/m or text, for traces of spring force alone; default the trace's, else from the rate of
+            loading.
+        minimum_slip: m or text such as ``"2 um"``; smaller slips are left out (default: 10 noise levels, and a tenth of
+            the large slips).
         settings: those of another segmentation: give the measurement's when segmenting the model's trace.
+
+    Raises:
+        InputError: a unit that cannot be read.
     """
+    if spring_stiffness is not None:
+        spring_stiffness = to_si(spring_stiffness, "N/m", key="spring_stiffness")
+    if minimum_slip is not None:
+        minimum_slip = to_si(minimum_slip, "m", key="minimum_slip")
     gain = settings.gain if settings is not None else None
     position, drive, gain, unit = block_motion(trace, spring_stiffness, gain)
 

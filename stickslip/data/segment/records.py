@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...system.shown import Shown, facts, table
+
+if TYPE_CHECKING:
+    import pandas
 
 PHASES = ("virgin loading", "stick", "hold", "nucleation", "slip", "ring-down", "continuous sliding")
 
@@ -124,10 +127,11 @@ class Segmentation(Shown):
         """All phases of one kind."""
         return tuple(phase for phase in self.phases if phase.kind == kind)
 
-    def _parts(self) -> list[Any]:
+    def to_dataframe(self) -> pandas.DataFrame:
+        """A row for each slip, by its number from 1, with the unit in the name of each column."""
         length = self.settings.unit
-        rows = {
-            str(e.index + 1): {
+        rows: dict[Any, dict[str, Any]] = {
+            e.index + 1: {
                 "onset (s)": e.t_onset,
                 "arrest (s)": e.t_arrest,
                 f"slip ({length})": e.slip,
@@ -136,6 +140,9 @@ class Segmentation(Shown):
             }
             for e in self.events
         }
+        return table(rows, "slip number")
+
+    def _parts(self) -> list[Any]:
         what = {"run": self.name, "slips": len(self.events), "regime": self.regime, "reason": self.reason}
-        events = [table(rows, "slip number")] if rows else []
+        events = [self.to_dataframe()] if self.events else []
         return [facts(what), *events, *(f"left out: {d}" for d in self.dropped), *self.warnings]

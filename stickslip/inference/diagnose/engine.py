@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +14,7 @@ from ...data.segment import Segmentation, segment
 from ...data.trace import Trace
 from ...errors import InputError
 from ...physics.effects import catalogue
+from ...system.threads import processors
 from ..force.fit import Fit, deviations, fit_base
 from ..force.linearised import Array
 from ..force.prescribed import applies
@@ -118,7 +118,7 @@ def diagnose(
         candidates: tags to try; default the whole catalogue.
         max_effects: at most so many are added one after the other.
         holdout: runs to keep aside, besides those whose role in the campaign is "held-out".
-        jobs: processes; default the number of cores.
+        jobs: processes; default the number of processors that this process may use.
         store: keeps finished pieces.
         time_limit: seconds after which the best answer so far is given.
         wrong: what the motion contradicts of the rig as it is stated: with any, the base is fitted and no effect tried.
@@ -155,7 +155,7 @@ def diagnose(
     if prepared.prescribed:
         tags = [t for t in tags if applies(t)]
     tags = [t for t in tags if prepared.shows(catalogue.get(t))]
-    jobs = (os.cpu_count() or 1) if jobs is None else jobs
+    jobs = processors() if jobs is None else jobs
     tell("fitting the base model", 0.5)
     base = kept(store, "base", prepared.problem, lambda: fit_base(prepared.problem, prepared.start))
     ladder = [

@@ -18,13 +18,12 @@ from ...physics.effects import catalogue
 from ...physics.effects.base import Memory
 from ...system import process, threads
 from ...system.lifeline import end_with
+from ...system.progress import Tell as Tell
 from ..force.candidates import Candidate, every_form, try_effect
 from ..force.fit import Fit
 from ..force.signatures import Explained
 from .carriage import Carriage
 from .checkpoints import Store, load_candidate, name_of, save_candidate
-
-Tell = Callable[[str, float], None]
 
 
 def trials(

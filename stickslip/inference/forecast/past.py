@@ -213,20 +213,12 @@ class Past:
 
 def _until(trace: Trace, moment: float) -> Trace:
     """The run up to a moment, with noise and count as these samples show them."""
-    n = int(np.searchsorted(trace.time, moment, side="right"))
-    changed = {
-        name: values[:n]
-        for name in ("displacement", "velocity", "spring_force", "drive_position", "normal_load")
-        if (values := getattr(trace, name)) is not None
-    }
-    if n < 2:
-        raise InputError(f"trace '{trace.name}' has {n} samples in the part for training", key="train")
-    signal = changed[trace.leading]
-    count = estimate_resolution(signal)
-    drive = trace.drive
-    if trace.drive_position is not None:
-        drive = Drive.sampled(trace.time[:n], changed["drive_position"])
-    missing = tuple(t for t in trace.missing if t < moment)
-    return trace.replace(
-        time=trace.time[:n], **changed, resolution=count, noise=noise_level(signal, count), drive=drive, missing=missing
-    )
+    try:
+        part = trace.between(stop=moment)
+    except InputError as error:
+        raise error.but(key="train") from None
+    count = estimate_resolution(part.signal)
+    drive = part.drive
+    if part.drive_position is not None:
+        drive = Drive.sampled(part.time, part.drive_position)
+    return part.replace(resolution=count, noise=noise_level(part.signal, count), drive=drive)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...data.trace import Trace
 from ...errors import InputError
+from ...system.progress import Tell
 from .past import Past
 from .predict import METHODS, Compared, Forecaster, compare, training_slips
 from .scoring import gains, score
@@ -20,7 +21,6 @@ MOMENTS = 10  # in a mean recurrence, where forecasts are made all along
 MOST = 4000  # moments
 INNER = 0.6  # of the part for training, from which laws learn that are tried on its rest
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
-Tell = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,18 @@ class Bank(eqx.Module):
     Fields:
         stiffness: (n,) in N/m.
         strength: (n,) in N, the cap of each element at full friction (``mu_s`` times its normal force).
+
+    Raises:
+        InputError: stiffness and strength are not of one shape.
     """
 
     stiffness: Array
     strength: Array
+
+    def __check_init__(self) -> None:
+        given = jnp.shape(self.stiffness), jnp.shape(self.strength)
+        if given[0] != given[1]:
+            raise InputError("every element of a bank has a stiffness and a strength", key="bank", value=given)
 
     @property
     def threshold(self) -> Array:

@@ -12,6 +12,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from ...errors import InputError, nearest
+from ...system.units import ends, shown, shown_with
 from ._ranges import check_within, concrete
 from .elastic import Moduli, equal_bodies
 from .indentation import Indentation, check_saturation, indentation
@@ -48,6 +49,16 @@ class CreepCurve(NamedTuple):
     stiffness: Array
     contact_share: Array
     n_springs: int
+
+    def __repr__(self) -> str:
+        if not all(map(concrete, self)):
+            return f"CreepCurve({jnp.shape(self.tau)[-1]} points, traced)"
+        reach = shown_with(float(self.u_max), float(self.u_max_spread), "m")
+        return (
+            f"CreepCurve({self.tau.size} points; u: {ends(self.u, 'm')}; t: {ends(self.t, 's')}; "
+            f"force: {ends(self.force, 'N')}; u_max: {reach}; stiffness: {shown(float(self.stiffness), 'N/m')}; "
+            f"contact_share: {float(self.contact_share):.3g}; n_springs: {self.n_springs})"
+        )
 
 
 def virtual_time(

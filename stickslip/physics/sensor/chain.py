@@ -8,7 +8,7 @@ wavelength of a helium-neon laser, interpolated to 40 counts of 7.91 nm; a 12-bi
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -17,9 +17,10 @@ from .noise import flicker_noise, random_walk, white_noise
 
 Array = np.ndarray
 FRINGE = 632.8e-9 / 2.0  # m
+_LEAST = {"gain": -1.0, "drift": -1.0, "clock_error": -0.5}  # of what may be negative
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Vibrometer:
     """Settings; zero switches a part off.
 
@@ -43,6 +44,9 @@ class Vibrometer:
         clock_error: by which share the sample clock runs fast (1).
         dither: whether half a count of noise is added before counting.
         seed: of everything random; every part draws from its own stream.
+
+    Raises:
+        InputError: a size that is negative or not finite, or a counter without a resolution.
     """
 
     resolution: float = 7.91e-9
@@ -67,6 +71,20 @@ class Vibrometer:
     dither: bool = False
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value, least = getattr(self, f.name), _LEAST.get(f.name, 0.0)
+            if f.name != "clears" and not least <= value < np.inf:
+                allowed = f"{least:g} or more, in SI"
+                raise InputError("out of range", key=f"sensor.{f.name}", value=value, allowed=allowed)
+        if self.counter_steps and not self.resolution:
+            raise InputError("a counter needs a resolution", key="sensor.resolution", allowed="above 0 m")
+
+    def __repr__(self) -> str:
+        """What is not as by default."""
+        own = (f"{f.name}={getattr(self, f.name)!r}" for f in fields(self) if getattr(self, f.name) != f.default)
+        return f"{type(self).__name__}({', '.join(own)})"
+
     @property
     def wrap(self) -> float | None:
         """Range after which the counter starts anew (m), or None."""
@@ -85,14 +103,14 @@ def measure(vibrometer: Vibrometer, motion: Callable[[Array], Array], times: Arr
         (n,) readings in m: whole counts times the resolution, wrapped and cleared.
 
     Raises:
-        InputError: a counter that wraps without a resolution, or fewer than two samples.
+        InputError: fewer than two samples, or times that do not increase evenly.
     """
     v = vibrometer
     t = np.asarray(times, float)
     if t.size < 2:
         raise InputError("the vibrometer needs two samples or more", key="output.sampling_rate", value=t.size)
-    if v.counter_steps and not v.resolution:
-        raise InputError("a counter needs a resolution", key="sensor.resolution", allowed="above 0 m")
+    if not _even(t):
+        raise InputError("the vibrometer samples evenly, and the times do not increase evenly", key="times")
     rate = (t.size - 1) / (t[-1] - t[0])
     true = t[0] + (t - t[0]) / (1.0 + v.clock_error)
     x = np.asarray(motion(true - v.delay), float)
@@ -117,6 +135,13 @@ def measure(vibrometer: Vibrometer, motion: Callable[[Array], Array], times: Arr
         half = v.counter_steps // 2
         counts = (counts + half) % v.counter_steps - half
     return counts * v.resolution
+
+
+def _even(t: Array, looks: int = 1000) -> bool:
+    """Whether times increase evenly, to a hundredth of a step; looked at here and there, for records are long."""
+    i = np.unique(np.linspace(0, t.size - 1, looks).astype(int))
+    step = (t[-1] - t[0]) / (t.size - 1)
+    return bool(step > 0.0 and np.all(np.abs(t[i] - t[0] - i * step) < 0.01 * step))
 
 
 def low_pass(y: Array, samples: float) -> Array:

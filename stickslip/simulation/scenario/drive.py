@@ -16,7 +16,7 @@ from .schema import DriveTable
 _MOST_STOPS = 10_000
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion(Drive):
     """The load point's motion.
 

@@ -68,18 +68,18 @@ class Scenario(Shown):
         return [facts({"title": self.title, "file": self.path, "changed": changed}), *tables]
 
 
-def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+def load_scenario(path: str | Path, overrides: str | Sequence[str] = ()) -> Scenario:
     """Read and check a scenario file (TOML; ``stickslip new scenario`` writes a commented one).
 
     Args:
         path: of the file.
-        overrides: changes such as ``"contact.H=0.5"``.
+        overrides: a change such as ``"contact.H=0.5"``, or several.
 
     Raises:
         InputError: the file is not there, not TOML or a campaign; unknown keys, missing units, values out of range.
     """
     path = Path(path)
-    changes = [parse_assignment(text) for text in overrides]
+    changes = [parse_assignment(text) for text in ([overrides] if isinstance(overrides, str) else overrides)]
     read = read_toml(path, "scenario")
     return _checked(read.content, path, read.sha256, tuple(changes), changes, read.text)
 

@@ -6,6 +6,7 @@ import math
 import tomllib
 from collections.abc import Sequence
 from copy import deepcopy
+from numbers import Real
 from typing import Any
 
 from ...errors import InputError
@@ -99,13 +100,13 @@ def series(start: float, stop: float, points: int) -> list[float]:
     return [start * (1 - s) + stop * s for s in share]
 
 
-def si_value(value: float | int | str, key: str) -> float:
+def si_value(value: Real | float | str, key: str) -> float:
     """A value of a series in SI base units, whatever its dimension; the schema checks that afterwards.
 
     Raises:
         InputError: not a quantity.
     """
-    if isinstance(value, (int, float)):
+    if isinstance(value, Real):
         return float(value)
     from ...system.units import unit_registry
 

@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import InputError
 from ...physics import contact as physics
 from ...physics.contact.creep import Average, TimeForm
+from ...system.units import ends
 from .build import Setup
 from .contact_tables import ElasticTable, RoughLineTable
 from .contacts import build_contact, moduli, profile_of
@@ -31,6 +32,9 @@ class StaticCreep(NamedTuple):
     tau: np.ndarray
     u: np.ndarray
     t: np.ndarray
+
+    def __repr__(self) -> str:
+        return f"StaticCreep({self.tau.size} points; u: {ends(self.u, 'm')}; t: {ends(self.t, 's')})"
 
 
 def static_creep(

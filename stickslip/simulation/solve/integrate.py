@@ -163,15 +163,26 @@ def integrate(
         The trajectory and the state at ``t1``.
 
     Raises:
-        InputError: mass, spring, damping, weakening or an element of the contact is outside its range.
-        SolveError: the steps became too small to get anywhere or a number was lost; says when and what to change.
+        InputError: mass, spring, damping, weakening or an element of the contact is outside its range; the end is not
+            after the start, the longest step is not positive, or the state is that of a model of another form.
+        SolveError: the steps became too small to get anywhere or a number was lost; says when and what to change, and
+            has the motion up to there as its ``trajectory``.
     """
     began = time.perf_counter()
     tolerance = Tolerance() if tolerance is None else tolerance
     bank = model.shaped()
     least = LEAST_ADVANCE / PIECE * _refuse_impossible(model, bank)
+    if not t0 < t1 < np.inf:
+        raise InputError("the end of a run must be after its start", key="t1", value=t1, allowed=f"above {t0:g} s")
+    if not largest_step > 0.0:
+        raise InputError(
+            "the longest step must be positive", key="largest_step", value=largest_step, allowed="above 0 s"
+        )
     state = model.rest(t0) if state is None else state
     kind = jax.tree.structure(state)
+    if len(state.memory) != len(model.effects) or np.shape(state.force) != np.shape(bank.strength):
+        what = "the state is not one of this model: its effects or the number of its elements are others"
+        raise InputError(what, key="state", hint="begin with model.rest(), or go on with the model the state is of")
     kinks = sorted({float(s) for s in stops if t0 < s < t1} | {float(t1)})
     pieces: list[Steps] = []
     accepted = rejected = 0
@@ -188,23 +199,33 @@ def integrate(
                 pieces.append(jax.tree.map(lambda a: np.asarray(a)[:1], steps))
             pieces.append(piece)
             reached = float(piece.t[-1]) if n else now
-            _refuse_failure(bool(content), reached, state, accepted, most_steps)
+            why = _failure(bool(content), state, accepted, most_steps)
             tried = n + missed
-            if reached < stop and reached - now < least * tried:
-                raise SolveError(
-                    f"the integration stopped at t = {reached:.6g} s (v = {float(state.v):.3g} m/s): {tried} steps "
-                    f"advanced it by only {reached - now:.3g} s; look for an effect with a force that jumps, or loosen "
-                    "the tolerance"
+            if why is None and reached < stop and reached - now < least * tried:
+                why = (
+                    f"{tried} steps advanced it by only {reached - now:.3g} s; look for an effect with a force that "
+                    "jumps, or loosen the tolerance"
                 )
+            if why is not None:
+                error = SolveError(
+                    f"the integration stopped at t = {reached:.6g} s (v = {float(state.v):.3g} m/s): {why}"
+                )
+                error.trajectory = _trajectory(pieces, accepted, rejected, began)
+                raise error
             if n > 1:
                 dt = float(piece.t[-1] - piece.t[-2])
             now = reached
             if progress is not None:
                 progress(now, piece)
         dt = min(dt, 1e-4)
+    return _trajectory(pieces, accepted, rejected, began), state
+
+
+def _trajectory(pieces: list[Steps], accepted: int, rejected: int, began: float) -> Trajectory:
     steps = Steps(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
-    stats = Stats(accepted, rejected, energy_error(steps), time.perf_counter() - began)
-    return Trajectory(steps, stats), state
+    with np.errstate(invalid="ignore", over="ignore"):  # where a number was lost
+        error = energy_error(steps)
+    return Trajectory(steps, Stats(accepted, rejected, error, time.perf_counter() - began))
 
 
 def _refuse_impossible(model: Model, bank: Bank) -> float:
@@ -224,21 +245,18 @@ def _refuse_impossible(model: Model, bank: Bank) -> float:
     return float(2.0 * np.pi * np.sqrt(mass / (stiffness.sum() + float(model.block.spring_stiffness))))
 
 
-def _refuse_failure(content: bool, now: float, state: State, accepted: int, most_steps: int) -> None:
-    """Turn what diffrax reports into an error that says when and what to change."""
-    finite = bool(np.isfinite(state.x)) and bool(np.isfinite(state.v))
-    if content and finite and accepted < most_steps:
-        return
+def _failure(content: bool, state: State, accepted: int, most_steps: int) -> str | None:
+    """What diffrax reports, in words that say what to change; None where nothing failed."""
     if accepted >= most_steps:
-        why = f"{accepted} steps were not enough; loosen the tolerance, raise the damping, or simulate less time"
-    elif not finite:
-        why = "position or velocity is no longer a number; look for a parameter far outside its usual range"
-    else:
-        why = (
+        return f"{accepted} steps were not enough; loosen the tolerance, raise the damping, or simulate less time"
+    if not (np.isfinite(state.x) and np.isfinite(state.v)):
+        return "position or velocity is no longer a number; look for a parameter far outside its usual range"
+    if not content:
+        return (
             f"the step size fell below {SMALLEST_STEP:g} s without the error of a step coming down; loosen the "
             "tolerance, or look for an effect with a force that jumps"
         )
-    raise SolveError(f"the integration stopped at t = {now:.6g} s (v = {float(state.v):.3g} m/s): {why}")
+    return None
 
 
 __all__ = ["Step", "Tolerance", "integrate"]

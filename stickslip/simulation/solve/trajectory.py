@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...system.shown import Shown, facts
+from ...system.units import ends, shown
 from .stepper import hermite
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class Steps(NamedTuple):
@@ -32,6 +38,12 @@ class Steps(NamedTuple):
     stored: Any
 
 
+UNITS = {  # of the energies J
+    "t": "s", "x": "m", "v": "m/s", "reading": "m", "spring_force": "N", "contact_force": "N", "psi": "1",
+    "sliding": "1",
+}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Stats:
     """What the integration cost and how well it kept its books.
@@ -48,8 +60,8 @@ class Stats:
     seconds: float
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Shown):
     """An integration from start to end.
 
     Attributes:
@@ -60,9 +72,28 @@ class Trajectory:
     steps: Steps
     stats: Stats
 
-    def at(self, t: np.ndarray) -> Steps:
+    def to_xarray(self, t: ArrayLike | None = None) -> xarray.Dataset:
+        """Everything over the time ``t`` (s), shape (m,), default that of the steps; SI units in ``attrs["units"]``."""
+        import xarray
+
+        found = (self.steps if t is None else self.at(t))._asdict()
+        data = {name: ("time", values, {"units": UNITS.get(name, "J")}) for name, values in found.items()}
+        return xarray.Dataset(data, coords={"time": data.pop("t")}, attrs=asdict(self.stats))
+
+    def _parts(self) -> list[str]:
+        s, stats = self.steps, self.stats
+        cost = {
+            "from": shown(float(s.t[0]), "s"), "to": shown(float(s.t[-1]), "s"), "steps": stats.steps,
+            "rejected": stats.rejected, "energy error": f"{stats.energy_error:.1e}",
+            "wall time": shown(stats.seconds, "s", 3),
+        }  # fmt: skip
+        told = ("x", "v", "spring_force", "contact_force")
+        return [facts(cost), facts({name: ends(getattr(s, name), UNITS[name]) for name in told})]
+
+    def at(self, t: ArrayLike) -> Steps:
         """Everything at the times ``t`` (s), shape (m,): cubic in the displacement, its derivative in the velocity
-        (between the ends of long steps a straight line would have edges), linear in the rest."""
+        (between the ends of long steps a straight line would have edges), linear in the rest. Before its start and
+        after its end a trajectory is what it is there."""
         s = self.steps
         t = np.clip(np.asarray(t, float), s.t[0], s.t[-1])
         i = np.clip(np.searchsorted(s.t, t, side="right") - 1, 0, max(s.t.size - 2, 0))
