@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import ast
+import functools
 import importlib.util
+import inspect
 import json
+import pydoc
 import re
 import runpy
 import sys
@@ -311,3 +314,23 @@ def test_the_page_of_the_api_has_every_public_name() -> None:
     page = (DOCS / "api.md").read_text()
     named = set(re.findall(r"(?:auto\w+:: stickslip|`ss)\.(\w+)", page))
     assert set(stickslip.__all__) - {"__version__"} <= named
+
+
+def properties() -> dict[str, str]:
+    """Docstrings of the properties of the classes that the page of the API has."""
+    named = re.findall(r"autoclass:: ([\w.]+)", (DOCS / "api.md").read_text())
+    kinds = (property, functools.cached_property)
+    return {
+        f"{name}.{key}": inspect.getdoc(member) or ""
+        for name in named
+        for key, member in inspect.getmembers(pydoc.locate(name))
+        if isinstance(member, kinds) and not key.startswith("_")
+    }
+
+
+def test_a_property_is_told_in_a_sentence() -> None:
+    """What stands before a colon in its first line, the page of the API shows as its type."""
+    found = properties()
+    assert len(found) > 50
+    first = {name: re.sub(r":\w+:`.*?`|`+.*?`+", "", doc).splitlines()[0] for name, doc in found.items()}
+    assert {name: line for name, line in first.items() if ":" in line} == {}

@@ -402,7 +402,7 @@ class Fit(Savable):
 
     @cached_property
     def arrays(self) -> xarray.Dataset:
-        """As in ``arrays.nc``: measured and model force, the backbone, the runs thinned for pictures."""
+        """Measured and model force, the backbone and the runs thinned for pictures, as in ``arrays.nc``."""
         return dataset(self._sections[1], self.campaign.title)
 
     @property

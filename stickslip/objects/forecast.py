@@ -53,7 +53,7 @@ class Forecast(Savable):
 
     @property
     def next(self) -> dict[str, float] | None:
-        """Time (s) from the end of the record to the slip that it does not hold: quantiles by their share."""
+        """Quantiles by their share of the time (s) from the end of the record to the slip that it does not hold."""
         found = self.result["next"]
         return None if found is None else dict(found)
 
@@ -64,7 +64,7 @@ class Forecast(Savable):
 
     @cached_property
     def wanders(self) -> pandas.DataFrame:
-        """A row for each law of the wandering level: its likelihood, its criterion and how it predicts later slips."""
+        """A row for each law of the wandering level, with its likelihood, its criterion and how it predicts later slips."""
         rows = {law["law"]: {k: law[k] for k in ("log_likelihood", "aic", "unseen")} for law in self.result["laws"]}
         return table(rows, "law")
 
@@ -101,7 +101,7 @@ class Forecast(Savable):
 
     @property
     def plot(self) -> ForecastPlots:
-        """Pictures: ``plot.levels()`` and ``plot.calibration()``."""
+        """Its pictures, ``plot.levels()`` and ``plot.calibration()``."""
         return ForecastPlots(self)
 
     def _parts(self) -> list[Any]:
