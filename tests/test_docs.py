@@ -334,3 +334,9 @@ def test_a_property_is_told_in_a_sentence() -> None:
     assert len(found) > 50
     first = {name: re.sub(r":\w+:`.*?`|`+.*?`+", "", doc).splitlines()[0] for name, doc in found.items()}
     assert {name: line for name, line in first.items() if ":" in line} == {}
+
+
+def test_a_property_is_understood_by_itself() -> None:
+    """As a notebook shows it, without the one that stands before it in the code."""
+    found = {name: doc for name, doc in properties().items() if re.match(r"(The same|Of|What they|It)\b", doc)}
+    assert found == {}

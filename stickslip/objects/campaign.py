@@ -74,7 +74,7 @@ class Campaign(Shown, Mapping[str, Trace]):
 
     @property
     def title(self) -> str:
-        """Of the campaign; the name of its file where it has none."""
+        """Title of the campaign; the name of its file where it has none."""
         return self.description.title or self.description.path.stem
 
     @property
@@ -84,7 +84,7 @@ class Campaign(Shown, Mapping[str, Trace]):
 
     @property
     def names(self) -> list[str]:
-        """Of the runs."""
+        """Names of the runs."""
         return [t.name for t in self.traces]
 
     def __len__(self) -> int:

@@ -102,7 +102,7 @@ class Fit(Savable):
 
     @property
     def effect_forms(self) -> tuple[str, ...]:
-        """The same with the form of each law where it is not the usual one, as :meth:`add` takes them."""
+        """Tags of the added effects, with the form of a law where it is not the usual one, as :meth:`add` takes them."""
         return tuple(with_form(e) for e in self.force_fit.problem.composition.effects)
 
     @property
@@ -117,7 +117,7 @@ class Fit(Savable):
 
     @cached_property
     def std(self) -> dict[str, float]:
-        """Name -> standard deviation (SI) of every free one."""
+        """Name -> standard deviation (SI) of every free parameter that all runs share, and of the contact's strength."""
         point = self.force_fit.point
         first = len(self.free) + point.phases.size
         weights = slice(first, first + point.weights.size)
@@ -166,7 +166,7 @@ class Fit(Savable):
 
     @cached_property
     def unseen_errors(self) -> pandas.DataFrame:
-        """The same on runs that are left out of the fit, each in turn."""
+        """As :attr:`errors`, on runs that are left out of the fit, each in turn."""
         return self._errors(self._unseen, error)
 
     @cached_property
@@ -176,17 +176,17 @@ class Fit(Savable):
 
     @cached_property
     def unseen_error_deviations(self) -> pandas.DataFrame:
-        """The same of :attr:`unseen_errors`."""
+        """Standard deviations of :attr:`unseen_errors`, as :attr:`error_deviations` are."""
         return self._errors(self._unseen, deviation)
 
     @property
     def error(self) -> float:
-        """Of all points together."""
+        """Rms of the residual force of all runs over the floor of this fit (1), near 1 if the model is right."""
         return float(self.errors.loc["all", "all"])
 
     @property
     def unseen_error(self) -> float:
-        """Of all points on runs that were left out."""
+        """As :attr:`error`, on runs that are left out of the fit, each in turn; nan where there is a single event."""
         return float(self.unseen_errors.loc["all", "all"])
 
     @property

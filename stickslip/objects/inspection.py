@@ -37,7 +37,7 @@ class Inspection(Savable):
 
     @property
     def cannot(self) -> list[str]:
-        """What they cannot."""
+        """What these data cannot tell, in sentences."""
         return list(self.result["cannot"])
 
     @property
