@@ -118,11 +118,8 @@ class Fit(Savable):
     @cached_property
     def std(self) -> dict[str, float]:
         """Name -> standard deviation (SI) of every free parameter that all runs share, and of the contact's strength."""
-        point = self.force_fit.point
-        first = len(self.free) + point.phases.size
-        weights = slice(first, first + point.weights.size)
-        whole = float(self.force_fit.covariance[weights, weights].sum())
-        return {STRENGTH: float(np.sqrt(max(whole, 0.0))), **self.force_fit.std()}
+        variance = np.diag(self.covariance.values)
+        return dict(zip(self.covariance.parameter.values.tolist(), np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
 
     @cached_property
     def parameters(self) -> pandas.DataFrame:
@@ -131,12 +128,15 @@ class Fit(Savable):
 
     @cached_property
     def covariance(self) -> xarray.DataArray:
-        """Covariance (SI) of the free parameters that all runs share, shape (a, a)."""
+        """Covariance (SI) of the contact's strength and the free parameters that all runs share, shape (a, a)."""
         return parameter_covariance(self)
 
     @property
     def correlations(self) -> pandas.DataFrame:
-        """Correlations of the free parameters that all runs share, the strongest pair first."""
+        """Correlations of the contact's strength and the free parameters that all runs share, the strongest pair first.
+
+        A row for each pair, ``of`` one ``and`` the other, with their ``correlation`` (-1 to 1).
+        """
         return correlation_table(self)
 
     # how far it is from the measurement
