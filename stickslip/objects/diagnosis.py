@@ -96,7 +96,7 @@ class Diagnosis(Savable):
 
     @property
     def ladder(self) -> pandas.DataFrame:
-        """A row for each model, with its fitted and unseen error in floors and by how much its effect lowered the cost."""
+        """A row for each model, with its fitted and unseen error in floors and what its effect took off the cost."""
         return self.best.ladder
 
     @cached_property

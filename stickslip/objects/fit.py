@@ -102,7 +102,7 @@ class Fit(Savable):
 
     @property
     def effect_forms(self) -> tuple[str, ...]:
-        """Tags of the added effects, with the form of a law where it is not the usual one, as :meth:`add` takes them."""
+        """Tags of the added effects, with the form of a law that is not the usual one, as :meth:`add` takes them."""
         return tuple(with_form(e) for e in self.force_fit.problem.composition.effects)
 
     @property
@@ -117,9 +117,10 @@ class Fit(Savable):
 
     @cached_property
     def std(self) -> dict[str, float]:
-        """Name -> standard deviation (SI) of every free parameter that all runs share, and of the contact's strength."""
-        variance = np.diag(self.covariance.values)
-        return dict(zip(self.covariance.parameter.values.tolist(), np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
+        """Name -> standard deviation (SI) of the contact's strength and every free parameter that all runs share."""
+        found = self.covariance
+        deviations = np.sqrt(np.maximum(np.diag(found), 0.0))
+        return dict(zip(found.parameter.values.tolist(), deviations.tolist(), strict=True))
 
     @cached_property
     def parameters(self) -> pandas.DataFrame:

@@ -78,19 +78,24 @@ def figure(rows: int = 1, columns: int = 1, *, width: float = 7.0, height: float
 
 
 def panels(
-    given: Axes | Sequence[Axes] | None, rows: int = 1, *, width: float = 7.0, height: float = 4.2
+    given: Axes | Sequence[Axes] | None, rows: int = 1, columns: int = 1, *, width: float = 7.0, height: float = 4.2
 ) -> tuple[Figure, list[Axes]]:
-    """The axes to draw in, one above the other, and their figure: those given, else a :func:`figure` of that size.
+    """The axes to draw in, row by row, and their figure: those given, else a :func:`figure` of that size.
 
     Raises:
-        InputError: another number of axes is needed.
+        InputError: what is given are no axes, or another number of them is needed.
     """
     if given is None:
-        made, axes = figure(rows, width=width, height=height)
-        return made, list(axes[:, 0])
+        made, axes = figure(rows, columns, width=width, height=height)
+        return made, list(axes.flat)
+    from matplotlib.axes import Axes
+
     found = list(np.ravel(np.asarray(given, dtype=object)))
-    if len(found) != rows:
-        raise InputError("another number of axes", key="ax", value=len(found), allowed=str(rows))
+    for one in found:
+        if not isinstance(one, Axes):
+            raise InputError(f"a {type(one).__name__} is no axes", key="ax", hint="give those of figure.subplots()")
+    if len(found) != rows * columns:
+        raise InputError("another number of axes", key="ax", value=len(found), allowed=str(rows * columns))
     return found[0].figure, found
 
 
