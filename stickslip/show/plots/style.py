@@ -6,7 +6,7 @@ import functools
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec
 
 import numpy as np
 
@@ -68,13 +68,25 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
 
 def figure(rows: int = 1, columns: int = 1, *, width: float = 7.0, height: float = 4.2) -> tuple[Figure, np.ndarray]:
-    """A figure and its axes, shape (rows, columns); sizes in inches of the whole."""
+    """A figure and its axes, shape (rows, columns); sizes in inches of the whole. A notebook shows it."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=(width, height), layout="constrained")
+    made: Any = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(made)
+    made._repr_png_ = functools.partial(_png, made)  # also where pyplot was not set up for it
     return made, np.asarray(made.subplots(rows, columns, squeeze=False))
+
+
+def _png(figure: Figure, dpi: float | Literal["figure"] = "figure") -> bytes:
+    """A picture as PNG, without time stamp or version, so that equal results are equal files."""
+    from matplotlib import rc_context
+
+    buffer = io.BytesIO()
+    metadata: dict[str, Any] = {"Software": None}
+    with rc_context(_LOOK):
+        figure.savefig(buffer, format="png", dpi=dpi, metadata=metadata)
+    return buffer.getvalue()
 
 
 def panels(
@@ -179,11 +191,4 @@ def remark(axes: Axes, text: str) -> None:
 
 def save(figure: Figure, path: str | Path, dpi: int = 130) -> Path:
     """Write a PNG without time stamp or version, so that equal results are equal files."""
-    from matplotlib import rc_context
-
-    path = Path(path)
-    buffer = io.BytesIO()
-    metadata: dict[str, Any] = {"Software": None}
-    with rc_context(_LOOK):
-        figure.savefig(buffer, format="png", dpi=dpi, metadata=metadata)
-    return write_aside(path, buffer.getvalue())
+    return write_aside(Path(path), _png(figure, dpi))
