@@ -95,6 +95,15 @@ def test_help_of_a_command_imports_no_jax(name):
     assert COMMANDS[name].split(",")[0].split(":")[0][:20] in " ".join(found.stdout.split())
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_is_broken_into_lines_by_the_width_alone(name, monkeypatch, capsys):
+    """In a line as long as it takes, every option has one."""
+    monkeypatch.setenv("COLUMNS", "900")
+    assert run([name, "--help"]) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("│")]
+    assert rows and not [row for row in rows if row.startswith("│" + 8 * " ")]
+
+
 def test_importing_the_package_imports_nothing():
     code = "import sys, stickslip; assert 'jax' not in sys.modules and 'numpy' not in sys.modules; stickslip.InputError"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0

@@ -45,7 +45,7 @@ def make_app() -> App:
         name="stickslip",
         help="Creep and stick-slip of a rough contact: simulate it, measure it, identify the missing effect.",
         version=__version__,
-        help_format="plaintext",
+        help_format="markdown",
         suppress_keyboard_interrupt=False,
     )
     for name, text in COMMANDS.items():

@@ -21,7 +21,7 @@ SCORE = ("score.json", "score.txt", "confusion.png", "confusion-by-amplitude.png
 challenge = App(
     name="challenge",
     help="Test the diagnosis blindly on campaigns with a hidden effect: make, seal, run, score.",
-    help_format="plaintext",
+    help_format="markdown",
 )
 
 
