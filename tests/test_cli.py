@@ -102,6 +102,7 @@ def test_help_is_broken_into_lines_by_the_width_alone(name, monkeypatch, capsys)
     assert run([name, "--help"]) == 0
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("│")]
     assert rows and not [row for row in rows if row.startswith("│" + 8 * " ")]
+    assert not [row for row in rows if "[default: False]" in row], "a flag that is not given is off"
 
 
 def test_importing_the_package_imports_nothing():
