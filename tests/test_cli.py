@@ -105,6 +105,13 @@ def test_help_is_broken_into_lines_by_the_width_alone(name, monkeypatch, capsys)
     assert not [row for row in rows if "[default: False]" in row], "a flag that is not given is off"
 
 
+def test_commands_are_listed_in_the_order_of_ones_work(capsys):
+    for arguments, order in (([], list(COMMANDS)), (["challenge"], ["make", "seal", "run", "score"])):
+        assert run([*arguments, "--help"]) == 0
+        first = [line[2:].split(" ")[0] for line in capsys.readouterr().out.splitlines() if line.startswith("│ ")]
+        assert [name for name in first if name in order] == order
+
+
 def test_importing_the_package_imports_nothing():
     code = "import sys, stickslip; assert 'jax' not in sys.modules and 'numpy' not in sys.modules; stickslip.InputError"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0

@@ -22,9 +22,9 @@ from ..system import process
 
 # module and function in it -> what it does, in one line
 COMMANDS = {
+    "new": "Write a commented scenario or campaign file to start from.",
     "simulate": "Simulate a scenario, or the model of a run folder: trace, slip events, pictures.",
     "creep": "The static creep curve of a scenario's contacts, without inertia.",
-    "new": "Write a commented scenario or campaign file to start from.",
     "inspect": "Traces of a campaign, their events, repairs, omissions, and what the data can tell.",
     "fit": "Fit the static or the dynamic model to a campaign, and say where it fails.",
     "diagnose": "Find the physical effect the model lacks, add it, and test it on runs left out of the fit.",
@@ -48,8 +48,8 @@ def make_app() -> App:
         help_format="markdown",
         suppress_keyboard_interrupt=False,
     )
-    for name, text in COMMANDS.items():
-        app.command(f"stickslip.cli.{name}:{name}", name=name, help=text)
+    for number, (name, text) in enumerate(COMMANDS.items()):  # listed in the order of one's work
+        app.command(f"stickslip.cli.{name}:{name}", name=name, help=text, sort_key=number)
     return app
 
 
