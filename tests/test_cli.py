@@ -112,6 +112,22 @@ def test_commands_are_listed_in_the_order_of_ones_work(capsys):
         assert [name for name in first if name in order] == order
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_has_an_example_that_is_understood(name, capsys):
+    example = cli.EXAMPLES[name]
+    assert run([name, "--help"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert f"Example: stickslip {example}" in told and " ".join(COMMANDS[name].split()) in told
+    assert cli.make_app().parse_args(example.split(), exit_on_error=False, print_error=False)
+
+
+def test_help_says_the_exit_codes(capsys):
+    assert run(["--help"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted." in told
+    assert "Prints CSV" not in told, "the list has the first line of each"
+
+
 def test_importing_the_package_imports_nothing():
     code = "import sys, stickslip; assert 'jax' not in sys.modules and 'numpy' not in sys.modules; stickslip.InputError"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0

@@ -20,21 +20,40 @@ from .. import __version__
 from ..errors import ArgumentError, InputError, StickslipError, nearest
 from ..system import process
 
-# module and function in it -> what it does, in one line
+# module and function in it -> what it does, in one line; below it what its own help adds
 COMMANDS = {
     "new": "Write a commented scenario or campaign file to start from.",
     "simulate": "Simulate a scenario, or the model of a run folder: trace, slip events, pictures.",
-    "creep": "The static creep curve of a scenario's contacts, without inertia.",
+    "creep": "The static creep curve of a scenario's contacts, without inertia.\n\n"
+    "Prints CSV with the columns tau (share of full friction), u (m), t (s).",
     "inspect": "Traces of a campaign, their events, repairs, omissions, and what the data can tell.",
     "fit": "Fit the static or the dynamic model to a campaign, and say where it fails.",
     "diagnose": "Find the physical effect the model lacks, add it, and test it on runs left out of the fit.",
-    "open": "The workbench in the browser: compare, add an effect, watch the error fall.",
+    "open": "The workbench in the browser: compare, add an effect, watch the error fall.\n\n"
+    "The server runs on this machine until Ctrl-C. Only those who have the printed address, with its random token, "
+    "reach it. What was done is kept in a folder .stickslip-workbench beside the campaign's file, and comes back when "
+    "the same campaign is opened again.",
     "forecast": "Forecast the next slip from how strength wanders and load rises, and score it on unseen slips.",
     "compare": "Two runs side by side: models, errors by phase, parameters and their differences.",
     "challenge": "Test the diagnosis blindly on campaigns with a hidden effect: make, seal, run, score.",
     "effects": "List the catalogue of effects, explain one, or print a model's equations.",
 }
 
+EXAMPLES = {
+    "new": "new campaign steel/campaign.toml",
+    "simulate": "simulate scenarios/grzemba2014.toml --set drive.velocity=200um/s --out out/run",
+    "creep": "creep scenarios/grzemba2014.toml --set contact.H=0.5",
+    "inspect": "inspect campaign.toml --out out/inspected",
+    "fit": "fit campaign.toml --add contact-ageing --profile weakening.drop --out out/ageing",
+    "diagnose": "diagnose campaign.toml --holdout v400 --time-limit 600 --out out/mine",
+    "open": "open campaign.toml",
+    "forecast": "forecast campaign.toml --run v050 --at 0.5",
+    "compare": "compare out/base out/ageing",
+    "challenge": "challenge make out/blind --cases 10 --seed 1",
+    "effects": "effects contact-ageing --picture ageing.png",
+}
+
+EXIT_CODES = "Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted."
 INTERRUPTED = 130
 OPTIONS = {"effects": "add", "profiles": "profile"}  # those called otherwise than the argument
 
@@ -43,13 +62,15 @@ def make_app() -> App:
     """The command line's application; commands are imported when they are called."""
     app = App(
         name="stickslip",
-        help="Creep and stick-slip of a rough contact: simulate it, measure it, identify the missing effect.",
+        help="Creep and stick-slip of a rough contact: simulate it, measure it, identify the missing effect.\n\n"
+        + EXIT_CODES,
         version=__version__,
         help_format="markdown",
         suppress_keyboard_interrupt=False,
     )
     for number, (name, text) in enumerate(COMMANDS.items()):  # listed in the order of one's work
-        app.command(f"stickslip.cli.{name}:{name}", name=name, help=text, sort_key=number)
+        told = f"{text}\n\nExample: `stickslip {EXAMPLES[name]}`"
+        app.command(f"stickslip.cli.{name}:{name}", name=name, help=told, sort_key=number)
     return app
 
 
