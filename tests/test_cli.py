@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import stickslip
 from stickslip import cli
 from stickslip.cli import COMMANDS, run
 from stickslip.system.cache import heal
@@ -119,6 +120,12 @@ def test_help_has_an_example_that_is_understood(name, capsys):
     told = " ".join(capsys.readouterr().out.split())
     assert f"Example: stickslip {example}" in told and " ".join(COMMANDS[name].split()) in told
     assert cli.make_app().parse_args(example.split(), exit_on_error=False, print_error=False)
+
+
+@pytest.mark.parametrize("option", ["--version", "-V"])
+def test_the_version_is_told_with_the_programs_name(capsys, option):
+    assert run([option]) == 0
+    assert capsys.readouterr().out.split() == ["stickslip", stickslip.__version__]
 
 
 def test_help_says_the_exit_codes(capsys):
@@ -226,6 +233,7 @@ BAD = {
     "two scenarios": (["simulate", "rig.toml", "rig2.toml"], ["more than one"]),
     "unknown option": (["simulate", "rig.toml", "--ot", "x"], ["--ot"]),
     "unknown command": (["simulat"], ["did you mean 'simulate'"]),
+    "unknown option before a command": (["--verison"], ["no option '--verison'", "did you mean '--version'"]),
     "not a series": (["simulate", "rig.toml", "--sweep", "drive.velocity=1:2"], ["not a series"]),
     "series of nothing": (
         ["simulate", "rig.toml", "--sweep", "drive.velocty=1e-5:1e-4:3"],

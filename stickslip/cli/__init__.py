@@ -54,6 +54,7 @@ EXAMPLES = {
 }
 
 EXIT_CODES = "Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted."
+ABOUT = ("--help", "-h", "--version", "-V")
 INTERRUPTED = 130
 OPTIONS = {"effects": "add", "profiles": "profile"}  # those called otherwise than the argument
 
@@ -64,7 +65,9 @@ def make_app() -> App:
         name="stickslip",
         help="Creep and stick-slip of a rough contact: simulate it, measure it, identify the missing effect.\n\n"
         + EXIT_CODES,
-        version=__version__,
+        version=f"stickslip {__version__}",
+        version_flags=ABOUT[2:],
+        help_flags=ABOUT[:2],
         help_format="markdown",
         suppress_keyboard_interrupt=False,
     )
@@ -188,7 +191,9 @@ def _usage(error: CycloptsError) -> InputError:
     command = list(getattr(error, "command_chain", None) or [])
     hint = f"stickslip {' '.join([*command, '--help'])}"
     if not command and unused:
-        return InputError(f"there is no command '{unused[0]}'", hint=f"{nearest(unused[0], COMMANDS)} See {hint}")
+        option = unused[0].startswith("-")
+        what = f"there is no option '{unused[0]}' before a command" if option else f"there is no command '{unused[0]}'"
+        return InputError(what, hint=f"{nearest(unused[0], ABOUT if option else COMMANDS)}\n  see {hint}")
     if isinstance(error, MissingArgumentError) and not error.keyword and error.argument:
         name = error.argument.name
         name = name if error.argument.field_info.is_keyword_only else name.strip("-").upper()
