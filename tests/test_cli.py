@@ -128,6 +128,16 @@ def test_the_version_is_told_with_the_programs_name(capsys, option):
     assert capsys.readouterr().out.split() == ["stickslip", stickslip.__version__]
 
 
+def test_the_shell_completes_commands_and_options(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))  # a line is added to .bashrc there
+    script = tmp_path / "stickslip.bash"
+    assert run(["--install-completion", "--shell", "bash", "--output", str(script)]) == 0
+    ask = f'source {script}; COMP_WORDS=(stickslip "$@"); COMP_CWORD=$#; _stickslip; echo "${{COMPREPLY[@]}}"'
+    for words, completed in ((["diag"], "diagnose"), (["fit", "--ad"], "--add"), (["challenge", "sc"], "score")):
+        done = subprocess.run(["bash", "-c", ask, "bash", *words], capture_output=True, text=True, timeout=60)
+        assert done.stdout.split() == [completed], done.stderr
+
+
 def test_help_says_the_exit_codes(capsys):
     assert run(["--help"]) == 0
     told = " ".join(capsys.readouterr().out.split())

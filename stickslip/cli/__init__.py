@@ -74,6 +74,7 @@ def make_app() -> App:
     for number, (name, text) in enumerate(COMMANDS.items()):  # listed in the order of one's work
         told = f"{text}\n\nExample: `stickslip {EXAMPLES[name]}`"
         app.command(f"stickslip.cli.{name}:{name}", name=name, help=told, sort_key=number)
+    app.register_install_completion_command(help="Have the shell complete commands and options by the tab key.")
     return app
 
 
