@@ -340,3 +340,18 @@ def test_a_property_is_understood_by_itself() -> None:
     """As a notebook shows it, without the one that stands before it in the code."""
     found = {name: doc for name, doc in properties().items() if re.match(r"(The same|Of|What they|It)\b", doc)}
     assert found == {}
+
+
+@pytest.mark.parametrize("room", ["blind", "objects", "show", "inference/forecast"])
+def test_a_docstring_that_tells_of_arguments_tells_of_all(room: str) -> None:
+    missing = {}
+    for path in sorted((ROOT / "stickslip" / room).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                taken = {a.arg for a in (*node.args.args, *node.args.kwonlyargs)} - {"self", "cls"}
+                _, _, told = (ast.get_docstring(node) or "").partition("Args:\n")
+                heads = re.findall(r"(?:^ +|\. )([\w, ]+):", told.split("\n\n")[0], re.MULTILINE)
+                left = taken - set(", ".join(heads).split(", "))
+                if told and left:
+                    missing[f"{path.name}: {node.name}"] = sorted(left)
+    assert missing == {}

@@ -110,6 +110,7 @@ class FitPlots:
         Args:
             against: "age" (time in contact), "time", "place", "velocity", "spring force", "slip path" (from the
                 start of the run), "load point" or "event".
+            ax: axes to draw in; default a figure of its own.
         """
         if against not in AGAINST:
             raise InputError("no such variable", key="against", value=against, hint=nearest(against, list(AGAINST)))
