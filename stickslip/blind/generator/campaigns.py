@@ -86,11 +86,13 @@ def make_campaign(
         The truth, ready for JSON: rig, surface, sensor, effects with their inner parameters, events of every run.
 
     Raises:
-        InputError: unknown effect; a campaign is there already; a run shows fewer than three slips.
+        InputError: unknown effect or negative seed; a campaign is there already; a run shows fewer than three slips.
     """
     folder = Path(folder)
     if (folder / "campaign.toml").exists():
         raise InputError("a campaign is there already", file=folder / "campaign.toml", hint="choose another folder")
+    if seed < 0:
+        raise InputError("a seed is not negative", key="seed", value=seed, allowed="0 or more")
     rng = np.random.default_rng(seed)
     setup = draw_setup(rng) if setup is None else setup
     if spring_known is None:
