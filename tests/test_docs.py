@@ -355,3 +355,10 @@ def test_a_docstring_that_tells_of_arguments_tells_of_all(room: str) -> None:
                 if told and left:
                     missing[f"{path.name}: {node.name}"] = sorted(left)
     assert missing == {}
+
+
+def test_all_that_the_page_of_the_api_names_is_there() -> None:
+    named = re.findall(r"auto\w+:: ([\w.]+)", (DOCS / "api.md").read_text())
+    assert [name for name in named if not getattr(pydoc.locate(name), "__doc__", None)] == []
+    challenge = ("make.make_challenge", "run.run_challenge", "score.score_challenge", "generator.make_campaign")
+    assert {f"stickslip.blind.{name}" for name in challenge} <= set(named)

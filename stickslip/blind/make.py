@@ -50,7 +50,8 @@ def make_challenge(
         The digest of the seal.
 
     Raises:
-        RunFolderError: the folder exists. InputError: a number or the seed makes no sense, or numba is missing.
+        RunFolderError: the folder exists.
+        InputError: a number or the seed makes no sense, or numba is missing.
     """
     if jobs is not None and jobs < 1:
         raise ArgumentError("out of range", key="jobs", value=jobs, allowed="1 or more")

@@ -36,7 +36,8 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         workers: of the local cluster; default the number of cores.
 
     Raises:
-        ArgumentError: no scheduler answers there, or no number of workers. InputError: dask.distributed is missing.
+        ArgumentError: no scheduler answers there, or no number of workers.
+        InputError: dask.distributed is missing.
     """
     need("work on many campaigns", "distributed", "dask", "distributed")
     import dask
