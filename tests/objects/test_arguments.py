@@ -2,6 +2,7 @@
 
 import inspect
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -107,3 +108,15 @@ def test_an_argument_is_called_by_its_name_in_python_and_by_its_option_on_the_co
         campaign.fit("roll-off")
     assert run(["diagnose", str(SHIPPED), "--max-effects", "0"]) == 2
     assert "--max-effects: out of range" in capsys.readouterr().err
+
+
+def test_fits_to_be_compared_have_names(campaign):
+    with pytest.raises(InputError, match="fits: fits are compared by their names") as refused:
+        ss.compare([campaign])
+    assert "allowed: fits by name" in str(refused.value)
+
+
+def test_where_there_is_nothing_to_choose_from_no_list_is_offered():
+    with pytest.raises(InputError, match="not in the model") as refused:
+        ss.Fit.remove(SimpleNamespace(effects=()), "wear")
+    assert "to fix" not in str(refused.value)
