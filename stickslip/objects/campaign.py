@@ -262,7 +262,8 @@ class Campaign(Shown, Mapping[str, Trace]):
     def forecast(
         self, run: str | None = None, train: float = 0.5, at: float | None = None, progress: Tell | None = None
     ) -> Forecast:
-        """Forecast the slips of the later part of a run, each from what was measured before it, and score it.
+        """Forecast the slips of the later part of a run, each from what was measured before it, and score it:
+        ``campaign.forecast("v050", at=0.5)``.
 
         Args:
             run: its name; default the run with the most slips.

@@ -232,7 +232,7 @@ class Fit(Savable):
     # what can be changed
 
     def with_values(self, values: Mapping[str, float | str]) -> Fit:
-        """The model with parameters set by hand, nothing fitted.
+        """The model with parameters set by hand, nothing fitted: ``fit.with_values({"rig.damping": "7 N s/m"})``.
 
         Args:
             values: name -> value in SI, or text with a unit; those of :attr:`free`, and ``contact.strength``.
@@ -246,7 +246,7 @@ class Fit(Savable):
         return made
 
     def refit(self, locked: str | Sequence[str] = ()) -> Fit:
-        """Fitted anew from where it stands.
+        """Fitted anew from where it stands: ``fit.refit(locked="rig.damping")``.
 
         Args:
             locked: parameters that stay as they are.
@@ -347,6 +347,8 @@ class Fit(Savable):
 
     def profile(self, name: str, progress: Tell | None = None) -> dict[str, Any]:
         """Profile likelihood of a parameter: held at values around its best one, all others fitted.
+
+        ``fit.profile("weakening.drop")`` says how far the data know it where its cost is no parabola.
 
         Returns:
             ``name``, ``unit``, ``value`` (SI), ``rise`` (of the cost, in units of chi-square), ``interval`` (95 %; None

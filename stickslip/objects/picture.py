@@ -105,7 +105,7 @@ class FitPlots:
 
     @styled
     def residual(self, against: str = "age", *, ax: Axes | None = None) -> Figure:
-        """Residual force over its floor against a variable, by run, with running medians.
+        """Residual force over its floor against a variable, by run, with medians: ``fit.plot.residual("place")``.
 
         Args:
             against: "age" (time in contact), "time", "place", "velocity", "spring force", "slip path" (from the
