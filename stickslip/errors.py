@@ -92,11 +92,11 @@ class RunFolderError(InputError):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A hint that names the valid spelling closest to ``name``, those about as close, or lists all of them."""
+    """A hint that names the valid spelling closest to ``name``, those about as close, or lists all; empty for none."""
     known = sorted(known)
     close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     if not close:
-        return f"one of: {', '.join(known)}"
+        return f"one of: {', '.join(known)}" if known else ""
     best = difflib.SequenceMatcher(None, close[0], name).ratio()
     close = [c for c in close if difflib.SequenceMatcher(None, c, name).ratio() > best - _TIED]
     return f"did you mean {' or '.join(repr(c) for c in close)}?"

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import stickslip
 from stickslip import cli
 from stickslip.cli import COMMANDS, run
 from stickslip.system.cache import heal
@@ -93,6 +94,55 @@ def test_help_of_a_command_imports_no_jax(name):
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert found.returncode == 0, found.stderr
     assert COMMANDS[name].split(",")[0].split(":")[0][:20] in " ".join(found.stdout.split())
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_is_broken_into_lines_by_the_width_alone(name, monkeypatch, capsys):
+    """In a line as long as it takes, every option has one."""
+    monkeypatch.setenv("COLUMNS", "900")
+    assert run([name, "--help"]) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("│")]
+    assert rows and not [row for row in rows if row.startswith("│" + 8 * " ")]
+    assert not [row for row in rows if "[default: False]" in row], "a flag that is not given is off"
+
+
+def test_commands_are_listed_in_the_order_of_ones_work(capsys):
+    for arguments, order in (([], list(COMMANDS)), (["challenge"], ["make", "seal", "run", "score"])):
+        assert run([*arguments, "--help"]) == 0
+        first = [line[2:].split(" ")[0] for line in capsys.readouterr().out.splitlines() if line.startswith("│ ")]
+        assert [name for name in first if name in order] == order
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_has_an_example_that_is_understood(name, capsys):
+    example = cli.EXAMPLES[name]
+    assert run([name, "--help"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert f"Example: stickslip {example}" in told and " ".join(COMMANDS[name].split()) in told
+    assert cli.make_app().parse_args(example.split(), exit_on_error=False, print_error=False)
+
+
+@pytest.mark.parametrize("option", ["--version", "-V"])
+def test_the_version_is_told_with_the_programs_name(capsys, option):
+    assert run([option]) == 0
+    assert capsys.readouterr().out.split() == ["stickslip", stickslip.__version__]
+
+
+def test_the_shell_completes_commands_and_options(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))  # a line is added to .bashrc there
+    script = tmp_path / "stickslip.bash"
+    assert run(["--install-completion", "--shell", "bash", "--output", str(script)]) == 0
+    ask = f'source {script}; COMP_WORDS=(stickslip "$@"); COMP_CWORD=$#; _stickslip; echo "${{COMPREPLY[@]}}"'
+    for words, completed in ((["diag"], "diagnose"), (["fit", "--ad"], "--add"), (["challenge", "sc"], "score")):
+        done = subprocess.run(["bash", "-c", ask, "bash", *words], capture_output=True, text=True, timeout=60)
+        assert done.stdout.split() == [completed], done.stderr
+
+
+def test_help_says_the_exit_codes(capsys):
+    assert run(["--help"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted." in told
+    assert "Prints CSV" not in told, "the list has the first line of each"
 
 
 def test_importing_the_package_imports_nothing():
@@ -194,6 +244,7 @@ BAD = {
     "two scenarios": (["simulate", "rig.toml", "rig2.toml"], ["more than one"]),
     "unknown option": (["simulate", "rig.toml", "--ot", "x"], ["--ot"]),
     "unknown command": (["simulat"], ["did you mean 'simulate'"]),
+    "unknown option before a command": (["--verison"], ["no option '--verison'", "did you mean '--version'"]),
     "not a series": (["simulate", "rig.toml", "--sweep", "drive.velocity=1:2"], ["not a series"]),
     "series of nothing": (
         ["simulate", "rig.toml", "--sweep", "drive.velocty=1e-5:1e-4:3"],

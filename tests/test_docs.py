@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import ast
 import doctest
+import functools
 import importlib
 import importlib.util
+import inspect
 import json
+import pydoc
 import re
 import runpy
 import sys
@@ -324,3 +327,51 @@ def test_the_page_of_the_api_has_every_public_name() -> None:
     page = (DOCS / "api.md").read_text()
     named = set(re.findall(r"(?:auto\w+:: stickslip|`ss)\.(\w+)", page))
     assert set(stickslip.__all__) - {"__version__"} <= named
+
+
+def properties() -> dict[str, str]:
+    """Docstrings of the properties of the classes that the page of the API has."""
+    named = re.findall(r"autoclass:: ([\w.]+)", (DOCS / "api.md").read_text())
+    kinds = (property, functools.cached_property)
+    return {
+        f"{name}.{key}": inspect.getdoc(member) or ""
+        for name in named
+        for key, member in inspect.getmembers(pydoc.locate(name))
+        if isinstance(member, kinds) and not key.startswith("_")
+    }
+
+
+def test_a_property_is_told_in_a_sentence() -> None:
+    """What stands before a colon in its first line, the page of the API shows as its type."""
+    found = properties()
+    assert len(found) > 50
+    first = {name: re.sub(r":\w+:`.*?`|`+.*?`+", "", doc).splitlines()[0] for name, doc in found.items()}
+    assert {name: line for name, line in first.items() if ":" in line} == {}
+
+
+def test_a_property_is_understood_by_itself() -> None:
+    """As a notebook shows it, without the one that stands before it in the code."""
+    found = {name: doc for name, doc in properties().items() if re.match(r"(The same|Of|What they|It)\b", doc)}
+    assert found == {}
+
+
+@pytest.mark.parametrize("room", ["blind", "objects", "show", "inference/forecast"])
+def test_a_docstring_that_tells_of_arguments_tells_of_all(room: str) -> None:
+    missing = {}
+    for path in sorted((ROOT / "stickslip" / room).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                taken = {a.arg for a in (*node.args.args, *node.args.kwonlyargs)} - {"self", "cls"}
+                _, _, told = (ast.get_docstring(node) or "").partition("Args:\n")
+                heads = re.findall(r"(?:^ +|\. )([\w, ]+):", told.split("\n\n")[0], re.MULTILINE)
+                left = taken - set(", ".join(heads).split(", "))
+                if told and left:
+                    missing[f"{path.name}: {node.name}"] = sorted(left)
+    assert missing == {}
+
+
+def test_all_that_the_page_of_the_api_names_is_there() -> None:
+    named = re.findall(r"auto\w+:: ([\w.]+)", (DOCS / "api.md").read_text())
+    assert [name for name in named if not getattr(pydoc.locate(name), "__doc__", None)] == []
+    challenge = ("make.make_challenge", "run.run_challenge", "score.score_challenge", "generator.make_campaign")
+    assert {f"stickslip.blind.{name}" for name in challenge} <= set(named)

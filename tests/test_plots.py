@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from itertools import pairwise
 
 import matplotlib
@@ -93,6 +94,13 @@ def test_equal_figures_are_equal_files(run, table, tmp_path):
     first, second = (save(trace_figure(run), tmp_path / f"{i}.png").read_bytes() for i in range(2))
     assert first == second
     assert first.startswith(b"\x89PNG")
+
+
+def test_a_notebook_shows_a_picture_without_being_set_up_for_it(run):
+    made = trace_figure(run)
+    assert made._repr_png_().startswith(b"\x89PNG")
+    made.set_size_inches(2.0, 1.0)
+    assert struct.unpack(">II", made._repr_png_()[16:24]) == (200, 100)
 
 
 def test_settings_of_others_stay(run, tmp_path):

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import RunFolderError, StickslipError
+from ..errors import ArgumentError, RunFolderError, StickslipError
 from ..system.extras import need
 from ..system.lifeline import end_with
 from ..system.progress import Tell
@@ -51,8 +51,11 @@ def make_challenge(
         The digest of the seal.
 
     Raises:
-        RunFolderError: the folder exists. InputError: number or seed makes no sense, or numba is missing.
+        RunFolderError: the folder exists.
+        InputError: a number or the seed makes no sense, or numba is missing.
     """
+    if jobs is not None and jobs < 1:
+        raise ArgumentError("out of range", key="jobs", value=jobs, allowed="1 or more")
     folder = Path(folder)
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise RunFolderError(

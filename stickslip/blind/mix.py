@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import ArgumentError
 from .detection import amplitude, draw_multiple, visible_forms
 
 if TYPE_CHECKING:
@@ -111,15 +111,19 @@ def plan(cases: int, seed: int) -> list[Case]:
     other case that has a choice; each of the three circumstances in half of the cases, and of every kind as near to
     half as can be.
 
+    Args:
+        cases: how many.
+        seed: fixes them all; not negative.
+
     Raises:
-        InputError: fewer than one case, or a negative seed.
+        ArgumentError: fewer than one case, or a negative seed.
     """
     from .generator import CATALOGUED, EFFECTS, OUTSIDE
 
     if cases < 1:
-        raise InputError("a challenge needs cases", key="--cases", value=cases, allowed="1 or more")
+        raise ArgumentError("a challenge needs cases", key="cases", value=cases, allowed="1 or more")
     if seed < 0:
-        raise InputError("a seed is not negative", key="--seed", value=seed, allowed="0 or more")
+        raise ArgumentError("a seed is not negative", key="seed", value=seed, allowed="0 or more")
     rng = np.random.default_rng([seed, 0])
     known = tuple(tag for tag in CATALOGUED if not EFFECTS[tag].decoy and visible_forms(EFFECTS[tag]))
     decks = {"one": _deal(known, rng), "two": _deal(known, rng), "outside": _deal(OUTSIDE, rng)}

@@ -73,8 +73,8 @@ def run_challenge(
         How many cases are ``done``, ``failed`` and ``open``.
 
     Raises:
-        SealError: a campaign is not as sealed. InputError: other settings than before; a case that there is not; no
-            scheduler answers.
+        SealError: a campaign is not as sealed.
+        InputError: other settings than before; a case that there is not; no scheduler answers.
         RunFolderError: another run is at this challenge, or the disk is full or read-only.
         StickslipError: the cluster was lost.
     """

@@ -17,6 +17,7 @@ def score_challenge(folder: str | Path, *, expected: str | None = None) -> dict[
     """Score a challenge. A case that failed or was not run counts as answered wrongly.
 
     Args:
+        folder: of the challenge.
         expected: digest of the seal as it was published.
 
     Returns:

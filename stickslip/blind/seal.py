@@ -57,6 +57,7 @@ def check_seal(folder: Path, *, truth: bool = True, expected: str | None = None)
     """Compare every sealed file with its hash.
 
     Args:
+        folder: of the challenge.
         truth: whether to look at the truth as well; a run does not touch it.
         expected: the digest of the seal as it was published.
 

@@ -20,21 +20,41 @@ from .. import __version__
 from ..errors import ArgumentError, InputError, StickslipError, nearest
 from ..system import process
 
-# module and function in it -> what it does, in one line
+# module and function in it -> what it does, in one line; below it what its own help adds
 COMMANDS = {
-    "simulate": "Simulate a scenario, or the model of a run folder: trace, slip events, pictures.",
-    "creep": "The static creep curve of a scenario's contacts, without inertia.",
     "new": "Write a commented scenario or campaign file to start from.",
+    "simulate": "Simulate a scenario, or the model of a run folder: trace, slip events, pictures.",
+    "creep": "The static creep curve of a scenario's contacts, without inertia.\n\n"
+    "Prints CSV with the columns tau (share of full friction), u (m), t (s).",
     "inspect": "Traces of a campaign, their events, repairs, omissions, and what the data can tell.",
     "fit": "Fit the static or the dynamic model to a campaign, and say where it fails.",
     "diagnose": "Find the physical effect the model lacks, add it, and test it on runs left out of the fit.",
-    "open": "The workbench in the browser: compare, add an effect, watch the error fall.",
+    "open": "The workbench in the browser: compare, add an effect, watch the error fall.\n\n"
+    "The server runs on this machine until Ctrl-C. Only those who have the printed address, with its random token, "
+    "reach it. What was done is kept in a folder .stickslip-workbench beside the campaign's file, and comes back when "
+    "the same campaign is opened again.",
     "forecast": "Forecast the next slip from how strength wanders and load rises, and score it on unseen slips.",
     "compare": "Two runs side by side: models, errors by phase, parameters and their differences.",
     "challenge": "Test the diagnosis blindly on campaigns with a hidden effect: make, seal, run, score.",
     "effects": "List the catalogue of effects, explain one, or print a model's equations.",
 }
 
+EXAMPLES = {
+    "new": "new campaign steel/campaign.toml",
+    "simulate": "simulate scenarios/grzemba2014.toml --set drive.velocity=200um/s --out out/run",
+    "creep": "creep scenarios/grzemba2014.toml --set contact.H=0.5",
+    "inspect": "inspect campaign.toml --out out/inspected",
+    "fit": "fit campaign.toml --add contact-ageing --profile weakening.drop --out out/ageing",
+    "diagnose": "diagnose campaign.toml --holdout v400 --time-limit 600 --out out/mine",
+    "open": "open campaign.toml",
+    "forecast": "forecast campaign.toml --run v050 --at 0.5",
+    "compare": "compare out/base out/ageing",
+    "challenge": "challenge make out/blind --cases 10 --seed 1",
+    "effects": "effects contact-ageing --picture ageing.png",
+}
+
+EXIT_CODES = "Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted."
+ABOUT = ("--help", "-h", "--version", "-V")
 INTERRUPTED = 130
 OPTIONS = {"effects": "add", "profiles": "profile"}  # those called otherwise than the argument
 
@@ -43,13 +63,18 @@ def make_app() -> App:
     """The command line's application; commands are imported when they are called."""
     app = App(
         name="stickslip",
-        help="Creep and stick-slip of a rough contact: simulate it, measure it, identify the missing effect.",
-        version=__version__,
-        help_format="plaintext",
+        help="Creep and stick-slip of a rough contact: simulate it, measure it, identify the missing effect.\n\n"
+        + EXIT_CODES,
+        version=f"stickslip {__version__}",
+        version_flags=ABOUT[2:],
+        help_flags=ABOUT[:2],
+        help_format="markdown",
         suppress_keyboard_interrupt=False,
     )
-    for name, text in COMMANDS.items():
-        app.command(f"stickslip.cli.{name}:{name}", name=name, help=text)
+    for number, (name, text) in enumerate(COMMANDS.items()):  # listed in the order of one's work
+        told = f"{text}\n\nExample: `stickslip {EXAMPLES[name]}`"
+        app.command(f"stickslip.cli.{name}:{name}", name=name, help=told, sort_key=number)
+    app.register_install_completion_command(help="Have the shell complete commands and options by the tab key.")
     return app
 
 
@@ -167,7 +192,9 @@ def _usage(error: CycloptsError) -> InputError:
     command = list(getattr(error, "command_chain", None) or [])
     hint = f"stickslip {' '.join([*command, '--help'])}"
     if not command and unused:
-        return InputError(f"there is no command '{unused[0]}'", hint=f"{nearest(unused[0], COMMANDS)} See {hint}")
+        option = unused[0].startswith("-")
+        what = f"there is no option '{unused[0]}' before a command" if option else f"there is no command '{unused[0]}'"
+        return InputError(what, hint=f"{nearest(unused[0], ABOUT if option else COMMANDS)}\n  see {hint}")
     if isinstance(error, MissingArgumentError) and not error.keyword and error.argument:
         name = error.argument.name
         name = name if error.argument.field_info.is_keyword_only else name.strip("-").upper()

@@ -21,11 +21,11 @@ SCORE = ("score.json", "score.txt", "confusion.png", "confusion-by-amplitude.png
 challenge = App(
     name="challenge",
     help="Test the diagnosis blindly on campaigns with a hidden effect: make, seal, run, score.",
-    help_format="plaintext",
+    help_format="markdown",
 )
 
 
-@challenge.command
+@challenge.command(sort_key=0)
 def make(folder: Path, *, cases: int = 100, seed: int = 0, grouped: Flag = False, jobs: Jobs = None) -> int:
     """Make campaigns with hidden effects; the truth is sealed in a file apart.
 
@@ -49,7 +49,7 @@ def make(folder: Path, *, cases: int = 100, seed: int = 0, grouped: Flag = False
     return 0
 
 
-@challenge.command
+@challenge.command(sort_key=2)
 def run(
     folder: Path,
     *,
@@ -111,7 +111,7 @@ def _time(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
-@challenge.command
+@challenge.command(sort_key=1)
 def seal(folder: Path) -> int:
     """Print the seal again: the digest that fixes cases and truth once it is published.
 
@@ -127,7 +127,7 @@ def seal(folder: Path) -> int:
     return 0
 
 
-@challenge.command
+@challenge.command(sort_key=3)
 def score(folder: Path, *, seal: str | None = None, json: Flag = False, force: Flag = False) -> int:
     """Compare the answers with the truth; refuses a folder whose seal does not match.
 

@@ -25,8 +25,6 @@ def creep(
 ) -> int:
     """The static creep curve of a scenario's contacts, without inertia.
 
-    Prints CSV with the columns tau (share of full friction), u (m), t (s).
-
     Parameters
     ----------
     scenario:

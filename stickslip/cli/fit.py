@@ -55,7 +55,7 @@ def fit(
     profile:
         Profile likelihood of a parameter: --profile weakening.drop. May be given several times.
     holdout:
-        A run that is held out of all fits. --holdout v400.csv. May be given several times. Default: runs whose
+        A run that is held out of all fits: --holdout v400. May be given several times. Default: runs whose
         role in the campaign is "held-out", else none. Of the others each is predicted from a fit without it.
     align:
         Static: what is laid on the measured passage of v_lim, the model's passage or (paper) its end.

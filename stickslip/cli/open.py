@@ -17,10 +17,6 @@ def open(
 ) -> int:
     """Open the workbench in the browser: compare, see where the model fails, add an effect, watch the error fall.
 
-    The server runs on this machine until Ctrl-C. Only those who have the printed address, with its random token, reach
-    it. What was done is kept in a folder .stickslip-workbench beside the campaign's file, and comes back when the same
-    campaign is opened again.
-
     Parameters
     ----------
     campaign:

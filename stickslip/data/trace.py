@@ -189,7 +189,7 @@ class Drive(_Rebuilt):
 
     @property
     def speed(self) -> float:
-        """The speed at which the drive moves when it moves: the median over time of its moving pieces, m/s."""
+        """Median over time of the speeds at which the drive moves, its holds left out, m/s."""
         lengths, speeds = np.diff(self.times), np.abs(self.velocities)
         moving = speeds > 0.05 * speeds.max(initial=0.0)
         if not moving.any():
@@ -396,7 +396,7 @@ class Trace(Shown, _Rebuilt):
 
     @property
     def leading(self) -> str:
-        """Name of the signal that is measured best known to tell events: displacement, else velocity, else force."""
+        """Name of the measured signal that tells events best (displacement, else velocity, else force)."""
         return next(name for name in SIGNALS if getattr(self, name) is not None)
 
     @property

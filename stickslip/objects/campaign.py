@@ -74,7 +74,7 @@ class Campaign(Shown, Mapping[str, Trace]):
 
     @property
     def title(self) -> str:
-        """Of the campaign; the name of its file where it has none."""
+        """Title of the campaign; the name of its file where it has none."""
         return self.description.title or self.description.path.stem
 
     @property
@@ -84,7 +84,7 @@ class Campaign(Shown, Mapping[str, Trace]):
 
     @property
     def names(self) -> list[str]:
-        """Of the runs."""
+        """Names of the runs."""
         return [t.name for t in self.traces]
 
     def __len__(self) -> int:
@@ -262,7 +262,8 @@ class Campaign(Shown, Mapping[str, Trace]):
     def forecast(
         self, run: str | None = None, train: float = 0.5, at: float | None = None, progress: Tell | None = None
     ) -> Forecast:
-        """Forecast the slips of the later part of a run, each from what was measured before it, and score it.
+        """Forecast the slips of the later part of a run, each from what was measured before it, and score it:
+        ``campaign.forecast("v050", at=0.5)``.
 
         Args:
             run: its name; default the run with the most slips.

@@ -32,10 +32,14 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
         within two or three of it predict equally well.
 
     Raises:
-        InputError: no fit, fits of other runs, or a single event, which leaves nothing to predict it from.
+        InputError: no fit, fits without names, fits of other runs, or a single event, which leaves nothing to predict
+            it from.
     """
+    allowed = 'fits by name, {"base": campaign.fit(), ...}'
+    if not isinstance(fits, Mapping):
+        raise InputError("fits are compared by their names", key="fits", value=type(fits).__name__, allowed=allowed)
     if not fits:
-        raise InputError("there is nothing to compare", allowed='fits by name, {"base": campaign.fit(), ...}')
+        raise InputError("there is nothing to compare", allowed=allowed)
     first, *others = fits.values()
     problem = first.force_fit.problem
     for name, other in zip([*fits][1:], others, strict=True):

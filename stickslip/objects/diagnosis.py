@@ -96,12 +96,12 @@ class Diagnosis(Savable):
 
     @property
     def ladder(self) -> pandas.DataFrame:
-        """A row for each model: fitted and unseen error in floors, and by how much its effect lowered the cost."""
+        """A row for each model, with its fitted and unseen error in floors and what its effect took off the cost."""
         return self.best.ladder
 
     @cached_property
     def candidates(self) -> pandas.DataFrame:
-        """A row for each effect of the first round, the best first: gain, amplitude, what speaks against it.
+        """A row for each effect of the first round, the best first, with gain, amplitude and what speaks against it.
 
         ``visible`` is the smallest amplitude that the last model would have shown (five standard deviations, SI).
         """
@@ -124,7 +124,7 @@ class Diagnosis(Savable):
 
     @cached_property
     def arrays(self) -> xarray.Dataset:
-        """As in ``arrays.nc``."""
+        """Arrays behind the pictures, as in ``arrays.nc``."""
         return dataset(self.variables, self.campaign.title)
 
     def _finish(self, run: Run) -> None:

@@ -102,7 +102,7 @@ class Fit(Savable):
 
     @property
     def effect_forms(self) -> tuple[str, ...]:
-        """The same with the form of each law where it is not the usual one, as :meth:`add` takes them."""
+        """Tags of the added effects, with the form of a law that is not the usual one, as :meth:`add` takes them."""
         return tuple(with_form(e) for e in self.force_fit.problem.composition.effects)
 
     @property
@@ -117,12 +117,10 @@ class Fit(Savable):
 
     @cached_property
     def std(self) -> dict[str, float]:
-        """Name -> standard deviation (SI) of every free one."""
-        point = self.force_fit.point
-        first = len(self.free) + point.phases.size
-        weights = slice(first, first + point.weights.size)
-        whole = float(self.force_fit.covariance[weights, weights].sum())
-        return {STRENGTH: float(np.sqrt(max(whole, 0.0))), **self.force_fit.std()}
+        """Name -> standard deviation (SI) of the contact's strength and every free parameter that all runs share."""
+        found = self.covariance
+        deviations = np.sqrt(np.maximum(np.diag(found), 0.0))
+        return dict(zip(found.parameter.values.tolist(), deviations.tolist(), strict=True))
 
     @cached_property
     def parameters(self) -> pandas.DataFrame:
@@ -131,12 +129,15 @@ class Fit(Savable):
 
     @cached_property
     def covariance(self) -> xarray.DataArray:
-        """Covariance (SI) of the free parameters that all runs share, shape (a, a)."""
+        """Covariance (SI) of the contact's strength and the free parameters that all runs share, shape (a, a)."""
         return parameter_covariance(self)
 
     @property
     def correlations(self) -> pandas.DataFrame:
-        """Correlations of the free parameters that all runs share, the strongest pair first."""
+        """Correlations of the contact's strength and the free parameters that all runs share, the strongest pair first.
+
+        A row for each pair, ``of`` one ``and`` the other, with their ``correlation`` (-1 to 1).
+        """
         return correlation_table(self)
 
     # how far it is from the measurement
@@ -166,7 +167,7 @@ class Fit(Savable):
 
     @cached_property
     def unseen_errors(self) -> pandas.DataFrame:
-        """The same on runs that are left out of the fit, each in turn."""
+        """As :attr:`errors`, on runs that are left out of the fit, each in turn."""
         return self._errors(self._unseen, error)
 
     @cached_property
@@ -176,17 +177,17 @@ class Fit(Savable):
 
     @cached_property
     def unseen_error_deviations(self) -> pandas.DataFrame:
-        """The same of :attr:`unseen_errors`."""
+        """Standard deviations of :attr:`unseen_errors`, as :attr:`error_deviations` are."""
         return self._errors(self._unseen, deviation)
 
     @property
     def error(self) -> float:
-        """Of all points together."""
+        """Rms of the residual force of all runs over the floor of this fit (1), near 1 if the model is right."""
         return float(self.errors.loc["all", "all"])
 
     @property
     def unseen_error(self) -> float:
-        """Of all points on runs that were left out."""
+        """As :attr:`error`, on runs that are left out of the fit, each in turn; nan where there is a single event."""
         return float(self.unseen_errors.loc["all", "all"])
 
     @property
@@ -231,7 +232,7 @@ class Fit(Savable):
     # what can be changed
 
     def with_values(self, values: Mapping[str, float | str]) -> Fit:
-        """The model with parameters set by hand, nothing fitted.
+        """The model with parameters set by hand, nothing fitted: ``fit.with_values({"rig.damping": "7 N s/m"})``.
 
         Args:
             values: name -> value in SI, or text with a unit; those of :attr:`free`, and ``contact.strength``.
@@ -245,7 +246,7 @@ class Fit(Savable):
         return made
 
     def refit(self, locked: str | Sequence[str] = ()) -> Fit:
-        """Fitted anew from where it stands.
+        """Fitted anew from where it stands: ``fit.refit(locked="rig.damping")``.
 
         Args:
             locked: parameters that stay as they are.
@@ -347,6 +348,8 @@ class Fit(Savable):
     def profile(self, name: str, progress: Tell | None = None) -> dict[str, Any]:
         """Profile likelihood of a parameter: held at values around its best one, all others fitted.
 
+        ``fit.profile("weakening.drop")`` says how far the data know it where its cost is no parabola.
+
         Returns:
             ``name``, ``unit``, ``value`` (SI), ``rise`` (of the cost, in units of chi-square), ``interval`` (95 %; None
             for an open end) and ``text``.
@@ -402,7 +405,7 @@ class Fit(Savable):
 
     @cached_property
     def arrays(self) -> xarray.Dataset:
-        """As in ``arrays.nc``: measured and model force, the backbone, the runs thinned for pictures."""
+        """Measured and model force, the backbone and the runs thinned for pictures, as in ``arrays.nc``."""
         return dataset(self._sections[1], self.campaign.title)
 
     @property

@@ -10,6 +10,7 @@ from ..inference.diagnose.shape import shape_of
 from ..inference.force.backbone import Backbone, PowerLaw
 from ..inference.force.knots import PHASES
 from ..inference.force.residual import VARIABLES, WAYS
+from .fit_tables import STRENGTH
 
 if TYPE_CHECKING:
     import xarray
@@ -23,16 +24,19 @@ def parameter_covariance(fit: Fit) -> xarray.DataArray:
     """See :attr:`stickslip.Fit.covariance`."""
     import xarray
 
-    names, found = [f.name for f in fit.free], fit.force_fit
-    slope = np.array([f.slope(float(z)) for f, z in zip(fit.free, found.point.z, strict=True)])
-    part = found.covariance[: len(names), : len(names)] * slope[:, None] * slope
-    units = [f.unit for f in fit.free]
+    names, units = [STRENGTH, *(f.name for f in fit.free)], ["N", *(f.unit for f in fit.free)]
+    found, n = fit.force_fit, len(fit.free)
+    made = np.zeros((n + 1, found.covariance.shape[0]))  # SI values by what is fitted
+    first = n + found.point.phases.size
+    made[0, first : first + found.point.weights.size] = 1.0  # the strength is the sum of the bank's weights
+    made[range(1, n + 1), range(n)] = [f.slope(float(z)) for f, z in zip(fit.free, found.point.z, strict=True)]
+    part = made @ found.covariance @ made.T
     return xarray.DataArray(
         part,
         dims=("parameter", "other"),
         coords={"parameter": names, "other": names, "unit": ("parameter", units), "other_unit": ("other", units)},
         name="covariance",
-        attrs={"units": "unit * other_unit", "long_name": "covariance of free parameters"},
+        attrs={"units": "unit * other_unit", "long_name": "covariance of fitted parameters"},
     )
 
 

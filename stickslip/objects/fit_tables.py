@@ -48,7 +48,7 @@ def parameter_table(fit: Fit) -> pandas.DataFrame:
 
 def correlation_table(fit: Fit) -> pandas.DataFrame:
     """See :attr:`stickslip.Fit.correlations`."""
-    names, covariance = [f.name for f in fit.free], fit.covariance.values
+    names, covariance = fit.covariance.parameter.values.tolist(), fit.covariance.values
     std = np.sqrt(np.diag(covariance))
     found = covariance / np.maximum(np.outer(std, std), 1e-300)
     pairs = sorted(zip(*np.tril_indices(len(names), -1), strict=True), key=lambda pair: -abs(found[pair]))

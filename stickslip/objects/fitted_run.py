@@ -53,7 +53,7 @@ class FittedRun(Shown):
 
     @property
     def title(self) -> str:
-        """Of the campaign."""
+        """Title of the campaign that was fitted."""
         return str(self.result.get("title") or self.folder.name)
 
     @property

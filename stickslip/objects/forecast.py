@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from .wander import most_slips
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from ..inference.forecast.past import Past
@@ -53,7 +55,7 @@ class Forecast(Savable):
 
     @property
     def next(self) -> dict[str, float] | None:
-        """Time (s) from the end of the record to the slip that it does not hold: quantiles by their share."""
+        """Quantiles by their share of the time (s) from the end of the record to the slip that it does not hold."""
         found = self.result["next"]
         return None if found is None else dict(found)
 
@@ -64,7 +66,7 @@ class Forecast(Savable):
 
     @cached_property
     def wanders(self) -> pandas.DataFrame:
-        """A row for each law of the wandering level: its likelihood, its criterion and how it predicts later slips."""
+        """A row for each law of the wandering level, with its likelihood, its AIC and how it predicts later slips."""
         rows = {law["law"]: {k: law[k] for k in ("log_likelihood", "aic", "unseen")} for law in self.result["laws"]}
         return table(rows, "law")
 
@@ -101,7 +103,7 @@ class Forecast(Savable):
 
     @property
     def plot(self) -> ForecastPlots:
-        """Pictures: ``plot.levels()`` and ``plot.calibration()``."""
+        """Its pictures, ``plot.levels()`` and ``plot.calibration()``."""
         return ForecastPlots(self)
 
     def _parts(self) -> list[Any]:
@@ -111,22 +113,25 @@ class Forecast(Savable):
 
 
 class ForecastPlots:
-    """The pictures of a forecast."""
+    """The pictures of a forecast, each of which returns its matplotlib figure.
+
+    All of them take ``ax``: two axes to draw in, of a figure of one's own.
+    """
 
     def __init__(self, found: Forecast) -> None:
         self._data = found.arrays
 
-    def levels(self) -> Figure:
+    def levels(self, *, ax: Sequence[Axes] | None = None) -> Figure:
         """Levels at onset and arrest against time, and the level at onset against that at the arrest before."""
         from ..show.report.forecast_figures import levels_picture
 
-        return levels_picture(self._data)
+        return levels_picture(self._data, ax)
 
-    def calibration(self) -> Figure:
+    def calibration(self, *, ax: Sequence[Axes] | None = None) -> Figure:
         """Forecast intervals against what came, and the calibration of every method."""
         from ..show.report.forecast_figures import calibration_picture
 
-        return calibration_picture(self._data)
+        return calibration_picture(self._data, ax)
 
 
 def forecast(

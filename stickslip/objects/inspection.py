@@ -37,7 +37,7 @@ class Inspection(Savable):
 
     @property
     def cannot(self) -> list[str]:
-        """What they cannot."""
+        """What these data cannot tell, in sentences."""
         return list(self.result["cannot"])
 
     @property
@@ -47,7 +47,7 @@ class Inspection(Savable):
 
     @cached_property
     def events(self) -> pandas.DataFrame:
-        """A row for each slip (SI): onset, recurrence, slip, peak velocity, ringing and what else was measured."""
+        """A row for each slip (SI) with onset, recurrence, slip, peak velocity, ringing and what else was measured."""
         keys = ("t_onset", "recurrence", "hold_time", "slip", "peak_velocity", "rise_time", "overshoot",
                 "ring_frequency", "decay_time")  # fmt: skip
         rows: dict[Any, dict[str, Any]] = {}

@@ -105,11 +105,12 @@ class FitPlots:
 
     @styled
     def residual(self, against: str = "age", *, ax: Axes | None = None) -> Figure:
-        """Residual force over its floor against a variable, by run, with running medians.
+        """Residual force over its floor against a variable, by run, with medians: ``fit.plot.residual("place")``.
 
         Args:
             against: "age" (time in contact), "time", "place", "velocity", "spring force", "slip path" (from the
                 start of the run), "load point" or "event".
+            ax: axes to draw in; default a figure of its own.
         """
         if against not in AGAINST:
             raise InputError("no such variable", key="against", value=against, hint=nearest(against, list(AGAINST)))

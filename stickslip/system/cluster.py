@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..errors import ArgumentError
 from .extras import need
 from .threads import processors
 
@@ -36,7 +36,8 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
         workers: of the local cluster; default the number of processors that this process may use.
 
     Raises:
-        InputError: no scheduler answers there, or dask.distributed is missing.
+        ArgumentError: no scheduler answers there, or no number of workers.
+        InputError: dask.distributed is missing.
     """
     need("work on many campaigns", "distributed", "dask", "distributed")
     import dask
@@ -44,19 +45,19 @@ def cluster(scheduler: str | None = None, workers: int | None = None) -> Iterato
 
     if scheduler is not None:
         if workers is not None:
-            raise InputError("an existing cluster has its own workers", key="--workers", hint="leave --workers out")
+            raise ArgumentError("an existing cluster has its own workers", key="workers", hint="leave it out")
         try:
             client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
-            raise InputError(
-                "no scheduler answers there", key="--scheduler", value=scheduler, allowed="such as tcp://host:8786",
+            raise ArgumentError(
+                "no scheduler answers there", key="scheduler", value=scheduler, allowed="such as tcp://host:8786",
                 hint="start one with 'dask scheduler', and workers with 'dask worker ADDRESS --nthreads 1'",
             ) from error  # fmt: skip
         with _quiet(), client:
             yield client
         return
     if workers is not None and workers < 1:
-        raise InputError("a cluster needs workers", key="--workers", value=workers, allowed="1 or more")
+        raise ArgumentError("a cluster needs workers", key="workers", value=workers, allowed="1 or more")
     with (
         _quiet(),
         dask.config.set(_SETTINGS),

@@ -17,7 +17,7 @@ from stickslip.blind.mix import Case, counts, plan
 from stickslip.blind.seal import CASES, TRUTH, check_seal, digest
 from stickslip.blind.visibility import SEEN, Reference
 from stickslip.cli import run
-from stickslip.errors import InputError, RunFolderError, StickslipError
+from stickslip.errors import ArgumentError, InputError, RunFolderError, StickslipError
 
 
 def test_mix_of_kinds() -> None:
@@ -217,7 +217,10 @@ def test_a_rig_that_does_not_slip_is_drawn_again(tmp_path: Path, monkeypatch: py
 
 
 def test_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    for extra in (["--cases", "0"], ["--seed", "-1"]):
+    for extra in (["--cases", "0"], ["--seed", "-1"], ["--jobs", "0"]):
         assert run(["challenge", "make", str(tmp_path / "x"), *extra]) == 2
         assert extra[0] in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
+    for wrong in ({"cases": 0}, {"seed": -1}, {"jobs": 0}):  # in Python by the argument's name
+        with pytest.raises(ArgumentError, match=f"^{next(iter(wrong))}: "):
+            make_challenge(tmp_path / "x", **wrong)

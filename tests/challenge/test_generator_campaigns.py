@@ -161,6 +161,17 @@ def test_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
         make_campaign(tmp_path / "z", 4, [("direct-effect", 0.05)], runs=SHORT[:1])
 
 
+@pytest.mark.parametrize(
+    ("option", "said"), [("--effect=wear=much", "invalid effect value: 'wear=much'"), ("--seed=-1", "0 or more")]
+)
+def test_a_wrong_option_is_told_in_words(tmp_path: Path, capsys: pytest.CaptureFixture, option: str, said: str) -> None:
+    try:
+        code = main([str(tmp_path / "x"), option])
+    except SystemExit as end:
+        code = end.code  # type: ignore[assignment]
+    assert code == 2 and said in capsys.readouterr().err and not (tmp_path / "x").exists()
+
+
 def test_generator_shares_nothing_with_the_model() -> None:
     """Of the package it may import the errors and the units alone."""
     root = Path(generator.__file__).parent

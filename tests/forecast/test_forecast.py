@@ -2,9 +2,12 @@
 
 import json
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray
+from matplotlib.figure import Figure
 from scipy.integrate import quad
 from scipy.stats import norm, truncnorm
 
@@ -13,9 +16,10 @@ from stickslip.cli import run
 from stickslip.data.trace import Trace
 from stickslip.errors import InputError
 from stickslip.inference.forecast.past import Past
-from stickslip.inference.forecast.predict import MEMBERS, Forecaster, times, waiting
+from stickslip.inference.forecast.predict import MEMBERS, METHODS, Forecaster, times, waiting
 from stickslip.inference.forecast.rolling import choose, moments, prepare, roll
 from stickslip.inference.forecast.scoring import crps, quantiles, score, standard_error
+from stickslip.objects.forecast import QUANTILES, ForecastPlots
 from stickslip.system.runstore import read_result
 
 from .synthetic import LAW, SPEED, STIFFNESS, record
@@ -195,6 +199,27 @@ def test_moments_do_not_depend_on_how_long_a_stick_will_be():
     cut = int(first[10])
     other = Past.of(spoilt(trace, cut, 1), 0.5)
     np.testing.assert_array_equal(moments(other, 3.0, 0.5)[:10], first[:10])
+
+
+def test_pictures_are_drawn_in_axes_of_ones_own():
+    """Made-up forecasts of ten slips, in a figure with other things."""
+    n, units = np.arange(1.0, 11.0), {"units": "N"}
+    data = {
+        "onset": ("slip_number", 0.2 + 0.01 * np.sin(n), units), "arrest": ("slip_number", 0.1 + 0.0 * n, units),
+        "time_onset": ("slip_number", n), "time_arrest": ("slip_number", n + 0.1), "truth": ("forecast", n),
+        "quantile_times": (("forecast", "share"), np.outer(n, 1.0 + np.array(QUANTILES))),
+        "pit": (("forecaster", "forecast"), np.tile(n / 11.0, (len(METHODS), 1))),
+    }  # fmt: skip
+    arrays = xarray.Dataset(data, {"forecaster": list(METHODS)}, {"title": "saw", "split": 5.0})
+    plots, own = ForecastPlots(SimpleNamespace(arrays=arrays)), Figure()
+    axes = own.subplots(3, 2)
+    assert plots.levels(ax=axes[0]) is own and plots.calibration(ax=axes[1]) is own
+    assert [a.has_data() for a in axes.flat] == [True] * 4 + [False] * 2 and len(own.axes) == 6
+    assert [len(draw().axes) for draw in (plots.levels, plots.calibration)] == [2, 2]
+    with pytest.raises(InputError, match="allowed: 2"):
+        plots.levels(ax=own.axes[0])
+    with pytest.raises(InputError, match="a Figure is no axes"):
+        plots.levels(ax=own)
 
 
 def write(folder, trace: Trace) -> str:

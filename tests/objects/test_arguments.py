@@ -1,7 +1,10 @@
 """Arguments of the objects: a single name stands for itself, and what cannot be meant is refused before any work."""
 
+import ast
 import inspect
+import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,6 +12,7 @@ import stickslip as ss
 from stickslip.cli import run
 from stickslip.errors import ArgumentError, InputError
 from stickslip.objects.fitted_run import FittedRun
+from stickslip.objects.forecast import ForecastPlots
 from stickslip.objects.picture import FitPlots
 from stickslip.objects.posterior import sample
 from stickslip.system.progress import silent
@@ -107,3 +111,27 @@ def test_an_argument_is_called_by_its_name_in_python_and_by_its_option_on_the_co
         campaign.fit("roll-off")
     assert run(["diagnose", str(SHIPPED), "--max-effects", "0"]) == 2
     assert "--max-effects: out of range" in capsys.readouterr().err
+
+
+def test_fits_to_be_compared_have_names(campaign):
+    with pytest.raises(InputError, match="fits: fits are compared by their names") as refused:
+        ss.compare([campaign])
+    assert "allowed: fits by name" in str(refused.value)
+
+
+def test_where_there_is_nothing_to_choose_from_no_list_is_offered():
+    with pytest.raises(InputError, match="not in the model") as refused:
+        ss.Fit.remove(SimpleNamespace(effects=()), "wear")
+    assert "to fix" not in str(refused.value)
+
+
+def test_examples_in_docstrings_are_calls_that_are_taken():
+    """``fit.profile("weakening.drop")`` in that of the method itself."""
+    found = []
+    for cls in (ss.Campaign, ss.Fit, FitPlots, ForecastPlots):
+        for name, method in inspect.getmembers(cls, inspect.isfunction):
+            for code in re.findall(rf"``\w+(?:\.plot)?\.{name}(\(.+?\))``", inspect.getdoc(method) or ""):
+                call = ast.parse(f"f{code}", mode="eval").body
+                inspect.signature(method).bind(None, *call.args, **{k.arg: k.value for k in call.keywords})
+                found.append(name)
+    assert {"add", "with_values", "refit", "profile", "simulate", "forecast", "residual"} <= set(found)

@@ -142,6 +142,17 @@ def test_covariance_is_that_of_the_deviations(aged):
     assert np.linalg.eigvalsh(c.values / np.sqrt(np.outer(np.diag(c), np.diag(c)))).min() > -1e-9
 
 
+def test_the_strength_follows_a_locked_parameter_as_the_covariance_says(base):
+    """Where everything else is best for a given value, a normal distribution has its mean given that value."""
+    name, c = "weakening.slip_distance", base.covariance
+    assert c.parameter.values.tolist() == list(base.std) and c.sel(parameter="contact.strength").unit == "N"
+    held = base.with_values({name: base.values[name] + 0.3 * base.std[name]}).refit(name)
+    step = held.values[name] - base.values[name]
+    expected = step * float(c.sel(parameter="contact.strength", other=name)) / base.std[name] ** 2
+    assert abs(expected) > 0.2 * base.std["contact.strength"]
+    assert held.values["contact.strength"] - base.values["contact.strength"] == pytest.approx(expected, rel=0.1)
+
+
 def test_what_is_saved_is_what_is_shown(aged, tmp_path):
     folder = aged.save(tmp_path / "run")
     kept = read_result(folder)

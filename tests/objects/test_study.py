@@ -43,3 +43,5 @@ def test_campaigns_need_names_of_their_own():
         ss.study([SHIPPED, SHIPPED])
     with pytest.raises(InputError):
         ss.study([])
+    with pytest.raises(InputError, match=r"^workers: "):  # by the argument's name, which is no option here
+        ss.study(SHIPPED, workers=0)

@@ -19,7 +19,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m stickslip.blind.generator", description=main.__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument(
-        "--effect", action="append", default=[], metavar="TAG[=AMPLITUDE][:FORM]", help=f"one of: {', '.join(EFFECTS)}"
+        "--effect",
+        action="append",
+        type=effect,
+        default=[],
+        metavar="TAG[=AMPLITUDE][:FORM]",
+        help=f"one of: {', '.join(EFFECTS)}",
     )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--new-lines", action="store_true", help="new rough lines after every slip")
@@ -34,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
         truth = make_campaign(
             given.folder,
             given.seed,
-            [_parse(text) for text in given.effect],
+            given.effect,
             new_lines=given.new_lines,
             virgin=not given.not_virgin,
             spring_known=None if given.spring is None else given.spring == "known",
@@ -53,7 +58,8 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _parse(text: str) -> tuple[str, float | None] | tuple[str, float | None, str]:
+def effect(text: str) -> tuple[str, float | None] | tuple[str, float | None, str]:
+    """``TAG[=AMPLITUDE][:FORM]`` as :func:`make_campaign` takes it."""
     text, _, form = text.partition(":")
     tag, _, number = text.partition("=")
     amplitude = float(number) if number else None

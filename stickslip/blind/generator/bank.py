@@ -42,7 +42,10 @@ def make_bank(
     """Draw ``pool`` sets of rough lines and press each contact to its load.
 
     Args:
+        surface: statistics of the lines and elastic constants.
         loads: normal force of each contact, N.
+        seed: of the lines.
+        pool: how many sets, of which the next one comes after every slip on new lines.
         groups: elements per contact, or None for every spring.
         roughness_spread: factor on h_rms of each contact (unequal contacts).
     """

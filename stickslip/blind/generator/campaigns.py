@@ -52,22 +52,29 @@ def make_campaign(
         seed: fixes everything.
         effects: (tag, amplitude or None[, form]) each; see ``forms.hide``.
         new_lines: new rough lines after every slip, as a real track has.
+        runs: names, velocities and holds of the runs.
         virgin: whether runs start from a contact never loaded; else the record starts after two slips.
         spring_known: whether the file gives the spring's stiffness; None: in every other case.
+        dt: small step of the simulation, s.
+        rate: samples per second of the counts.
+        quiet: whether creep is simulated with long steps; see ``dynamics.simulate``.
         setup: the apparatus; None draws one.
         recorder: what happens to the counts of every run; see ``recorder.record``.
         grouped: join springs of about the same threshold into one element, as many as the setup says; else every
             spring that touches is one, which takes ten times as long.
+        title: in the campaign file.
 
     Returns:
         The truth, ready for JSON: rig, surface, sensor, effects with their inner parameters, events of every run.
 
     Raises:
-        InputError: unknown effect; a campaign is there already; a run shows fewer than three slips.
+        InputError: unknown effect or negative seed; a campaign is there already; a run shows fewer than three slips.
     """
     folder = Path(folder)
     if (folder / "campaign.toml").exists():
         raise InputError("a campaign is there already", file=folder / "campaign.toml", hint="choose another folder")
+    if seed < 0:
+        raise InputError("a seed is not negative", key="seed", value=seed, allowed="0 or more")
     rng = np.random.default_rng(seed)
     setup = draw_setup(rng) if setup is None else setup
     if spring_known is None:

@@ -127,9 +127,16 @@ def simulate(
     the small step throughout: the reference, whose events move by 2 us between dt = 2e-5 s and 2.5e-6 s.
 
     Args:
+        rig: block, spring and friction.
+        drive: of the load point.
         bank: the contact springs; row 0 at the start, the next row after every slip if ``new_lines``.
         effects: amplitudes and inner parameters, shape (slots.EFFECT_SIZE,); None or zeros for none.
+        duration: of the motion, s.
+        dt: small step, s.
         rate: samples per second of the result.
+        quiet: whether creep is followed with long steps, as told above.
+        new_lines: whether every slip brings the next row of ``bank``.
+        seed: of the relaxing branches.
         stop: (n, share): end after n slips and that share of the last interval, if that comes before ``duration``.
         relaxation: (time, log-normal spread) of the relaxing branches of the springs, s.
 

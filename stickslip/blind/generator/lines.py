@@ -151,6 +151,7 @@ def group(normal: Array, spring: float, groups: int) -> tuple[Array, Array]:
     Args:
         normal: ascending normal forces of one contact, N.
         spring: tangential stiffness of one spring, N/m.
+        groups: elements at most.
 
     Returns:
         Normal force and stiffness of each element, ascending in threshold.

@@ -33,6 +33,9 @@ def record(
         kind: one of ``RECORDERS``. A cleared counter is cleared by the user while the block sticks: after the first
             slip, and then after every other one at random. Samples are lost in two to six places of a run, of which
             half are as likely as the block moves fast there, the others anywhere.
+        read: counts of one run, shape (n,).
+        rate: samples per second.
+        rng: draws when and where.
         sticks: (arrest, next onset) of the record, s; a slip that the record does not see both ends of has none.
 
     Raises:

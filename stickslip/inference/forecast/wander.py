@@ -76,7 +76,7 @@ class Wander:
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """Of the components, each once."""
+        """Coordinates of the components, each once."""
         return tuple(dict.fromkeys(c.coordinate for c in self.components))
 
     def __str__(self) -> str:

@@ -16,7 +16,14 @@ if TYPE_CHECKING:
 
 @styled
 def creep_figure(tau: np.ndarray, u: np.ndarray, t: np.ndarray, title: str) -> Figure:
-    """Displacement (m) against load and against virtual time (s); all shape (n,)."""
+    """A static creep curve against load and against virtual time: ``creep_figure(*ss.static_creep(scenario), "rig")``.
+
+    Args:
+        tau: share of full friction (1), shape (n,).
+        u: displacement, m, shape (n,).
+        t: virtual time, s, shape (n,).
+        title: above both panels.
+    """
     made, axes = figure(1, 2, width=10.0, height=4.2)
     made.suptitle(plain(title), fontsize=11)
     k, unit = scaled(u, "m")

@@ -6,7 +6,7 @@ import functools
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec
 
 import numpy as np
 
@@ -68,29 +68,46 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
 
 def figure(rows: int = 1, columns: int = 1, *, width: float = 7.0, height: float = 4.2) -> tuple[Figure, np.ndarray]:
-    """A figure and its axes, shape (rows, columns); sizes in inches of the whole."""
+    """A figure and its axes, shape (rows, columns); sizes in inches of the whole. A notebook shows it."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=(width, height), layout="constrained")
+    made: Any = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(made)
+    made._repr_png_ = functools.partial(_png, made)  # also where pyplot was not set up for it
     return made, np.asarray(made.subplots(rows, columns, squeeze=False))
 
 
+def _png(figure: Figure, dpi: float | Literal["figure"] = "figure") -> bytes:
+    """A picture as PNG, without time stamp or version, so that equal results are equal files."""
+    from matplotlib import rc_context
+
+    buffer = io.BytesIO()
+    metadata: dict[str, Any] = {"Software": None}
+    with rc_context(_LOOK):
+        figure.savefig(buffer, format="png", dpi=dpi, metadata=metadata)
+    return buffer.getvalue()
+
+
 def panels(
-    given: Axes | Sequence[Axes] | None, rows: int = 1, *, width: float = 7.0, height: float = 4.2
+    given: Axes | Sequence[Axes] | None, rows: int = 1, columns: int = 1, *, width: float = 7.0, height: float = 4.2
 ) -> tuple[Figure, list[Axes]]:
-    """The axes to draw in, one above the other, and their figure: those given, else a :func:`figure` of that size.
+    """The axes to draw in, row by row, and their figure: those given, else a :func:`figure` of that size.
 
     Raises:
-        InputError: another number of axes is needed.
+        InputError: what is given are no axes, or another number of them is needed.
     """
     if given is None:
-        made, axes = figure(rows, width=width, height=height)
-        return made, list(axes[:, 0])
+        made, axes = figure(rows, columns, width=width, height=height)
+        return made, list(axes.flat)
+    from matplotlib.axes import Axes
+
     found = list(np.ravel(np.asarray(given, dtype=object)))
-    if len(found) != rows:
-        raise InputError("another number of axes", key="ax", value=len(found), allowed=str(rows))
+    for one in found:
+        if not isinstance(one, Axes):
+            raise InputError(f"a {type(one).__name__} is no axes", key="ax", hint="give those of figure.subplots()")
+    if len(found) != rows * columns:
+        raise InputError("another number of axes", key="ax", value=len(found), allowed=str(rows * columns))
     return found[0].figure, found
 
 
@@ -174,11 +191,4 @@ def remark(axes: Axes, text: str) -> None:
 
 def save(figure: Figure, path: str | Path, dpi: int = 130) -> Path:
     """Write a PNG without time stamp or version, so that equal results are equal files."""
-    from matplotlib import rc_context
-
-    path = Path(path)
-    buffer = io.BytesIO()
-    metadata: dict[str, Any] = {"Software": None}
-    with rc_context(_LOOK):
-        figure.savefig(buffer, format="png", dpi=dpi, metadata=metadata)
-    return write_aside(path, buffer.getvalue())
+    return write_aside(Path(path), _png(figure, dpi))

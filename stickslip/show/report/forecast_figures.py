@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, plain, scaled, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, panels, plain, scaled, styled
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
 
 @styled
-def levels_picture(data: xarray.Dataset) -> Figure:
+def levels_picture(data: xarray.Dataset, axes: Sequence[Axes] | None = None) -> Figure:
     """Levels at onset and arrest against time, and the level at onset against that of the slip before."""
-    made, axes = figure(1, 2, width=11.0, height=3.6)
-    ax, beside = axes[0, 0], axes[0, 1]
+    made, (ax, beside) = panels(axes, columns=2, width=11.0, height=3.6)
     k, unit = scaled(data.onset.values, data.onset.attrs["units"])
     t = data.time_onset.values
     ax.plot(t, data.onset.values * k, ".-", color=DARK, lw=0.8, ms=4, label="at onset")
@@ -33,10 +34,9 @@ def levels_picture(data: xarray.Dataset) -> Figure:
 
 
 @styled
-def calibration_picture(data: xarray.Dataset) -> Figure:
+def calibration_picture(data: xarray.Dataset, axes: Sequence[Axes] | None = None) -> Figure:
     """Forecast intervals against measured times, and the distribution of their forecast probabilities."""
-    made, axes = figure(1, 2, width=11.0, height=3.8)
-    ax, beside = axes[0, 0], axes[0, 1]
+    made, (ax, beside) = panels(axes, columns=2, width=11.0, height=3.8)
     order = np.argsort(data.truth.values, kind="stable")
     truth, q = data.truth.values[order], data.quantile_times.values[order]
     every = np.unique(np.linspace(0, truth.size - 1, min(truth.size, 150)).astype(int))

@@ -38,11 +38,13 @@ def static_result(
     """Creep processes fitted one by one, break-away ramps in normalised form; numbers and arrays for pictures.
 
     Args:
+        traces, segmentations: the runs and their events.
         rig_of: what is known of the rig in a run.
         align, form: of the fit (see `fit_static`).
         v_lim: speed at which a creep process ends, m/s.
         sampling: "log" or "uniform" (see `creep_processes`).
         springs: springs of a line for ramps.
+        progress: told how many creep processes are fitted, and of how many.
 
     Raises:
         InputError: nothing in the traces can be compared with the static model.

@@ -34,6 +34,9 @@ def hide(
     """Put an effect into ``setup`` (in place).
 
     Args:
+        setup: the apparatus, changed.
+        tag: of the effect.
+        rng: draws amplitude and form where they are not given, and inner parameters.
         amplitude: in the effect's SI unit; None draws one, log-uniform over the plausible range.
         form: name of one of its forms; None draws one.
 
