@@ -16,6 +16,7 @@ from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, plain, style
 
 from .along_the_motion import along_runs
 from .campaigns import keep, rms, shipped
+from .usual_rate_and_state import usual
 
 RECORDS = {"basalt": 20e6, "sepiolite": 30e6}  # N, that the campaign files scale the friction with
 LAW = "rate-and-state"
@@ -27,7 +28,9 @@ def rocks(data: Path, work: Path) -> dict[str, Any]:
     for name in RECORDS:
         campaign = shipped(f"rock-{name}", data, work / "rocks")
         steps[name] = campaign, campaign.fit([LAW])
-        made[name] = stepped(*steps[name])
+        (trace,) = campaign.traces
+        found = usual(trace.time, trace.drive.position(trace.time), trace.spring_force / RECORDS[name])
+        made[name] = {**stepped(*steps[name]), "usual": found}
     keep(picture({name: fit for name, (_, fit) in steps.items()}), "real-rocks")
     return {"steps": made, "dispersion": DISPERSION}
 
