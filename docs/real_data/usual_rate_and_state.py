@@ -153,9 +153,14 @@ def usual(t: np.ndarray, x: np.ndarray, mu: np.ndarray) -> dict[str, Any]:
     """Both laws of the state on one step: t in s, the load point's way x in m, friction mu."""
     step = Step.of(t, x, mu)
     starts = [(0.008, 0.009, 8e-6, 4e3), (0.013, -0.007, 7e-5, 2e3), (0.01, 0.005, 2e-5, 2e3)]
+    laws = {law: fitted(step, law, starts) for law in LAWS}
+    line = np.polynomial.Polynomial.fit(step.time, step.friction, 1)(step.time)
     return {
-        "v1": step.v1,
-        "v2": step.v2,
-        "points": step.time.size,
-        "laws": {law: fitted(step, law, starts) for law in LAWS},
-    }
+        "v1": step.v1, "v2": step.v2, "points": step.time.size, "laws": laws,
+        "line": float(np.std(step.friction - line)), "peak": float(np.ptp(step.model(_best(laws["slip"]), "slip"))),
+    }  # fmt: skip
+
+
+def _best(found: dict[str, Any]) -> np.ndarray:
+    """Parameters as the model takes them."""
+    return np.array([np.log(found["values"][n][0]) if n in ("L", "k") else found["values"][n][0] for n in NAMES])
