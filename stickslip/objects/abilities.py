@@ -9,13 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data.prescribed import prescribed
-from ..data.segment import LAWS, Segmentation, Shapes, event_shapes
+from ..data.resolution import noise_level
+from ..data.segment import LAWS, Segmentation, Shapes, crept, event_shapes
 from ..data.trace import Trace
 from ..inference.fit.creep_process import V_LIM, creep_processes
 from ..inference.fit.normalised import is_ramp
 from ..system.units import shown
 
 _RING_RATE = 5000.0  # Hz: a contact resonance of some 500 Hz needs ten samples a period
+COARSE = 1 / 50  # of the creep before a slip that a count is: 1/30 makes a drop that is 8 deviations off
+DITHERED = 0.5  # of a count, which the noise of a sample is: rounding then is noise as well
 _NEAR = 1.25  # drive velocities closer than this factor count as one
 
 
@@ -46,6 +49,7 @@ def abilities(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) ->
     shapes = [event_shapes(t, s) for t, s in slipping]
     verdicts = [judge(pairs, slipping) for judge in (_velocities, _events, _holds, _virgin, _signals, _slow_noise)]
     verdicts += [judge(slipping, shapes) for judge in (_slip, _overshoot, _ringing)]
+    verdicts.append(_counts(slipping))
     verdicts += [judge(pairs, slipping) for judge in (_creep, _ramps, _unseen)]
     for good, bad in verdicts:
         can += good
@@ -204,6 +208,28 @@ def _ringing(slipping: Pairs, shapes: list[Shapes]) -> Verdict:
     if quiet:
         bad.append(f"No ring-down: {_some(quiet)}.")
     return good, bad
+
+
+def _counts(slipping: Pairs) -> Verdict:
+    """Counts that a creep passes few of: where the block is between two of them no noise tells."""
+    coarse = []
+    for trace, segmentation in slipping:
+        count, creep = trace.resolution, _usual(crept(trace, segmentation))
+        if trace.displacement is None or not count or not creep < count / COARSE:
+            continue
+        if noise_level(trace.displacement, count) < DITHERED * count:
+            coarse.append(f"{trace.name} ({shown(count, 'm', 3)}, with {shown(creep, 'm', 3)} of creep)")
+    if not coarse:
+        return [], []
+    return [], [
+        f"Counts are coarse beside the creep before a slip in {_some(coarse)}: drop, healing time and damping are then "
+        "off by more than their deviations. A finer sensor, or noise of half a count on it, mends that."
+    ]
+
+
+def _usual(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else np.nan
 
 
 def _creep(pairs: Pairs, slipping: Pairs) -> Verdict:
