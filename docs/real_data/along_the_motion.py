@@ -48,6 +48,7 @@ def told(name: str, made: Diagnosis) -> dict[str, Any]:
         "title": made.campaign.title, "runs": len(fits[0].problem.runs), "events": int(fits[0].problem.events),
         "says": f"{verdict['kind']}: {verdict['text']}",
         "scatter": made.result["scatter"],
+        "parameters": {name: [v["value"], v["std"], v["unit"]] for name, v in made.result["parameters"].items()},
         "ladder": ladder(made),
         "where": [{k: v / level for k, v in where(rung.fit, rung.unseen).items()} for rung in (rungs[0], rungs[-1])],
     }  # fmt: skip
