@@ -28,6 +28,7 @@ _PUBLIC = {
     "Campaign": "objects.campaign",
     "compare": "objects.compare",
     "study": "objects.study",
+    "sweep": "objects.sweep",
     "Fit": "objects.fit",
     "Diagnosis": "objects.diagnosis",
     "workbench": "workbench",
@@ -72,6 +73,7 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .objects.fitted_run import load_run as load_run
     from .objects.stored import load_fit as load_fit
     from .objects.study import study as study
+    from .objects.sweep import sweep as sweep
     from .physics.contact import creep_curve as creep_curve
     from .physics.contact import power_law_bank as power_law_bank
     from .physics.contact import rough_bank as rough_bank

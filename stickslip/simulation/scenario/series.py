@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from .recording import Recording
 
-_KNOWN_UNITS = {
+KEY_UNITS = {
     "drive.velocity": "m/s",
     "block.mass": "kg",
     "block.spring_stiffness": "N/m",
@@ -30,6 +30,11 @@ _KNOWN_UNITS = {
     "weakening.healing_time": "s",
 }
 SUMMED = ("recurrence", "slip", "peak_velocity", "creep_before_slip")
+NUMBERS = {  # of a run -> unit
+    "events": "1",
+    "critical_velocity": "m/s",
+    **{f"{name}{end}": UNITS[name] for name in SUMMED for end in ("", "_std")},
+}
 
 
 def scenarios_of(scenario: Scenario, sweep: SweepTable) -> list[tuple[float, Scenario]]:
@@ -67,17 +72,22 @@ def summary(
     """
     import xarray
 
+    rows = [numbers(run) for run in runs]
     columns: dict[str, tuple] = {
-        "value": ("run", np.array(values[: len(runs)]), {"units": _KNOWN_UNITS.get(key, "1"), "long_name": key}),
-        "events": ("run", np.array([run.sizes["event"] for run in runs]), {"units": "1"}),
-        "critical_velocity": ("run", np.array([run.attrs["critical_velocity"] for run in runs]), {"units": "m/s"}),
+        "value": ("run", np.array(values[: len(runs)]), {"units": KEY_UNITS.get(key, "1"), "long_name": key}),
+        **{name: ("run", np.array([row[name] for row in rows]), {"units": unit}) for name, unit in NUMBERS.items()},
     }
-    for name in SUMMED:
-        later = [_later(run[name].values) for run in runs]
-        for end, number in (("", np.mean), ("_std", np.std)):
-            found = np.array([number(a) if a.size else np.nan for a in later])
-            columns[f"{name}{end}"] = ("run", found, {"units": UNITS[name]})
     return xarray.Dataset(columns, attrs={"key": key, "title": scenario.title})
+
+
+def numbers(run: xarray.Dataset | Recording) -> dict[str, float]:
+    """Number of events of a run, critical velocity (m/s), and ``SUMMED`` with their spreads, as of :func:`summary`."""
+    found: dict[str, float] = {"events": run.sizes["event"], "critical_velocity": run.attrs["critical_velocity"]}
+    for name in SUMMED:
+        later = _later(run[name].values)
+        for end, number in (("", np.mean), ("_std", np.std)):
+            found[f"{name}{end}"] = float(number(later)) if later.size else np.nan
+    return found
 
 
 def _later(values: np.ndarray) -> np.ndarray:
