@@ -307,9 +307,9 @@ def test_interrupting_a_run_leaves_nothing(scenario, capsys, monkeypatch):
 
 
 def test_interrupting_a_series_keeps_what_is_finished(scenario, capsys, monkeypatch):
-    from stickslip.simulation import scenario as simulation
+    from stickslip.objects import sweep
 
-    real, calls = simulation.simulate, []
+    real, calls = sweep.simulate, []
 
     def second_time(*args, **kwargs):
         calls.append(1)
@@ -317,7 +317,7 @@ def test_interrupting_a_series_keeps_what_is_finished(scenario, capsys, monkeypa
             raise KeyboardInterrupt
         return real(*args, **kwargs)
 
-    monkeypatch.setattr(simulation, "simulate", second_time)
+    monkeypatch.setattr(sweep, "simulate", second_time)
     assert run(["simulate", scenario, "--out", "out", "--sweep", "contact.p=2:4:3"]) == 130
     result = json.loads(Path("out/result.json").read_text())
     assert len(result["runs"]) == 1

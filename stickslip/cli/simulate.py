@@ -27,6 +27,7 @@ def simulate(
     set: Changes = (),
     sweep: str | None = None,
     json: Flag = False,
+    jobs: int = 1,
     trace: str | None = None,
     effect: OwnEffects = (),
     force: Force = False,
@@ -44,6 +45,8 @@ def simulate(
         Run a series: --sweep drive.velocity=20um/s:1mm/s:8 (start, stop, number), or values with commas.
     json:
         Print the result as JSON instead of a table.
+    jobs:
+        Processes that share the runs of a series.
     trace:
         Of a run folder: drive as this measured run was driven, with its holds.
     """
@@ -55,7 +58,7 @@ def simulate(
     loaded = _load(path, changes, trace, effect, sweep)
     series = loaded.file.sweep
     with open_run(out, force=force) if out is not None else nullcontext() as run:
-        work = _single(loaded, run) if series is None else _series(loaded, series, run)
+        work = _single(loaded, run) if series is None else _series(loaded, series, run, jobs)
         work["warnings"] = [*outside(loaded), *work["warnings"]]
         result = {**head(loaded), **work, "seconds": round(time.perf_counter() - began, 3)}
         if run is not None:
@@ -121,16 +124,16 @@ def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
     return numbers(recording)
 
 
-def _series(scenario: Scenario, sweep: SweepTable, run: Run | None) -> dict[str, Any]:
+def _series(scenario: Scenario, sweep: SweepTable, run: Run | None, jobs: int) -> dict[str, Any]:
+    from ..objects.sweep import one_by_one
     from ..show.simulated import series_numbers, write_series
-    from ..simulation.scenario import simulate as one
     from ..simulation.scenario.series import scenarios_of, summary
 
     members = scenarios_of(scenario, sweep)
     done: list[xarray.Dataset] = []
     try:
-        for value, member in members:
-            done.append(one(member))
+        for made, (value, _) in zip(one_by_one([member for _, member in members], jobs), members, strict=True):
+            done.append(made)
             if sys.stderr.isatty():
                 verdict = done[-1].attrs["verdict"]
                 print(f"{len(done)} of {len(members)}: {sweep.key} = {value:.4g}: {verdict}", file=sys.stderr)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -86,6 +87,7 @@ def sweep(
             raise KeyboardInterrupt(text if pieces is not None else "") from None
         data = _together(members, list(changes), [found[key] for key in chunks])
         if run is not None:
+            shutil.rmtree(run.folder / "pieces")
             run.arrays(data)
             run.json(
                 {"schema": 1, "kind": "sweep", "title": loaded.title, "runs": len(members), "versions": versions()}
@@ -111,22 +113,43 @@ def _made(
     if not chunks:
         return
     if workers == 1 and scheduler is None:
-        yield from ((key, _chunk(members, None)) for key, members in chunks.items())
+        yield from ((key, _chunk(members)) for key, members in chunks.items())
         return
-    with cluster(scheduler, workers) as client:
+    with cluster(scheduler, workers) as client, client.as_current():
         from distributed import as_completed
 
         parent = None if scheduler else os.getpid()
-        waiting = {client.submit(_chunk, members, parent, pure=False): key for key, members in chunks.items()}
+        waiting = {client.submit(in_worker, _chunk, c, parent, pure=False): key for key, c in chunks.items()}
         for done in as_completed(waiting):
             yield waiting[done], done.result()
 
 
-def _chunk(members: Sequence[Scenario], parent: int | None) -> dict[str, np.ndarray]:
-    """Some runs, one after the other: columns of numbers, and why a run failed."""
+def one_by_one(members: Sequence[Scenario], workers: int) -> Iterator[xarray.Dataset]:
+    """The whole data set of every run in their order, by processes of this machine (1: in this one).
+
+    Raises:
+        ArgumentError: no number of processes.
+    """
+    if workers < 1:
+        raise ArgumentError("out of range", key="jobs", value=workers, allowed="1 or more")
+    if workers == 1:
+        yield from map(simulate, members)
+        return
+    with cluster(None, workers) as client, client.as_current():
+        waiting = [client.submit(in_worker, simulate, member, os.getpid(), pure=False) for member in members]
+        yield from (done.result() for done in waiting)
+
+
+def in_worker(work: Callable[[Any], Any], given: Any, parent: int | None) -> Any:
+    """Do something in a process of a cluster, which ends with its ``parent`` if that is on this machine."""
     if parent is not None:
         end_with(parent)
-        process.begin()
+    process.begin()
+    return work(given)
+
+
+def _chunk(members: Sequence[Scenario]) -> dict[str, np.ndarray]:
+    """Some runs, one after the other: columns of numbers, and why a run failed."""
     rows, notes = [], []
     for member in members:
         try:

@@ -195,7 +195,9 @@ def _slopes(t: Array, x: Array, error: Array) -> Array:
             if abs(x[b - 1] - x[a]) >= KNOWN * np.hypot(error[a], error[b - 1]):
                 break
         if k > 1:
-            slope[i] = np.polynomial.Polynomial.fit(t[a:b], x[a:b], 1, w=1.0 / error[a:b]).deriv()(t[i])
+            weight = error[a:b] ** -2.0
+            since = t[a:b] - np.average(t[a:b], weights=weight)
+            slope[i] = (weight * since) @ x[a:b] / ((weight * since) @ since)
     return slope
 
 
