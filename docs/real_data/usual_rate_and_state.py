@@ -24,6 +24,7 @@ NEAR, TRANSIENT = (
     10e-6,
     50e-6,
 )  # m of the load point, over which misfits are correlated, and that count as the transient
+SLOPES: dict[str, Any] = {"jac": "3-point", "diff_step": 1e-4}  # above the error of the integration
 FINE = {"xatol": 0.02, "fatol": 0.02}
 NAMES = ("mu", "a", "b", "L", "k", "trend", "late")
 SCALE = (1e-3, 1e-3, 1e-3, 0.3, 0.3, 1e-6, 0.1)
@@ -120,7 +121,7 @@ def fitted(step: Step, law: str, starts: list[tuple[float, float, float, float]]
     ends = [
         least_squares(
             step.residual, [usual, a, b, np.log(length), np.log(k), 0.0, 0.0], x_scale=SCALE, bounds=bounds,
-            args=(law,), max_nfev=60,
+            args=(law,), max_nfev=60, **SLOPES,
         )
         for a, b, length, k in starts
     ]  # fmt: skip
@@ -134,7 +135,7 @@ def fitted(step: Step, law: str, starts: list[tuple[float, float, float, float]]
         def whitened(p: np.ndarray, half: np.ndarray = half) -> np.ndarray:
             return np.asarray(solve_triangular(half, step.residual(p, law), lower=True))
 
-        again = least_squares(whitened, best, x_scale=SCALE, bounds=bounds, max_nfev=60)
+        again = least_squares(whitened, best, x_scale=SCALE, bounds=bounds, max_nfev=60, **SLOPES)
         best = again.x
     left = step.residual(best, law)
     std = np.sqrt(np.diag(np.linalg.inv(again.jac.T @ again.jac)))
