@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import ArgumentError, InputError
 from ..system.runstore import Run, json_text, open_run, refuse_existing
 from . import show
 from .parameters import Changes, Flag, Force, MoreChanges, OwnEffects
@@ -57,6 +57,8 @@ def simulate(
     began = time.perf_counter()
     loaded = _load(path, changes, trace, effect, sweep)
     series = loaded.file.sweep
+    if series is None and jobs != 1:
+        raise ArgumentError("only the runs of a series are shared", key="jobs", value=jobs, hint="add --sweep")
     with open_run(out, force=force) if out is not None else nullcontext() as run:
         work = _single(loaded, run) if series is None else _series(loaded, series, run, jobs)
         work["warnings"] = [*outside(loaded), *work["warnings"]]

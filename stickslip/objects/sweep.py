@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import pickle
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ArgumentError, StickslipError
+from ..errors import ArgumentError, SolveError, StickslipError
+from ..physics.effects import catalogue
+from ..show.simulated import input_records
 from ..simulation.scenario import Scenario, load_scenario, simulate
 from ..simulation.scenario.series import KEY_UNITS, NUMBERS, numbers
 from ..system import process
@@ -19,13 +23,15 @@ from ..system.cluster import cluster
 from ..system.lifeline import end_with
 from ..system.progress import silent, telling
 from ..system.runstore import json_text, open_run, versions
+from ..system.threads import processors
 from .checkpoints import Pieces, code_digest
 from .run import Tell
 
 if TYPE_CHECKING:
     import xarray
+    from distributed import Client, Future
 
-CHUNK = 20  # runs, which a process does one after the other and which are kept together
+CHUNK = 20  # runs at most, which a process does one after the other and which are kept together
 Changes = tuple[tuple[str, Any], ...]
 
 
@@ -58,22 +64,29 @@ def sweep(
         :func:`simulate` gives, to the last bit.
 
     Raises:
-        InputError: a key or a value is not allowed (before anything runs), columns of different length, no scheduler.
+        InputError: a key or a value is not allowed (before anything runs), columns of different length, no
+            scheduler, or a run would not fit into memory.
         RunFolderError: the folder exists.
 
     Examples:
         ``ss.sweep("rig.toml", {"contact.H": [0.3, 0.5, 0.7], "drive.velocity": ["50 um/s"] * 3}, out="out/roughness")``
     """
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    if loaded.path is not None:  # workers may be elsewhere
+        loaded = replace(loaded, path=loaded.path.resolve())
     rows = _rows(changes)
     members = [loaded.with_changes(row) for row in rows]  # all checked before the first runs
-    chunks = {f"{first:06d}": members[first : first + CHUNK] for first in range(0, len(members), CHUNK)}
+    coordinates = _coordinates(members, list(changes))
+    at_once = workers or processors()
+    size = max(1, min(CHUNK, len(members) // (4 * at_once)))
+    chunks = {f"{first:06d}-{size}": members[first : first + size] for first in range(0, len(members), size)}
+    if scheduler is None:
+        workers = min(at_once, len(chunks)) if workers is None or workers > 0 else workers
     with (
         telling("sweeping", progress) as tell,
         open_run(out, force=force, resume=True) if out else nullcontext() as run,
     ):
-        given = {"scenario": loaded.content, "rows": rows, "versions": versions(), "code": code_digest()}
-        pieces = None if run is None else Pieces(run, json_text(given))
+        pieces = None if run is None else Pieces(run, json_text(_given(loaded, members, rows)))
         found = {key: kept for key in chunks if pieces is not None and (kept := pieces.load(key)) is not None}
         try:
             for key, made in _made({k: c for k, c in chunks.items() if k not in found}, scheduler, workers):
@@ -85,17 +98,20 @@ def sweep(
         except KeyboardInterrupt:
             text = f"{len(found)} of {len(chunks)} parts are kept, and the same call resumes from them"
             raise KeyboardInterrupt(text if pieces is not None else "") from None
-        data = _together(members, list(changes), [found[key] for key in chunks])
+        data = _together([found[key] for key in chunks], coordinates, loaded.title)
         if run is not None:
-            shutil.rmtree(run.folder / "pieces")
             run.arrays(data)
             run.json(
                 {"schema": 1, "kind": "sweep", "title": loaded.title, "runs": len(members), "versions": versions()}
             )
+            shutil.rmtree(run.folder / "pieces")
     return data
 
 
 def _rows(changes: Mapping[str, Sequence[Any]]) -> list[Changes]:
+    for key, values in changes.items():
+        if isinstance(values, str) or not hasattr(values, "__len__"):
+            raise ArgumentError("not a list of values", key="changes", value={key: values}, allowed="one for each run")
     columns = {key: list(values) for key, values in changes.items()}
     sizes = {len(values) for values in columns.values()}
     if len(sizes) != 1 or not sizes.pop():
@@ -104,6 +120,14 @@ def _rows(changes: Mapping[str, Sequence[Any]]) -> list[Changes]:
         raise ArgumentError("values do not make a table", key="changes", value=told, allowed=allowed)
     plain = [[v.item() if isinstance(v, np.generic) else v for v in values] for values in columns.values()]
     return [tuple(zip(columns, row, strict=True)) for row in zip(*plain, strict=True)]
+
+
+def _given(loaded: Scenario, members: Sequence[Scenario], rows: Sequence[Changes]) -> dict[str, Any]:
+    """What finished runs depend on: the scenario with its changes, the files that it names, versions and code."""
+    naming = {(m.file.drive.file, getattr(m.file.contact, "file", None)): m for m in members}
+    inputs = [input_records(m) for m in naming.values()]
+    code = code_digest([str(module.__file__) for module in catalogue.user_modules()])
+    return {"scenario": loaded.content, "rows": rows, "inputs": inputs, "versions": versions(), "code": code}
 
 
 def _made(
@@ -118,10 +142,10 @@ def _made(
     with cluster(scheduler, workers) as client, client.as_current():
         from distributed import as_completed
 
-        parent = None if scheduler else os.getpid()
-        waiting = {client.submit(in_worker, _chunk, c, parent, pure=False): key for key, c in chunks.items()}
+        submit = _submitting(client, None if scheduler else os.getpid())
+        waiting = {submit(_chunk, members): key for key, members in chunks.items()}
         for done in as_completed(waiting):
-            yield waiting[done], done.result()
+            yield waiting[done], _result(done)
 
 
 def one_by_one(members: Sequence[Scenario], workers: int) -> Iterator[xarray.Dataset]:
@@ -132,20 +156,47 @@ def one_by_one(members: Sequence[Scenario], workers: int) -> Iterator[xarray.Dat
     """
     if workers < 1:
         raise ArgumentError("out of range", key="jobs", value=workers, allowed="1 or more")
+    workers = min(workers, len(members))
     if workers == 1:
         yield from map(simulate, members)
         return
     with cluster(None, workers) as client, client.as_current():
-        waiting = [client.submit(in_worker, simulate, member, os.getpid(), pure=False) for member in members]
-        yield from (done.result() for done in waiting)
+        submit = _submitting(client, os.getpid())
+        waiting = [submit(simulate, member) for member in members]
+        while waiting:
+            yield _result(waiting.pop(0))
 
 
-def in_worker(work: Callable[[Any], Any], given: Any, parent: int | None) -> Any:
+def _submitting(client: Client, parent: int | None) -> Callable[[Callable[[Any], Any], Any], Future]:
+    """What sends work to a cluster, with scenarios that are read again where users' effects are known."""
+    files = tuple(str(module.__file__) for module in catalogue.user_modules())
+
+    def submit(work: Callable[[Any], Any], given: Any) -> Future:
+        return client.submit(_in_worker, work, pickle.dumps(given), files, parent, pure=False)
+
+    return submit
+
+
+def _in_worker(work: Callable[[Any], Any], given: bytes, files: Sequence[str], parent: int | None) -> Any:
     """Do something in a process of a cluster, which ends with its ``parent`` if that is on this machine."""
     if parent is not None:
         end_with(parent)
     process.begin()
-    return work(given)
+    for file in files:
+        if not any(str(module.__file__) == file for module in catalogue.user_modules()):
+            catalogue.load_file(file)
+    return work(pickle.loads(given))  # noqa: S301 - of the process that asked
+
+
+def _result(done: Future) -> Any:
+    from distributed import CancelledError
+    from distributed.scheduler import KilledWorker
+
+    try:
+        return done.result()
+    except (CancelledError, KilledWorker) as error:
+        what = "a worker process was ended from outside, or there was no memory for it"
+        raise StickslipError(f"{what}; the same call goes on, with fewer workers perhaps") from error
 
 
 def _chunk(members: Sequence[Scenario]) -> dict[str, np.ndarray]:
@@ -155,29 +206,39 @@ def _chunk(members: Sequence[Scenario]) -> dict[str, np.ndarray]:
         try:
             rows.append(numbers(simulate(member, silent)))
             notes.append("")
-        except StickslipError as error:
+        except SolveError as error:
             rows.append(dict.fromkeys(NUMBERS, np.nan))
             notes.append(str(error).split("\n")[0])
     return {"note": np.array(notes), **{name: np.array([row[name] for row in rows]) for name in NUMBERS}}
 
 
-def _together(members: Sequence[Scenario], keys: Sequence[str], parts: Sequence[Mapping[str, Any]]) -> xarray.Dataset:
+def _together(parts: Sequence[Mapping[str, Any]], coordinates: Mapping[str, Any], title: str) -> xarray.Dataset:
     import xarray
 
     columns = {name: np.concatenate([part[name] for part in parts]) for name in ("note", *NUMBERS)}
     known: dict[str, Any] = {name: ("run", columns[name], {"units": unit}) for name, unit in NUMBERS.items()}
-    changed = {
-        key: ("run", np.array([_value(m, key) for m in members]), {"units": KEY_UNITS[key]} if key in KEY_UNITS else {})
-        for key in keys
-    }
-    return xarray.Dataset(
-        {**known, "note": ("run", columns["note"])}, coords=changed, attrs={"title": members[0].title}
-    )
+    known["note"] = ("run", columns["note"])
+    return xarray.Dataset(known, coords=coordinates, attrs={"title": title})
+
+
+def _coordinates(members: Sequence[Scenario], keys: Sequence[str]) -> dict[str, Any]:
+    """The changed keys over the runs, as they stand in the checked scenarios."""
+    found = {}
+    for key in keys:
+        values = [_value(member, key) for member in members]
+        if not all(isinstance(v, str) for v in values) and not all(isinstance(v, int | float) for v in values):
+            allowed = "a number or a text in every run"
+            raise ArgumentError("values of a key are of different kinds", key="changes", value=key, allowed=allowed)
+        found[key] = ("run", np.array(values), {"units": KEY_UNITS[key]} if key in KEY_UNITS else {})
+    return found
 
 
 def _value(scenario: Scenario, key: str) -> Any:
-    """What a key stands at, in SI."""
+    """What a key stands at, in SI; entries of lists are counted from 1, effects also called by their tags."""
     value: Any = scenario.file
     for name in key.split("."):
-        value = value[int(name)] if isinstance(value, list | tuple) else getattr(value, name)
+        if isinstance(value, list | tuple):
+            value = value[int(name) - 1] if name.isdigit() else next(entry for entry in value if entry.type == name)
+        else:
+            value = getattr(value, name)
     return value
