@@ -19,7 +19,7 @@ from .campaigns import FOLDERS, keep, shipped
 PARTS = 3  # of the strokes, whose means are drawn
 FIXTURE = "uneven-compliance"
 RESTING = 5e-7  # m, within which the stage rests at a turn
-LEVELS = np.linspace(-0.8, 0.8, 9)  # of the friction force, towards the new direction
+LEVELS = np.linspace(-0.8, 0.6, 8)  # of the friction force, towards the new direction
 
 
 def reciprocating_loops(data: Path, work: Path) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import xarray
 import stickslip as ss
 from stickslip.errors import InputError, RunFolderError
 from stickslip.objects import sweep as module
+from stickslip.physics.effects import catalogue
 from stickslip.simulation.conformance import load_effects
 from stickslip.simulation.scenario.series import numbers
 from tests.scenario.conftest import rig
@@ -104,8 +105,9 @@ def test_processes_have_the_same_numbers(scenario, monkeypatch):
 
 
 @pytest.mark.slow
-def test_an_effect_of_ones_own_is_known_to_the_processes(tmp_path):
+def test_an_effect_of_ones_own_is_known_to_the_processes(tmp_path, monkeypatch):
     """Keys of effects and of pieces of a drive are read where they were set."""
+    monkeypatch.setattr(catalogue, "_user", {})
     (tmp_path / "own.py").write_text(OWN)
     load_effects([tmp_path / "own.py"])
     made = ss.make_scenario(rig(effect=[{"type": "sweep-own", "size": 0.0}]))
