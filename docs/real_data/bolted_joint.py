@@ -24,7 +24,7 @@ def bolted_joint(data: Path, work: Path) -> dict[str, Any]:
     made = shipped("bolted-joint", data, work).diagnose()
     assert made.found is not None
     fits = [rung.fit for rung in made.found.ladder if rung.fit is not None]
-    level, seen = strength(fits[0]), swings(fits)
+    level, seen = strength(fits[0]), first_and_last(swings(fits))
     forced = sweeps(data / FOLDERS["bolted-joint"])
     keep(amplitudes(seen, forced), "real-bolted-joint")
     return {
@@ -93,6 +93,12 @@ def sweeps(records: Path) -> dict[str, list[float]]:
         out["frequency"].append(resonance)
         out["damping"].append(float(1.0 / np.polyfit(along, 1.0 / np.tan(lag[near]), 1)[0]))
     return out
+
+
+def first_and_last(seen: dict[str, Any]) -> dict[str, Any]:
+    """Swings as measured, of the base, and of the last model."""
+    first = {name: seen[name] for name in ("amplitude", "measured", "base")}
+    return first if list(seen)[-1] == "base" else {**first, "last model": list(seen.values())[-1]}
 
 
 @styled
