@@ -50,18 +50,24 @@ def same(found: xarray.Dataset, scenario: Any) -> None:
     assert found["slip"].attrs["units"] == found["creep_before_slip_std"].attrs["units"] == "m"
 
 
-@pytest.mark.slow
-def test_what_is_finished_is_kept_and_gone_on_with(scenario, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "CHUNK", 2)
+def interrupted(monkeypatch: pytest.MonkeyPatch, at: int) -> list[int]:
+    """Have one of the runs interrupted; what is counted are all that were begun."""
     real, calls = module.simulate, []
 
-    def third(*args, **kwargs):
+    def simulate(*args, **kwargs):
         calls.append(1)
-        if len(calls) == 4:
+        if len(calls) == at:
             raise KeyboardInterrupt
         return real(*args, **kwargs)
 
-    monkeypatch.setattr(module, "simulate", third)
+    monkeypatch.setattr(module, "simulate", simulate)
+    return calls
+
+
+@pytest.mark.slow
+def test_what_is_finished_is_kept_and_gone_on_with(scenario, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "CHUNK", 2)
+    calls = interrupted(monkeypatch, 4)
     with pytest.raises(KeyboardInterrupt, match="3 of 5 parts are kept"):
         ss.sweep(scenario, TABLE, out=tmp_path / "out", workers=1)
     assert not (tmp_path / "out").exists()
@@ -77,15 +83,7 @@ def test_what_is_finished_is_kept_and_gone_on_with(scenario, tmp_path, monkeypat
 @pytest.mark.slow
 def test_other_changes_are_not_gone_on_with(scenario, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "CHUNK", 1)
-    real, calls = module.simulate, []
-
-    def second(*args, **kwargs):
-        calls.append(1)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return real(*args, **kwargs)
-
-    monkeypatch.setattr(module, "simulate", second)
+    calls = interrupted(monkeypatch, 2)
     with pytest.raises(KeyboardInterrupt):
         ss.sweep(scenario, {"drive.velocity": [1e-4, 2e-4]}, out=tmp_path / "out", workers=1)
     found = ss.sweep(scenario, {"drive.velocity": ["100 um/s", 3e-4]}, out=tmp_path / "out", workers=1)
