@@ -66,7 +66,6 @@ def interrupted(monkeypatch: pytest.MonkeyPatch, at: int) -> list[int]:
 
 @pytest.mark.slow
 def test_what_is_finished_is_kept_and_gone_on_with(scenario, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "CHUNK", 2)
     calls = interrupted(monkeypatch, 4)
     with pytest.raises(KeyboardInterrupt, match="3 of 5 parts are kept"):
         ss.sweep(scenario, TABLE, out=tmp_path / "out", workers=1)
@@ -82,7 +81,6 @@ def test_what_is_finished_is_kept_and_gone_on_with(scenario, tmp_path, monkeypat
 
 @pytest.mark.slow
 def test_other_changes_are_not_gone_on_with(scenario, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "CHUNK", 1)
     calls = interrupted(monkeypatch, 2)
     with pytest.raises(KeyboardInterrupt):
         ss.sweep(scenario, {"drive.velocity": [1e-4, 2e-4]}, out=tmp_path / "out", workers=1)
@@ -92,8 +90,7 @@ def test_other_changes_are_not_gone_on_with(scenario, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_processes_have_the_same_numbers(scenario, monkeypatch):
-    monkeypatch.setattr(module, "CHUNK", 1)
+def test_processes_have_the_same_numbers(scenario):
     told: list[float] = []
     same(ss.sweep(scenario, TABLE, workers=2, progress=lambda _, share: told.append(share)), scenario)
     assert told[-1] == 1.0 and len(told) >= len(VELOCITIES)
