@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
@@ -17,6 +16,7 @@ from ..errors import ArgumentError, SolveError, StickslipError
 from ..physics.effects import catalogue
 from ..show.simulated import input_records
 from ..simulation.scenario import Scenario, load_scenario, simulate
+from ..simulation.scenario.load import Parts, from_parts
 from ..simulation.scenario.series import KEY_UNITS, NUMBERS, numbers
 from ..system import process
 from ..system.cluster import cluster
@@ -137,13 +137,13 @@ def _made(
     if not chunks:
         return
     if workers == 1 and scheduler is None:
-        yield from ((key, _chunk(members)) for key, members in chunks.items())
+        yield from ((key, _chunk(*members)) for key, members in chunks.items())
         return
     with cluster(scheduler, workers) as client, client.as_current():
         from distributed import as_completed
 
         submit = _submitting(client, None if scheduler else os.getpid())
-        waiting = {submit(_chunk, members): key for key, members in chunks.items()}
+        waiting = {submit(_chunk, *members): key for key, members in chunks.items()}
         for done in as_completed(waiting):
             yield waiting[done], _result(done)
 
@@ -167,17 +167,17 @@ def one_by_one(members: Sequence[Scenario], workers: int) -> Iterator[xarray.Dat
             yield _result(waiting.pop(0))
 
 
-def _submitting(client: Client, parent: int | None) -> Callable[[Callable[[Any], Any], Any], Future]:
-    """What sends work to a cluster, with scenarios that are read again where users' effects are known."""
+def _submitting(client: Client, parent: int | None) -> Callable[..., Future]:
+    """What sends work to a cluster, with scenarios as plain tables, which are read where users' effects are known."""
     files = tuple(str(module.__file__) for module in catalogue.user_modules())
 
-    def submit(work: Callable[[Any], Any], given: Any) -> Future:
-        return client.submit(_in_worker, work, pickle.dumps(given), files, parent, pure=False)
+    def submit(work: Callable[..., Any], *members: Scenario) -> Future:
+        return client.submit(_in_worker, work, [m.parts for m in members], files, parent, pure=False)
 
     return submit
 
 
-def _in_worker(work: Callable[[Any], Any], given: bytes, files: Sequence[str], parent: int | None) -> Any:
+def _in_worker(work: Callable[..., Any], members: Sequence[Parts], files: Sequence[str], parent: int | None) -> Any:
     """Do something in a process of a cluster, which ends with its ``parent`` if that is on this machine."""
     if parent is not None:
         end_with(parent)
@@ -185,7 +185,7 @@ def _in_worker(work: Callable[[Any], Any], given: bytes, files: Sequence[str], p
     for file in files:
         if not any(str(module.__file__) == file for module in catalogue.user_modules()):
             catalogue.load_file(file)
-    return work(pickle.loads(given))  # noqa: S301 - of the process that asked
+    return work(*(from_parts(*parts) for parts in members))
 
 
 def _result(done: Future) -> Any:
@@ -199,7 +199,7 @@ def _result(done: Future) -> Any:
         raise StickslipError(f"{what}; the same call goes on, with fewer workers perhaps") from error
 
 
-def _chunk(members: Sequence[Scenario]) -> dict[str, np.ndarray]:
+def _chunk(*members: Scenario) -> dict[str, np.ndarray]:
     """Some runs, one after the other: columns of numbers, and why a run failed."""
     rows, notes = [], []
     for member in members:

@@ -16,6 +16,8 @@ from ...system.shown import Shown, facts
 from .overrides import parse_assignment, with_overrides
 from .schema import ScenarioFile, file_model
 
+Parts = tuple[dict[str, Any], Path | None, str, Sequence[tuple[str, Any]]]
+
 
 @dataclass(frozen=True, repr=False)
 class Scenario(Shown):
@@ -53,9 +55,14 @@ class Scenario(Shown):
         """A copy with keys such as ``("contact.H", 0.5)`` set; checked as a file is."""
         return _checked(dict(self.content), self.path, self.sha256, (*self.changes, *changes), changes, "")
 
+    @property
+    def parts(self) -> Parts:
+        """What :func:`from_parts` makes it from again, in another process."""
+        return dict(self.content), self.path, self.sha256, self.changes
+
     def __reduce__(self) -> tuple[Any, ...]:
         # the class of its file is made for the kind of contact, so it is read again
-        return _checked, (dict(self.content), self.path, self.sha256, self.changes, (), "")
+        return from_parts, self.parts
 
     def _parts(self) -> list[str]:
         tables = [
@@ -93,6 +100,11 @@ def make_scenario(content: Mapping[str, Any], folder: str | Path | None = None) 
     """
     path = None if folder is None else Path(folder) / "scenario.toml"
     return _checked(dict(content), path, "", (), (), "")
+
+
+def from_parts(content: dict[str, Any], path: Path | None, sha256: str, changes: Sequence[tuple[str, Any]]) -> Scenario:
+    """The scenario that has these :attr:`Scenario.parts`, checked again; effects it names must be in the catalogue."""
+    return _checked(content, path, sha256, changes, (), "")
 
 
 def _checked(
