@@ -23,6 +23,7 @@ from typing import Any
 
 from real_data.along_the_motion import diagnosed, drill_string
 from real_data.bolted_joint import bolted_joint
+from real_data.forecasts import forecasts
 from real_data.friction_damper import friction_damper
 from real_data.loops import reciprocating_loops
 from real_data.paper_slider import paper
@@ -40,6 +41,7 @@ PARTS: dict[str, Callable[[Path, Path], dict[str, Any]]] = {
     "paper": paper,
     "paper-slider-speeds": partial(diagnosed, "paper-slider-speeds"),
     "paper-wandering": paper_wandering,
+    "forecasts": forecasts,
     "fault": fault,
     "classroom": classroom,
     "bolted-joint": bolted_joint,

@@ -239,7 +239,7 @@ def test_pages_that_draw_a_picture_show_it() -> None:
 
 
 def test_every_picture_has_a_script() -> None:
-    own = [ROOT / "tests" / f"{name}.py" for name in ("forecast/real", "forecast/simulated", "force/ranks")]
+    own = [ROOT / "tests" / f"{name}.py" for name in ("forecast/simulated", "force/ranks")]
     files = [*DOCS.glob("*.py"), *DOCS.glob("*/*.py"), *own]
     scripts = "\n".join(path.read_text(encoding="utf-8") for path in files)
     pictures = [p for folder in ("images", "paper", "figures", "verification") for p in (DOCS / folder).glob("*.png")]

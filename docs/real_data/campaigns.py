@@ -19,6 +19,8 @@ from stickslip.show.plots import save
 
 DOCS = Path(__file__).resolve().parents[1]
 FOLDERS = {
+    "paper-slider": "paper-slider-ens",
+    "laboratory-fault": "psu-stickslip-p5198",
     "paper-slider-speeds": "paper-slider-ens",
     "reciprocating-loops": "reciprocating-loops-200Hz",
     "reciprocating-loops-whole": "reciprocating-loops-200Hz",

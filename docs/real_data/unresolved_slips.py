@@ -10,21 +10,12 @@ import numpy as np
 
 from stickslip.show.report.figures import trace_picture
 
-from .campaigns import campaign, keep, program, result, shipped
-
-FAULT = """[[trace]]
-name = "p5198"
-file = "{data}/psu-stickslip-p5198/newDF_TimeToFailure_from_6600_to_6900_WITHOUT_subwindows.csv"
-outside = true
-time = {{ column = "Time", unit = "s" }}
-drive_position = {{ column = "LPDisp", unit = "um" }}
-spring_force = {{ column = "ShearStress", unit = "1 MPa * 25 cm^2" }}
-"""
+from .campaigns import keep, program, result, shipped
 
 
 def fault(data: Path, work: Path) -> dict[str, Any]:
     """The laboratory fault."""
-    path = campaign(work, "fault", "Laboratory fault p5198", FAULT.format(data=data))
+    path = str(shipped("laboratory-fault", data, work / "record").description.path)
     seen, arrays = result(path, work / "fault", "inspect")
     trace = seen["traces"][0]
     keep(trace_picture(arrays, 0, trace), "real-fault", 90)
@@ -33,7 +24,7 @@ def fault(data: Path, work: Path) -> dict[str, Any]:
     durations, slips = [e["duration"] for e in events], [e["slip"] for e in events]
     tied = float(np.corrcoef(durations, slips)[0, 1])
     refused = [program("fit", path, "--model", model)[1].splitlines()[0] for model in ("static", "inertial")]
-    refused = [text.replace(str(work), "").replace("stickslip: ", "").lstrip("/") for text in refused]
+    refused = [text.replace(str(Path(path).parent), "").replace("stickslip: ", "").lstrip("/") for text in refused]
     return {
         "slips": len(events),
         "recurrence_s": mean(recurrence),

@@ -1,6 +1,7 @@
 """Forecasts of the next slip: scored rightly, calibrated on a known law, and blind to what comes later."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -125,6 +126,25 @@ def test_the_rise_of_late_tells_of_the_onset(known):
     without = roll(past, LAW, 0.5, rise=False).score()["wandering strength"]
     assert with_it["crps"] < 0.7 * without["crps"]
     assert without["coverage_90"] == pytest.approx(0.9, abs=0.03)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [0.0, 0.5])
+def test_nothing_of_a_slip_is_counted_as_creep_before_it(width):
+    """No forecast is scored once the force has passed its top, sharp or smoothed over half a second."""
+    trace = record(600, 3, rate=50.0)
+    assert trace.spring_force is not None
+    n = int(0.5 * width * 50.0)
+    force = np.convolve(np.pad(trace.spring_force, n, "edge"), np.full(2 * n + 1, 1.0 / (2 * n + 1)), "valid")
+    past, _ = prepare(replace(trace, spring_force=force), 0.4)
+    rolled = roll(past, LAW)
+    time, arrest = past.trace.time, np.searchsorted(past.trace.time, past.arrays["time_arrest"])
+    tops = [first + np.argmax(force[first:last]) for first, last in pairwise(arrest)]
+    assert rolled.truth.size > 2000 and (rolled.sample <= np.array(tops)[rolled.slip - 1]).all()
+    early = rolled.ahead(0.5)  # without the last half second, in which a smoothed record holds what follows
+    assert (time[early.sample] + 0.5 <= past.arrays["time_onset"][early.slip]).all()
+    assert early.truth.size == np.sum(rolled.truth >= 0.5) == len(early.members["constant strength"])
+    assert early.gains()["constant strength"]["share"] > 0.7
 
 
 def spoilt(trace: Trace, last: int, seed: int) -> Trace:

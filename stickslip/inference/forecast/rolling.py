@@ -39,6 +39,15 @@ class Rolled:
     truth: Array
     members: dict[str, list[Array]]
 
+    def ahead(self, lead: float) -> Rolled:
+        """Those made ``lead`` seconds or more before the onset.
+
+        Where a record was smoothed over that long, what came later than it no longer shows in what they use.
+        """
+        early = np.flatnonzero(self.truth >= lead)
+        members = {name: [found[i] for i in early] for name, found in self.members.items()}
+        return Rolled(self.sample[early], self.slip[early], self.truth[early], members)
+
     def score(self) -> dict[str, dict[str, float]]:
         """Of every method; see :func:`stickslip.inference.forecast.scoring.score`."""
         return {name: score(found, self.truth, self.slip) for name, found in self.members.items()}

@@ -1,18 +1,7 @@
-"""Levels and forecasts of measured records, for docs/forecast.md.
-
-    python -m tests.forecast.real [FOLDER]
-
-FOLDER holds the records (default: the environment's STICKSLIP_REAL_DATA). They are others' and are not part of this
-repository. Writes docs/results/forecast.json and docs/figures/forecast.png.
-"""
+"""Levels and forecasts of the records whose slips are irregular."""
 
 from __future__ import annotations
 
-import json
-import os
-import sys
-import tempfile
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -25,38 +14,14 @@ from stickslip.inference.forecast.rolling import prepare, roll
 from stickslip.inference.forecast.scoring import quantiles
 from stickslip.inference.forecast.wander import Wander
 from stickslip.objects.forecast import Forecast
-from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, styled
 
-DOCS = Path(__file__).parents[2] / "docs"
-FAULT = "psu-stickslip-p5198/newDF_TimeToFailure_from_6600_to_6900_WITHOUT_subwindows.csv"
-CAMPAIGNS = {
-    "paper slider": """schema = 1
-title = "Paper on paper"
-[rig]
-mass = "30.7 g"
-spring_stiffness = "168 N/m"
-[[trace]]
-name = "k168v42"
-file = "{data}/paper-slider-ens/k168Nm_v42.mat"
-outside = true
-time = {{ column = "t", unit = "s" }}
-spring_force = {{ column = "Fnorm", unit = "0.3012 N" }}
-drive_velocity = "42 um/s"
-""",
-    "laboratory fault": """schema = 1
-title = "Laboratory fault p5198"
-[[trace]]
-name = "p5198"
-file = "{data}/FAULT"
-outside = true
-time = {{ column = "Time", unit = "s" }}
-drive_position = {{ column = "LPDisp", unit = "um" }}
-spring_force = {{ column = "ShearStress", unit = "1 MPa * 25 cm^2" }}
-""".replace("FAULT", FAULT),
-}
-TRAIN = {"paper slider": 0.5, "laboratory fault": 0.7}  # the latter as those who published learners of it
+from .campaigns import keep, shipped
+
+# share for training, for the fault as those who published learners of it
+RECORDS = {"paper slider": ("paper-slider", 0.5), "laboratory fault": ("laboratory-fault", 0.7)}
 STEPS = 70  # samples at the end of the record that their score leaves out
+LEADS = (0.5, 1.0)  # s before an onset, from which on forecasts are not counted
 
 
 def chosen(found: Forecast) -> tuple[Wander, bool]:
@@ -117,6 +82,15 @@ def own_scores(found: Forecast) -> dict[str, Any]:
     out["growth"] = Forecaster(found.past, law).curves.growth
     for name, rise in (("with the rise of late", True), ("without the rise of late", False)):
         out[name] = roll(found.past, law, rise=rise).score()[METHODS[0]]
+    early = {lead: found.rolled.ahead(lead) for lead in LEADS}
+    out["ahead"] = {
+        f"{lead:g} s": {
+            "methods": {name: s["crps"] for name, s in rolled.score().items()},
+            "gains": rolled.gains(),
+            "forecasts": int(rolled.truth.size),
+        }
+        for lead, rolled in early.items()
+    }
     return out
 
 
@@ -150,36 +124,26 @@ def picture(slider: Forecast, fault: Forecast) -> Any:
     return made
 
 
-def main() -> None:
-    data = Path(sys.argv[1] if len(sys.argv) > 1 else os.environ.get("STICKSLIP_REAL_DATA", ""))
-    if not (data / FAULT).is_file():
-        raise SystemExit(f"there are no records in '{data}'; name their folder, or set STICKSLIP_REAL_DATA")
+def forecasts(data: Path, work: Path) -> dict[str, Any]:
+    """Both records, and the picture of the page."""
     found: dict[str, Forecast] = {}
     results: dict[str, Any] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for name, text in CAMPAIGNS.items():
-            path = Path(folder) / "campaign.toml"
-            path.write_text(text.format(data=data.resolve()), encoding="utf-8")
-            found[name] = ss.load_campaign(path).forecast(train=TRAIN[name])
-            results[name] = own_scores(found[name])
-            s = found[name].score
-            print(
-                f"{name}: CRPS {s['crps']:.3f} s (mean recurrence {s['crps_mean_recurrence']:.3f} s), R2 {s['r2']:.3f}"
-            )
-            ties = results[name]["levels"]
-            print("  " + ", ".join(f"{k} {v:.3g}" for k, v in ties.items()))
-    results["laboratory fault"]["learners"] = learners(found["laboratory fault"], data / FAULT)
-    print(results["laboratory fault"]["learners"])
+    for name, (file, train) in RECORDS.items():
+        found[name] = whole(file, data, work / file).forecast(train=train)
+        results[name] = own_scores(found[name])
+    fault = next((work / "laboratory-fault").glob("*.csv"))
+    results["laboratory fault"]["learners"] = learners(found["laboratory fault"], fault)
     # the same law through the slip path: how strongly the choice of coordinate matters
     past, laws = prepare(found["paper slider"].past.trace, 0.5)
     alone = {str(c.law): roll(past, c.law).score()[METHODS[0]]["crps"] for c in laws}
     results["paper slider"]["crps by law"] = alone
-    (DOCS / "results").mkdir(exist_ok=True)
-    head = {"version": ss.__version__, "date": date.today().isoformat(), "command": "python -m tests.forecast.real"}
-    text = json.dumps({**head, "records": results}, indent=1, default=float)
-    (DOCS / "results" / "forecast.json").write_text(text + "\n", encoding="utf-8")
-    save(picture(found["paper slider"], found["laboratory fault"]), DOCS / "figures" / "forecast.png", dpi=90)
+    keep(picture(found["paper slider"], found["laboratory fault"]), "forecast", 90)
+    return {"records": results}
 
 
-if __name__ == "__main__":
-    main()
+def whole(name: str, data: Path, work: Path) -> ss.Campaign:
+    """A shipped campaign, whose record is used from its beginning to its end."""
+    path = shipped(name, data, work).description.path
+    lines = [row for row in path.read_text(encoding="utf-8").splitlines() if not row.startswith(("start", "stop"))]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return ss.load_campaign(path)
