@@ -1,10 +1,15 @@
-"""Make the figures of docs/verification.md and print its numbers: ``python docs/make_verification.py [name ...]``."""
+"""Make the figures of docs/verification.md and write its tables: ``python docs/make_verification.py [name ...]``.
+
+Tables go to docs/results/verification.json, each with version, date and command; other numbers are printed.
+"""
 
 from __future__ import annotations
 
+import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from datetime import date
 from pathlib import Path
 
 import matplotlib
@@ -19,6 +24,7 @@ sys.path.insert(0, str(ROOT))
 import jax
 import jax.numpy as jnp
 
+from stickslip import __version__
 from stickslip.physics.contact import (
     flat_punch,
     indentation,
@@ -40,17 +46,42 @@ from tests.solve import (
     slip_differences,
     slip_events,
     static_limit,
+    test_events,
 )
 from tests.solve.rig import STRENGTH, order, rig, tighter
 
 FOLDER = ROOT / "docs" / "verification"
 MARKS = ("o-", "s--", "^:", "D-.")  # so that a grey print keeps lines apart
-DRAW: dict[str, Callable[[], plt.Figure]] = {}
+RESULTS = ROOT / "docs" / "results" / "verification.json"
+TOLERANCES = {"default": 1.0, "default/10": 10.0, "default/100": 100.0, "default/1000": 1000.0}
+DRAW: dict[str, Callable[[], plt.Figure | None]] = {}
 
 
-def figure(work: Callable[[], plt.Figure]) -> Callable[[], plt.Figure]:
+def figure(work: Callable[[], plt.Figure | None]) -> Callable[[], plt.Figure | None]:
+    """A part of the page: a figure, a table or both."""
     DRAW[work.__name__] = work
     return work
+
+
+def table(part: str, command: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Write a table of the page; its cells are text."""
+    known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
+    known[part] = {
+        "version": __version__, "date": date.today().isoformat(),
+        "command": f"python docs/make_verification.py {command}", "columns": list(columns), "rows": [*map(list, rows)],
+    }  # fmt: skip
+    RESULTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    for row in rows:
+        print(" | ".join(row))
+
+
+def short(value: float, digits: int = 2) -> str:
+    """A small number as 1.9e-5."""
+    return f"{value:.{digits - 1}e}".replace("e-0", "e-")
+
+
+def percent(share: float) -> str:
+    return f"{100.0 * share:.{2 if share < 2e-3 else 1}f} %"
 
 
 def axes(n: int, **options: float) -> tuple[plt.Figure, list[plt.Axes]]:
@@ -141,6 +172,14 @@ def static() -> plt.Figure:
         share = np.array([np.divide(*static_limit.breakaway_lag(a, c_s)) for a in v])
         print("breakaway lag over T*:", c_s, dict(zip(v, share.round(3), strict=True)))
         right.semilogx(v * 1e6, share, mark + "-", label=f"$c_s$ = {c_s:g} N/m")
+        lag = ", ".join(f"{a:.2f}" for a in share[1:])  # of the last of the two springs
+    table("static", "static", ("statement", "expected", "obtained"), (
+        ("constant friction: order of the departure in v₀ (u < u_max/2)", "2", f"{order(fast, constant):.2f}"),
+        ("base law: order", "1", f"{order(slow, base):.2f}"),
+        ("base law: coefficient (1 - r) Φ_slip v/v_c, 25 ... 200 µm/s", "1",
+         ", ".join(f"{a:.2f}" for a in base / told)),
+        (r"last element slides late by, in T\*, c_s = 1 kN/m, 100 ... 1600 µm/s", "0.8 ... 1", lag),
+    ))  # fmt: skip
     right.axhspan(0.8, 1.0, alpha=0.15, color="k")
     right.set(xlabel="drive velocity (µm/s)", ylabel="lag / T*", title="Lag of the last element")
     right.legend()
@@ -211,15 +250,23 @@ def after_an_event() -> plt.Figure:
     left.set(xlabel="creep (nm)", ylabel="spring force (N)", xlim=(-20, 800))
     left.legend()
     print("creep after an event against the static curve, nm:", np.max(np.abs(s.x[creep] - s.x[0] - static)) * 1e9)
-    table = {0.95: 21.0, 0.90: 9.2, 0.85: 5.7, 0.70: 2.6}
+    static_factor = {0.95: 21.0, 0.90: 9.2, 0.85: 5.7, 0.70: 2.6}
+    found = []
     for damping, mark in ((0.5, "o"), (2.0, "s")):
         factors = {}
-        for ratio in table:
+        for ratio in static_factor:
             virgin_creep, *creeps = slip_events.creep_to(slip_events.run(rig(damping=damping, ratio=ratio), 9.0), 1e-6)
             factors[ratio] = virgin_creep / creeps[-1]
-        print(f"factor of creep, c = {damping:g}:", {k: round(v, 2) for k, v in factors.items()})
+        found.append(factors)
         right.semilogy(list(factors), list(factors.values()), mark, label=f"simulated, c = {damping:g} N s/m")
-    right.semilogy(list(table), list(table.values()), "k_", ms=20, label="static, after an undamped slip")
+    columns = ("μ_k/μ_s", "static, after an undamped slip", "simulated, c = 0.5 N s/m", "c = 2 N s/m")
+    rows = [
+        (f"{r:.2f}", f"{known:g}", *(f"{f[r]:.{1 if f[r] < 100 else 0}f}" for f in found))
+        for r, known in static_factor.items()
+    ]
+    table("after an event", "after_an_event", columns, rows)
+    values = list(static_factor.values())
+    right.semilogy(list(static_factor), values, "k_", ms=20, label="static, after an undamped slip")
     right.set(xlabel=r"$\mu_k/\mu_s$", ylabel="virgin creep / later creep", title="Creep up to 1 µm/s")
     right.legend()
     return fig
@@ -244,18 +291,16 @@ def brute_force() -> plt.Figure:
     middle.set(xlabel="time since its start (s)", ylabel="solver - brute force (nm)", title="Creep up to 1 µm/s")
     middle.legend()
     bins = (64, 128, 256, 512, 1024)
-    worst = []
+    worst, rows = [], []
     for n in bins:
         made = slip_events.run(rig(springs=comparison.rough_contact(4, 4096, 0.3, 2.46e-6, n)[2]), 7.2, tighter(10.0))
         gaps = comparison.creep_gaps(comparison.Pair(both.path, both.reference, made))
         worst.append([np.max(np.abs(g)) * 1e9 for _, g in gaps])
-        print(
-            n,
-            "elements: creep, nm",
-            np.round(worst[-1], 2),
-            "onset",
-            (made.events.onset - both.reference.onset)[0] / period,
-        )
+        late = (made.events.onset - both.reference.onset)[0] / period
+        rows.append((str(n), *(f"{nm:.1f} nm" if nm < 1000 else f"{nm / 1000:.1f} µm" for nm in worst[-1][:2]),
+                     f"{late:.1g}" if abs(late) < 1e-3 else f"{late:.2g}"))  # fmt: skip
+    columns = ("elements", "virgin creep", "later creep", "first onset, share of the period")
+    table("elements", "brute_force", columns, rows)
     for phase in (0, 1):
         right.loglog(bins, np.array(worst)[:, phase], MARKS[phase], label=f"stick phase {phase + 1}")
     right.axhline(1.0, color="k", lw=0.8)
@@ -286,11 +331,52 @@ def converge() -> plt.Figure:
     for i, name in enumerate(convergence.QUANTITIES):
         middle.loglog(factors, by_tolerance[:, i], MARKS[i], label=name)
         right.loglog(bins, by_bins[:, i], MARKS[i], label=name)
-        print(name, "by tolerance", by_tolerance[:, i], "by elements", by_bins[:, i])
+    columns = ("relative error of", "default", "/10", "/100", "32 elements", "128", "512")
+    rows = [
+        ("first onset" if name == "onset" else name.replace("peak", "peak velocity"),
+         *(short(by_tolerance[k, i]) for k in (0, 2, 4)), *(short(by_bins[k, i]) for k in (0, 2, 4)))
+        for i, name in enumerate(convergence.QUANTITIES)
+    ]  # fmt: skip
+    table("convergence", "converge", columns, rows)
     middle.set(xlabel="default tolerance divided by", ylabel="relative error")
     right.set(xlabel="elements of the bank", ylabel="relative error")
     middle.legend()
     return fig
+
+
+@figure
+def orders() -> None:
+    steps = (1e-4, 5e-5, 2.5e-5, 1.25e-5)
+    columns = ("error of", "order", *(f"{1e6 * step:g} µs" for step in steps))
+    found = convergence.event_orders(steps)
+    rows = [(name, f"{power:.2f}", *map(short, errors)) for name, (power, errors) in found.items()]
+    table("orders", "orders", columns, rows)
+
+
+@figure
+def times() -> None:
+    exact = slip_differences.brute_slips(np.zeros(len(derivatives.BASE)), 5e-7)
+    rows = []
+    for name, factor in TOLERANCES.items():
+        trajectory, _ = integrate(rig(), slip_differences.END, tolerance=tighter(factor))
+        made, t = test_events.events(trajectory), trajectory.steps.t
+        at = np.searchsorted(t, made.arrest)
+        lasts = np.abs((made.arrest - made.onset) - (exact.arrest - exact.onset)).max()
+        sizes = (
+            np.abs(a / b - 1.0).max() for a, b in ((made.slip, exact.slip), (made.peak_velocity, exact.peak_velocity))
+        )
+        onsets = ", ".join(f"{1e6 * late:.2g}" for late in np.abs(made.onset - exact.onset))
+        rows.append(
+            (
+                name,
+                f"{1e3 * (t[at] - t[at - 1]).max():.2g} ms",
+                f"{1e6 * lasts:.2g} µs",
+                *map(short, sizes),
+                f"{onsets} µs",
+            )
+        )
+    columns = ("tolerance", "step at an arrest", "arrest - onset", "slip", "peak velocity", "onset")
+    table("times of events", "times", columns, rows)
 
 
 @figure
@@ -307,16 +393,37 @@ def scatter() -> plt.Figure:
 
 
 @figure
+def ladder() -> None:
+    k = derivatives.NAMES.index("spring_stiffness")
+    rungs = {"3 · 10⁻⁴": 3e-4, "10⁻⁴": 1e-4, "10⁻⁵": 1e-5, "10⁻⁶": 1e-6, "10⁻⁷": 1e-7}
+    found: list[list[float]] = []
+    for grids in (1, 4):
+        slips = slip_differences.on_tied_steps(10.0, 2, grids)
+        values = []
+        for step in rungs.values():
+            move = step * np.eye(len(derivatives.BASE))[k]
+            there, back = (slip_differences.table(slips(m))["recurrence"][0] for m in (move, -move))
+            values.append(float(there - back) / (2.0 * step))
+        found.append([*values, float(slip_differences.solved(10.0, 2, grids)[1]["recurrence"][k][0])])
+    rows = [(name, *(f"{values[i]:.6f}" for values in found)) for i, name in enumerate([*rungs, "derivative"])]
+    table("ladder of differences", "ladder", ("differences over", "one grid, s", "mean of four grids, s"), rows)
+
+
+@figure
 def energy() -> plt.Figure:
     fig, (left, middle, right) = axes(3)
-    factors, worst, steps, spent = np.array([1.0, 10.0, 100.0, 1000.0]), [], [], []
-    for f in factors:
+    worst, steps, spent = [], [], []
+    for f in TOLERANCES.values():
         start = time.process_time()
         made = slip_events.run(rig(), 8.0, tighter(f))
         spent.append(time.process_time() - start)
         worst.append(np.max(np.abs(books.imbalance(made.trajectory.steps))))
         steps.append(made.trajectory.stats.steps)
-    print("energy: tolerance/", factors, "imbalance", worst, "steps", steps, "processor s", np.round(spent, 2))
+    rows = [
+        (name, short(worst[k]), f"{steps[k]:,}".replace(",", " "), f"{spent[k]:.2f} s")
+        for k, name in enumerate(TOLERANCES)
+    ]
+    table("energy", "energy", ("tolerance", "imbalance", "steps", "processor time"), rows)
     s = made.trajectory.steps
     for name, style in zip(("spring_work", "friction_work", "viscous_work", "stored"), MARKS, strict=True):
         left.plot(s.t, getattr(s, name) * 1e6, style[1:], label=name.replace("_", " "))
@@ -374,10 +481,22 @@ def derivative() -> plt.Figure:
         near = np.array([-0.004, 0.004])
         right.plot(near * 100, t[20] + slope * near, color=colour, lw=2.5, alpha=0.5)
     expected = slip_differences.brute_differences(1e-3)
-    for factor, refine in ((1.0, 1), (10.0, 1), (10.0, 2)):
-        values, columns = slip_differences.solved(factor, refine)
-        slope, at = float(columns["recurrence"][which][0]), float(values["recurrence"][0])
-        print(f"tied steps, tolerance/{factor:g}/{refine}: {slip_differences.errors(columns, expected)}, {slope:.4f} s")
+    kinds = {
+        "default tolerance": (1.0, 1, 1), "default/10": (10.0, 1, 1),
+        "default/10, each divided by two": (10.0, 2, 1),
+        "default/10, each divided by two, mean of four grids (the default)": (10.0, 2, 4),
+    }  # fmt: skip
+    rows = []
+    for kind, (factor, refine, grids) in kinds.items():
+        values, columns = slip_differences.solved(factor, refine, grids)
+        slope, at = columns["recurrence"][which], float(values["recurrence"][0])
+        errors = slip_differences.errors(columns, expected).values()
+        rows.append((kind, *map(percent, errors), ", ".join(f"{a:.4f}" for a in slope)))
+    slope = float(slope[0])
+    right_ones = ", ".join(f"{a:.4f}" for a in expected["recurrence"][which])
+    columns = ("steps of a run with", "first onset", "recurrences", "slips", "peak velocities",
+               f"recurrence by ln c_s ({right_ones} s)")  # fmt: skip
+    table("derivatives of slips", "derivative", columns, rows)
     right.plot(near * 500, at + slope * 5 * near, "k--", lw=1.2, label="on steps tied to the motion")
     right.set(
         xlabel="change of spring stiffness (%)",
@@ -394,9 +513,10 @@ def main() -> None:
         start = time.process_time()
         print(f"--- {name}")
         fig = DRAW[name]()
-        tidy(fig)
-        fig.savefig(FOLDER / f"{name}.png", dpi=110)
-        plt.close(fig)
+        if fig is not None:
+            tidy(fig)
+            fig.savefig(FOLDER / f"{name}.png", dpi=110)
+            plt.close(fig)
         print(f"    ({time.process_time() - start:.0f} s)", flush=True)
 
 

@@ -79,6 +79,7 @@ def paper(data: Path, work: Path) -> dict[str, Any]:
         "static": {name: static[name] for name in ("text", "satisfying", "processes", "median_nrmse")},
         "dynamic": {
             "error": last["train_error"], "cycles": dynamic["fit"]["cycles"], "by_phase": last["by_phase"],
+            "level": dynamic["scatter"]["text"],
         },
         "others": others,
     }  # fmt: skip

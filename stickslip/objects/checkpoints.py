@@ -34,7 +34,8 @@ class Pieces:
     """Finished pieces in the run folder, one file each, written aside and renamed."""
 
     def __init__(self, run: Run, inputs: str) -> None:
-        self._run, self._inputs = run, inputs
+        # a digest: each of many pieces has one, and the text may be longer than a piece
+        self._run, self._inputs = run, hashlib.sha256(inputs.encode()).hexdigest()
 
     def _path(self, key: str) -> Path:
         return self._run.path(f"pieces/{key}.npz")

@@ -17,7 +17,8 @@ from pathlib import Path
 from .measuring import head, keep, last_table, row, timed
 
 ROOT = Path(__file__).resolve().parents[2]
-PARTS = ("static", "solvers", "sizes", "springs", "drive", "events", "jacobian", "batches", "command-line", "workbench")
+SIZES = ("springs", "drive", "holds", "events")
+PARTS = ("static", "solvers", "sizes", *SIZES, "jacobian", "batches", "many", "writing", "command-line", "workbench")
 FACTOR = 3.0  # of tolerance, accurate enough at 256 springs (table of solvers)
 
 
@@ -71,7 +72,7 @@ def main() -> None:
     parser.add_argument("--springs", type=int, nargs="+", help="numbers of springs of the solvers")
     parser.add_argument("--sets", type=int, default=1000, help="parameter sets of the batches")
     parser.add_argument("--small", action="store_true", help="small sizes, to see that it runs; writes no files")
-    parser.add_argument("--only", choices=PARTS, help="sizes: springs, drive and events")
+    parser.add_argument("--only", choices=PARTS, help="sizes: springs, drive, holds and events")
     arguments = parser.parse_args()
     only, small = arguments.only, arguments.small
     load = ", ".join(f"{x:.1f}" for x in os.getloadavg())
@@ -85,7 +86,7 @@ def main() -> None:
         from . import solvers
 
         solvers.report(arguments.limit, small, arguments.springs or solvers.SPRINGS)
-    sizes_wanted = [part for part in ("springs", "drive", "events") if only in (None, "sizes", part)]
+    sizes_wanted = [part for part in SIZES if only in (None, "sizes", part)]
     if sizes_wanted:
         from . import sizes
 
@@ -96,6 +97,14 @@ def main() -> None:
         from . import batches
 
         batches.report(FACTOR, 8 if small else arguments.sets, kept=not small)
+    if only in (None, "many"):
+        from . import many
+
+        many.sweeps(small)
+    if only in (None, "writing"):
+        from . import many
+
+        many.writing(small)
     if only in (None, "command-line"):
         command_line(small)
     if only in (None, "workbench"):

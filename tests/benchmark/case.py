@@ -13,6 +13,7 @@ from tests.solve import brute_force
 
 MASS, C_S, DAMPING = 0.09, 3000.0, 10.0  # kg, N/m, N s/m
 RATIO, D_C, T_H = 0.7, 1e-6, 0.02  # 1, m, s
+HELD = 2.5  # s of drive before a hold
 STIFFNESS, STRENGTH = 7e5, 0.26  # of all elements together: N/m, N
 TIMES, CREEP = 1e-3, 1e-9  # what is accurate enough: share of the period; m
 REFERENCE = 2e-7  # s, step of the leapfrog that others are measured against
@@ -27,11 +28,21 @@ class Case:
         springs: number of elements.
         duration: of the drive (s), from rest.
         velocity: of the drive (m/s).
+        hold: how long (s) the load point stands still after :data:`HELD` of drive.
     """
 
     springs: int = 256
     duration: float = 5.0
     velocity: float = 5e-5
+    hold: float = 0.0
+
+    @property
+    def drive(self) -> tuple[list[float], list[float]]:
+        """Times (s) and positions (m) of the load point; the last velocity goes on."""
+        if not self.hold:
+            return [0.0, 1.0], [0.0, self.velocity]
+        driven = np.array([0.0, HELD, HELD, HELD + 1.0])
+        return list(driven + np.array([0.0, 0.0, self.hold, self.hold])), list(driven * self.velocity)
 
     @cached_property
     def stiffness(self) -> np.ndarray:
@@ -97,7 +108,7 @@ def leapfrog(case: Case, dt: float) -> Answer:
     every = max(1, round(case.grid[0] / dt))
     path = brute_force.simulate(
         case.stiffness, case.cap, duration=case.duration, mass=MASS, spring_stiffness=C_S, damping=DAMPING,
-        ratio=RATIO, slip_distance=D_C, healing_time=T_H, times=[0.0, 1.0], positions=[0.0, case.velocity], dt=dt,
+        ratio=RATIO, slip_distance=D_C, healing_time=T_H, times=case.drive[0], positions=case.drive[1], dt=dt,
         every=every,
     )  # fmt: skip
     if len(path.t) == len(case.grid):

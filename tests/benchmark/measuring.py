@@ -16,7 +16,7 @@ from stickslip import __version__
 
 RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results" / "performance.json"
 UNITS = {"s": 1.0, "ms": 1e-3}
-SLOWER = 1.5  # times what the rest of a part became, from which it is said
+SLOWER = 1.5  # times what plain Python became, from which it is said
 _printed: list[list[str]] = []  # the rows of the last table, its head first
 
 
@@ -58,6 +58,7 @@ def keep(part: str, only: str, **found: Any) -> None:
     """
     known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
     before = known.get(part, {})
+    found = {**found, "yardstick_s": yardstick()}
     for line in slower(before, found):
         print(line, flush=True)
     known[part] = {
@@ -74,22 +75,35 @@ def keep(part: str, only: str, **found: Any) -> None:
 
 def former(part: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The times of a part that is measured anew, with version and date; empty where there is none."""
-    return [{"version": part["version"], "date": part.get("date"), "times": times(part)}] if part else []
+    kept = {key: part.get(key) for key in ("version", "date", "yardstick_s")}
+    return [{**kept, "times": times(part)}] if part else []
+
+
+def yardstick() -> float:
+    """Processor time (s) of plain Python: how fast the machine is at the moment."""
+    return timed(lambda: sum(range(10_000_000)), 5)[1]
 
 
 def slower(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """What takes longer than it did in the results of an earlier version, a line each.
+    """What takes longer than it did in the results of an earlier version, or is no longer finished, a line each.
 
-    Against the median of the part, so that a slower machine does not count.
+    Against the time of plain Python, so that a slower machine does not count; where that was not kept, against the
+    median of the part.
     """
     old, new = times(before), times(now)
     ratios = {name: new[name] / old[name] for name in new if old.get(name, 0.0) > 0.0 and new[name] > 0.0}
+    lost = [name for name, seconds in new.items() if seconds == 0.0 and old.get(name, 0.0) > 0.0]
+    lines = [f"no longer finished: {name}, {old[name]:.3g} s in the kept results" for name in lost]
     if not ratios:
-        return []
-    usual = median(ratios.values())
-    return [
+        return lines
+    was, among = before.get("yardstick_s"), "plain Python"
+    if was and now.get("yardstick_s"):
+        usual = now["yardstick_s"] / was
+    else:
+        usual, among = median(ratios.values()), "the others"
+    return lines + [
         f"slower than in the kept results: {name}, {old[name]:.3g} -> {new[name]:.3g} s "
-        f"({ratio / usual:.1f} times what the others became)"
+        f"({ratio / usual:.1f} times what {among} became)"
         for name, ratio in ratios.items()
         if ratio > SLOWER * usual
     ]

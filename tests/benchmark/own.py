@@ -27,11 +27,12 @@ def model(case: Case, theta: Array | None = None, bank: Bank | None = None) -> M
     factor = jnp.ones(8) if theta is None else jnp.exp(theta)
     m, c_s, c, d_c, t_h, v0, k, cap = factor * jnp.array([MASS, C_S, DAMPING, D_C, T_H, case.velocity, 1.0, 1.0])
     bank = Bank(case.stiffness, case.cap) if bank is None else bank
+    times, positions = (jnp.asarray(a) for a in case.drive)
     return Model(
         Block(m, c_s, c),
         Bank(k * bank.stiffness, cap * bank.strength),
         Weakening(RATIO, d_c, t_h),
-        LoadPoint(jnp.array([0.0, 1.0]), jnp.stack([0.0 * v0, v0])),
+        LoadPoint(times, positions / case.velocity * v0),
     )
 
 

@@ -1,4 +1,4 @@
-"""Cost against size: number of springs, velocity of the drive, number of events. Tables, results, three pictures."""
+"""Cost against springs, velocity of the drive, length of a hold and number of events: tables, results, pictures."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from .solvers import Found, coarsest_leapfrog, coarsest_own
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "performance"
 SPRINGS, BINS = (64, 250, 1000, 4000), (32, 64, 128, 256)
 VELOCITIES = (1e-5, 3e-5, 1e-4, 3e-4, 7e-4)  # m/s; at 1 mm/s this rig slides steadily after two slips
+HOLDS = (1.0, 10.0, 100.0)  # s
 EVENTS, FAST = (1, 3, 10, 30, 100, 300, 1000), 2e-4  # 1, m/s
 OWN_ALL, OWN_BINS, LEAPFROG = "own, every spring an element", "own, springs in bins", "numba leapfrog, every spring"
 OWN, OWN_TIMES = "own", "own, every onset to 0.001 of the period"
@@ -65,6 +66,21 @@ def drive(velocities: Sequence[float] = VELOCITIES, events: int = 5) -> Series:
     return _slopes(series, "velocity")
 
 
+def holds(lengths: Sequence[float] = HOLDS) -> Series:
+    """Five seconds of drive with a hold in the middle, longer and longer."""
+    series: Series = {OWN: [], LEAPFROG: []}
+    print("\nHolds: 5 s of drive at 50 um/s with a hold, 64 springs, coarsest settings that are accurate enough.")
+    _head("hold s")
+    for length in lengths:
+        case = Case(springs=64, duration=5.0 + length, hold=length)
+        reference = leapfrog(case, REFERENCE)
+        found = coarsest_own(case, reference)
+        _note(series, OWN, length, found, f"tolerance/{found.setting:g}")
+        found = coarsest_leapfrog(case, reference)
+        _note(series, LEAPFROG, length, found, f"{found.setting * 1e6:g} us")
+    return _slopes(series, "hold")
+
+
 def events(numbers: Sequence[int] = EVENTS, chosen_at: int = 10) -> Series:
     """Longer and longer drives; settings are those that are accurate enough for some ten events, and are kept.
 
@@ -98,12 +114,13 @@ def events(numbers: Sequence[int] = EVENTS, chosen_at: int = 10) -> Series:
     return _slopes(series, "events")
 
 
-def report(small: bool = False, only: Sequence[str] = ("springs", "drive", "events")) -> dict:
-    """All three, or some; results and pictures are written for those that ran (not for a small run)."""
+def report(small: bool = False, only: Sequence[str] = ("springs", "drive", "holds", "events")) -> dict:
+    """All four, or some; results and pictures are written for those that ran (not for a small run)."""
     leapfrog(Case(springs=8, duration=0.1), 5e-5)  # compiles
     parts = {
         "springs": lambda: springs((64, 250), 2) if small else springs(),
         "drive": lambda: drive((1e-4, 7e-4), 2) if small else drive(),
+        "holds": lambda: holds((1.0,)) if small else holds(),
         "events": lambda: events((1, 3), 2) if small else events(),
     }
     result = {name: parts[name]() for name in only}
@@ -122,6 +139,7 @@ def draw(name: str, series: Series) -> Figure:
     label, factor = {
         "springs": ("number of springs", 1.0),
         "drive": ("velocity of the drive (µm/s)", 1e6),
+        "holds": ("duration of the hold (s)", 1.0),
         "events": ("number of events", 1.0),
     }[name]
     made, axes = figure(width=6.0, height=3.8)

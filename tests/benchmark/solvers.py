@@ -12,6 +12,7 @@ from . import own, peers
 from .case import CREEP, REFERENCE, STEPS, TIMES, Accuracy, Answer, Case, events_of, leapfrog, measure
 from .measuring import head, keep, row, timed
 
+ENOUGH, MOST = 100.0, 60.0  # times the own solver's, s: how long a peer may take at most
 FACTORS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)  # the default tolerance is divided by
 
 
@@ -84,7 +85,8 @@ def table(case: Case, limit: float) -> list[dict[str, Any]]:
         if found.good:
             spent[name] = found.cpu
 
-    coarsest_own(case, reference, tell=lambda f: tell("own", f"tolerance/{f.setting:g}", f.steps, f))
+    best = coarsest_own(case, reference, tell=lambda f: tell("own", f"tolerance/{f.setting:g}", f.steps, f))
+    limit = min(max(limit, ENOUGH * best.cpu), MOST)
     coarsest_leapfrog(case, reference, lambda f: tell("leapfrog, numba", f"{f.setting * 1e6:g} us", f.steps, f))
     for name in (*(f"scipy {m}" for m in peers.SCIPY), *(f"diffrax {m}" for m in peers.DIFFRAX)):
         library, method = name.split()
@@ -98,7 +100,7 @@ def table(case: Case, limit: float) -> list[dict[str, Any]]:
                 (answer, count), cpu, _ = timed(lambda rtol=rtol, work=work, until=until: work(rtol, until), 1)
             except peers.OverTime as why:
                 row(name, f"rtol {rtol:g}", f"over {limit:g}", "", "", "", "", f"no: {why}")
-                note(name, f"rtol {rtol:g}", processor_s=None, why=str(why), enough=False)
+                note(name, f"rtol {rtol:g}", processor_s=None, limit_s=limit, why=str(why), enough=False)
                 if rtol < 1e-3:  # an implicit solver may be slower where it is coarser
                     break
                 continue

@@ -31,6 +31,19 @@ def test_only_what_became_slower_than_the_rest_is_said():
     assert slower({}, TABLE) == []
 
 
+def test_a_part_that_became_slower_as_a_whole_is_said_and_a_slower_machine_is_not():
+    three = {"rows": [[name, f"{3.0 * float(value)}", more] for name, value, more in TABLE["rows"]]}
+    before = {**TABLE, "yardstick_s": 0.2}
+    assert len(slower(before, {**TABLE, **three, "yardstick_s": 0.2})) == len(TABLE["rows"])
+    assert slower(before, {**TABLE, **three, "yardstick_s": 0.6}) == []
+
+
+def test_what_is_no_longer_finished_is_said():
+    now = {"series": {"own": [{"size": 10, "processor_s": None}, {"size": 20, "processor_s": 0.2}]}}
+    (line,) = slower(RUNS, now)
+    assert "no longer finished: own size 10, 0.1 s" in line
+
+
 def test_former_times_stay_when_a_part_is_measured_anew(tmp_path, monkeypatch):
     monkeypatch.setattr(measuring, "RESULTS", tmp_path / "performance.json")
     for first in ("2.0", "3.0", "4.0"):

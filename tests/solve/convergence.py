@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 
 import diffrax
 import jax
@@ -16,7 +17,7 @@ from stickslip.physics.model import Model, State
 from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
 
 from . import brute_force
-from .rig import FAR, MASS, bank, drive, rig, slips, tighter
+from .rig import FAR, MASS, Slips, bank, drive, order, rig, slips, tighter
 from .slip_events import run
 
 TERM = diffrax.ODETerm(lambda t, y, args: y)
@@ -88,31 +89,65 @@ def second_event(springs: int = 128, factor: float = 1.0, **options: float) -> n
 QUICK = {"spring_stiffness": 3000.0, "ratio": 0.7}  # of a rig that slips four times within a second
 
 
+EVENT_QUANTITIES = ("onset", "arrest", "slip", "peak velocity", "recurrence", "creep")
+
+
 @functools.cache
 def _quick_reference(end: float) -> brute_force.Path:
     load_point = drive((FAR, 2e-4))
     b = bank()
     return brute_force.simulate(
         b.stiffness, b.strength, duration=end, mass=MASS, damping=10.0, slip_distance=1e-6, healing_time=0.02,
-        times=load_point.times, positions=load_point.positions, dt=2e-7, every=100, **QUICK,
+        times=load_point.times, positions=load_point.positions, dt=1e-7, every=200, **QUICK,
     )  # fmt: skip
 
 
-@functools.cache
-def later_onsets(step: float, grids: int = 8, end: float = 1.1) -> np.ndarray:
-    """Errors of the onsets of four slips by steps of about so many seconds, over the period, shape (grids, 4).
+def event_quantities(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> dict[str, np.ndarray]:
+    """Of every slip: EVENT_QUANTITIES (s, s, m, m/s, s, m); creep is that before it."""
+    found = slips(t, x, v)
+    creep = found.begin - np.concatenate([[0.0], found.end[:-1]])
+    return dict(zip(EVENT_QUANTITIES, (
+        found.onset, found.arrest, found.size, _peaks(t, v, found), found.recurrence, creep,
+    ), strict=True))  # fmt: skip
 
-    Each of the grids has steps longer by 0.2 % than those before, and meets the slips elsewhere in a step.
+
+def _peaks(t: np.ndarray, v: np.ndarray, found: Slips) -> np.ndarray:
+    """Peak velocities between samples: tops of parabolas."""
+    tops = []
+    for onset, arrest in zip(found.onset, found.arrest, strict=True):
+        inside = np.flatnonzero((t > onset) & (t < arrest))
+        top = inside[np.argmax(v[inside])]
+        before, at, after = v[top - 1 : top + 2]
+        tops.append(at - (after - before) ** 2 / (8.0 * (before - 2.0 * at + after)))
+    return np.array(tops)
+
+
+@functools.cache
+def slip_to_slip(step: float, grids: int = 16, end: float = 1.1) -> dict[str, np.ndarray]:
+    """Errors of EVENT_QUANTITIES of four slips by steps of about so many seconds, each of shape (grids, slips).
+
+    Of times over the period, of the others over their mean. Each of the grids has steps longer by 0.14 % than those
+    before, and meets the slips elsewhere in a step.
     """
     model, path = rig(2e-4, **QUICK), _quick_reference(end)
-    exact = slips(*path).onset
-    found = []
-    for longer in 1.0 + 0.002 * np.arange(grids):
+    exact = event_quantities(*path)
+    scale = {name: float(np.mean(values)) for name, values in exact.items()}
+    scale |= dict.fromkeys(("onset", "arrest"), scale["recurrence"])
+    found: dict[str, list[np.ndarray]] = {name: [] for name in exact}
+    for longer in 1.0 + 0.00137 * np.arange(grids):
         made = np.array(_every(model, jnp.asarray(end), round(end / step) + 2, jnp.asarray(longer * step)))
         t, x, v = made[:, np.isfinite(made[0])]
         curve, at = CubicHermiteSpline(t, x, v), path.t[path.t < t[-1]]
-        found.append(slips(at, curve(at), curve(at, 1)).onset)
-    return (np.array(found) - exact) / np.median(np.diff(exact))
+        for name, values in event_quantities(at, curve(at), curve(at, 1)).items():
+            found[name].append((values - exact[name]) / scale[name])
+    return {name: np.array(errors) for name, errors in found.items()}
+
+
+def event_orders(steps: Sequence[float]) -> dict[str, tuple[float, list[float]]]:
+    """Order of every quantity in the step, and its errors: root mean squares over grids and slips."""
+    made = [slip_to_slip(step) for step in steps]
+    errors = {name: [float(np.sqrt(np.mean(m[name] ** 2))) for m in made] for name in EVENT_QUANTITIES}
+    return {name: (order(np.array(steps), np.array(e)), e) for name, e in errors.items()}
 
 
 def onset_scatter(damping: float, kicks: np.ndarray, duration: float = 9.0) -> np.ndarray:

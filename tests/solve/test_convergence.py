@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from .convergence import later_onsets, onset_scatter, oscillator_errors, second_event, slip_errors
+from .convergence import event_orders, onset_scatter, oscillator_errors, second_event, slip_errors, slip_to_slip
 from .rig import order
 
 
@@ -25,11 +25,14 @@ def test_second_order_within_a_slip():
 
 @pytest.mark.slow
 def test_second_order_from_slip_to_slip_wherever_in_a_step_elements_stick():
-    steps = (5e-5, 2.5e-5, 1.25e-5)
-    errors = np.array([later_onsets(step) for step in steps])
-    for onset in np.abs(errors.mean(axis=1)).T:
-        assert order(np.array(steps), onset) == pytest.approx(2.0, abs=0.15)
-    assert np.all(errors.std(axis=1)[0] < 1e-6)
+    steps = (1e-4, 5e-5, 2.5e-5, 1.25e-5)
+    for name, (found, errors) in event_orders(steps).items():
+        assert 1.85 < found < 2.15, name
+        assert errors[-1] < 2e-6, name
+    made = [slip_to_slip(step)["onset"] for step in steps[1:]]
+    for onset in np.abs(np.array(made).mean(axis=1)).T:
+        assert order(np.array(steps[1:]), onset) == pytest.approx(2.0, abs=0.15)
+    assert np.all(made[0].std(axis=0) < 1e-6)
 
 
 @pytest.mark.long
