@@ -365,7 +365,8 @@ def times() -> None:
         sizes = (
             np.abs(a / b - 1.0).max() for a, b in ((made.slip, exact.slip), (made.peak_velocity, exact.peak_velocity))
         )
-        onsets = ", ".join(f"{1e6 * late:.2g}" for late in np.abs(made.onset - exact.onset))
+        late = 1e6 * np.abs(made.onset - exact.onset)
+        onsets = ", ".join(f"{t:.0f}" if t >= 10.0 else f"{t:.2g}" for t in late)
         rows.append(
             (
                 name,

@@ -214,17 +214,6 @@ def experiments(found: dict[str, Any]) -> str:
 # --- performance ------------------------------------------------------------------------------------------------------
 
 
-def aims(found: dict[str, Any]) -> str:
-    """Targets, and what was measured."""
-    if not found:
-        return MISSING
-    rows = [
-        [r["aim"], r["measured"], r["reached"], r["date"].replace("-", "\u2011"), f"`{r['command']}`"]
-        for r in found["rows"]
-    ]
-    return table(["target", "measured", "reached", "date", "measured by"], rows) + f"\n\n*{found['machine']}.*"
-
-
 @_drawn
 def plain(found: dict[str, Any]) -> str:
     """A table as it was printed."""
@@ -268,7 +257,7 @@ def _seconds(run: dict[str, Any] | None, found: dict[str, Any], setting: bool = 
     seconds = run["processor_s"]
     if seconds is None:
         why = run.get("why", "").removeprefix("reached ")
-        return f"over {found['limit_s']:g}" + (f" ({why})" if why else "")
+        return f"over {run.get('limit_s', found['limit_s']):.3g}" + (f" ({why})" if why else "")
     text = "below 0.001" if seconds < 5e-4 else f"{seconds:.3g}"
     if setting and run["setting"]:
         text += f" ({run['setting']})"

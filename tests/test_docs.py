@@ -197,7 +197,6 @@ def test_tables_say_what_is_not_measured(tables: ModuleType) -> None:
     for draw in (
         tables.rates,
         tables.cases,
-        tables.aims,
         tables.plain,
         tables.by_springs,
         tables.by_drive,

@@ -19,21 +19,24 @@ def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[
     A force that rises too slowly is left as it is: a block that creeps along makes the same.
 
     Returns:
-        The events of every trace, and a sentence for each whose scale was set right.
+        The events of every trace, and a sentence that names all whose scale was set right.
     """
-    out, notes = [], []
+    out: list[Segmentation] = []
+    wrong: dict[str, dict[str, float]] = {}
     for trace, old in zip(traces, found, strict=True):
         gain = stick_gain(trace, old)
         if gain is None or trace.spring_stiffness is None or not gain_is_wrong(gain):
             out.append(old)
             continue
         out.append(segment(trace, spring_stiffness=trace.spring_stiffness * gain["value"]))
-        notes.append(
-            f"{trace.name}: sensor-gain of {100 * (gain['value'] - 1):+.1f} % (+-{100 * gain['std']:.1f} %): while the "
-            f"block sticks, the force rises {gain['value']:.3f} times as fast as stiffness times drive. The force was "
-            "divided by it; stiffness or drive velocity may be what is wrong instead."
-        )
-    return out, notes
+        wrong[trace.name] = gain
+    if not wrong:
+        return out, []
+    sizes = ", ".join(f"{100 * (g['value'] - 1):+.1f} % (+-{100 * g['std']:.1f} %, {n})" for n, g in wrong.items())
+    return out, [
+        f"sensor-gain of {sizes}: while the block sticks, the force rises faster than stiffness times drive by this "
+        "much. It was divided by it; stiffness or drive velocity may be what is wrong instead."
+    ]
 
 
 def with_displacements(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Trace], list[str]]:

@@ -67,6 +67,9 @@ def test_a_force_that_rises_too_slowly_may_be_creep_and_is_left_as_it_is():
     (mended,), (note,) = true_gains([fast], [segment(fast)])
     assert "sensor-gain of +9.8 %" in note
     assert mended.events[3].slip < 0.95 * segment(fast).events[3].slip
+    # said once of all runs
+    _, (note,) = true_gains([fast, trace, fast.replace(name="again")], [segment(fast), found, segment(fast)])
+    assert f"{fast.name}), +9.8 %" in note and "again): while" in note
 
 
 def test_ripple_of_the_drive_is_found_below_the_noise():

@@ -1,0 +1,175 @@
+"""The table of targets on the page of performance, computed from the figures that the benchmark keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import log
+from typing import Any
+
+import tables
+
+SLOW, HALF_SLOW = 1e-5, 5e-5  # m/s
+
+
+def targets(found: dict[str, Any]) -> str:
+    """Every target with what was measured; ``found`` is the whole of performance.json."""
+    rows = [[aim, told, reached, _date(found[part]), _command(found[part])] for part, aim, told, reached in _all(found)]
+    rows += [[r["aim"], r["measured"], r["reached"], _date(r), _command(r)] for r in found["elsewhere"]["rows"]]
+    return tables.table(["target", "measured", "reached", "date", "measured by"], rows)
+
+
+def _all(found: dict[str, Any]) -> Iterable[tuple[str, str, str, str]]:
+    """Part of the file, target, what was measured, and whether it is reached."""
+    yield from (make(found) for make in (_static, _sets, _leapfrog, _slowly, _holds, _many_springs))
+    yield from _peers(found)
+    yield from (make(found) for make in (_onsets, _velocities, _springs, _rigs, _gpu, _writing, _simulate, _help))
+
+
+def _static(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    part = found["static"]
+    times = {row[0]: float(row[1]) for row in part["rows"]}
+    numpy, own = times["numpy, every spring at every step"], times["own (a), from heights"]
+    others = part["other_runs_ms"]
+    least = min(others["numpy, every spring at every step"]) / max(others["own (a), from heights"])
+    table = numpy / times["own (b), table there, other rms height and load"]
+    told = f"{least:.0f} to {numpy / own:.0f} times from heights, {table:.0f} times from a table"
+    return "static", "static curve 20 times faster than numpy", told, "in some runs"
+
+
+def _sets(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    many = found["static"]["many"]
+    told = f"{many['ms a set']} ms a set, {many['grown MiB']} MiB more"
+    return "static", "10 000 parameter sets in one call, bounded memory", told, "yes"
+
+
+def _runs(found: dict[str, Any]) -> dict[tuple[float, int, int], dict[str, Any]]:
+    out: dict[tuple[float, int, int], dict[str, Any]] = {}
+    for run in found["solvers"]["runs"]:
+        out.setdefault((run["velocity"], run["events"], run["springs"]), {})[run["solver"]] = run
+    return out
+
+
+def _over_leapfrog(runs: dict[str, Any]) -> float:
+    return float(runs["own"]["processor_s"] / runs["leapfrog, numba"]["processor_s"])
+
+
+def _span(values: Iterable[float]) -> str:
+    low, high = min(values := list(values)), max(values)
+    return f"{low:.2g}" if f"{low:.1g}" == f"{high:.1g}" else f"{low:.2g} to {high:.2g}"
+
+
+def _leapfrog(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    runs = _runs(found)
+    half = [_over_leapfrog(r) for (v, _, n), r in runs.items() if v == HALF_SLOW and n in (64, 250)]
+    fast = [_over_leapfrog(r) for (v, _, _), r in runs.items() if v > HALF_SLOW]
+    told = f"{_span(half)} times slower at 50 µm/s, {_span(fast)} times at 200 and 700 µm/s"
+    return "solvers", "not slower than a numba leapfrog, 64 and 250 springs, 50 to 700 µm/s", told, "no"
+
+
+def _slowly(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    few = next(_over_leapfrog(r) for (v, _, _), r in _runs(found).items() if v == SLOW)
+    own, leapfrog = (
+        next(p["processor_s"] for p in points if p["size"] == SLOW) for points in found["drive"]["series"].values()
+    )
+    told = f"{few:.2g} times slower with 64 springs, {own / leapfrog:.2g} times with 256"
+    return "solvers", "3 times faster than the leapfrog at 10 µm/s", told, "no"
+
+
+def _holds(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    own, leapfrog = found["holds"]["series"].values()
+    told = []
+    ratios = [b["processor_s"] / a["processor_s"] for a, b in zip(own, leapfrog, strict=True)]
+    for point, ratio in zip(own, ratios, strict=True):
+        faster = f"{ratio:.2g} times faster" if ratio >= 1.0 else f"{1.0 / ratio:.2g} times slower"
+        told.append(f"{faster} ({point['size']:g} s)")
+    reached = "yes" if min(ratios) >= 3.0 else "for long holds" if max(ratios) >= 3.0 else "no"
+    return "holds", "3 times faster than the leapfrog with holds", ", ".join(told), reached
+
+
+def _many_springs(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    bins, _, leapfrog = ({p["size"]: p["processor_s"] for p in s} for s in found["springs"]["series"].values())
+    ratio = leapfrog[4000] / bins[4000]
+    reached = "yes" if ratio >= 5.0 else "no"
+    return "springs", "5 times faster than the leapfrog with 4000 springs", f"{ratio:.2g} times, in bins", reached
+
+
+def _peers(found: dict[str, Any]) -> Iterable[tuple[str, str, str, str]]:
+    for aim, wanted, prefix in (
+        ("100 times faster than the best of scipy", 100.0, "scipy"),
+        ("5 times faster than diffrax's Tsit5", 5.0, "diffrax Tsit5"),
+    ):
+        told, reached = [], []
+        for (v, events, springs), runs in sorted(_runs(found).items(), key=lambda item: (item[0][1], item[0][0])):
+            if springs != 64:
+                continue
+            peers = [r for name, r in runs.items() if name.startswith(prefix)]
+            ended = [r["processor_s"] for r in peers if r["enough"]]
+            # one that was stopped takes longer than it was given
+            given = min(r.get("limit_s", found["solvers"]["limit_s"]) for r in peers)
+            ratio = (min(ended) if ended else given) / runs["own"]["processor_s"]
+            told.append(f"{'' if ended else 'over '}{ratio:.2g} ({events} at {1e6 * v:g} µm/s)")
+            reached.append(ratio >= wanted)
+        yield "solvers", f"{aim} (events at a velocity)", ", ".join(told), f"in {sum(reached)} of {len(reached)}"
+
+
+def _onsets(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    slope = found["events"]["series"]["own, every onset to 0.001 of the period"][0]["slope"]
+    runs = {events: r["own"] for (_, events, _), r in _runs(found).items() if events >= 50}
+    setting = runs[1000]["setting"].partition("/")[2]
+    grown = log(runs[1000]["processor_s"] / runs[50]["processor_s"]) / log(20.0)
+    told = f"with the default tolerance/{setting}; cost as events^{slope:.2f} up to 100, ^{grown:.1f} from 50 to 1000"
+    return "solvers", "every onset of 1000 to 0.001 of the period, cost linear in events", told, "up to 100 events"
+
+
+def _velocities(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    slope = found["drive"]["series"]["own"][0]["slope"]
+    return "drive", "cost sublinear in 1/v₀", f"(1/v₀)^{-slope:.2f} from 10 to 700 µm/s", "yes"
+
+
+def _springs(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    slope = found["springs"]["series"]["own, every spring an element"][0]["slope"]
+    return (
+        "springs",
+        "cost sublinear in the number of springs",
+        f"constant with bins, springs^{slope:.2f} without",
+        "yes",
+    )
+
+
+def _rigs(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    rows = {row[0]: row for row in found["many"]["rows"]}
+    one, two = rows["one process"], rows["two processes"]
+    told = f"{one[2]} ms a rig, with two processes {two[2]}; {one[4]} MiB more, at most {one[5]} MiB on disk"
+    return "many", f"{one[1]} rigs by `ss.sweep`, bounded memory", told, "yes"
+
+
+def _gpu(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    vmap = next(row[3] for row in found["batches"]["rows"] if row[0].startswith("vmap"))
+    told = f"not measured, for want of one; on a processor a run of such a batch takes {vmap} times as long as alone"
+    return "batches", "a batch on a GPU 50 times faster than one core", told, "not known"
+
+
+def _writing(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    seconds = {row[0]: float(row[2]) for row in found["writing"]["rows"]}
+    told = ", ".join(f"{name} {value:g} s" for name, value in seconds.items())
+    reached = "yes" if max(seconds.values()) < 1.0 else "by " + ", ".join(n for n, s in seconds.items() if s < 1.0)
+    return "writing", "10⁶ samples written in 1 s", told, reached
+
+
+def _simulate(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    wall = [float(row[2]) for row in found["command-line"]["rows"]]
+    told = f"{wall[3]:.1f} s and {wall[2]:.0f} s"
+    return "command-line", "second `simulate` under 1.2 s, first under 4 s", told, "no"
+
+
+def _help(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    wall = float(found["command-line"]["rows"][1][2])
+    return "command-line", "`--help` under 0.2 s", f"{wall:.2f} s", "yes" if wall < 0.2 else "no"
+
+
+def _date(part: dict[str, Any]) -> str:
+    return str(part["date"]).replace("-", "‑")
+
+
+def _command(part: dict[str, Any]) -> str:
+    return f"`{part['command']}`"
