@@ -14,9 +14,9 @@ from ..data.readers.repair import from_load_point
 from ..data.segment import Segmentation, segment
 from ..data.trace import Trace
 from ..errors import InputError, nearest
-from ..system.progress import telling
-from ..system.shown import Shown, facts, table
-from .run import several
+from ..system.object_repr import Shown, facts, table
+from ..system.progress import reporting
+from .result_base import several
 
 if TYPE_CHECKING:
     import pandas
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .fit import Fit
     from .forecast import Forecast
     from .inspection import Inspection
-    from .run import Tell
+    from .result_base import Tell
     from .static_fit import Align, Sampling, StaticFit, Time
 
 
@@ -347,7 +347,7 @@ def load_campaign(
     _load_effects(effects)
     description = files.load_campaign(path)
     traces = []
-    with telling("reading", progress) as tell:
+    with reporting("reading", progress) as tell:
         for i, entry in enumerate(description.entries):
             tell(f"reading {entry.label}", i / len(description.entries))
             traces.append(files.load_trace(description, entry))

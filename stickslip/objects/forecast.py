@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, nearest
+from ..inference.forecast.coordinate_text import steps, told
 from ..inference.forecast.levels import levels, wandering
 from ..inference.forecast.predict import METHODS, Compared, Forecaster, goes_back, training_slips
 from ..inference.forecast.rolling import SHARES, Rolled, choose, prepare, roll
 from ..inference.forecast.scoring import quantiles
-from ..inference.forecast.telling import steps, told
 from ..inference.forecast.wander import Wander
-from ..system.progress import telling
-from ..system.shown import facts, table
-from .run import Savable, Tell, dataset, head
+from ..system.object_repr import facts, table
+from ..system.progress import reporting
+from .result_base import Savable, Tell, dataset, head
 from .wander import most_slips
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..inference.forecast.past import Past
+    from ..inference.forecast.known_record import Past
     from .campaign import Campaign
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -142,7 +142,7 @@ def forecast(
     number = _chosen(campaign, run)
     if at is not None and not at >= 0.0:
         raise InputError("a moment before the stick begins", key="at", value=at, allowed="0 or more")
-    with telling("forecasting", progress) as tell:
+    with reporting("forecasting", progress) as tell:
         return _forecast(campaign, number, train, at, tell)
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import InputError
-from ..system.progress import telling
-from ..system.shown import facts
+from ..system.object_repr import facts
+from ..system.progress import reporting
 from ..system.units import to_si
-from .run import Savable, Tell, dataset, head
+from .result_base import Savable, Tell, dataset, head
 
 if TYPE_CHECKING:
     from .campaign import Campaign
@@ -70,7 +70,7 @@ def fit_static(
         return StaticRig.of(campaign.description.rig_of(trace.name), spring_stiffness=trace.spring_stiffness)
 
     try:
-        with telling("creep processes", progress) as tell:
+        with reporting("creep processes", progress) as tell:
             result, variables = static_result(
                 traces,
                 found,

@@ -20,12 +20,12 @@ from ..simulation.scenario.load import Parts, from_parts
 from ..simulation.scenario.series import KEY_UNITS, NUMBERS, numbers
 from ..system import process
 from ..system.cluster import cluster
-from ..system.lifeline import end_with
-from ..system.progress import silent, telling
+from ..system.parent_watch import end_with
+from ..system.progress import reporting, silent
 from ..system.runstore import json_text, open_run, versions
 from ..system.threads import processors
 from .checkpoints import Pieces, code_digest
-from .run import Tell
+from .result_base import Tell
 
 if TYPE_CHECKING:
     import xarray
@@ -83,7 +83,7 @@ def sweep(
     if scheduler is None:
         workers = min(at_once, len(chunks)) if workers is None or workers > 0 else workers
     with (
-        telling("sweeping", progress) as tell,
+        reporting("sweeping", progress) as tell,
         open_run(out, force=force, resume=True) if out else nullcontext() as run,
     ):
         pieces = None if run is None else Pieces(run, json_text(_given(loaded, members, rows)))

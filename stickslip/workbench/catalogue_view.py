@@ -7,11 +7,11 @@ from typing import Any
 
 import panel as pn
 
-from .controls import GAP, Catalogue, Message, Words, button
 from .evidence import rows
 from .ladder_view import CARD
 from .residual_view import Residual
 from .session import Session, watch
+from .widgets import GAP, Catalogue, Message, Words, button
 
 
 class Listed:

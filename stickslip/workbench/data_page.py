@@ -12,11 +12,11 @@ import panel as pn
 from ..data.segment import Segmentation
 from ..objects.campaign import Campaign
 from ..system.units import shown
-from .adding_form import adding
-from .beside import Beside, Show, Tell, beside
+from .background_work import BackgroundWork, Show, Tell, beside
 from .event_view import EventView
 from .figures import label, unit_of
-from .parts import Sentences, Table, progress
+from .new_run_form import adding
+from .page_parts import Sentences, Table, progress
 from .selection import chosen, select
 from .session import Session, watch
 from .signals import Signals
@@ -143,7 +143,7 @@ def groups(found: Looked | None) -> list[dict[str, Any]]:
     return [{"head": head, "items": list(items), "mark": mark} for head, items, mark in every if items]
 
 
-def _told(session: Session, work: Beside) -> Any:
+def _told(session: Session, work: BackgroundWork) -> Any:
     made = Sentences(tall=264, margin=(0, 0, 0, 16))
 
     def update() -> None:
@@ -171,7 +171,7 @@ def _runs(session: Session) -> Table:
     return made
 
 
-def _events(session: Session, work: Beside) -> Table:
+def _events(session: Session, work: BackgroundWork) -> Table:
     made = Table(lambda number: select(session, chosen(session)[0], number), tall=260, margin=(8, 0, 0, 0))
 
     def update() -> None:

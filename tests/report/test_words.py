@@ -7,7 +7,7 @@ from stickslip.data.checks.spring_force import force_findings, gain_is_wrong, st
 from stickslip.data.displacements import true_gains
 from stickslip.data.segment import segment
 from stickslip.data.trace import Drive, Trace
-from stickslip.objects.abilities import abilities
+from stickslip.objects.data_abilities import abilities
 from stickslip.show.report.describe import describe_trace
 from stickslip.show.report.ripple import stick_ripple, stick_spectrum
 

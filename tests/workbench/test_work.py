@@ -10,9 +10,9 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.system.progress import Cancelled, breathe, portion, showing
-from stickslip.workbench.beside import beside, close_all
+from stickslip.workbench.background_work import beside, close_all
 from stickslip.workbench.session import Session
-from stickslip.workbench.work import Search, Worker
+from stickslip.workbench.worker import Search, Worker
 
 
 def until(true, seconds=20.0):

@@ -18,10 +18,11 @@ from ...system.threads import processors
 from ..force.fit import Fit, deviations, fit_base
 from ..force.linearised import Array
 from ..force.prescribed import applies
+from ..force.profile_deviations import LEVEL, widened
 from ..force.residual import Structure, structures
 from ..force.rig import slips_finding, within_knowledge
 from ..force.signatures import Explained
-from ..force.valleys import LEVEL, widened
+from .backbone_laws import Shape, shape_of, unshaped
 from .checkpoints import Store, kept
 from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Judged, as_well
@@ -29,7 +30,6 @@ from .level import TAG, Level, level_of
 from .prepare import FEWEST, Prepared, prepare
 from .rounds import Round
 from .search import Rung, Search
-from .shape import Shape, shape_of, unshaped
 from .trials import Tell
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one

@@ -16,7 +16,7 @@ from ..force.problem import Problem
 from ..force.rig import EXACT, SPRING
 from .checkpoints import Store, kept
 from .decide import Judge, Judged, best_forms, inside, named
-from .finals import settled
+from .final_comparison import settled
 from .rounds import Round, one_round
 from .trials import Tell
 

@@ -41,7 +41,7 @@ FIRST = 0.6  # share of the rounds of a fit that begins in what it takes, at mos
 MOST_JUMPS = 4  # of the reading in a campaign: they are rare
 ADJUSTED = 0.8  # share of a base fit before the motion is adjusted
 FEWEST = 12  # events from which on it is asked whether their strengths follow each other
-ALIKE = 6.0  # of the cost, by which coordinates that can be told apart differ at least: a likelihood ratio of twenty
+DISTINCT = 6.0  # of the cost, by which distinguishable coordinates differ at least: a likelihood ratio of twenty
 LARGER = 1.0  # e-folds by which sizes are taken for larger where a search may stand in a dent
 
 
@@ -60,7 +60,7 @@ class Fit:
         strength: force of the contact at full strength (N).
         evaluations: of the model.
         valleys: changes of all that is shared, one standard deviation each, that the derivatives do not show (see
-            :mod:`.valleys`).
+            :mod:`.profile_deviations`).
     """
 
     problem: Problem
@@ -343,7 +343,7 @@ def wandering(found: Fit) -> Fit:
     assert best.scatter.follows is not None
     if found.cost - best.cost < len(WANDER) * np.log(problem.events):  # Schwarz's criterion
         return found
-    alike = tuple(name for name, f in tried.items() if f is not best and f.cost - best.cost < ALIKE)
+    alike = tuple(name for name, f in tried.items() if f is not best and f.cost - best.cost < DISTINCT)
     own = replace(best.scatter, follows=replace(best.scatter.follows, alike=alike))
     best = replace(best, scatter=own)
     best = _arrived(adapted(refit(problem, best.point, best)))

@@ -17,20 +17,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..objects.campaign import Campaign
-from ..objects.run import write_arrays
+from ..objects.result_base import write_arrays
 from ..system.runstore import digests, json_text, read_result, write_aside
 
 if TYPE_CHECKING:
     from ..inference.force.fit import Fit as ForceFit
     from ..objects.diagnosis import Diagnosis
     from ..objects.fit import Fit
-    from ..objects.stored import Arrays
+    from ..objects.stored_fit import Arrays
 
 FOLDER = ".stickslip-workbench"
 SCHEMA = 1
 
 
-class Journal:
+class HistoryFile:
     """Where the history of one campaign file is kept.
 
     Args:
@@ -67,7 +67,7 @@ class Journal:
         Raises:
             OSError, KeyError, ValueError, TypeError, StickslipError: it is damaged, or its effects are gone.
         """
-        from ..objects.stored import unpacked
+        from ..objects.stored_fit import unpacked
 
         if not self.file.is_file():
             return [], [], {}
@@ -92,7 +92,7 @@ class Journal:
         return Diagnosis(self.campaign, None, dict(result), {}, self.diagnosis) if same else None
 
     def _of(self, fit: Fit) -> dict[str, Any]:
-        from ..objects.stored import packed
+        from ..objects.stored_fit import packed
 
         if id(fit) not in self._packed:
             self._packed[id(fit)] = (fit, packed(fit, self._keep))

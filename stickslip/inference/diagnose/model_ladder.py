@@ -16,17 +16,17 @@ from ...physics.params import specs, variants
 from ...system.progress import portion
 from ..force.candidates import shapes_backbone, try_effect
 from ..force.fit import Fit, deviations, fit_base
+from ..force.profile_deviations import LEVEL, held, widened
 from ..force.signatures import Explained
-from ..force.valleys import LEVEL, held, widened
 from ..uncertainty import Profile, profile
+from .backbone_laws import shape_of, unshaped
 from .confirm import Confirmation, confirm
 from .decide import DISPERSION
 from .engine import Diagnosis, Verdict, leading, static_residual
-from .finals import settled
+from .final_comparison import settled
 from .level import level_of
 from .prepare import Prepared
 from .search import Rung, without
-from .shape import shape_of, unshaped
 from .trials import Tell
 
 Form = tuple[str, Mapping[str, str]]  # tag and variants of an effect

@@ -11,14 +11,14 @@ from ..errors import InputError
 from ..objects.experiments import Setting
 from ..objects.fit import Fit
 from ..system.units import shown
-from .controls import field
-from .parts import head
-from .remembering import Remembered
+from .page_parts import head
+from .saved_fields import SavedFields
 from .selection import chosen
 from .session import Session, watch
+from .widgets import field
 
 
-class Asked:
+class SimulationForm:
     """What is to be simulated."""
 
     def __init__(self, session: Session) -> None:
@@ -39,7 +39,7 @@ class Asked:
         self.fields: dict[str, Any] = {name: getattr(self, name) for name in names}
         self.row = pn.FlexBox(*self.fields.values(), gap="6px 0")
         self.view = pn.Column(head("What is left empty is as in the measured run."), self.row)
-        self._kept = Remembered(session, "simulate", self.fields)
+        self._kept = SavedFields(session, "simulate", self.fields)
         self.run.param.watch(lambda event: self._placeholders(), "value")
         watch(session, ["campaign", "run"], self._runs)
         watch(session, ["steps", "at"], self._placeholders)

@@ -19,7 +19,7 @@ from ..force.candidates import Candidate
 from ..force.fit import Fit
 
 
-class Carriage:
+class FitPickler:
     """Takes candidates to another process that has the same base.
 
     Attributes:
@@ -34,7 +34,7 @@ class Carriage:
         self._arrays = dict(_arrays(self.base, ""))
 
     @classmethod
-    def packed(cls, base: Fit, path: Path) -> Carriage:
+    def packed(cls, base: Fit, path: Path) -> FitPickler:
         """One for this process; the base is written to the file, from which the others have it."""
         path.write_bytes(dumps(base))
         return cls(path)

@@ -11,12 +11,12 @@ import param
 from ..errors import StickslipError
 from ..system.progress import Cancelled, breathe
 from .session import Session
-from .work import Tell
+from .worker import Tell
 
 Show = Callable[[Any], None]
 
 
-class Beside(param.Parameterized):
+class BackgroundWork(param.Parameterized):
     """One piece of work at a time, which all windows of a session see alike.
 
     Attributes:
@@ -82,14 +82,14 @@ class Beside(param.Parameterized):
         self._worker.close()
 
 
-_kept: WeakKeyDictionary[Session, dict[str, Beside]] = WeakKeyDictionary()
+_kept: WeakKeyDictionary[Session, dict[str, BackgroundWork]] = WeakKeyDictionary()
 
 
-def beside(session: Session, name: str) -> Beside:
+def beside(session: Session, name: str) -> BackgroundWork:
     """The work of that name of a session."""
     own = _kept.setdefault(session, {})
     if name not in own:
-        own[name] = Beside(type(session.worker)())
+        own[name] = BackgroundWork(type(session.worker)())
     return own[name]
 
 

@@ -9,9 +9,9 @@ import panel as pn
 import param
 from panel.custom import JSComponent
 
-from .beside import Beside
-from .controls import Message, Spoken, button, static
-from .watching import watch
+from .background_work import BackgroundWork
+from .session_callbacks import watch
+from .widgets import Message, Spoken, button, static
 
 _STYLE = [static("table.css")]
 
@@ -91,7 +91,9 @@ class Copy(JSComponent):
     _stylesheets = _STYLE
 
 
-def starter(work: Beside, name: str, call: Callable[[], None], width: int = 150, **more: Any) -> pn.widgets.Button:
+def starter(
+    work: BackgroundWork, name: str, call: Callable[[], None], width: int = 150, **more: Any
+) -> pn.widgets.Button:
     """A button that begins a piece of work, and cannot be pressed while that goes on."""
     made = button(name, call, width, **{"margin": (22, 8, 0, 0), **more})
 
@@ -102,7 +104,7 @@ def starter(work: Beside, name: str, call: Callable[[], None], width: int = 150,
     return made
 
 
-def progress(work: Beside, stopping: bool = True) -> Progress:
+def progress(work: BackgroundWork, stopping: bool = True) -> Progress:
     """Of a piece of work."""
 
     def heard(message: Message) -> None:

@@ -9,8 +9,8 @@ from ..objects import experiments
 from ..objects.experiments import MEASURES, Simulated
 from ..objects.fit import Fit
 from ..system.units import shown, shown_with
-from .asked import named
 from .overview import reduced
+from .simulation_form import named
 
 POINTS = 4000  # that are drawn of a curve
 

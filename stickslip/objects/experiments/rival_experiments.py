@@ -11,8 +11,8 @@ from scipy.signal import detrend
 
 from ...data.segment import segment
 from ...errors import InputError, StickslipError
+from ...inference.diagnose.expected_information import information, margins
 from ...inference.diagnose.prepare import Prepared
-from ...inference.diagnose.telling import information, margins
 from ...inference.force.knots import Knots, knots
 from ...inference.force.scales import of_run
 from ...simulation.conformance import blamed
@@ -20,7 +20,7 @@ from ...simulation.conformance.trial import first_line
 from ...simulation.scenario.recording import Recording
 from ...system.progress import Cancelled
 from ..fit import Fit
-from ..run import Tell
+from ..result_base import Tell
 from .events import MEASURES, part, run, sensed
 from .setting import Setting, changed, scenario, settled
 
@@ -29,7 +29,7 @@ SEEN = 1e-9  # m, swing that a sensor may show
 
 
 @dataclass(frozen=True)
-class Telling:
+class SimulatedExperiment:
     """An experiment simulated for each of some models.
 
     Attributes:
@@ -90,11 +90,11 @@ def rivals(
     return out
 
 
-def tell_apart(
+def simulate_rivals(
     model: Fit, fits: Mapping[str, Fit], options: Mapping[str, Setting], tell: Tell,
-    show: Callable[[Sequence[Telling]], None] = lambda found: None, code: str = "",
+    show: Callable[[Sequence[SimulatedExperiment]], None] = lambda found: None, code: str = "",
     until: Callable[[], bool] = lambda: True,
-) -> list[Telling]:  # fmt: skip
+) -> list[SimulatedExperiment]:  # fmt: skip
     """Every experiment simulated for every model; the one first of which most information is expected.
 
     Args:
@@ -105,7 +105,7 @@ def tell_apart(
         code: the lines of Python that lead to the model.
         until: whether there is time for more; what is not simulated then is missing.
     """
-    out: list[Telling] = []
+    out: list[SimulatedExperiment] = []
     for i, (words, setting) in enumerate(options.items()):
         if not until():
             break
@@ -116,13 +116,15 @@ def tell_apart(
         except Exception as error:  # an effect of one's own may fail in any way
             said = error if isinstance(error, StickslipError) else blamed(error)
             note = str(said or first_line(error)).split("\n")[0]
-            out.append(Telling(words, setting, model, fits, {}, note=note, code=code))
+            out.append(SimulatedExperiment(words, setting, model, fits, {}, note=note, code=code))
         out.sort(key=lambda t: (bool(t.note), -round(t.information, 3), -t.margin))
         show(list(out))
     return out
 
 
-def _told(words: str, setting: Setting, model: Fit, fits: Mapping[str, Fit], tell: Tell, code: str) -> Telling:
+def _told(
+    words: str, setting: Setting, model: Fit, fits: Mapping[str, Fit], tell: Tell, code: str
+) -> SimulatedExperiment:
     setting = settled(model, setting)
     found, seen = {}, []
     for i, (tag, fit) in enumerate(fits.items()):
@@ -133,7 +135,7 @@ def _told(words: str, setting: Setting, model: Fit, fits: Mapping[str, Fit], tel
     apart = margins([fit.force_fit for fit in fits.values()], seen, changed(model, setting))
     least = float(apart[~np.eye(len(apart), dtype=bool)].min())
     measure, slip, share = farthest(found) or ("", -1, 0.0)
-    return Telling(
+    return SimulatedExperiment(
         words, setting, model, fits, found, information(apart), least, measure, slip + 1, share, code=code
     )  # fmt: skip
 

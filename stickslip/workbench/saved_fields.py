@@ -9,7 +9,7 @@ from typing import Any
 from .session import Session, watch
 
 
-class Remembered:
+class SavedFields:
     """Fields of a page.
 
     Args:

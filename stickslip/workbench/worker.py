@@ -16,7 +16,7 @@ from typing import Any
 from cloudpickle import dumps, loads
 
 from ..errors import StickslipError
-from ..objects.run import Tell
+from ..objects.result_base import Tell
 from ..system.progress import cancellable
 
 PATIENCE = 3.0  # s that a process has to end after it gave its answer; its own workers may wait for more work
@@ -176,7 +176,7 @@ def _child(there: Connection, work: bytes, files: Sequence[str], parent: int) ->
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server's own; it ends this process
     os.environ.setdefault("PYTHONWARNINGS", QUIET)
     from ..system import process
-    from ..system.lifeline import end_with
+    from ..system.parent_watch import end_with
 
     end_with(parent)
     process.begin()

@@ -9,13 +9,13 @@ from .steps import HAND, Step, complete
 
 if TYPE_CHECKING:
     from ..objects.fitted_run import FittedRun
-    from .journal import Journal
+    from .history_file import HistoryFile
     from .session import Session
 
 SAME = 0.01  # standard deviations by which a parameter that was fitted anew may be off
 
 
-def history(session: Session, journal: Journal) -> bool:
+def history(session: Session, journal: HistoryFile) -> bool:
     """Show the history that was kept; whether there was any. One that is damaged is said to be."""
     try:
         rows, fits, more = journal.read()

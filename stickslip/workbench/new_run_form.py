@@ -13,12 +13,12 @@ from ..data.readers import Columns
 from ..errors import InputError
 from ..objects.campaign import Campaign
 from ..system.units import to_si
-from .adding import CHANNELS, FOLDER, NONE, VELOCITY, Choice, add, create, entry_text, guess, look
-from .beside import Show, Tell, beside
-from .controls import Words, button, field
-from .parts import Table, head, progress
-from .places import new_place
+from .background_work import Show, Tell, beside
+from .file_names import new_place
+from .new_run import CHANNELS, FOLDER, NONE, VELOCITY, Choice, add, create, entry_text, guess, look
+from .page_parts import Table, head, progress
 from .session import Session, watch
+from .widgets import Words, button, field
 
 LARGEST = 500  # MB of a file
 ROWS = 3  # of the file that are shown

@@ -11,10 +11,10 @@ import pytest
 from stickslip.inference.diagnose.checkpoints import kept, load_candidate, save_candidate
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit, fit_base
+from stickslip.inference.force.fit_arrays import fit_arrays, fit_of
+from stickslip.inference.force.profile_deviations import LEVEL, widened
 from stickslip.inference.force.scatter import EVENTS
 from stickslip.inference.force.signatures import Explained
-from stickslip.inference.force.stored import fit_arrays, fit_of
-from stickslip.inference.force.valleys import LEVEL, widened
 
 
 @pytest.mark.slow

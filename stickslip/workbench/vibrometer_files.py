@@ -9,9 +9,9 @@ from ..objects.campaign import Campaign
 from ..objects.experiments.events import run
 from ..objects.experiments.setting import Setting, scenario
 from ..objects.fit import Fit
-from ..objects.run import Tell
+from ..objects.result_base import Tell
 from ..simulation.scenario.writers import write_campaign
-from .places import new_folder
+from .file_names import new_folder
 
 RATE = 10_000.0  # Hz at which a synthetic record is written
 COUNT = 7.91e-9  # m, where the campaign's runs have no count of their own

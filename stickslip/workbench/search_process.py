@@ -17,7 +17,7 @@ from ..objects.diagnosis import Diagnosis
 from ..objects.fit import Fit
 from ..physics.effects import catalogue
 from ..simulation.conformance import blamed
-from .work import Search, Tell
+from .worker import Search, Tell
 
 FIRST = (
     "contact-ageing", "rate-and-state", "contact-damping", "viscoelastic-contact", "thermal-creep", "slip-weakening",

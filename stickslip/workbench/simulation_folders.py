@@ -12,18 +12,18 @@ from ..inference.fit.serialised import KEY
 from ..inference.fit.serialised import record as model_record
 from ..objects.campaign import Campaign
 from ..objects.experiments.events import Simulated
+from ..objects.experiments.rival_experiments import SimulatedExperiment
 from ..objects.experiments.setting import Setting, scenario
 from ..objects.experiments.sweeps import Swept
-from ..objects.experiments.telling import Telling
 from ..objects.fit import Fit
-from ..objects.run import Tell
+from ..objects.result_base import Tell
 from ..show.simulated import head, numbers, series_numbers, write_series, write_single
 from ..simulation.scenario import Scenario
 from ..simulation.scenario.recording import Recording
 from ..simulation.scenario.series import scenarios_of, summary
 from ..system.progress import breathe
 from ..system.runstore import Run, open_run, versions
-from .places import new_folder
+from .file_names import new_folder
 from .simulation_lines import Found, command, commands, one, python
 
 AGAIN = "again"
@@ -85,25 +85,26 @@ def _series(run: Run, found: Swept, history: Mapping[str, Any]) -> None:
 
 
 def _experiments(
-    run: Run, found: Sequence[Telling], campaign: Campaign, told: Mapping[str, Any], effects: str, tell: Tell
+    run: Run, found: Sequence[SimulatedExperiment], campaign: Campaign, told: Mapping[str, Any], effects: str,
+    tell: Tell,
 ) -> None:  # fmt: skip
     done = [t for t in found if t.recordings]
     rows: list[dict[str, Any]] = []
     many, number = sum(len(t.recordings) for t in done), 0
-    for i, telling in enumerate(done, start=1):
-        folders = {tag: f"{i}-{tag}" for tag in telling.recordings}
-        for tag, recording in telling.recordings.items():
+    for i, experiment in enumerate(done, start=1):
+        folders = {tag: f"{i}-{tag}" for tag in experiment.recordings}
+        for tag, recording in experiment.recordings.items():
             breathe()
-            tell(f"{telling.words}, with {tag}", number / many)
+            tell(f"{experiment.words}, with {tag}", number / many)
             number += 1
             inner = Run(run.path(f"{folders[tag]}/result.json").parent, run.target / folders[tag], False)
             own = f"{run.target.name}/{folders[tag]}"
-            again = {"python": told["python"], "commands": [_again(telling, tag, own, effects)]}
-            _single(inner, telling.fits[tag], telling.setting, recording, again)
+            again = {"python": told["python"], "commands": [_again(experiment, tag, own, effects)]}
+            _single(inner, experiment.fits[tag], experiment.setting, recording, again)
         rows.append({
-            "experiment": telling.words, "setting": asdict(telling.setting), "information": telling.information,
-            "margin": telling.margin, "measure": telling.measure, "slip": telling.slip, "share": telling.share,
-            "note": telling.note, "folders": folders,
+            "experiment": experiment.words, "setting": asdict(experiment.setting),
+            "information": experiment.information, "margin": experiment.margin, "measure": experiment.measure,
+            "slip": experiment.slip, "share": experiment.share, "note": experiment.note, "folders": folders,
         })  # fmt: skip
     model = {tag: f"{run.target.name}/1-{tag}" for tag in done[0].recordings}
     lines = commands(found, model, f"{run.target.name}-{AGAIN}", effects)
@@ -116,5 +117,5 @@ def _experiments(
     })  # fmt: skip
 
 
-def _again(telling: Telling, tag: str, own: str, effects: str) -> str:
-    return command(one(telling, tag), own, f"{own.replace('/', '-')}-{AGAIN}", effects)
+def _again(experiment: SimulatedExperiment, tag: str, own: str, effects: str) -> str:
+    return command(one(experiment, tag), own, f"{own.replace('/', '-')}-{AGAIN}", effects)

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..system.units import shown_with
 from . import simulation_lines
-from .beside import beside
+from .background_work import beside
 from .session import Session
 
 RIVALS = "rivals"

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ...errors import StickslipError
 from ..force.candidates import Candidate
 from ..force.fit import Fit, fit
+from ..force.profile_deviations import widened
 from ..force.scatter import Scatter
-from ..force.valleys import widened
 from .checkpoints import Store, kept, name_of
 from .decide import CHANCE, DISPERSION, Judged, best_forms
 

@@ -7,7 +7,7 @@ import pytest
 
 from stickslip.inference.force.descent import SETTLED
 from stickslip.inference.force.fit import fit
-from stickslip.inference.force.valleys import LEVEL, _variance, held, widened
+from stickslip.inference.force.profile_deviations import LEVEL, _variance, held, widened
 
 pytestmark = pytest.mark.slow
 

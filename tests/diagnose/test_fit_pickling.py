@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cloudpickle import dumps
 
-from stickslip.inference.diagnose.carriage import Carriage
+from stickslip.inference.diagnose.fit_pickling import FitPickler
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.signatures import Explained
@@ -16,8 +16,8 @@ from tests.force.conftest import made
 @pytest.mark.slow
 def test_candidates_arrive_as_they_were_upon_the_base_that_is_there(tmp_path):
     case = made(tmp_path / "case", 3)
-    here = Carriage.packed(fit(case.problem, case.point), tmp_path / "base")
-    there = Carriage(tmp_path / "base")
+    here = FitPickler.packed(fit(case.problem, case.point), tmp_path / "base")
+    there = FitPickler(tmp_path / "base")
     (sent,) = try_effect(there.base, Explained(there.base), "tilt", [{"by": "spring"}])
     cost = sent.fit.cost
     packed = there.pack([sent])

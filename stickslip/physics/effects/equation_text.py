@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .plain import plain
+from .latex_to_text import plain
 
 
 @dataclass(frozen=True)

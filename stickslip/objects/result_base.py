@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
+from ..system.object_repr import Shown
 from ..system.progress import Tell as Tell
 from ..system.runstore import Run, open_run, versions
-from ..system.shown import Shown
 
 if TYPE_CHECKING:
     import xarray
@@ -82,7 +82,7 @@ class Savable(Shown):
 def finish(run: Run, fit: Fit | None = None) -> None:
     """Write what a run folder holds besides its numbers: the models to go on from, and the report."""
     from ..show.report import write_report
-    from .stored import write_models
+    from .stored_fit import write_models
 
     if fit is not None:
         write_models(run, fit)

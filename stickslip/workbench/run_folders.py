@@ -18,7 +18,7 @@ from ..objects.fit import Fit
 from ..show.report.html import REPORT
 from ..system.runstore import RESULT, read_result
 from ..system.units import shown_with
-from .places import new_folder
+from .file_names import new_folder
 
 MOST = 100  # run folders that are listed
 LARGEST = 64 << 20  # bytes of a report that is shown
@@ -29,7 +29,7 @@ DEEP = 2  # folders below the campaign's in which run folders are looked for
 
 
 @dataclass(frozen=True)
-class Kept:
+class RunFolder:
     """A run folder.
 
     Attributes:
@@ -49,7 +49,7 @@ class Kept:
     report: bool
 
 
-def listed(folder: Path) -> list[Kept]:
+def listed(folder: Path) -> list[RunFolder]:
     """Run folders in a folder and in those in it, the newest first; what leads elsewhere or is damaged is left out."""
     home = folder.resolve()
     paths = [p for deep in range(1, DEEP + 1) for p in folder.glob("/".join(["*"] * deep + [RESULT]))]
@@ -68,7 +68,7 @@ def listed(folder: Path) -> list[Kept]:
         when = datetime.fromtimestamp(written).strftime("%Y-%m-%d %H:%M")
         report = any(p.resolve().is_relative_to(home) for p in (own / REPORT, *pictures(own)) if p.is_file())
         name = own.relative_to(folder).as_posix()
-        found.append((written, Kept(name, own, str(result.get("kind", "")), words(result), when, report)))
+        found.append((written, RunFolder(name, own, str(result.get("kind", "")), words(result), when, report)))
     return [kept for _, kept in sorted(found, key=lambda pair: -pair[0])[:MOST]]
 
 
@@ -134,7 +134,7 @@ def _copied(folder: Path, to: Path) -> Path:
     return to
 
 
-def report(kept: Kept) -> str:
+def report(kept: RunFolder) -> str:
     """The report of a run folder, or a page of its pictures where it has none.
 
     Raises:

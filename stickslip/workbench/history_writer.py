@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import RunFolderError
 from ..objects.campaign import Campaign
 from ..system.runstore import alone
-from .journal import Journal
+from .history_file import HistoryFile
 
 if TYPE_CHECKING:
     from .session import Session
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 TAKEN = "another workbench has this campaign open, or nothing can be written beside it: changes here will not be saved"
 
 
-class Keeper:
+class HistoryWriter:
     """Of one session.
 
     Attributes:
@@ -25,13 +25,13 @@ class Keeper:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self.journal: Journal | None = None
+        self.journal: HistoryFile | None = None
         self._held = ExitStack()
         self._written: tuple[Any, ...] = ()
 
     def begin(self, campaign: Campaign) -> None:
         """Keep that of a campaign with a file, in place of one that was open before."""
-        journal = Journal(campaign)
+        journal = HistoryFile(campaign)
         self._held.close()
         self.journal, self._written = None, ()
         try:

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.data.segment import segment
 from stickslip.data.trace import Drive, Trace
-from stickslip.objects.abilities import _slow_noise, abilities
+from stickslip.objects.data_abilities import _slow_noise, abilities
 
 
 def test_slow_noise_is_asked_for_where_it_is_not_stated():

@@ -10,7 +10,7 @@ import pytest
 import stickslip as ss
 from stickslip.blind.generator import Run, make_campaign
 from stickslip.inference.diagnose.decide import DISPERSION
-from stickslip.inference.diagnose.telling import KNOWN, Changed, information, margins
+from stickslip.inference.diagnose.expected_information import KNOWN, Changed, information, margins
 from stickslip.inference.force import problem as problem_module
 from stickslip.inference.force.noise import by_reading, known_of
 from stickslip.inference.force.problem import Problem

@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from ..objects.diagnosis import Diagnosis
     from ..objects.fit import Fit
     from .session import Session
-    from .work import Search
+    from .worker import Search
 
 KEPT = 8  # models whose promises are kept
 
 
-class Looking:
+class CatalogueSearch:
     """The processes of a session, which is told what they find.
 
     Args:
@@ -32,7 +32,7 @@ class Looking:
 
     def promises(self) -> None:
         """Look at every effect on top of the model as it stands, unless that goes on or is known already."""
-        from . import searches
+        from . import search_process
 
         session, fit = self._session, self._session.fitted
         if fit is None or (session.listed < 1.0 and self._at == (fit, session.loaded)):
@@ -57,12 +57,12 @@ class Looking:
             if begun and self._listing is begun[0]:
                 session.listed, session.said = 1.0, f"the effects could not be looked at: {text}"
 
-        self._listing = searches.promises(fit, session.effects, found, failed)
+        self._listing = search_process.promises(fit, session.effects, found, failed)
         begun.append(self._listing)
 
     def diagnose(self, out: Path | None) -> None:
         """The whole search, with ``out`` for its run folder; finished pieces are kept and used again."""
-        from . import searches
+        from . import search_process
 
         session = self._session
         if session.searching:
@@ -80,7 +80,7 @@ class Looking:
             self._search = None
             session.param.update(searching="", said=f"the diagnosis ended: {text}")
 
-        self._search = searches.diagnosis(session.data, session.effects, out, tell, done, failed)
+        self._search = search_process.diagnosis(session.data, session.effects, out, tell, done, failed)
 
     def stop(self) -> None:
         """End the diagnosis; what it has finished is used when it is begun again."""

@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..objects.campaign import Campaign, load_campaign
 from ..system.runstore import alone, write_aside
 from ..system.units import factor_to_si, to_si
-from .places import new_place
+from .file_names import new_place
 
 NONE = "-"  # no column
 VELOCITY = "velocity of the load point"

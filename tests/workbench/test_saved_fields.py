@@ -7,13 +7,13 @@ from contextlib import closing
 import pytest
 
 from stickslip.workbench import app
-from stickslip.workbench.asked import Asked
 from stickslip.workbench.catalogue_view import Listed
-from stickslip.workbench.journal import Journal
+from stickslip.workbench.history_file import HistoryFile
 from stickslip.workbench.residual_view import Residual
 from stickslip.workbench.rivals_view import Rivals
 from stickslip.workbench.session import Session
 from stickslip.workbench.signals import Signals
+from stickslip.workbench.simulation_form import SimulationForm
 from stickslip.workbench.sweep_view import SweepView
 
 FIELDS = {"velocity": "70 um/s", "hold": "3 s", "mass": "0.2 kg", "load": "2", "events": 4, "back": True}
@@ -26,7 +26,7 @@ class Shown:
         self.tabs = app.tabs(session)
         self.signals, self.residual = Signals(session), Residual(session)
         self.listed = Listed(session, self.residual)
-        self.asked = Asked(session)
+        self.asked = SimulationForm(session)
         self.sweep, self.rivals = SweepView(session, self.asked), Rivals(session, self.asked)
 
     def fill(self) -> None:
@@ -56,7 +56,7 @@ def session(campaign, base, monkeypatch):
     monkeypatch.setattr(Session, "list_promises", lambda self: None)
     made = Session(campaign=campaign)
     made.first(base)
-    made._keeper.journal = Journal(campaign)
+    made._keeper.journal = HistoryFile(campaign)
     return made
 
 
@@ -113,6 +113,6 @@ def test_what_is_damaged_or_of_another_version_is_left_alone(session, damage):
 def test_nothing_is_written_over_a_history_that_was_not_read_yet(campaign, session):
     session.remember("page", "keep_page")
     again = Session(campaign=campaign)
-    again._keeper.journal = Journal(campaign)
+    again._keeper.journal = HistoryFile(campaign)
     again.remember("page", "model_page")
-    assert Journal(campaign).read()[2]["view"] == {"page": "keep_page"}
+    assert HistoryFile(campaign).read()[2]["view"] == {"page": "keep_page"}
