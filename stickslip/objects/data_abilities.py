@@ -79,7 +79,7 @@ def _velocities(pairs: Pairs, slipping: Pairs) -> Verdict:
             "four."
         ]
     if len(groups) == 2 or groups[-1] < 4 * groups[0]:
-        return [f"{len(groups)} drive velocities ({shown} µm/s): effects that depend on velocity show."], [
+        return [f"{len(groups)} drive velocities ({shown} µm/s): effects that depend on velocity can be seen."], [
             "Fewer than three velocities over a factor of four: many effects cannot be distinguished."
         ]
     return [f"{len(groups)} drive velocities ({shown} µm/s) separate what depends on velocity from what does not."], []
@@ -123,13 +123,13 @@ def _holds(pairs: Pairs, slipping: Pairs) -> Verdict:
     if not slipping:
         return [], []
     if sum(held):
-        return [f"{_count(sum(held), 'slip')} after a hold: strengthening with time and creep at rest show."], []
+        return [f"{_count(sum(held), 'slip')} after a hold: strengthening with time and creep at rest can be seen."], []
     return [], ["No hold: strengthening with time, creep at rest and drift of the sensor cannot be separated."]
 
 
 def _virgin(pairs: Pairs, slipping: Pairs) -> Verdict:
     if not pairs or any(t.virgin for t, _ in pairs):
-        return ["A virgin start: the first loading of a fresh contact is there."] if pairs else [], []
+        return ["A virgin start: the first loading of a fresh contact is recorded."] if pairs else [], []
     return [], [
         "No virgin start is stated (virgin = true): the first stick of every trace is left out, and the contact's "
         "memory of the last slip is in every creep."
@@ -223,7 +223,7 @@ def _counts(slipping: Pairs) -> Verdict:
         return [], []
     return [], [
         f"Counts are coarse beside the creep before a slip in {_some(coarse)}: drop, healing time and damping are then "
-        "off by more than their deviations. A finer sensor, or noise of half a count on it, mends that."
+        "off by more than their deviations. A finer sensor, or noise of half a count on it, corrects that."
     ]
 
 
@@ -264,7 +264,7 @@ def _ramps(pairs: Pairs, slipping: Pairs) -> Verdict:
         return [], []
     return (
         [f"{_count(len(ramps), 'break-away ramp')}: the normalised static curve (H and u_max) can be fitted."],
-        ["Ramps without a geometry: h_rms, line length and load cannot be had from them."],
+        ["Ramps without a geometry: h_rms, line length and load cannot be determined from them."],
     )
 
 

@@ -444,13 +444,15 @@ class Fit(Savable):
             "campaign": self.campaign.title,
             "model": " + ".join(self.parts),
             "error": f"{self.error:.3g} floors",
-            "on unseen runs": f"{self.unseen_error:.3g}" if np.isfinite(self.unseen_error) else "one event holds none",
+            "on unseen runs": f"{self.unseen_error:.3g}"
+            if np.isfinite(self.unseen_error)
+            else "none, with one event only",
             "parameters": "set by hand" if self.by_hand else None,
         }
         rows = self.correlations.itertuples(index=False)
         tied = ", ".join(f"{one} and {other} ({r:.2f})" for one, other, r in rows if abs(r) > TIED)
         table = self.parameters[["value", "std", "unit"]]
-        return [facts(what), table, *([f"tied by the data: {tied}"] if tied else []), self.errors]
+        return [facts(what), table, *([f"determined only together: {tied}"] if tied else []), self.errors]
 
 
 @contextmanager

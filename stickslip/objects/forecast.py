@@ -226,7 +226,7 @@ def _next(past: Past, law: Wander, rise: bool) -> dict[str, float] | None:
 
 def _notes(past: Past, at: float | None, law: Wander, rise: bool) -> list[str]:
     """What should be known of how it was made."""
-    where = "all along, even in time" if at is None else f"{at:g} mean recurrences after each arrest"
+    where = "at times spread evenly over the record" if at is None else f"{at:g} mean recurrences after each arrest"
     how = f"{law}, {'with' if rise else 'without'} the recent rise of the level"
     said = [
         f"Forecasts are made {where}; each uses only what was measured by then.",
@@ -237,5 +237,7 @@ def _notes(past: Past, at: float | None, law: Wander, rise: bool) -> list[str]:
             "The block goes back: the reversal of the drive is not predicted, and no forecast extends beyond it."
         )
     if past.trace.drive_position is not None:
-        said.append("The load point was measured, so it is taken to go on as fast as over the last mean recurrence.")
+        said.append(
+            "The load point was measured, so it is assumed to continue as fast as over the last mean recurrence."
+        )
     return said

@@ -49,7 +49,8 @@ def fit_static(
 
     Args:
         campaign: the runs.
-        align: what is laid on the measured passage of ``v_lim``, the model's passage or ("paper") its end.
+        align: the point of the model's curve that is shifted onto the measured passage of ``v_lim``: its own
+            passage, or ("paper") its end.
         time: virtual time with the block's own motion ("exact") or without it ("paper").
         v_lim: speed of the block at which a creep process ends (m/s, or text with a unit).
         sampling: windows even in the logarithm of the time left ("log"), or in time as in the paper ("uniform").

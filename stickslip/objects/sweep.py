@@ -50,8 +50,8 @@ def sweep(
     Args:
         scenario: file, or from :func:`load_scenario`.
         changes: key of the scenario -> its values (numbers in SI, or text with a unit), one for each run.
-        out: folder that keeps finished runs; the same call goes on where one was interrupted, and ends with
-            ``arrays.nc`` and ``result.json`` in it.
+        out: folder that keeps finished runs; after an interruption the same call does only those that are missing. When all
+            are done it holds ``arrays.nc`` and ``result.json``.
         force: replace an existing run folder.
         scheduler: address of a running dask scheduler, ``tcp://host:8786``; default a cluster on this machine.
         workers: of the local cluster; default one a core. 1: in this process, without dask.
@@ -196,7 +196,9 @@ def _result(done: Future) -> Any:
         return done.result()
     except (CancelledError, KilledWorker) as error:
         what = "a worker process was ended from outside, or there was no memory for it"
-        raise StickslipError(f"{what}; the same call goes on, with fewer workers perhaps") from error
+        raise StickslipError(
+            f"{what}; repeat the call: with out=FOLDER it resumes from the finished runs, and fewer workers need less memory"
+        ) from error
 
 
 def _chunk(*members: Scenario) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Workers that end with the process they work for: killed, it cannot tell them, and some of a pool wait for ever."""
+"""Workers that end with the process they work for: a killed one cannot end them, and some of a pool wait for ever."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What goes on for a session in processes beside: every effect is looked at, and the whole diagnosis."""
+"""What runs for a session in separate processes: the evaluation of every effect, and the whole diagnosis."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class CatalogueSearch:
         self._known: dict[tuple[Fit, int], tuple[Promise, ...]] = {}
 
     def promises(self) -> None:
-        """Look at every effect on top of the model as it stands, unless that goes on or is known already."""
+        """Evaluate every effect on top of the present model, unless that is running or known already."""
         from . import search_process
 
         session, fit = self._session, self._session.fitted
@@ -55,7 +55,7 @@ class CatalogueSearch:
 
         def failed(text: str) -> None:
             if begun and self._listing is begun[0]:
-                session.listed, session.said = 1.0, f"the effects could not be looked at: {text}"
+                session.listed, session.said = 1.0, f"the effects could not be evaluated: {text}"
 
         self._listing = search_process.promises(fit, session.effects, found, failed)
         begun.append(self._listing)

@@ -64,7 +64,7 @@ class Listed:
         )
         self._diagnose.disabled = bool(session.searching)
         self._words.text = (
-            f"looking at the effects ({100 * session.listed:.0f} %)"
+            f"evaluating the effects ({100 * session.listed:.0f} %)"
             if session.listed < 1.0
             else "ordered by expected fall of the cost; click to overlay an effect on the residual"
         )

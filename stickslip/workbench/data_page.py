@@ -56,7 +56,7 @@ def page(session: Session) -> Any:
         campaign = session.data
         known = work.found is not None and work.found.campaign is campaign
         if not known and not session.busy:
-            work.do("looking at the data", lambda tell, show: looked(campaign, tell, show))
+            work.do("analysing the data", lambda tell, show: looked(campaign, tell, show))
 
     watch(session, ["campaign", "busy"], look_at)
     watch(work, ["doing"], look_at, now=True)
@@ -70,7 +70,7 @@ def looked(campaign: Campaign, tell: Tell, show: Show) -> Looked:
     """Events first, which are there soon, then what else there is to say."""
     tell("finding the events", 0.0)
     show(Looked(campaign, campaign.events))
-    tell("looking at the events", 0.3)
+    tell("analysing the events", 0.3)
     return Looked(campaign, campaign.events, campaign.inspect())
 
 
@@ -129,7 +129,7 @@ def _column(name: str, values: Sequence[Any], std: float | None, unit: str) -> t
 def groups(found: Looked | None) -> list[dict[str, Any]]:
     """Repairs, what these data can and cannot tell, as sentences under headings."""
     if found is None or found.inspection is None:
-        return [{"head": "What these data can tell", "items": ["is being looked at"], "mark": ""}]
+        return [{"head": "What these data can tell", "items": ["being analysed"], "mark": ""}]
     i = found.inspection
     repaired = list(i.result["dropped"])
     notes = [f"{t['name']}: {text}" for t in i.result["traces"] for text in (*t["notes"], *t["warnings"])]

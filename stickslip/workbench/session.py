@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LOOKING", "Note", "Session", "watch"]
 
-LOOKING = "looking at the data"
+LOOKING = "analysing the data"
 STILL = 0.25  # s without a move, after which a model that was moved is kept
 
 

@@ -1,4 +1,4 @@
-"""How a session tells what goes on in it, and what went wrong."""
+"""Messages of a session: what it is doing, and what went wrong."""
 
 from __future__ import annotations
 

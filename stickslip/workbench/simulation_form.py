@@ -89,4 +89,4 @@ def needed(session: Session) -> Fit:
 def named(fit: Fit, now: Fit | None) -> str:
     """What a curve is of: the model as it stands, or one that stood before."""
     parts = " + ".join(fit.parts)
-    return f"model: {parts}" if fit is now else f"a model before: {parts}"
+    return f"model: {parts}" if fit is now else f"an earlier model: {parts}"

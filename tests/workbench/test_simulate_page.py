@@ -100,7 +100,7 @@ def test_a_simulation_is_shown_beside_the_measurement(session):
     assert creep[1] == pytest.approx(creep[0], rel=0.05) and creep[0] > 1e-6
     assert rows[1][0] == made._name.label.value == "model: static + inertia"
     session.by_hand({"weakening.drop": session.fit.values["weakening.drop"] * 1.05})
-    assert made._table.rows[1][0] == made._name.label.value == "a model before: static + inertia"
+    assert made._table.rows[1][0] == made._name.label.value == "an earlier model: static + inertia"
 
 
 def test_a_wrong_quantity_is_said_and_nothing_else_happens(session):
@@ -154,7 +154,7 @@ def test_the_sweep_is_drawn_with_measured_points(session):
     assert len(made._model.data["v"]) == 2 and np.isfinite(made._model.data["recurrence"]).all()
     assert [row["text"] for row in made.signs.rows] == ["measured", "model: static + inertia"]
     session.by_hand({"weakening.drop": session.fit.values["weakening.drop"] * 1.05})
-    assert [row["text"] for row in made.signs.rows] == ["measured", "a model before: static + inertia"]
+    assert [row["text"] for row in made.signs.rows] == ["measured", "an earlier model: static + inertia"]
     session.undo()
     assert [row["text"] for row in made.signs.rows] == ["measured", "model: static + inertia"]
 

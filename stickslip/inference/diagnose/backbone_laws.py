@@ -162,9 +162,7 @@ def named_text(shape: Shape) -> str:
 
 def _free(line: RoughLine) -> str:
     hurst, height = _with(line.hurst, line.hurst_std, "1"), _with(line.h_rms, line.h_rms_std, "m")
-    return (
-        f"Were the roughness another, H = {hurst} and h_rms = {height} would be nearest (chi-square {line.cost:.0f})."
-    )
+    return f"With another roughness, H = {hurst} and h_rms = {height} would be nearest (chi-square {line.cost:.0f})."
 
 
 def _with(value: float, std: float, unit: str) -> str:
@@ -173,7 +171,7 @@ def _with(value: float, std: float, unit: str) -> str:
 
 def _line(line: RoughLine) -> dict[str, Any]:
     guessed = f"; guesses: {', '.join(line.guessed)}" if line.guessed else ""
-    edge = "; at the edge of what such lines can do" if line.edge else ""
+    edge = "; at the edge of the range of such lines" if line.edge else ""
     stated = f" ({' and '.join(line.stated)} as the rig states)" if line.stated else ""
     return {
         "H": line.hurst, "H_std": line.hurst_std, "h_rms": line.h_rms, "h_rms_std": line.h_rms_std,

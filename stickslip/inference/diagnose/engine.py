@@ -143,7 +143,7 @@ def diagnose(
             "out to test an effect",
             file=campaign.path,
             key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in prepared.traces[:4]),
-            hint="record it again: two loops, or a step up and down; stickslip fit takes it as it is",
+            hint="record it again: two loops, or a step up and down; stickslip fit accepts it as it is",
         )
     dropped = list(prepared.dropped)
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]

@@ -1,7 +1,7 @@
-"""A base model and what was fitted on top of it, on their way between processes.
+"""A base model and what was fitted on top of it, as they are sent between processes.
 
 Candidates share with their base all that is known of the record, nine tenths of what they hold: on their way back
-those arrays are named and not copied.
+those arrays are sent by name and not copied.
 """
 
 from __future__ import annotations

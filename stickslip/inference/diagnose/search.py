@@ -95,8 +95,8 @@ class Search:
         last = self.ladder[-1]
         self.ladder[-1] = Rung.of(last.model, last.added, self.base, last.removed)
         return (
-            f"spring: {shown(self.base.values[SPRING], 'N/m', 4)} as the slips want, not {shown(stated, 'N/m', 4)} as "
-            f"stated: springs are not known better than to {100 * EXACT:g} %"
+            f"spring: {shown(self.base.values[SPRING], 'N/m', 4)} as the slips require, not {shown(stated, 'N/m', 4)} "
+            f"as stated: springs are not known better than to {100 * EXACT:g} %"
         )
 
     def add(self, done: Round) -> None:

@@ -42,7 +42,7 @@ MOST_JUMPS = 4  # of the reading in a campaign: they are rare
 ADJUSTED = 0.8  # share of a base fit before the motion is adjusted
 FEWEST = 12  # events from which on it is asked whether their strengths follow each other
 DISTINCT = 6.0  # of the cost, by which distinguishable coordinates differ at least: a likelihood ratio of twenty
-LARGER = 1.0  # e-folds by which sizes are taken for larger where a search may stand in a dent
+LARGER = 1.0  # e-folds by which sizes are assumed larger where a search may have ended in a local minimum
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def fit(
 
 
 def _arrived(found: Fit) -> Fit:
-    """The better of a fit and of one that goes on from it with all that is random taken for larger than it is.
+    """The better of a fit and of one that goes on from it with all that is random assumed larger than it is.
 
     Where an element begins to slide the force has a kink, and the floor of the valley is rough: in one of its dents the
     search may stand still before it has arrived, and then every law that is added gains by leaving it.
@@ -298,7 +298,7 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
     """A refit with sizes of its own of what is random; what carries the noise to a force stays that of its base.
 
     Under the sizes of a model that lacks an effect, events look as scattered as the effect makes them, and laws that
-    describe it more or less well look alike.
+    describe it well or badly look equally good.
 
     Args:
         found: where to go on from.

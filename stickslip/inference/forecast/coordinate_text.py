@@ -1,4 +1,4 @@
-"""What levels wander along, in words and numbers: time, slip path or place."""
+"""What levels vary with, in words and numbers: time, slip path or place."""
 
 from __future__ import annotations
 

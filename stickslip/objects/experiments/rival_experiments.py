@@ -62,7 +62,7 @@ class SimulatedExperiment:
     def tells(self) -> str:
         """How likely the true model is expected to become beside any other one, in words."""
         if self.margin < np.log(2.0):
-            return "hardly likelier"
+            return "about as likely"
         power = self.margin / np.log(10.0)
         return f"{10.0**power:.2g} times as likely" if power < 3.0 else f"10^{power:.0f} times as likely"
 
