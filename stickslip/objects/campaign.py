@@ -12,6 +12,7 @@ from ..data.checks import Finding, refuse_impossible, rig_against_motion
 from ..data.displacements import true_gains, with_displacements
 from ..data.readers.repair import from_load_point
 from ..data.segment import Segmentation, segment
+from ..data.segment.left_out import left_out
 from ..data.trace import Trace
 from ..errors import InputError, nearest
 from ..system.object_repr import Shown, facts, table
@@ -145,8 +146,6 @@ class Campaign(Shown, Mapping[str, Trace]):
     @cached_property
     def lost(self) -> tuple[str, ...]:
         """What was left out of the data, in words."""
-        from ..show.report.describe import left_out
-
         return tuple(left_out(self.traces, self.scaled[0]))
 
     def prepare(self, holdout: str | Sequence[str] = ()) -> Prepared:

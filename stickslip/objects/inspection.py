@@ -85,9 +85,10 @@ class Inspection(Savable):
 def inspect(campaign: Campaign, progress: Tell | None = None) -> Inspection:
     """See :meth:`Campaign.inspect`."""
     from ..data.checks import rig_against_motion, stopping
+    from ..data.segment.stick_ripple import stick_ripple
     from ..inference.diagnose.stiffness_check import spring_finding
     from ..show.report import describe_trace, trace_pieces
-    from ..show.report.ripple import stick_ripple
+    from ..show.report.ripple_text import ripple_text
     from .data_abilities import abilities
 
     rows: list[dict[str, Any]] = []
@@ -102,7 +103,7 @@ def inspect(campaign: Campaign, progress: Tell | None = None) -> Inspection:
                 key = f"trace{i}_ripple"
                 for name, unit in (("frequency", "Hz"), ("amplitude", ripple["unit"])):
                     variables[f"{key}_{name}"] = (key, ripple.pop(name), {"units": unit})
-                row["ripple"] = ripple
+                row["ripple"] = {**ripple, "text": ripple_text(ripple["lines"], trace, ripple["unit"])}
             variables |= trace_pieces(trace, segmentation, i)
             rows.append(row)
     able = abilities(traces, events)

@@ -50,7 +50,7 @@ def sweep(
     Args:
         scenario: file, or from :func:`load_scenario`.
         changes: key of the scenario -> its values (numbers in SI, or text with a unit), one for each run.
-        out: folder that keeps finished runs; after an interruption the same call does only those that are missing. When all
+        out: folder that keeps finished runs; after an interruption the same call does those that are missing. When all
             are done it holds ``arrays.nc`` and ``result.json``.
         force: replace an existing run folder.
         scheduler: address of a running dask scheduler, ``tcp://host:8786``; default a cluster on this machine.
@@ -197,7 +197,7 @@ def _result(done: Future) -> Any:
     except (CancelledError, KilledWorker) as error:
         what = "a worker process was ended from outside, or there was no memory for it"
         raise StickslipError(
-            f"{what}; repeat the call: with out=FOLDER it resumes from the finished runs, and fewer workers need less memory"
+            f"{what}; repeat the call: with out=FOLDER it keeps finished runs, and fewer workers need less memory"
         ) from error
 
 

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import median_filter
 
-from ...data.segment import Segmentation, block_motion
-from ...data.trace import Trace
-from ...system.units import shown
+from ..trace import Trace
+from .kinematics import block_motion
+from .records import Segmentation
 
 _RATE = 1000.0  # Hz, what faster records are averaged down to
 _HIGHEST = 200.0  # Hz
-_LEAST_STICKS, _LINES, _APART = 12, 4, 1.2  # fewer sticks that look alike make lines of their own
+_LEAST_STICKS, _LINES, _APART = 12, 4, 1.2  # fewer sticks of similar course make lines of their own
 _MARGIN = 1.3  # on the highest line that noise alone makes
 _SIDEBANDS = 2.6  # of a line, in units of one over the recurrence time, within which the gaps of the slips blur it
-_FAINT = 0.05  # lines below this share of the noise of one sample are not told
+_FAINT = 0.05  # lines below this share of the noise of one sample are not reported
 _POINTS = 3000
 _GRID = np.linspace(-1, 1, 301)
 
@@ -33,7 +33,7 @@ def stick_ripple(trace: Trace, found: Segmentation) -> dict[str, Any] | None:
 
     Returns:
         ``lines``: list of period (s), amplitude (in ``unit``) and prominence, the strongest first; ``unit``;
-        ``text``; ``frequency`` (Hz) and ``amplitude`` arrays for a picture (largest of each bin).
+        ``frequency`` (Hz) and ``amplitude`` arrays for a picture (largest of each bin).
     """
     pieces = _residues(trace, found)
     if pieces is None:
@@ -72,7 +72,6 @@ def stick_ripple(trace: Trace, found: Segmentation) -> dict[str, Any] | None:
     return {
         "lines": lines,
         "unit": unit,
-        "text": _text(lines, trace, unit),
         "frequency": frequency[:usable].reshape(-1, size).mean(axis=1),
         "amplitude": np.sqrt(power[:usable].reshape(-1, size).max(axis=1)),
     }
@@ -136,19 +135,3 @@ def _tapered(rest: np.ndarray, sticks: list[tuple[int, int]]) -> float:
         rest[a:b] = (rest[a:b] - np.interp(np.linspace(-1, 1, b - a), _GRID, mean)) * window
         total += float(window.sum())
     return total
-
-
-def _text(lines: list[dict[str, float]], trace: Trace, unit: str) -> str:
-    if not lines:
-        return "no ripple stands out while the block sticks"
-    parts = []
-    for line in lines:
-        part = f"period {line['period']:.4g} s"
-        mains = next((f for f in (50, 60) if abs(1 / line["period"] - f) < 0.01 * f), None)
-        if mains:
-            part += f" (mains, {mains} Hz)"
-        elif trace.drive_velocity:
-            part += f" ({shown(line['period'] * trace.drive_velocity, 'm', 3)} of drive)"
-        size = f"{line['amplitude'] * 1e9:.3g} nm" if unit == "m" else f"{line['amplitude']:.3g} {unit}"
-        parts.append(f"{part}, amplitude {size}")
-    return "ripple while the block sticks: " + "; ".join(parts)

@@ -2,7 +2,7 @@
 
 Taken from the generator's own campaigns: how far an effect moves the features, in floors, when rig and lines are moved
 so as to hide it, and other lines at an event may hide it as well. Spring and mass count as known. Neither the package's
-model nor its fit takes part. `python -m stickslip.blind.visibility` prints the table of `detection`.
+model nor its fit takes part. `python -m tests.challenge.visibility` prints the table of `stickslip.blind.detection`.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from ..data.campaign import load_campaign, load_traces
-from ..data.segment import segment
-from ..errors import StickslipError
-from ..inference.features.curve import SampledCurve
-from ..inference.features.evaluate import features
-from ..inference.features.measurement import Measurement, measure
-from ..inference.fit.start import ring_period
-from .floors import floors_alone
-from .generator import EFFECTS, Setup, draw_setup, make_campaign
-from .generator.sensor import SILENT
+from stickslip.blind.generator import EFFECTS, Setup, draw_setup, make_campaign
+from stickslip.blind.generator.sensor import SILENT
+from stickslip.data.campaign import load_campaign, load_traces
+from stickslip.data.segment import segment
+from stickslip.errors import StickslipError
+from stickslip.inference.features.curve import SampledCurve
+from stickslip.inference.features.evaluate import features
+from stickslip.inference.features.measurement import Measurement, measure
+from stickslip.inference.fit.start import ring_period
+from tests.fit.feature_floors import floors_alone
 
 SEEN = 5.0  # standard deviations from which an effect counts as seen
 SCATTER = 1.5  # between the same lines at every event and new ones

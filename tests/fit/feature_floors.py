@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inference.features.measurement import Measurement
+from stickslip.inference.features.measurement import Measurement
 
 
 @dataclass(frozen=True)
