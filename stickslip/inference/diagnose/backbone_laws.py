@@ -1,9 +1,9 @@
 """What the laws of geometry say of the measured backbone, and whether one of them is to be named.
 
-Effects that only shape the backbone change nothing along the motion. They are told by the same rules as the others
-(:mod:`.decide`), from the fall of chi-square of one curve: no run is left out, for all runs share the contact. A change
-of shape is told from roughness only where the roughness is known: else H and h_rms are parameters of the distribution
-of gaps, take up most of it, and what they leave is no proof of a cause.
+Effects that only shape the backbone change nothing along the motion. They are judged by the same rules as the
+others (:mod:`.decide`), from the fall of chi-square of one curve: no run is left out, for all runs share the contact. A
+change of shape is distinguished from roughness only where the roughness is known: else H and h_rms are parameters of
+the distribution of gaps, explain most of it, and what they leave is no proof of a cause.
 """
 
 from __future__ import annotations

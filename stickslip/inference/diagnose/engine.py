@@ -65,7 +65,7 @@ class Diagnosis:
 
     Attributes:
         verdict, ladder, rounds: what was found, and how.
-        named: effects of the last model, each with the round in which it was last told from others.
+        named: effects of the last model, each with the round in which it was last distinguished from others.
         prepared: the data.
         floor: of the force at every point: noise and scatter of the last model (N), shape (p,).
         shape: the backbone that the last model measured, and its laws.

@@ -50,7 +50,7 @@ class _Held:
     """A model along a run that its fit has not seen.
 
     Attributes:
-        residual: force, all events alike (N), shape (p,).
+        residual: force, all events equal (N), shape (p,).
         unsure: what a standard deviation of each independent combination of its parameters does (N), shape (p, q).
         white: the covariance of the residuals, the parameters known.
         blocks: points by event.

@@ -30,7 +30,7 @@ class Rung:
 
     Attributes:
         model: tags of its parts. added: the last of them, None where the ladder begins.
-        residual: of the force with all events alike, on the runs it was fitted to (N), shape (p,).
+        residual: of the force with all events equal, on the runs it was fitted to (N), shape (p,).
         unseen: the same of runs left out (:func:`..force.heldout.apart`); None for the static model, which has no fit
             of its own.
         fit: None for the static model.
@@ -57,7 +57,7 @@ class Search:
         base: the model as it stands.
         ladder: its steps.
         rounds: all effects on top of each model.
-        named: effects of the model, each with the round in which it was last told from others.
+        named: effects of the model, each with the round in which it was last distinguished from others.
         gone: effects that were taken out again; they are not tried any more, so that the search ends.
     """
 

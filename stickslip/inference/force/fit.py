@@ -144,7 +144,7 @@ class Fit:
 
     @property
     def marginal(self) -> Array:
-        """Residual force with all events alike (N), shape (p,)."""
+        """Residual force with all events equal (N), shape (p,)."""
         return self.forces.residual - (self.forces.local * self.point.events[self.problem.of]).sum(axis=1)
 
     @property

@@ -42,7 +42,7 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
         run: number of the run in the problem, whose phases and pull at the start are taken.
         cycles: of that run, arrays (n,).
         events: logarithms of factors on strength and on yield displacements, and the power by which these are
-            stretched besides, in every cycle, shape (n, 3); default all events alike.
+            stretched besides, in every cycle, shape (n, 3); default all events equal.
 
     Returns:
         The tracks, with a leading axis of cycles.
