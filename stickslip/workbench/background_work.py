@@ -1,4 +1,4 @@
-"""Work of the pages beside the fits, looks at the data and simulations, in threads of their own: sliders stay free."""
+"""Analyses of the data and simulations in threads of their own, so that sliders and fits are not held up."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Show = Callable[[Any], None]
 
 
 class BackgroundWork(param.Parameterized):
-    """One piece of work at a time, which all windows of a session see alike.
+    """One piece of work at a time, which all windows of a session show.
 
     Attributes:
         doing, share: what is being done ("" for nothing), and how much of it is.
@@ -85,7 +85,7 @@ class BackgroundWork(param.Parameterized):
 _kept: WeakKeyDictionary[Session, dict[str, BackgroundWork]] = WeakKeyDictionary()
 
 
-def beside(session: Session, name: str) -> BackgroundWork:
+def background(session: Session, name: str) -> BackgroundWork:
     """The work of that name of a session."""
     own = _kept.setdefault(session, {})
     if name not in own:

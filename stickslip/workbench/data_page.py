@@ -12,7 +12,7 @@ import panel as pn
 from ..data.segment import Segmentation
 from ..objects.campaign import Campaign
 from ..system.units import shown
-from .background_work import BackgroundWork, Show, Tell, beside
+from .background_work import BackgroundWork, Show, Tell, background
 from .event_view import EventView
 from .figures import label, unit_of
 from .new_run_form import adding
@@ -48,7 +48,7 @@ class Looked:
 
 def page(session: Session) -> Any:
     """The page of a session."""
-    work = beside(session, "inspection")
+    work = background(session, "inspection")
     signals, event = Signals(session), EventView(session)
     bar = progress(work, stopping=False)
 

@@ -9,7 +9,7 @@ import panel as pn
 
 from ..errors import StickslipError
 from . import run_folders, simulation_folders
-from .background_work import Show, Tell, beside
+from .background_work import Show, Tell, background
 from .history_text import SIMULATIONS, told, when
 from .page_parts import Table, head, progress, starter
 from .session import Session, watch
@@ -43,7 +43,7 @@ class Folders:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._work = beside(session, "saving")
+        self._work = background(session, "saving")
         self._listed: list[run_folders.RunFolder] = []
         self.what = field(pn.widgets.Select, "what is saved", 210, options=[MODEL, DIAGNOSIS, *SIMULATED], value=MODEL)
         self.name = field(pn.widgets.TextInput, "name of the run folder", 160, placeholder="first")
@@ -70,7 +70,7 @@ class Folders:
         session, name, what = self._session, self.name.value_input or self.name.value, self.what.value
         found: Any = session.fit if what == MODEL else session.diagnosis if what == DIAGNOSIS else None
         if what in SIMULATED:
-            found = beside(session, SIMULATED[what]).found
+            found = background(session, SIMULATED[what]).found
         if found is None:
             self._work.said = f"not there yet: {what}"
             return

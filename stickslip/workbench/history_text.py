@@ -8,7 +8,7 @@ from typing import Any
 
 from ..system.units import shown_with
 from . import simulation_lines
-from .background_work import beside
+from .background_work import background
 from .session import Session
 
 RIVALS = "rivals"
@@ -72,5 +72,5 @@ def python(session: Session) -> str:
 
 def simulated(session: Session) -> dict[str, Any]:
     """What was simulated last, for what there is."""
-    found = {name: beside(session, name).found for name in SIMULATIONS}
+    found = {name: background(session, name).found for name in SIMULATIONS}
     return {name: each for name, each in found.items() if each}

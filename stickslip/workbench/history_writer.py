@@ -1,4 +1,4 @@
-"""Who keeps the history of a session beside its campaign, as long as no other workbench does."""
+"""Writing the history of a session beside its campaign, as long as no other workbench does."""
 
 from __future__ import annotations
 

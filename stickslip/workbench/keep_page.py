@@ -7,7 +7,7 @@ from typing import Any
 import panel as pn
 
 from . import history_text
-from .background_work import beside
+from .background_work import background
 from .folders_view import Folders
 from .page_parts import Copy, Table, head
 from .session import Session, watch
@@ -40,6 +40,6 @@ def _lines(session: Session) -> list[Any]:
         python.text, shell.text = history_text.python(session), history_text.commands(session)
 
     for name in history_text.SIMULATIONS:
-        watch(beside(session, name), ["doing"], update)
+        watch(background(session, name), ["doing"], update)
     watch(session, ["steps", "at", "campaign"], update, now=True)
     return [head("The same in Python, in the campaign's folder"), python, head("and as commands"), shell]

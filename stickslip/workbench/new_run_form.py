@@ -13,7 +13,7 @@ from ..data.readers import Columns
 from ..errors import InputError
 from ..objects.campaign import Campaign
 from ..system.units import to_si
-from .background_work import Show, Tell, beside
+from .background_work import Show, Tell, background
 from .file_names import new_place
 from .new_run import CHANNELS, FOLDER, NONE, VELOCITY, Choice, add, create, entry_text, guess, look
 from .page_parts import Table, head, progress
@@ -95,7 +95,11 @@ class Form:
     doing = "adding the run"
 
     def __init__(self, session: Session) -> None:
-        self._session, self._work, self._reading = session, beside(session, "adding"), beside(session, "reading")
+        self._session, self._work, self._reading = (
+            session,
+            background(session, "adding"),
+            background(session, "reading"),
+        )
         self.dropped: tuple[str, bytes] | None = None
         self._given = b""
         self._found: Read | None = None

@@ -1,4 +1,4 @@
-"""What stood before, shown again: the history beside the campaign, or the model of a run folder."""
+"""Restoring a session: from the history beside the campaign, or with the model of a run folder."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from ..objects.diagnosis import Diagnosis
 from ..objects.experiments import MEASURES, SimulatedExperiment
 from ..physics.effects import catalogue
 from ..system.units import to_si
-from .background_work import Show, Tell, beside
+from .background_work import Show, Tell, background
 from .evidence import LEAST, best_forms
 from .figures import figure, label, legend, of_run, unit_of
 from .page_parts import Table, head, progress, starter
@@ -41,7 +41,7 @@ class Rivals:
 
     def __init__(self, session: Session, asked: SimulationForm) -> None:
         self._session, self._asked = session, asked
-        self._work = beside(session, "rivals")
+        self._work = background(session, "rivals")
         self._sets: list[tuple[tuple[str, ...], str]] = []
         self._drawn: SimulatedExperiment | None = None
         self._offered: list[str] = []

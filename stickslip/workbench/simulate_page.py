@@ -7,7 +7,7 @@ from typing import Any
 import panel as pn
 
 from . import vibrometer_files
-from .background_work import Show, Tell, beside
+from .background_work import Show, Tell, background
 from .page_parts import head, progress, starter
 from .rivals_view import Rivals
 from .session import Session
@@ -31,7 +31,7 @@ class _Synthetic:
 
     def __init__(self, session: Session, asked: SimulationForm) -> None:
         self._session, self._asked = session, asked
-        self._work = beside(session, "synthetic")
+        self._work = background(session, "synthetic")
         self.name = field(pn.widgets.TextInput, "folder beside the campaign", 240, value="synthetic")
         begin = starter(self._work, "Write a record", self.start)
         words = "What is set above as a vibrometer would record it: record.csv and campaign.toml in a new folder"

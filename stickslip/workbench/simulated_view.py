@@ -10,7 +10,7 @@ from bokeh.core.properties import value
 
 from ..objects import experiments
 from ..objects.experiments import Simulated
-from .background_work import Show, Tell, beside
+from .background_work import Show, Tell, background
 from .figures import compared, crosshair, figure, label, legend, source, unit_of
 from .overview import record
 from .page_parts import Table, progress, starter
@@ -26,7 +26,7 @@ class SimulatedView:
 
     def __init__(self, session: Session, asked: SimulationForm) -> None:
         self._session, self._asked = session, asked
-        self._work = beside(session, "simulation")
+        self._work = background(session, "simulation")
         self._measured = source(t=[], x=[], gap=[])
         self._model = source(t=[], x=[], gap=[])
         self._model.name = "simulated"

@@ -1,4 +1,4 @@
-"""What is to be simulated, as it is written on the page, of which model, and what came of it."""
+"""The form of a simulation: its fields on the page, the model that is simulated, and the result."""
 
 from __future__ import annotations
 

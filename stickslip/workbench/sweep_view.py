@@ -11,7 +11,7 @@ from bokeh.models import FixedTicker, Range1d
 from ..objects import experiments
 from ..objects.experiments import Swept
 from ..system.units import shown
-from .background_work import Show, Tell, beside
+from .background_work import Show, Tell, background
 from .figures import figure, label, look, source, unit_of
 from .page_parts import head, progress, starter
 from .saved_fields import SavedFields
@@ -57,7 +57,7 @@ class SweepView:
 
     def __init__(self, session: Session, asked: SimulationForm) -> None:
         self._session, self._asked = session, asked
-        self._work = beside(session, "sweep")
+        self._work = background(session, "sweep")
         theme = look()
         self.low, self.high = (field(pn.widgets.TextInput, name, 130) for name in ("velocities from", "to"))
         self.points = field(pn.widgets.IntInput, "how many", 90, value=6, start=2, end=40)

@@ -1,4 +1,4 @@
-"""Work off the thread that serves the windows: fits in one thread of their own, a search in a process of its own."""
+"""Fits in a thread of their own and searches in a process of their own, so that the windows are served meanwhile."""
 
 from __future__ import annotations
 

@@ -356,7 +356,7 @@ def test_events_are_listed_in_the_unit_and_to_the_place_of_their_deviations(camp
 def test_what_the_data_tell_is_said(campaign):
     session = Session(campaign=campaign)
     assert data_page.page(session) is not None
-    found = data_page.beside(session, "inspection").found
+    found = data_page.background(session, "inspection").found
     told = {g["head"]: g["items"] for g in data_page.groups(found)}
     assert told["Can tell"] == campaign.inspect().can and told["Repaired or left out"] == ["nothing"]
     columns, rows = data_page.event_rows(found, "v100")

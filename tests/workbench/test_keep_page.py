@@ -14,7 +14,7 @@ from stickslip.objects.experiments import Setting
 from stickslip.objects.fitted_run import load_run
 from stickslip.system.units import shown_with
 from stickslip.workbench import folders_view, history_text, keep_page, run_folders, simulation_folders
-from stickslip.workbench.background_work import beside
+from stickslip.workbench.background_work import background
 from stickslip.workbench.rivals_view import Rivals
 from stickslip.workbench.simulated_view import SimulatedView
 from stickslip.workbench.simulation_form import SimulationForm
@@ -91,7 +91,7 @@ def test_the_page_saves_lists_and_shows(session, folder):
     made = folders_view.Folders(session)
     made.name.value = "by the page"
     made.save()
-    assert beside(session, "saving").said == "saved as by the page"
+    assert background(session, "saving").said == "saved as by the page"
     names = [row[0] for row in made._table.rows]
     assert "by the page" in names
     told = json.loads((folder / "by the page" / "result.json").read_text())["history"]
@@ -101,10 +101,10 @@ def test_the_page_saves_lists_and_shows(session, folder):
     made._table._handle_msg({"kind": "row", "row": names.index("by the page")})
     assert "<iframe" in made._frame.object and made._tab.visible
     made.save()
-    assert "already" in beside(session, "saving").said
+    assert "already" in background(session, "saving").said
     made.what.value = folders_view.DIAGNOSIS
     made.save()
-    assert "not there yet" in beside(session, "saving").said
+    assert "not there yet" in background(session, "saving").said
     for message in ({"kind": "row", "row": 10**6}, {"kind": "row", "row": "x"}, {"row": 0}, {}):
         made._table._handle_msg(message)
 
@@ -137,7 +137,7 @@ def _saved_by_the_page(session, folder, what, name):
     made = folders_view.Folders(session)
     made.what.value, made.name.value = what, name
     made.save()
-    assert beside(session, "saving").said == f"saved as {name}"
+    assert background(session, "saving").said == f"saved as {name}"
     return json.loads((folder / name / "result.json").read_text())
 
 
@@ -168,7 +168,7 @@ def test_a_simulation_is_kept_as_the_command_keeps_it(session, folder, monkeypat
     asked = SimulationForm(session)
     asked.run.value, asked.hold.value, asked.mass.value, asked.load.value = "v400", "1 s", "1.3 kg", "2"
     SimulatedView(session, asked).start()
-    recording = beside(session, "simulation").found.recording
+    recording = background(session, "simulation").found.recording
     told = _saved_by_the_page(session, folder, "the simulation", "one run")
     its, out = _by_command(told, folder, monkeypatch)
     _the_same(told, its, ("events", "facts", "scenario"))
@@ -207,12 +207,12 @@ def test_rivals_are_kept_each_in_every_experiment(session, base, aged, folder, m
     options = {"as driven": Setting("v400", "400 um/s", events=3, load="2"), "wrong": Setting("v400", mass="0 kg")}
     made = Rivals(session, SimulationForm(session))
     found = experiments.simulate_rivals(base, fits, options, _silent, code=session.code())
-    beside(session, "rivals").found = found
+    background(session, "rivals").found = found
     assert made._table.rows[0][0] == "as driven"
     folders = folders_view.Folders(session)
     folders.what.value, folders.name.value = "the experiments", "experiments"
     folders.save()
-    assert beside(session, "saving").said == "saved as experiments"
+    assert background(session, "saving").said == "saved as experiments"
     told = json.loads((folder / "experiments" / "result.json").read_text())
     first, failed = told["experiments"]
     assert first["experiment"] == "as driven" and first["margin"] >= 0.0 and "mass" in failed["note"]
@@ -235,7 +235,7 @@ def test_what_was_not_simulated_cannot_be_saved(session, folder):
     for what in folders_view.SIMULATED:
         made.what.value, made.name.value = what, "nothing there"
         made.save()
-        assert "not there yet" in beside(session, "saving").said
+        assert "not there yet" in background(session, "saving").said
     wrong = [experiments.SimulatedExperiment("a", Setting("v400"), session.fit, {}, {}, note="no")]
     with pytest.raises(InputError, match="no experiment"):
         simulation_folders.save(wrong, session.campaign, "nothing there", _silent)

@@ -18,7 +18,7 @@ from stickslip.simulation.scenario import make_scenario
 from stickslip.system.progress import Cancelled, cancellable
 from stickslip.system.units import to_si
 from stickslip.workbench import simulate_page, vibrometer_files
-from stickslip.workbench.background_work import beside
+from stickslip.workbench.background_work import background
 from stickslip.workbench.rivals_view import Rivals, _undecided
 from stickslip.workbench.session import Session
 from stickslip.workbench.simulated_view import SimulatedView
@@ -89,7 +89,7 @@ def test_a_simulation_is_shown_beside_the_measurement(session):
     made = SimulatedView(session, asked)
     asked.run.value, asked.velocity.value, asked.events.value = "v400", "400 um/s", 7
     made.start()
-    assert beside(session, "simulation").said == ""
+    assert background(session, "simulation").said == ""
     assert len(made._model.data["t"]) > 500 and len(made._measured.data["t"]) > 500
     own, model = (float(np.max(d.data["x"])) for d in (made._measured, made._model))
     assert model == pytest.approx(own, rel=0.15)
@@ -108,7 +108,7 @@ def test_a_wrong_quantity_is_said_and_nothing_else_happens(session):
     made = SimulatedView(session, asked)
     asked.mass.value = "heavy"
     made.start()
-    work = beside(session, "simulation")
+    work = background(session, "simulation")
     assert "mass" in work.said and work.found is None and work.doing == ""
 
 
@@ -117,7 +117,7 @@ def test_without_a_model_it_is_said(campaign):
     simulate_page.page(session)
     asked = SimulationForm(session)
     SimulatedView(session, asked).start()
-    assert "no model yet" in beside(session, "simulation").said
+    assert "no model yet" in background(session, "simulation").said
 
 
 @pytest.mark.slow
@@ -200,7 +200,7 @@ def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(
     np.testing.assert_array_equal(*drives)  # each is put to the very same
     made = Rivals(session, SimulationForm(session))
     assert "holds of 1 s and 10 s" in made._said.text and made.effects.value == list(RIVALS)
-    beside(session, "rivals").found = found
+    background(session, "rivals").found = found
     assert made._table.rows[0][0] == "a hold of 10 s" and made._table.chosen == 0
     words, _, table = made._place
     assert (
@@ -258,7 +258,7 @@ def test_where_nothing_was_proposed_effects_can_be_chosen(session):
     assert "Choose effects" in made._said.text and {"wear", *RIVALS} <= set(made.effects.options)
     made.effects.value = ["wear"]
     made.start()
-    assert "two effects" in beside(session, "rivals").said
+    assert "two effects" in background(session, "rivals").said
 
 
 def test_what_is_offered_follows_the_promises_until_others_are_chosen(session):
