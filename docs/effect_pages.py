@@ -21,7 +21,7 @@ import xarray
 from stickslip.inference.fit.parameters import priors
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Effect
-from stickslip.physics.effects.printed import pieces
+from stickslip.physics.effects.equation_text import pieces
 from stickslip.physics.effects.symbols import BASE, found, of_parameters
 from stickslip.physics.params import Spec, specs, variants
 from stickslip.show.plots.style import scaled

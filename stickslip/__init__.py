@@ -22,7 +22,7 @@ _PUBLIC = {
     "rough_bank": "physics.contact",
     "power_law_bank": "physics.contact",
     "load_run": "objects.fitted_run",
-    "load_fit": "objects.stored",
+    "load_fit": "objects.stored_fit",
     "load_campaign": "objects.campaign",
     "load_example": "objects.example",
     "Campaign": "objects.campaign",
@@ -71,7 +71,7 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .objects.example import load_example as load_example
     from .objects.fit import Fit as Fit
     from .objects.fitted_run import load_run as load_run
-    from .objects.stored import load_fit as load_fit
+    from .objects.stored_fit import load_fit as load_fit
     from .objects.study import study as study
     from .objects.sweep import sweep as sweep
     from .physics.contact import creep_curve as creep_curve

@@ -20,7 +20,7 @@ import pytest
 
 from stickslip.inference.fit.parameters import priors
 from stickslip.physics.effects import catalogue
-from stickslip.physics.effects.plain import plain
+from stickslip.physics.effects.latex_to_text import plain
 from stickslip.physics.params import specs, variants
 from stickslip.simulation.scenario import load_scenario
 

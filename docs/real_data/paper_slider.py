@@ -11,8 +11,8 @@ import numpy as np
 
 from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.segment import segment
+from stickslip.data.segment.stick_ripple import stick_spectrum
 from stickslip.show.report.figures import ripple_picture, trace_picture
-from stickslip.show.report.ripple import stick_spectrum
 
 from .campaigns import campaign, keep, program, result
 

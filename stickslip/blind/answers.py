@@ -12,7 +12,7 @@ from ..system.runstore import RESULT
 from .one_case import failures, is_done
 
 KINDS = ("complete", "missing", "ambiguous", "unknown")
-# what campaigns of several velocities and holds cannot be expected to tell apart
+# what campaigns of several velocities and holds cannot be expected to distinguish
 CLASSES = (("sensor-drift", "sensor-high-pass"), ("sensor-low-pass", "residual-load"))
 
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from .generator.forms import Effect, Form
 
 LARGEST = 30.0  # multiples of detection
-# tag -> form -> amplitude in the unit of the generator, made by stickslip.blind.visibility
+# tag -> form -> amplitude in the unit of the generator, made by tests/challenge/visibility.py
 DETECTION: dict[str, dict[str, float]] = {
     "velocity-weakening": {"exponent 1": 0.014, "hyperbolic": 0.017, "exponent 2": 0.013, "exponent 1/2": 0.0043},
     "slip-weakening": {"exponential": 0.0049, "linear": 0.0045, "hyperbolic": 0.0039},
@@ -55,7 +55,7 @@ def detection(effect: Effect, form: str) -> float:
     """The amplitude from which an effect can be seen in one of its forms, in its unit: five standard deviations.
 
     Not of noise alone but of noise and the scatter of the contact together, in five runs of a rig whose friction,
-    weakening, damping and roughness are unknown (see :mod:`.visibility`); geometric mean of two rigs.
+    weakening, damping and roughness are unknown (see ``tests/challenge/visibility.py``); geometric mean of two rigs.
     """
     return DETECTION[effect.tag][form]
 

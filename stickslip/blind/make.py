@@ -13,11 +13,11 @@ from typing import Any
 
 from ..errors import ArgumentError, RunFolderError, StickslipError
 from ..system.extras import need
-from ..system.lifeline import end_with
+from ..system.parent_watch import end_with
 from ..system.progress import Tell
 from ..system.runstore import Run, json_text, open_run, versions
 from ..system.threads import processors
-from .mix import MIX, Case, case_seed, plan
+from .case_plan import MIX, Case, case_seed, plan
 from .seal import CASES, TRUTH, make_seal
 
 ATTEMPTS = 8
@@ -41,7 +41,7 @@ def make_challenge(
 
     Args:
         folder: must not exist, or be empty.
-        cases, seed: see :func:`stickslip.blind.mix.plan`.
+        cases, seed: see :func:`stickslip.blind.case_plan.plan`.
         own: cases of one's own in place of the mix.
         grouped: join springs of about the same threshold: ten times faster, slips a little beside (docs/challenge).
         jobs: parallel processes; default the number of processors that this process may use.

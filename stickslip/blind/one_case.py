@@ -85,7 +85,7 @@ def _attempt(
 ) -> dict[str, Any]:
     if not is_done(folder, case):
         if _starts(folder, case, session) >= LIVES:
-            error: BaseException = ProcessDiedError(f"the process died {LIVES} times while at this case")
+            error: BaseException = ProcessDiedError(f"the process died {LIVES} times during this case")
             record_failure(folder, case, error, 0.0)
             return _told(case, "failed", str(error), began)
         with _starts_file(folder, case).open("a", encoding="utf-8") as stream:

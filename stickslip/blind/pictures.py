@@ -1,4 +1,4 @@
-"""Pictures of a score: who was taken for whom, and how the share of right answers grows with the amplitude."""
+"""Pictures of a score: what was named for each hidden effect, and the share of right answers over the amplitude."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def _confidence(axes: Axes, bins: Sequence[Mapping[str, Any]]) -> None:
     x, y, low, high = _points([{**b, "stated": b["confidence"]["holds"]} for b in stated], "stated")
     axes.plot(np.array(x) / 1.06, [b["confidence"]["stated"] for b in stated], "D", color=MIDDLE, label="stated, mean")
     axes.errorbar(np.array(x) * 1.06, y, [low, high], color=DARK, marker="o", linestyle="", capsize=3,
-                  label="claim holds")  # fmt: skip
+                  label="claim correct")  # fmt: skip
     for b, at in zip(stated, x, strict=True):
         axes.annotate(f"n = {b['confidence']['holds']['of']}", (at, 1.04), ha="center", va="bottom", color=DARK)
     axes.set_ylim(0, 1.13)

@@ -134,7 +134,7 @@ def _protocol(runs: Path, seal: str, options: dict[str, Any]) -> None:
         if before.get(key) != now[key]:
             raise InputError(
                 f"this challenge was begun with other {key}", file=path, value=now[key], allowed=json_text(before[key]),
-                hint="one score must rest on one protocol: go on with the same settings, or remove the folder 'runs'",
+                hint="one score needs one protocol: continue with the same settings, or remove the folder 'runs'",
             )  # fmt: skip
 
 

@@ -132,7 +132,7 @@ def _confusion(s: Mapping[str, Any]) -> list[str]:
 
 
 def _confidence(s: Mapping[str, Any]) -> list[str]:
-    """Stated confidence against how often the claim holds, by amplitude; nothing where no verdict states one."""
+    """Stated confidence against how often the claim correct, by amplitude; nothing where no verdict states one."""
     parts = [(WORDS["nothing"], s["calibration"]["nothing"])]
     parts += [(f"{_edge(b)} times detection", b["confidence"]) for b in s["by_amplitude"]]
     rows = [
@@ -140,7 +140,7 @@ def _confidence(s: Mapping[str, Any]) -> list[str]:
         for name, c in parts
         if c["stated"] is not None
     ]
-    return _block("Confidence", ("stated, mean", "claim holds", "Brier score"), rows) if rows else []
+    return _block("Confidence", ("stated, mean", "claim correct", "Brier score"), rows) if rows else []
 
 
 def _calibration(found: Mapping[str, Any]) -> list[str]:
@@ -151,7 +151,7 @@ def _calibration(found: Mapping[str, Any]) -> list[str]:
     if found["brier"] is not None:
         rows.append(("Brier score of stated confidence", [f"{found['brier']:.3f}"]))
         rows += [
-            (f"stated {100 * r['stated']:.0f} % on average, claim holds", [share(r["holds"])])
+            (f"stated {100 * r['stated']:.0f} % on average: claim correct", [share(r["holds"])])
             for r in found["reliability"]
             if r["stated"] is not None
         ]

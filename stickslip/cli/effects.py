@@ -110,8 +110,8 @@ def _explained(cls: type[Effect]) -> str:
 
 
 def _formula(latex: str) -> list[str]:
-    from ..physics.effects.plain import plain
-    from ..physics.effects.printed import pieces
+    from ..physics.effects.equation_text import pieces
+    from ..physics.effects.latex_to_text import plain
 
     return [*(f"  {plain(part)}" for part in pieces(latex)), f"  LaTeX: {latex}"]
 
@@ -131,7 +131,7 @@ def _forms(cls: type[Effect]) -> Iterator[str]:
 
 def _parameters(cls: type[Effect]) -> Iterator[str]:
     from ..inference.fit.parameters import priors
-    from ..physics.effects.plain import plain
+    from ..physics.effects.latex_to_text import plain
     from ..physics.params import span, specs
 
     effect = cls()

@@ -58,7 +58,8 @@ def fit(
         A run that is held out of all fits: --holdout v400. May be given several times. Default: runs whose
         role in the campaign is "held-out", else none. Of the others each is predicted from a fit without it.
     align:
-        Static: what is laid on the measured passage of v_lim, the model's passage or (paper) its end.
+        Static: which point of the model's curve is shifted onto the measured passage of v_lim: its own passage, or
+        (paper) its end.
     time:
         Static: virtual time with the block's own motion (exact) or without it (paper).
     v_lim:

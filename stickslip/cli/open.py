@@ -33,7 +33,7 @@ def open(
         Another address of this machine under which the server is reached, from other machines as well.
     """
     need_pages()
-    from ..workbench.opening import offered, opened
+    from ..workbench.open_paths import offered, opened
     from ..workbench.serve import serve
     from ..workbench.session import Session
 
@@ -63,7 +63,7 @@ def _own(address: str) -> bool:
 
 def _is_scenario(path: Path) -> bool:
     """Whether a file describes a rig to simulate, and no measured runs."""
-    from ..workbench.opening import is_campaign
+    from ..workbench.open_paths import is_campaign
 
     if path.suffix != ".toml" or not path.is_file() or is_campaign(path):
         return False

@@ -1,1 +1,1 @@
-"""What was measured: traces and their readers, events, campaigns, and the rig held against the motion."""
+"""What was measured: traces and their readers, events, campaigns, and checks of the rig against the motion."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..system.shown import Shown, facts
+from ..system.object_repr import Shown, facts
 from ..system.units import ends, factor_to_si, shown, to_si
 from .resolution import estimate_resolution, noise_level
 

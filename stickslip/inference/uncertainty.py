@@ -278,9 +278,7 @@ def profile(
     else:
         text = f"{name} is determined on both sides"
     if _ragged(rise):
-        text += (
-            ", but the refits do not follow one valley: more starts, or fewer free parameters, before this is believed"
-        )
+        text += ", but the refits do not follow one optimum: use more starts or fewer parameters before relying on it"
     return Profile(name, z, rise, (low, high), text)
 
 

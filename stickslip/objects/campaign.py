@@ -12,11 +12,12 @@ from ..data.checks import Finding, refuse_impossible, rig_against_motion
 from ..data.displacements import true_gains, with_displacements
 from ..data.readers.repair import from_load_point
 from ..data.segment import Segmentation, segment
+from ..data.segment.left_out import left_out
 from ..data.trace import Trace
 from ..errors import InputError, nearest
-from ..system.progress import telling
-from ..system.shown import Shown, facts, table
-from .run import several
+from ..system.object_repr import Shown, facts, table
+from ..system.progress import reporting
+from .result_base import several
 
 if TYPE_CHECKING:
     import pandas
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from .fit import Fit
     from .forecast import Forecast
     from .inspection import Inspection
-    from .run import Tell
+    from .result_base import Tell
     from .static_fit import Align, Sampling, StaticFit, Time
 
 
@@ -145,8 +146,6 @@ class Campaign(Shown, Mapping[str, Trace]):
     @cached_property
     def lost(self) -> tuple[str, ...]:
         """What was left out of the data, in words."""
-        from ..show.report.describe import left_out
-
         return tuple(left_out(self.traces, self.scaled[0]))
 
     def prepare(self, holdout: str | Sequence[str] = ()) -> Prepared:
@@ -347,7 +346,7 @@ def load_campaign(
     _load_effects(effects)
     description = files.load_campaign(path)
     traces = []
-    with telling("reading", progress) as tell:
+    with reporting("reading", progress) as tell:
         for i, entry in enumerate(description.entries):
             tell(f"reading {entry.label}", i / len(description.entries))
             traces.append(files.load_trace(description, entry))

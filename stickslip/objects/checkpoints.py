@@ -13,7 +13,7 @@ import numpy as np
 
 from ..physics.effects import catalogue
 from ..system.runstore import Run, json_text
-from .run import write_arrays
+from .result_base import write_arrays
 
 
 def code_digest(effect_files: Sequence[str | Path] = ()) -> str:

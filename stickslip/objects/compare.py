@@ -12,7 +12,7 @@ from ..inference.diagnose.decide import standard_error
 from ..inference.force.errors import of_all, sums
 from ..inference.force.fit import deviations
 from ..inference.force.heldout import apart, folds, halves, unseen
-from ..system.shown import table
+from ..system.object_repr import table
 from .fit import Fit
 
 if TYPE_CHECKING:

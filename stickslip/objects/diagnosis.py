@@ -13,23 +13,23 @@ import numpy as np
 from ..data.checks import stopping
 from ..errors import ArgumentError, InputError, RunFolderError, nearest
 from ..inference.diagnose.checkpoints import Store
-from ..inference.diagnose.climb import Climbed
 from ..inference.diagnose.engine import Diagnosis as Found
 from ..inference.diagnose.engine import diagnose as search
+from ..inference.diagnose.model_ladder import Climbed
 from ..inference.diagnose.summary import summary
 from ..physics.effects import catalogue
 from ..show.report.excerpts import trace_sections
 from ..simulation.conformance import try_laws
-from ..system.progress import telling
+from ..system.object_repr import facts, table
+from ..system.progress import reporting
 from ..system.runstore import Run, json_text, open_run, refuse_existing, versions
-from ..system.shown import facts, table
-from .abilities import abilities
 from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
+from .data_abilities import abilities
 from .fit import Fit
 from .next_experiment import next_experiment
-from .run import Savable, Tell, dataset, finish, head, several
-from .stored import load_fit
+from .result_base import Savable, Tell, dataset, finish, head, several
+from .stored_fit import load_fit
 from .wander import wander, wander_sentence
 
 if TYPE_CHECKING:
@@ -212,9 +212,9 @@ def diagnose(
         return _made(campaign, done, able, began, time_limit, tell)
 
     if out is None:
-        with telling("diagnosing", progress) as tell:
+        with reporting("diagnosing", progress) as tell:
             return found(None, 0, tell)
-    with open_run(out, force=force, resume=True) as run, telling("diagnosing", progress) as tell:
+    with open_run(out, force=force, resume=True) as run, reporting("diagnosing", progress) as tell:
         key = json_text(
             {
                 "inputs": campaign.inputs(),

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ArgumentError, InputError, nearest
-from ..inference.diagnose.climb import Climbed, chosen, climb, extended, replaced, shortened
 from ..inference.diagnose.confirm import Confirmation
 from ..inference.diagnose.fitted import fitted_model
+from ..inference.diagnose.model_ladder import Climbed, chosen, climb, extended, replaced, shortened
 from ..inference.fit.parameters import Free, effect_parameters
 from ..inference.fit.serialised import Fitted
 from ..inference.force.backbone import backbone, power_law
@@ -25,18 +25,18 @@ from ..inference.force.heldout import apart
 from ..inference.force.residual import coordinates
 from ..inference.uncertainty import TIED
 from ..physics.effects import catalogue
-from ..physics.effects.named import with_form
+from ..physics.effects.effects_from_text import with_form
 from ..simulation.conformance import try_laws
-from ..system.progress import portion, telling
+from ..system.object_repr import facts
+from ..system.progress import portion, reporting
 from ..system.runstore import Run
-from ..system.shown import facts
 from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rough_lines
+from .fit_plots import FitPlots
 from .fit_result import fit_result
 from .fit_tables import STRENGTH, correlation_table, error_table, ladder_table, parameter_table
 from .free_cycles import free_run_errors, freely
 from .parameters_by_hand import moved, profile, refitted
-from .picture import FitPlots
-from .run import Savable, Tell, dataset, finish, several
+from .result_base import Savable, Tell, dataset, finish, several
 
 if TYPE_CHECKING:
     import arviz
@@ -357,7 +357,7 @@ class Fit(Savable):
         Raises:
             InputError: no free parameter of that name.
         """
-        with telling(f"profile of {name}", progress) as tell:
+        with reporting(f"profile of {name}", progress) as tell:
             return profile(self, name, tell)
 
     def sample(
@@ -382,7 +382,7 @@ class Fit(Savable):
         """
         from .posterior import sample
 
-        with telling("sampling", progress) as tell:
+        with reporting("sampling", progress) as tell:
             return sample(self, draws, tune, chains, seed, tell)
 
     # what is kept
@@ -390,7 +390,7 @@ class Fit(Savable):
     def confirm(self, progress: Tell | None = None) -> Confirmation:
         """Base and last model run freely through the measured cycles; simulated once."""
         if self._confirmation is None:
-            with telling("running freely", progress) as tell:
+            with reporting("running freely", progress) as tell:
                 self._confirmation = self.climbed.confirmed(tell)
         return self._confirmation
 
@@ -444,19 +444,21 @@ class Fit(Savable):
             "campaign": self.campaign.title,
             "model": " + ".join(self.parts),
             "error": f"{self.error:.3g} floors",
-            "on unseen runs": f"{self.unseen_error:.3g}" if np.isfinite(self.unseen_error) else "one event holds none",
+            "on unseen runs": f"{self.unseen_error:.3g}"
+            if np.isfinite(self.unseen_error)
+            else "none, with one event only",
             "parameters": "set by hand" if self.by_hand else None,
         }
         rows = self.correlations.itertuples(index=False)
         tied = ", ".join(f"{one} and {other} ({r:.2f})" for one, other, r in rows if abs(r) > TIED)
         table = self.parameters[["value", "std", "unit"]]
-        return [facts(what), table, *([f"tied by the data: {tied}"] if tied else []), self.errors]
+        return [facts(what), table, *([f"determined only together: {tied}"] if tied else []), self.errors]
 
 
 @contextmanager
 def _told(title: str, text: str) -> Iterator[None]:
     """Shows the shares of the work within, where somebody sees them."""
-    with telling(title, None) as tell, portion(0.0, 1.0, partial(tell, text)):
+    with reporting(title, None) as tell, portion(0.0, 1.0, partial(tell, text)):
         yield
 
 
@@ -482,5 +484,5 @@ def fit(
     for name in profiles:
         if name not in known:
             raise ArgumentError("no free parameter of that name", key="profiles", value=name, hint=nearest(name, known))
-    with telling("fitting", progress) as tell:
+    with reporting("fitting", progress) as tell:
         return Fit(campaign, climb(prepared, forms, tell))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..inference.diagnose.shape import shape_of
+from ..inference.diagnose.backbone_laws import shape_of
 from ..inference.force.backbone import Backbone, PowerLaw
 from ..inference.force.knots import PHASES
 from ..inference.force.residual import VARIABLES, WAYS

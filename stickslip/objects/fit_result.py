@@ -8,7 +8,7 @@ from ..inference.diagnose.confirm import Confirmation
 from ..inference.diagnose.summary import fitted_sections
 from ..show.report.excerpts import trace_sections
 from ..show.report.identifiability import identifiability
-from .run import head
+from .result_base import head
 
 if TYPE_CHECKING:
     from .fit import Fit

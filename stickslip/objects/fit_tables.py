@@ -11,7 +11,7 @@ from ..inference.force.errors import Sums, of_all
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.knots import PHASES
 from ..inference.force.prescribed import placeholders
-from ..system.shown import table
+from ..system.object_repr import table
 
 if TYPE_CHECKING:
     import pandas

@@ -13,17 +13,17 @@ from ..data.trace import Drive
 from ..errors import InputError, RunFolderError, nearest
 from ..inference.fit.equations import solved
 from ..inference.fit.serialised import KEY, Driven, Fitted, constant_drive, from_record, pieces_drive, shared
+from ..physics.effects.effects_from_text import with_form
 from ..physics.effects.equations import Equations
-from ..physics.effects.named import with_form
 from ..physics.model import Model
 from ..physics.params import specs, variants
 from ..simulation.conformance import load_effects
 from ..simulation.scenario.load import Scenario, make_scenario
 from ..simulation.scenario.overrides import parse_assignment
+from ..system.object_repr import Shown, facts, table
 from ..system.runstore import RESULT, read_result
-from ..system.shown import Shown, facts, table
 from ..system.units import to_si
-from .run import several
+from .result_base import several
 
 if TYPE_CHECKING:
     import pandas

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, nearest
+from ..inference.forecast.coordinate_text import steps, told
 from ..inference.forecast.levels import levels, wandering
 from ..inference.forecast.predict import METHODS, Compared, Forecaster, goes_back, training_slips
 from ..inference.forecast.rolling import SHARES, Rolled, choose, prepare, roll
 from ..inference.forecast.scoring import quantiles
-from ..inference.forecast.telling import steps, told
 from ..inference.forecast.wander import Wander
-from ..system.progress import telling
-from ..system.shown import facts, table
-from .run import Savable, Tell, dataset, head
+from ..system.object_repr import facts, table
+from ..system.progress import reporting
+from .result_base import Savable, Tell, dataset, head
 from .wander import most_slips
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..inference.forecast.past import Past
+    from ..inference.forecast.known_record import Past
     from .campaign import Campaign
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -142,7 +142,7 @@ def forecast(
     number = _chosen(campaign, run)
     if at is not None and not at >= 0.0:
         raise InputError("a moment before the stick begins", key="at", value=at, allowed="0 or more")
-    with telling("forecasting", progress) as tell:
+    with reporting("forecasting", progress) as tell:
         return _forecast(campaign, number, train, at, tell)
 
 
@@ -226,7 +226,7 @@ def _next(past: Past, law: Wander, rise: bool) -> dict[str, float] | None:
 
 def _notes(past: Past, at: float | None, law: Wander, rise: bool) -> list[str]:
     """What should be known of how it was made."""
-    where = "all along, even in time" if at is None else f"{at:g} mean recurrences after each arrest"
+    where = "at times spread evenly over the record" if at is None else f"{at:g} mean recurrences after each arrest"
     how = f"{law}, {'with' if rise else 'without'} the recent rise of the level"
     said = [
         f"Forecasts are made {where}; each uses only what was measured by then.",
@@ -237,5 +237,7 @@ def _notes(past: Past, at: float | None, law: Wander, rise: bool) -> list[str]:
             "The block goes back: the reversal of the drive is not predicted, and no forecast extends beyond it."
         )
     if past.trace.drive_position is not None:
-        said.append("The load point was measured, so it is taken to go on as fast as over the last mean recurrence.")
+        said.append(
+            "The load point was measured, so it is assumed to continue as fast as over the last mean recurrence."
+        )
     return said

@@ -14,7 +14,7 @@ from ..inference.diagnose.free_errors import errors
 from ..inference.diagnose.free_measures import simulated
 from ..inference.diagnose.prepare import Prepared
 from ..inference.force.fit import Fit
-from ..system.shown import table
+from ..system.object_repr import table
 
 if TYPE_CHECKING:
     import pandas

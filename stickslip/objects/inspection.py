@@ -6,10 +6,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from ..system.progress import telling
+from ..system.object_repr import facts, table
+from ..system.progress import reporting
 from ..system.runstore import Run
-from ..system.shown import facts, table
-from .run import Savable, Tell, dataset, head
+from .result_base import Savable, Tell, dataset, head
 
 if TYPE_CHECKING:
     import pandas
@@ -85,14 +85,15 @@ class Inspection(Savable):
 def inspect(campaign: Campaign, progress: Tell | None = None) -> Inspection:
     """See :meth:`Campaign.inspect`."""
     from ..data.checks import rig_against_motion, stopping
-    from ..inference.diagnose.spring import spring_finding
+    from ..data.segment.stick_ripple import stick_ripple
+    from ..inference.diagnose.stiffness_check import spring_finding
     from ..show.report import describe_trace, trace_pieces
-    from ..show.report.ripple import stick_ripple
-    from .abilities import abilities
+    from ..show.report.ripple_text import ripple_text
+    from .data_abilities import abilities
 
     rows: list[dict[str, Any]] = []
     variables: dict[str, tuple] = {}
-    with telling("inspecting", progress) as tell:
+    with reporting("inspecting", progress) as tell:
         traces, events = campaign.traces, campaign.events
         for i, (trace, segmentation) in enumerate(zip(traces, events, strict=True)):
             tell(trace.name, i / len(traces))
@@ -102,7 +103,7 @@ def inspect(campaign: Campaign, progress: Tell | None = None) -> Inspection:
                 key = f"trace{i}_ripple"
                 for name, unit in (("frequency", "Hz"), ("amplitude", ripple["unit"])):
                     variables[f"{key}_{name}"] = (key, ripple.pop(name), {"units": unit})
-                row["ripple"] = ripple
+                row["ripple"] = {**ripple, "text": ripple_text(ripple["lines"], trace, ripple["unit"])}
             variables |= trace_pieces(trace, segmentation, i)
             rows.append(row)
     able = abilities(traces, events)

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..inference.diagnose.climb import Climbed
 from ..inference.diagnose.engine import Diagnosis as Found
+from ..inference.diagnose.model_ladder import Climbed
 from ..inference.diagnose.rounds import Round
 from ..inference.diagnose.search import Rung
 from .campaign import Campaign
-from .experiments import Setting, Telling, practicable, scenario, tell_apart
+from .experiments import Setting, SimulatedExperiment, practicable, scenario, simulate_rivals
 from .fit import Fit
-from .run import Tell
+from .result_base import Tell
 
 
 def next_experiment(
@@ -47,7 +47,7 @@ def _with(
         return known
     fits = {j.tag: _fit(campaign, found, done, j.tag, j.candidate.fit) for j in done.close}
     first = next(iter(fits.values()))
-    options = tell_apart(first, fits, _options(first), tell, until=in_time)
+    options = simulate_rivals(first, fits, _options(first), tell, until=in_time)
     if not options:
         return known
     rows = [
@@ -75,7 +75,7 @@ def _options(model: Fit) -> dict[str, Setting]:
     return practicable(plain, abs(run.velocity), block.spring_stiffness, block.mass)
 
 
-def _text(known: str, options: list[Telling]) -> str:
+def _text(known: str, options: list[SimulatedExperiment]) -> str:
     best = options[0]
     if best.note or best.margin < np.log(2.0):
         return f"{known} (no experiment of the usual kind is expected to separate them)"

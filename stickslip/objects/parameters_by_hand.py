@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, nearest
-from ..inference.diagnose.climb import profiled
+from ..inference.diagnose.model_ladder import profiled
 from ..inference.fit.parameters import Free
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at
 from ..inference.force.fit import fit as fit_force
-from ..inference.force.valleys import pinned
+from ..inference.force.profile_deviations import pinned
 from ..system.units import shown, to_si
 from .fit_tables import STRENGTH
-from .run import Tell
+from .result_base import Tell
 
 if TYPE_CHECKING:
     from .fit import Fit

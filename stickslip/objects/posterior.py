@@ -12,14 +12,14 @@ from ..inference.fit.parameters import to_si
 from ..inference.force.posterior import Walked, walked
 from ..system.extras import need
 from .fit_tables import STRENGTH
-from .run import Tell
+from .result_base import Tell
 
 if TYPE_CHECKING:
     import arviz
 
     from .fit import Fit
 
-ALIKE = 1.05  # R-hat from which the chains do not agree
+CONVERGED = 1.05  # largest R-hat of chains that agree
 FEW = 100  # effective draws below which a 95 % interval is rough
 
 
@@ -81,9 +81,9 @@ def trust(found: Any) -> list[str]:
     names = list(found.posterior.data_vars)
     if found.posterior.sizes["chain"] > 1:
         rhat = arviz.rhat(found)
-        apart = [name for name in names if float(rhat[name]) > ALIKE]
+        apart = [name for name in names if float(rhat[name]) > CONVERGED]
         if apart:
-            said.append(f"The chains do not agree on {', '.join(apart)} (R-hat above {ALIKE:g}): draw more.")
+            said.append(f"The chains do not agree on {', '.join(apart)} (R-hat above {CONVERGED:g}): draw more.")
     size = arviz.ess(found)
     few = [name for name in names if float(size[name]) < FEW]
     if few:

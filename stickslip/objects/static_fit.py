@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import InputError
-from ..system.progress import telling
-from ..system.shown import facts
+from ..system.object_repr import facts
+from ..system.progress import reporting
 from ..system.units import to_si
-from .run import Savable, Tell, dataset, head
+from .result_base import Savable, Tell, dataset, head
 
 if TYPE_CHECKING:
     from .campaign import Campaign
@@ -49,7 +49,8 @@ def fit_static(
 
     Args:
         campaign: the runs.
-        align: what is laid on the measured passage of ``v_lim``, the model's passage or ("paper") its end.
+        align: the point of the model's curve that is shifted onto the measured passage of ``v_lim``: its own
+            passage, or ("paper") its end.
         time: virtual time with the block's own motion ("exact") or without it ("paper").
         v_lim: speed of the block at which a creep process ends (m/s, or text with a unit).
         sampling: windows even in the logarithm of the time left ("log"), or in time as in the paper ("uniform").
@@ -70,7 +71,7 @@ def fit_static(
         return StaticRig.of(campaign.description.rig_of(trace.name), spring_stiffness=trace.spring_stiffness)
 
     try:
-        with telling("creep processes", progress) as tell:
+        with reporting("creep processes", progress) as tell:
             result, variables = static_result(
                 traces,
                 found,

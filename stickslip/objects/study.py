@@ -12,10 +12,10 @@ import numpy as np
 from ..errors import InputError, StickslipError
 from ..system import process
 from ..system.cluster import cluster
-from ..system.lifeline import end_with
-from ..system.progress import silent, telling
+from ..system.parent_watch import end_with
+from ..system.progress import reporting, silent
 from .campaign import load_campaign
-from .run import Tell, several
+from .result_base import Tell, several
 
 if TYPE_CHECKING:
     import xarray
@@ -55,7 +55,7 @@ def study(
     if not named or len(named) != len(campaigns):
         raise InputError("at least one campaign is needed, each with a unique name", value=len(campaigns))
     found: dict[str, dict[str, Any]] = {}
-    with telling("studying", progress) as tell, cluster(scheduler, workers) as client, client.as_current():
+    with reporting("studying", progress) as tell, cluster(scheduler, workers) as client, client.as_current():
         from distributed import as_completed
 
         local = None if scheduler else os.getpid()

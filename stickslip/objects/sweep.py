@@ -20,12 +20,12 @@ from ..simulation.scenario.load import Parts, from_parts
 from ..simulation.scenario.series import KEY_UNITS, NUMBERS, numbers
 from ..system import process
 from ..system.cluster import cluster
-from ..system.lifeline import end_with
-from ..system.progress import silent, telling
+from ..system.parent_watch import end_with
+from ..system.progress import reporting, silent
 from ..system.runstore import json_text, open_run, versions
 from ..system.threads import processors
 from .checkpoints import Pieces, code_digest
-from .run import Tell
+from .result_base import Tell
 
 if TYPE_CHECKING:
     import xarray
@@ -50,8 +50,8 @@ def sweep(
     Args:
         scenario: file, or from :func:`load_scenario`.
         changes: key of the scenario -> its values (numbers in SI, or text with a unit), one for each run.
-        out: folder that keeps finished runs; the same call goes on where one was interrupted, and ends with
-            ``arrays.nc`` and ``result.json`` in it.
+        out: folder that keeps finished runs; after an interruption the same call does those that are missing. When all
+            are done it holds ``arrays.nc`` and ``result.json``.
         force: replace an existing run folder.
         scheduler: address of a running dask scheduler, ``tcp://host:8786``; default a cluster on this machine.
         workers: of the local cluster; default one a core. 1: in this process, without dask.
@@ -83,7 +83,7 @@ def sweep(
     if scheduler is None:
         workers = min(at_once, len(chunks)) if workers is None or workers > 0 else workers
     with (
-        telling("sweeping", progress) as tell,
+        reporting("sweeping", progress) as tell,
         open_run(out, force=force, resume=True) if out else nullcontext() as run,
     ):
         pieces = None if run is None else Pieces(run, json_text(_given(loaded, members, rows)))
@@ -196,7 +196,9 @@ def _result(done: Future) -> Any:
         return done.result()
     except (CancelledError, KilledWorker) as error:
         what = "a worker process was ended from outside, or there was no memory for it"
-        raise StickslipError(f"{what}; the same call goes on, with fewer workers perhaps") from error
+        raise StickslipError(
+            f"{what}; repeat the call: with out=FOLDER it keeps finished runs, and fewer workers need less memory"
+        ) from error
 
 
 def _chunk(*members: Scenario) -> dict[str, np.ndarray]:

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..data.prescribed import prescribed, with_motion
 from ..errors import InputError
+from ..inference.forecast.coordinate_text import steps, told
 from ..inference.forecast.levels import levels
 from ..inference.forecast.predict import compare, goes_back
 from ..inference.forecast.strokes import Strokes
-from ..inference.forecast.telling import steps, told
 from ..system.units import shown
 
 if TYPE_CHECKING:
@@ -35,8 +35,9 @@ def wander(campaign: Campaign) -> dict[str, Any] | None:
 
     Returns:
         ``run``, ``slips`` or ``strokes``, ``coordinate``, ``weights`` and ``text`` (see
-        :func:`stickslip.inference.forecast.telling.told`), the best law with ``size`` (share of the mean level) and
-        ``length``; of strokes also ``track`` (m), ``variation`` (share of the level), and ``shares`` of its variance.
+        :func:`stickslip.inference.forecast.coordinate_text.told`), the best law with ``size`` (share of the mean
+        level) and ``length``; of strokes also ``track`` (m), ``variation`` (share of the level), and ``shares`` of its
+        variance.
         None where fewer than :data:`MANY` slips or strokes, or no level, can be had.
     """
     number = most_slips(campaign)

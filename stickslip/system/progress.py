@@ -75,7 +75,7 @@ def working(title: str) -> Iterator[Tell]:
 
 
 @contextmanager
-def telling(title: str, progress: Tell | None) -> Iterator[Tell]:
+def reporting(title: str, progress: Tell | None) -> Iterator[Tell]:
     """Gives ``progress``; where that is None, a bar if a terminal or a notebook shows it, else silence.
 
     Work that can be ended from elsewhere, as in the workbench, shows its progress there.

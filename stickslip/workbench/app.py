@@ -15,12 +15,12 @@ from panel.theme.native import Native
 
 from ..objects.example import copied
 from ..system.units import shown_with
-from .adding_form import FirstRun
-from .controls import Frame, Message, Words, button
 from .figures import dark, look
+from .new_run_form import FirstRun
 from .selection import follow
 from .session import Note, Session, watch
-from .watching import Place, placed
+from .session_callbacks import Place, placed
+from .widgets import Frame, Message, Words, button
 
 TITLES = {
     "data_page": "Data", "model_page": "Model against measurement", "missing_page": "What is missing",

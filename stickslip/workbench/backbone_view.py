@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..system.units import shown_with
-from .controls import Words
 from .figures import figure, label, legend, look, source, unit_of
 from .session import Session, watch
+from .widgets import Words
 
 
 class Backbone:

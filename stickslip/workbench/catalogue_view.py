@@ -7,11 +7,11 @@ from typing import Any
 
 import panel as pn
 
-from .controls import GAP, Catalogue, Message, Words, button
 from .evidence import rows
 from .ladder_view import CARD
 from .residual_view import Residual
 from .session import Session, watch
+from .widgets import GAP, Catalogue, Message, Words, button
 
 
 class Listed:
@@ -64,7 +64,7 @@ class Listed:
         )
         self._diagnose.disabled = bool(session.searching)
         self._words.text = (
-            f"looking at the effects ({100 * session.listed:.0f} %)"
+            f"evaluating the effects ({100 * session.listed:.0f} %)"
             if session.listed < 1.0
             else "ordered by expected fall of the cost; click to overlay an effect on the residual"
         )

@@ -12,11 +12,11 @@ import panel as pn
 from ..data.segment import Segmentation
 from ..objects.campaign import Campaign
 from ..system.units import shown
-from .adding_form import adding
-from .beside import Beside, Show, Tell, beside
+from .background_work import BackgroundWork, Show, Tell, background
 from .event_view import EventView
 from .figures import label, unit_of
-from .parts import Sentences, Table, progress
+from .new_run_form import adding
+from .page_parts import Sentences, Table, progress
 from .selection import chosen, select
 from .session import Session, watch
 from .signals import Signals
@@ -48,7 +48,7 @@ class Looked:
 
 def page(session: Session) -> Any:
     """The page of a session."""
-    work = beside(session, "inspection")
+    work = background(session, "inspection")
     signals, event = Signals(session), EventView(session)
     bar = progress(work, stopping=False)
 
@@ -56,7 +56,7 @@ def page(session: Session) -> Any:
         campaign = session.data
         known = work.found is not None and work.found.campaign is campaign
         if not known and not session.busy:
-            work.do("looking at the data", lambda tell, show: looked(campaign, tell, show))
+            work.do("analysing the data", lambda tell, show: looked(campaign, tell, show))
 
     watch(session, ["campaign", "busy"], look_at)
     watch(work, ["doing"], look_at, now=True)
@@ -70,7 +70,7 @@ def looked(campaign: Campaign, tell: Tell, show: Show) -> Looked:
     """Events first, which are there soon, then what else there is to say."""
     tell("finding the events", 0.0)
     show(Looked(campaign, campaign.events))
-    tell("looking at the events", 0.3)
+    tell("analysing the events", 0.3)
     return Looked(campaign, campaign.events, campaign.inspect())
 
 
@@ -129,7 +129,7 @@ def _column(name: str, values: Sequence[Any], std: float | None, unit: str) -> t
 def groups(found: Looked | None) -> list[dict[str, Any]]:
     """Repairs, what these data can and cannot tell, as sentences under headings."""
     if found is None or found.inspection is None:
-        return [{"head": "What these data can tell", "items": ["is being looked at"], "mark": ""}]
+        return [{"head": "What these data can tell", "items": ["being analysed"], "mark": ""}]
     i = found.inspection
     repaired = list(i.result["dropped"])
     notes = [f"{t['name']}: {text}" for t in i.result["traces"] for text in (*t["notes"], *t["warnings"])]
@@ -143,7 +143,7 @@ def groups(found: Looked | None) -> list[dict[str, Any]]:
     return [{"head": head, "items": list(items), "mark": mark} for head, items, mark in every if items]
 
 
-def _told(session: Session, work: Beside) -> Any:
+def _told(session: Session, work: BackgroundWork) -> Any:
     made = Sentences(tall=264, margin=(0, 0, 0, 16))
 
     def update() -> None:
@@ -171,7 +171,7 @@ def _runs(session: Session) -> Table:
     return made
 
 
-def _events(session: Session, work: Beside) -> Table:
+def _events(session: Session, work: BackgroundWork) -> Table:
     made = Table(lambda number: select(session, chosen(session)[0], number), tall=260, margin=(8, 0, 0, 0))
 
     def update() -> None:

@@ -1,4 +1,4 @@
-"""The chosen event beside the other events of its run: creep, slip and ring-down, each laid on the others."""
+"""The chosen event beside the other events of its run: creep, slip and ring-down, overlaid."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class EventView:
 def part(record: Record, found: Segmentation, number: int, which: str) -> Curve | None:
     """Time (s) and displacement (the record's unit) of a part of an event.
 
-    Creep and slip are laid on the onset, the ring-down on the arrest; displacements are along the slip.
+    Creep and slip are aligned at the onset, the ring-down on the arrest; displacements are along the slip.
 
     Args:
         record, found: of the run.

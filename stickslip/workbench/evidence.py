@@ -11,7 +11,7 @@ import numpy as np
 from ..inference.force.first_order import Promise
 from ..objects.diagnosis import Diagnosis
 from ..objects.fit import Fit
-from ..objects.picture import AGAINST
+from ..objects.fit_plots import AGAINST
 from ..physics.effects import catalogue
 from ..physics.params import specs
 from ..system.units import shown_with
@@ -49,7 +49,7 @@ def rows(
         fit: the model as it stands.
         promises: of effects on top of it.
         diagnosis: whose gains are shown beside.
-        against: the variable over which signatures are drawn (see :data:`stickslip.objects.picture.AGAINST`).
+        against: the variable over which signatures are drawn (see :data:`stickslip.objects.fit_plots.AGAINST`).
         period: over which it is folded (SI); None for not at all.
         chosen: tag of the row that is marked.
     """

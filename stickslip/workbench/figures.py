@@ -1,4 +1,4 @@
-"""Figures of the workbench: one look, light and dark, with units on every axis and colours that all can tell apart."""
+"""Figures of the workbench: one look, light and dark, with units on every axis and colours that all can distinguish."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class Look:
     Attributes:
         text, soft, line, surface, page: of the page: text, its softer form, lines, cards, what is behind them.
         measured, model, band: of the two curves and of what noise and scatter allow.
-        runs: of the runs: to be told apart by the colour-blind.
+        runs: of the runs: the colour-blind can distinguish them.
         accent: of what can be pressed.
-        low, middle, high: of the heat map: better than the data can tell, as good, worse.
+        low, middle, high: of the heat map: better than the data can resolve, as good, worse.
     """
 
     text: str

@@ -8,12 +8,12 @@ from typing import Any
 import panel as pn
 
 from ..errors import StickslipError
-from . import kept, kept_simulations
-from .beside import Show, Tell, beside
-from .controls import Words, button, field
-from .history import SIMULATIONS, told, when
-from .parts import Table, head, progress, starter
+from . import run_folders, simulation_folders
+from .background_work import Show, Tell, background
+from .history_text import SIMULATIONS, told, when
+from .page_parts import Table, head, progress, starter
 from .session import Session, watch
+from .widgets import Words, button, field
 
 MODEL, DIAGNOSIS = "the model as it stands", "the diagnosis"
 SIMULATED = dict(zip(("the simulation", "the sweep", "the experiments"), SIMULATIONS, strict=True))
@@ -43,8 +43,8 @@ class Folders:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._work = beside(session, "saving")
-        self._listed: list[kept.Kept] = []
+        self._work = background(session, "saving")
+        self._listed: list[run_folders.RunFolder] = []
         self.what = field(pn.widgets.Select, "what is saved", 210, options=[MODEL, DIAGNOSIS, *SIMULATED], value=MODEL)
         self.name = field(pn.widgets.TextInput, "name of the run folder", 160, placeholder="first")
         self._table = Table(self._choose, columns=["run folder", "of", "verdict or error", "when"], tall=360)
@@ -70,7 +70,7 @@ class Folders:
         session, name, what = self._session, self.name.value_input or self.name.value, self.what.value
         found: Any = session.fit if what == MODEL else session.diagnosis if what == DIAGNOSIS else None
         if what in SIMULATED:
-            found = beside(session, SIMULATED[what]).found
+            found = background(session, SIMULATED[what]).found
         if found is None:
             self._work.said = f"not there yet: {what}"
             return
@@ -78,9 +78,9 @@ class Folders:
         def make(tell: Tell, show: Show) -> Any:
             tell("saving", 0.0)
             if what in SIMULATED:
-                folder = kept_simulations.save(found, session.data, name, tell, session.options())
+                folder = simulation_folders.save(found, session.data, name, tell, session.options())
             else:
-                folder = kept.save(found, session.data, name, tell, told(session))
+                folder = run_folders.save(found, session.data, name, tell, told(session))
             self._work.said = f"saved as {folder.name}"
             return folder
 
@@ -91,13 +91,13 @@ class Folders:
         described = self._session.data.description
         if not described.filed:
             return
-        self._listed = kept.listed(described.folder)
+        self._listed = run_folders.listed(described.folder)
         rows = [[k.name, k.kind, k.words, when(k.when)] for k in self._listed]
         self._table.param.update(rows=rows, chosen=-1)
 
     def _choose(self, number: int) -> None:
         try:
-            self._frame.object = framed(kept.report(self._listed[number]))
+            self._frame.object = framed(run_folders.report(self._listed[number]))
             self._said.text, self._tab.visible, self._table.chosen = "", True, number
         except (StickslipError, OSError) as error:
             self._said.text, self._tab.visible, self._frame.object = str(error), False, ""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..system.units import shown
-from .controls import Words
 from .figures import FEW, compared, figure, label, legend, source, unit_of
 from .overview import reduced
 from .selection import selected
 from .session import Session, watch
+from .widgets import Words
 
 AROUND = (2.0, 3.0)  # durations of the slip that are shown before and after it
 POINTS = 800

@@ -10,10 +10,10 @@ from bokeh.events import Tap
 from bokeh.models import CustomJSTickFormatter, HoverTool
 
 from ..system.units import shown
-from .controls import BUTTON, field
 from .figures import FEW, figure, look, source
 from .selection import choose, worst
 from .session import Session, watch
+from .widgets import BUTTON, field
 
 NOW = "as it stands"
 WORST = 2.0  # floors at which the map is at its darkest, at least

@@ -6,12 +6,12 @@ from typing import Any
 
 import panel as pn
 
-from . import history
-from .beside import beside
-from .controls import Words
+from . import history_text
+from .background_work import background
 from .folders_view import Folders
-from .parts import Copy, Table, head
+from .page_parts import Copy, Table, head
 from .session import Session, watch
+from .widgets import Words
 
 
 def page(session: Session) -> Any:
@@ -26,7 +26,7 @@ def _history(session: Session) -> list[Any]:
     made = Table(session.show, columns=columns, tall=360)
 
     def update() -> None:
-        made.param.update(rows=history.rows(session), chosen=session.at)
+        made.param.update(rows=history_text.rows(session), chosen=session.at)
 
     watch(session, ["steps", "at"], update, now=True)
     floors = Words(text="Errors are in floors of each step's own model: 1 is as good as the data allow.")
@@ -37,9 +37,9 @@ def _lines(session: Session) -> list[Any]:
     python, shell = Copy(), Copy()
 
     def update() -> None:
-        python.text, shell.text = history.python(session), history.commands(session)
+        python.text, shell.text = history_text.python(session), history_text.commands(session)
 
-    for name in history.SIMULATIONS:
-        watch(beside(session, name), ["doing"], update)
+    for name in history_text.SIMULATIONS:
+        watch(background(session, name), ["doing"], update)
     watch(session, ["steps", "at", "campaign"], update, now=True)
     return [head("The same in Python, in the campaign's folder"), python, head("and as commands"), shell]

@@ -16,9 +16,9 @@ from .session import Session, watch
 
 MANY = 4  # models of a ladder, above which their names are written aslant
 FLOORS = (
-    "Errors are in floors: 1 is as good as noise and scatter of the data allow. All rungs are held against the floors "
-    "of the last model, so earlier ones differ from the errors that the head and the history gave them. Gain: by how "
-    "much the cost (chi-square, no unit) fell."
+    "Errors are in floors: 1 is as good as noise and scatter of the data allow. All errors here are divided by the "
+    "floors of the last model, so those of earlier models differ from the errors in the head and the history. Gain: by "
+    "how much the cost (chi-square, no unit) fell."
 )
 CARD = "background: var(--wb-surface); border: 1px solid var(--wb-line); border-radius: 4px; padding: 8px 12px;"
 

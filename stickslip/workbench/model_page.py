@@ -9,14 +9,14 @@ import numpy as np
 import panel as pn
 
 from ..objects.fit import Fit
-from ..objects.picture import balanced, one_cycle
-from .controls import Knobs, Message, Words, button, field
+from ..objects.fit_plots import balanced, one_cycle
 from .figures import FEW, compared, crosshair, figure, label, legend, look, source, unit_of
 from .free_panel import Free
 from .heat_view import Heat
-from .knobs import Knob, given, knobs, rows
+from .parameter_sliders import Knob, given, knobs, rows
 from .selection import choose, cycles, selected
 from .session import Session, watch
+from .widgets import Knobs, Message, Words, button, field
 
 
 def page(session: Session) -> Any:

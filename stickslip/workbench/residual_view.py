@@ -11,17 +11,17 @@ from bokeh.models.annotations import Span
 
 from ..errors import InputError
 from ..objects.fit import Fit
-from ..objects.picture import AGAINST, WIDEST
+from ..objects.fit_plots import AGAINST, WIDEST
 from ..show.plots.style import PARTS
 from ..system.units import shown
-from . import folding
-from .controls import field
+from . import phase_period
 from .curves import bent, bent_ticks, smooth
 from .evidence import bins, law
 from .figures import figure, label, legend, look, of_run, source, unit_of
-from .folding import PHASE
-from .remembering import Remembered
+from .phase_period import PHASE
+from .saved_fields import SavedFields
 from .session import Session, watch
+from .widgets import field
 
 WORDS = {"age": "time in contact", "place": "displacement", "event": "number of the event"}
 CHOSEN = "effect"  # of what is remembered
@@ -66,7 +66,7 @@ class Residual:
         self.figure.y_range.start, self.figure.y_range.end = -WIDEST, WIDEST
         self._draw_runs()
         legend(self.figure, "below", ncols=4)
-        Remembered(session, "residual", {"against": self.against, "period": self.period})
+        SavedFields(session, "residual", {"against": self.against, "period": self.period})
         self.against.param.watch(lambda event: self.update(), "value")
         self.period.param.watch(lambda event: self.update(), "value")
         watch(session, ["steps", "at", "promises", "campaign"], self.update)
@@ -148,15 +148,15 @@ class Residual:
         """The variable that is drawn (of ``AGAINST``), and the period (SI) it is folded over; None for none."""
         against, text = self.against.value, str(self.period.value or "").strip()
         drive = against == PHASE
-        self.period.disabled = not drive and against not in folding.WAYS
+        self.period.disabled = not drive and against not in phase_period.WAYS
         example = "100 um, 20 ms, 50 Hz; empty: of the model" if drive else "100 um or 20 ms; empty: none"
         self.period.placeholder, period, wrong = example, None, ""
         try:
             if drive:
                 against = "load point"
-                against, period = folding.drive(text, fit)
+                against, period = phase_period.drive(text, fit)
             elif text and not self.period.disabled:
-                period = folding.period(text, str(fit.force[AGAINST[against]].attrs["units"]))
+                period = phase_period.period(text, str(fit.force[AGAINST[against]].attrs["units"]))
         except InputError as error:
             wrong = str(error)
         if wrong or self._session.said == self._wrong:  # what was wrong is mended

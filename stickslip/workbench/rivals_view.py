@@ -8,18 +8,18 @@ import panel as pn
 from ..inference.force.candidates import every_form
 from ..objects import experiments
 from ..objects.diagnosis import Diagnosis
-from ..objects.experiments import MEASURES, Telling
+from ..objects.experiments import MEASURES, SimulatedExperiment
 from ..physics.effects import catalogue
 from ..system.units import to_si
-from .asked import Asked, needed
-from .beside import Show, Tell, beside
-from .controls import Words, field
+from .background_work import Show, Tell, background
 from .evidence import LEAST, best_forms
 from .figures import figure, label, legend, of_run, unit_of
-from .measures import cells, thinned
-from .parts import Table, head, progress, starter
-from .remembering import Remembered
+from .page_parts import Table, head, progress, starter
+from .saved_fields import SavedFields
 from .session import Session, watch
+from .simulation_form import SimulationForm, needed
+from .slip_tables import cells, thinned
+from .widgets import Words, field
 
 RIVALS = 8  # effects that are compared at once
 FALLBACK = 1e-4  # m/s, where a run has no velocity of its own
@@ -39,11 +39,11 @@ def _undecided(diagnosis: Diagnosis | None) -> list[tuple[tuple[str, ...], str]]
 class Rivals:
     """Rival effects in every experiment that is easily made, so that one sees which would separate them."""
 
-    def __init__(self, session: Session, asked: Asked) -> None:
+    def __init__(self, session: Session, asked: SimulationForm) -> None:
         self._session, self._asked = session, asked
-        self._work = beside(session, "rivals")
+        self._work = background(session, "rivals")
         self._sets: list[tuple[tuple[str, ...], str]] = []
-        self._drawn: Telling | None = None
+        self._drawn: SimulatedExperiment | None = None
         self._offered: list[str] = []
         self.which = field(pn.widgets.Select, "effects that these data cannot distinguish", 420, options=[])
         self.effects = field(
@@ -58,7 +58,7 @@ class Rivals:
             pn.FlexBox(self.which, self.effects, begin, gap="6px 10px"), progress(self._work), self._table,
             self._place,
         )  # fmt: skip
-        self._kept = Remembered(session, "rivals", {"effects": self.effects})
+        self._kept = SavedFields(session, "rivals", {"effects": self.effects})
         self.which.param.watch(lambda event: self._propose(), "value")
         watch(session, ["diagnosis", "promises", "loaded"], self._offer)
         watch(session, ["campaign"], self._anew)
@@ -101,7 +101,7 @@ class Rivals:
             return
         told = {} if self._session.diagnosis is None else self._session.diagnosis.verdict.get("forms", {})
 
-        def make(tell: Tell, show: Show) -> list[Telling]:
+        def make(tell: Tell, show: Show) -> list[SimulatedExperiment]:
             fit, code = needed(self._session), self._session.code()
             scenario = experiments.scenario(fit, asked)
             velocity = campaign[asked.run].drive_velocity or scenario.file.drive.velocity or FALLBACK
@@ -111,7 +111,7 @@ class Rivals:
             if not asked.as_measured:
                 options = {"as set above": asked, **options}
             fits = experiments.rivals(fit, tags, told, experiments.part(tell, 0, 2))
-            return experiments.tell_apart(fit, fits, options, experiments.part(tell, 1, 2), show, code)
+            return experiments.simulate_rivals(fit, fits, options, experiments.part(tell, 1, 2), show, code)
 
         self._work.do("fitting each of them", make)
 
@@ -121,7 +121,7 @@ class Rivals:
 
     def update(self) -> None:
         """List the experiments, and draw the one in which they differ most."""
-        found: list[Telling] | None = self._work.found
+        found: list[SimulatedExperiment] | None = self._work.found
         if not found:
             return
         columns = ["experiment: a click draws it", "the true one becomes", "they differ most in", "by"]
@@ -134,17 +134,17 @@ class Rivals:
         self._table.param.update(columns=columns, rows=rows)
         self._draw(found[0])
 
-    def _draw(self, telling: Telling) -> None:
+    def _draw(self, experiment: SimulatedExperiment) -> None:
         """The models side by side in one experiment."""
-        found: list[Telling] = self._work.found
-        self._table.chosen = next((i for i, t in enumerate(found) if t is telling), -1)
-        if telling is self._drawn or not telling.recordings:
+        found: list[SimulatedExperiment] = self._work.found
+        self._table.chosen = next((i for i, t in enumerate(found) if t is experiment), -1)
+        if experiment is self._drawn or not experiment.recordings:
             return
-        self._drawn = telling
+        self._drawn = experiment
         made = [figure(name, height=280, output_backend="canvas") for name in ("displacement", "load point - block")]
-        moved = {tag: r["displacement"].values for tag, r in telling.recordings.items()}
+        moved = {tag: r["displacement"].values for tag, r in experiment.recordings.items()}
         k, unit = unit_of(np.concatenate([*moved.values()]), "m")
-        for i, (tag, r) in enumerate(telling.recordings.items()):
+        for i, (tag, r) in enumerate(experiment.recordings.items()):
             data = thinned(r["time"].values, moved[tag] * k, (r["drive_position"].values - moved[tag]) * k)
             for name, own in zip(("x", "gap"), made, strict=True):
                 own.line(data["t"], data[name], line_width=2, legend_label=tag, **of_run(i))
@@ -152,22 +152,22 @@ class Rivals:
             own.xaxis.axis_label, own.yaxis.axis_label = label("time from the start", "s"), label(name, unit)
             legend(own)
         made[1].x_range = made[0].x_range
-        trace = self._session.data[telling.setting.run]
-        rows = [[tag, *cells(experiments.simulated(r, trace))] for tag, r in telling.recordings.items()]
+        trace = self._session.data[experiment.setting.run]
+        rows = [[tag, *cells(experiments.simulated(r, trace))] for tag, r in experiment.recordings.items()]
         columns = [
-            f"{telling.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
+            f"{experiment.words}: means ± scatter, without the first slip", *(key.replace("_", " ") for key in MEASURES)
         ]  # fmt: skip
         table = Table(columns=columns, rows=rows)
-        self._place[:] = [Words(text=_difference(telling)), pn.Row(*made), table]
+        self._place[:] = [Words(text=_difference(experiment)), pn.Row(*made), table]
 
 
-def _difference(telling: Telling) -> str:
+def _difference(experiment: SimulatedExperiment) -> str:
     """How clearly an experiment separates the models, in words."""
-    words = f"After {telling.words} the true one is expected to be {telling.tells} as any other."
-    if telling.measure:
-        place = experiments.where(telling.measure, telling.slip)
-        words += f" They differ most in the {place}: by {100 * telling.share:.2g} % of its mean."
-    if len({r.sizes["event"] for r in telling.recordings.values()}) > 1:
-        counts = ", ".join(f"{tag} {r.sizes['event']}" for tag, r in telling.recordings.items())
+    words = f"After {experiment.words} the true one is expected to be {experiment.tells} as any other."
+    if experiment.measure:
+        place = experiments.where(experiment.measure, experiment.slip)
+        words += f" They differ most in the {place}: by {100 * experiment.share:.2g} % of its mean."
+    if len({r.sizes["event"] for r in experiment.recordings.values()}) > 1:
+        counts = ", ".join(f"{tag} {r.sizes['event']}" for tag, r in experiment.recordings.items())
         words += f" The number of slips differs: {counts}."
     return words

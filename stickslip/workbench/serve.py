@@ -20,11 +20,11 @@ from tornado.routing import Router
 from tornado.web import Application, RequestHandler, StaticFileHandler
 
 from ..errors import InputError
-from . import own
+from . import own_effects
 from .app import ready, view
-from .beside import close_all
+from .background_work import close_all
 from .session import LOOKING, Session
-from .work import Worker, end_all
+from .worker import Worker, end_all
 
 LOOPBACK = "127.0.0.1"
 NAMES = ("127.0.0.1", "localhost")
@@ -117,7 +117,7 @@ def serve(
         signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
     url = f"http://{f'[{address}]' if ':' in address else address}:{port}/{token}/"
     tell(url)
-    watcher = own.watch(session, session.effects) if session.effects else None
+    watcher = own_effects.watch(session, session.effects) if session.effects else None
     if waiting:  # a fit would keep the first window waiting
         session.busy = LOOKING
         server.io_loop.call_later(PATIENCE, begin)

@@ -17,20 +17,20 @@ import param
 from ..errors import RunFolderError, StickslipError
 from ..objects.campaign import Campaign, load_campaign
 from ..objects.example import to_work_in
-from . import again
-from .keeper import Keeper
-from .looking import Looking
+from . import restore
+from .catalogue_search import CatalogueSearch
+from .history_writer import HistoryWriter
+from .session_callbacks import watch
+from .session_messages import Note, long
 from .steps import Step, complete, fewer, first, moved
-from .telling import Note, long
-from .watching import watch
-from .work import AtOnce
+from .worker import AtOnce
 
 if TYPE_CHECKING:
     from ..objects.fit import Fit
 
 __all__ = ["LOOKING", "Note", "Session", "watch"]
 
-LOOKING = "looking at the data"
+LOOKING = "analysing the data"
 STILL = 0.25  # s without a move, after which a model that was moved is kept
 
 
@@ -85,8 +85,8 @@ class Session(param.Parameterized):
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
-        self._keeper = Keeper(self)
-        self._looking = Looking(self)
+        self._keeper = HistoryWriter(self)
+        self._looking = CatalogueSearch(self)
         self._moves: dict[str, float | str] = {}
         self._guard = threading.Lock()
         self._anew = False
@@ -154,11 +154,11 @@ class Session(param.Parameterized):
 
     def _begin(self, campaign: Campaign) -> None:
         with long(self, LOOKING):
-            if self._keeper.journal is None or not again.history(self, self._keeper.journal):
+            if self._keeper.journal is None or not restore.history(self, self._keeper.journal):
                 self.busy = "fitting the base model"
                 self.first(complete(campaign.fit()))
             if self.saved is not None:
-                again.model(self, self.saved)
+                restore.model(self, self.saved)
                 self.saved = None
             self.keep()
 

@@ -10,13 +10,13 @@ from bokeh.core.properties import value
 
 from ..objects import experiments
 from ..objects.experiments import Simulated
-from .asked import Asked, named, needed
-from .beside import Show, Tell, beside
+from .background_work import Show, Tell, background
 from .figures import compared, crosshair, figure, label, legend, source, unit_of
-from .measures import event_rows, thinned
 from .overview import record
-from .parts import Table, progress, starter
+from .page_parts import Table, progress, starter
 from .session import Session, watch
+from .simulation_form import SimulationForm, named, needed
+from .slip_tables import event_rows, thinned
 
 LEFT = 76
 
@@ -24,9 +24,9 @@ LEFT = 76
 class SimulatedView:
     """One run of the model beside the measured one."""
 
-    def __init__(self, session: Session, asked: Asked) -> None:
+    def __init__(self, session: Session, asked: SimulationForm) -> None:
         self._session, self._asked = session, asked
-        self._work = beside(session, "simulation")
+        self._work = background(session, "simulation")
         self._measured = source(t=[], x=[], gap=[])
         self._model = source(t=[], x=[], gap=[])
         self._model.name = "simulated"

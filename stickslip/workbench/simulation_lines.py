@@ -8,12 +8,12 @@ from shlex import quote
 from typing import Any
 
 from ..objects.experiments.events import Simulated
+from ..objects.experiments.rival_experiments import SimulatedExperiment
 from ..objects.experiments.setting import Setting, changes
 from ..objects.experiments.sweeps import Swept
-from ..objects.experiments.telling import Telling
 from ..objects.fit import Fit
 
-Found = Simulated | Swept | Sequence[Telling]
+Found = Simulated | Swept | Sequence[SimulatedExperiment]
 
 
 def python(found: Found, most: int | None = None) -> list[str]:
@@ -31,10 +31,10 @@ def python(found: Found, most: int | None = None) -> list[str]:
                 f"recordings = [{each} for v in velocities]"]  # fmt: skip
     made = _rivals(found[0]) if found else []
     done = [t for t in found if t.recordings]
-    for telling in done[:most]:
-        made += [f"# {telling.words}", "recordings = {"]
-        for tag in telling.recordings:
-            own = _scenario(f"rivals[{tag!r}]", telling.fits[tag], telling.setting)
+    for experiment in done[:most]:
+        made += [f"# {experiment.words}", "recordings = {"]
+        for tag in experiment.recordings:
+            own = _scenario(f"rivals[{tag!r}]", experiment.fits[tag], experiment.setting)
             made.append(f"    {tag!r}: ss.simulate({own}),")
         made.append("}")
     left = 0 if most is None else len(done) - most
@@ -59,18 +59,18 @@ def command(found: Simulated | Swept, model: str, out: str, effects: str = "") -
     return f"stickslip simulate {quote(model)}{run}{sets}{sweep}{effects} --out {quote(out)}"
 
 
-def commands(found: Sequence[Telling], model: Mapping[str, str], out: str, effects: str = "") -> list[str]:
+def commands(found: Sequence[SimulatedExperiment], model: Mapping[str, str], out: str, effects: str = "") -> list[str]:
     """The same of experiments; ``model`` is the run folder of each rival's model."""
     done = [t for t in found if t.recordings]
     return [
-        command(one(telling, tag), model[tag], f"{out}-{number}-{tag}", effects)
-        for number, telling in enumerate(done, start=1) for tag in telling.recordings
+        command(one(experiment, tag), model[tag], f"{out}-{number}-{tag}", effects)
+        for number, experiment in enumerate(done, start=1) for tag in experiment.recordings
     ]  # fmt: skip
 
 
-def one(telling: Telling, tag: str) -> Simulated:
+def one(experiment: SimulatedExperiment, tag: str) -> Simulated:
     """What was simulated of one rival."""
-    return Simulated(telling.fits[tag], telling.setting, telling.recordings[tag])
+    return Simulated(experiment.fits[tag], experiment.setting, experiment.recordings[tag])
 
 
 def _scenario(name: str, fit: Fit, setting: Setting) -> str:
@@ -79,11 +79,11 @@ def _scenario(name: str, fit: Fit, setting: Setting) -> str:
     return f"{made}.with_changes({changed!r})" if changed else made
 
 
-def _rivals(telling: Telling) -> list[str]:
-    base = "fit" + "".join(f".remove({tag!r})" for tag in telling.fits if tag in telling.model.effects)
+def _rivals(experiment: SimulatedExperiment) -> list[str]:
+    base = "fit" + "".join(f".remove({tag!r})" for tag in experiment.fits if tag in experiment.model.effects)
     made = {
-        tag: "fit" if fit is telling.model else f"base.add({fit.effect_forms[fit.effects.index(tag)]!r})"
-        for tag, fit in telling.fits.items()
+        tag: "fit" if fit is experiment.model else f"base.add({fit.effect_forms[fit.effects.index(tag)]!r})"
+        for tag, fit in experiment.fits.items()
     }
     return [f"base = {base}", f"rivals = {{{', '.join(f'{tag!r}: {line}' for tag, line in made.items())}}}"]
 

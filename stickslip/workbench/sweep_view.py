@@ -11,13 +11,13 @@ from bokeh.models import FixedTicker, Range1d
 from ..objects import experiments
 from ..objects.experiments import Swept
 from ..system.units import shown
-from .asked import Asked, named, needed
-from .beside import Show, Tell, beside
-from .controls import Signs, field
+from .background_work import Show, Tell, background
 from .figures import figure, label, look, source, unit_of
-from .parts import head, progress, starter
-from .remembering import Remembered
+from .page_parts import head, progress, starter
+from .saved_fields import SavedFields
 from .session import Session, watch
+from .simulation_form import SimulationForm, named, needed
+from .widgets import Signs, field
 
 
 def ticks(values: np.ndarray) -> list[float]:
@@ -55,13 +55,13 @@ def _scale(axis: Any, shown: Any, values: np.ndarray) -> None:
 class SweepView:
     """Recurrence and slip over the velocity, measured and simulated."""
 
-    def __init__(self, session: Session, asked: Asked) -> None:
+    def __init__(self, session: Session, asked: SimulationForm) -> None:
         self._session, self._asked = session, asked
-        self._work = beside(session, "sweep")
+        self._work = background(session, "sweep")
         theme = look()
         self.low, self.high = (field(pn.widgets.TextInput, name, 130) for name in ("velocities from", "to"))
         self.points = field(pn.widgets.IntInput, "how many", 90, value=6, start=2, end=40)
-        self._kept = Remembered(session, "sweep", {"low": self.low, "high": self.high, "points": self.points})
+        self._kept = SavedFields(session, "sweep", {"low": self.low, "high": self.high, "points": self.points})
         self._model = source(v=[], recurrence=[], slip=[])
         self._model.name = "sweep"
         self._measured = source(v=[], recurrence=[], slip=[], run=[])

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from visibility import SEEN, Reference
 
+from stickslip.blind.case_plan import Case, counts, plan
 from stickslip.blind.detection import DETECTION, detection, largest_multiple
 from stickslip.blind.generator import CATALOGUED, EFFECTS, OUTSIDE
 from stickslip.blind.make import make_challenge
-from stickslip.blind.mix import Case, counts, plan
 from stickslip.blind.seal import CASES, TRUTH, check_seal, digest
-from stickslip.blind.visibility import SEEN, Reference
 from stickslip.cli import run
 from stickslip.errors import ArgumentError, InputError, RunFolderError, StickslipError
 

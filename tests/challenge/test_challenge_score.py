@@ -192,7 +192,7 @@ def test_confusion_and_confidence_by_amplitude(folder: Path) -> None:
     assert table[1].split() == ["nothing", "missing", "2", ".", ".", ".", "1", ".", ".", "1", "."]
     assert " ".join(table[4].split()) == "outside the catalogue, 2 to 5 times . . . . . . 2 . ."
     rows = [" ".join(row.split()) for row in table[table.index("") + 1 :]]
-    assert rows[0] == "Confidence stated, mean claim holds Brier score"
+    assert rows[0] == "Confidence stated, mean claim correct Brier score"
     assert rows[4].startswith("5 to 10 times detection 70 % 1/2 50 % (")
     assert rows[4].endswith(" 0.400")
 

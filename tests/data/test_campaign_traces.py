@@ -236,7 +236,7 @@ def test_units_wrong_by_a_thousand(campaign, run, refuses, signal, words):
 
 def test_a_unit_wrong_by_a_thousand_tells_what_the_header_said(campaign, run, refuses):
     body = TIME + X.replace('"um"', '"mm"') + DRIVE
-    words = ["'um' in place of 'mm'", "noticed before", "the file says column 'x' is in um, the campaign says mm"]
+    words = ["'um' in place of 'mm'", "noted while reading", "the file says column 'x' is in um, the campaign says mm"]
     refuses(lambda: only(campaign(body, rows=np.column_stack(run), header="time [s],x [um]")), *words)
 
 

@@ -11,7 +11,7 @@ import xarray
 
 from stickslip.inference.diagnose import confirm as confirming
 from stickslip.inference.diagnose.confirm import confirm
-from stickslip.inference.diagnose.finals import settled
+from stickslip.inference.diagnose.final_comparison import settled
 from stickslip.inference.diagnose.free_errors import contradiction, errors, predicted, summed
 from stickslip.inference.diagnose.free_words import cautions, free_variables
 from stickslip.inference.force.candidates import try_effect

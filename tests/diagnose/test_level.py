@@ -47,7 +47,7 @@ def test_what_cannot_be_told_has_an_experiment():
         for other in set(ALONG) - {one}:
             found = Level(one, (other,), 0.07, 6.3e-4, 0.01, 1600.0)
             assert found.experiment["separates"] == [f"{TAG} along {one}", f"{TAG} along {other}"]
-            assert f"(or {other}: these data cannot tell)" in found.text
+            assert f"(or {other}: these data cannot distinguish them)" in found.text
 
 
 def fit(level: float, follows: Any = Follows("time", 1.0)) -> Any:

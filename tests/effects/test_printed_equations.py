@@ -17,10 +17,10 @@ from stickslip.errors import InputError
 from stickslip.physics.contact import Bank, normal_scores, power_law_bank
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import BodyForce, Contact, Effect, Motion
+from stickslip.physics.effects.effects_from_text import effects_of
+from stickslip.physics.effects.equation_text import pieces
 from stickslip.physics.effects.equations import PowerLaw, equations, of_tags
-from stickslip.physics.effects.named import effects_of
-from stickslip.physics.effects.plain import plain
-from stickslip.physics.effects.printed import pieces
+from stickslip.physics.effects.latex_to_text import plain
 from stickslip.physics.effects.symbols import distinct, found, marks, of_parameters, replaced, subscripted
 from stickslip.physics.model import Block, Weakening
 from stickslip.physics.params import parameter, specs

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stickslip.blind.floors import Scatter, level, root_sum
 from stickslip.inference.features.measurement import Measurement
+
+from .feature_floors import Scatter, level, root_sum
 
 # From base fits of campaigns without a missing effect (docs/measuring): what is left of a fit where the lines are the
 # same at every event, ...

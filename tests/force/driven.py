@@ -14,7 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 import stickslip as ss
 from stickslip.data.segment import Event
-from stickslip.inference.force.along import Held, Way, along
+from stickslip.inference.force.force_along_motion import Held, Way, along
 from stickslip.inference.force.problem import Problem
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Effect

@@ -16,7 +16,7 @@ def base(small):
     return fit(small.problem, small.point)
 
 
-def test_a_force_that_is_there_is_foretold_in_unseen_runs(base):
+def test_the_gain_of_a_force_in_unseen_runs_is_predicted(base):
     """Residuals that are nothing but the column: runs say the same of its size, and all of the cost falls."""
     explained = Explained(base)
     column = base.slopes.tangent[:, None] * np.sin(np.arange(base.problem.at.size) / 50.0)[:, None]

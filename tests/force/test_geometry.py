@@ -15,8 +15,8 @@ from stickslip.blind.generator.lines import Surface, press, rough_line
 from stickslip.data.campaign import Rig
 from stickslip.effects import make
 from stickslip.errors import InputError
+from stickslip.inference.diagnose.backbone_laws import Shape, judged, section, shape_of
 from stickslip.inference.diagnose.engine import Verdict, with_shape
-from stickslip.inference.diagnose.shape import Shape, judged, section, shape_of
 from stickslip.inference.fit.static_table import StaticRig
 from stickslip.inference.force import geometry
 from stickslip.inference.force.backbone import Backbone, power_law
@@ -291,7 +291,7 @@ def test_without_load_or_friction_it_says_what_is_missing(missing, monkeypatch):
     curve = measured(independent(7), 7)
     with pytest.raises(InputError, match=missing):
         laws(curve, **{missing: None})
-    monkeypatch.setattr("stickslip.inference.diagnose.shape.backbone", lambda fit: curve)
+    monkeypatch.setattr("stickslip.inference.diagnose.backbone_laws.backbone", lambda fit: curve)
     found = section(shape_of(SimpleNamespace(), rig_with(**{missing: None})))
     assert missing in found["text"]
     assert (found["rough_line"], found["laws"]) == (None, [])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.inference.force import inserted_knots
-from stickslip.inference.force.along import along
+from stickslip.inference.force.force_along_motion import along
 from stickslip.inference.force.inserted_knots import Inserted
 from stickslip.inference.force.later_ringing import Turns
 from stickslip.physics.effects import catalogue

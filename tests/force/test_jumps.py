@@ -10,10 +10,10 @@ import pytest
 from stickslip.blind.generator import Run
 from stickslip.data.segment import segment
 from stickslip.inference.force.fit import fit_base
+from stickslip.inference.force.fit_arrays import fit_arrays, fit_of
 from stickslip.inference.force.jumps import jumps
 from stickslip.inference.force.knots import knots
 from stickslip.inference.force.starting_values import begin
-from stickslip.inference.force.stored import fit_arrays, fit_of
 
 from .conftest import made
 

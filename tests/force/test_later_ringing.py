@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from stickslip.inference.force import later_ringing
-from stickslip.inference.force.along import along
+from stickslip.inference.force.force_along_motion import along
 from stickslip.inference.force.inserted_knots import Inserted
 from stickslip.inference.force.later_ringing import later_turns
 from stickslip.physics.effects import catalogue

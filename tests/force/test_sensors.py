@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from jax import Array
 
-from stickslip.inference.force.along import read, undone
+from stickslip.inference.force.force_along_motion import read, undone
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Motion, Sensor
 from stickslip.physics.params import parameter

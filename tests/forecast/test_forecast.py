@@ -16,7 +16,7 @@ import stickslip as ss
 from stickslip.cli import run
 from stickslip.data.trace import Trace
 from stickslip.errors import InputError
-from stickslip.inference.forecast.past import Past
+from stickslip.inference.forecast.known_record import Past
 from stickslip.inference.forecast.predict import MEMBERS, METHODS, Forecaster, times, waiting
 from stickslip.inference.forecast.rolling import choose, moments, prepare, roll
 from stickslip.inference.forecast.scoring import crps, quantiles, score, standard_error

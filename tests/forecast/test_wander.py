@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
+from stickslip.inference.forecast.coordinate_text import steps, told
 from stickslip.inference.forecast.predict import Compared, compare, coordinates, predictor, take
-from stickslip.inference.forecast.telling import steps, told
 from stickslip.inference.forecast.wander import (
     ARREST,
     ONSET,

@@ -11,9 +11,9 @@ import pytest
 import stickslip as ss
 from stickslip.cli import run
 from stickslip.errors import ArgumentError, InputError
+from stickslip.objects.fit_plots import FitPlots
 from stickslip.objects.fitted_run import FittedRun
 from stickslip.objects.forecast import ForecastPlots
-from stickslip.objects.picture import FitPlots
 from stickslip.objects.posterior import sample
 from stickslip.system.progress import silent
 

@@ -15,7 +15,7 @@ from stickslip.blind.generator.forms import EFFECTS
 from stickslip.inference.diagnose.rounds import Round
 from stickslip.objects import next_experiment as module
 from stickslip.objects.diagnosis import Diagnosis
-from stickslip.objects.experiments import Setting, telling
+from stickslip.objects.experiments import Setting, rival_experiments
 from stickslip.objects.next_experiment import next_experiment
 from stickslip.system.progress import Cancelled
 
@@ -84,8 +84,10 @@ def test_a_law_that_fails_is_a_note_and_a_cancel_ends_it(monkeypatch):
             raise Cancelled("")
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr(telling, "_told", failing)
-    found = telling.tell_apart(None, {}, {"one": Setting("v100"), "two": Setting("v100")}, lambda text, share: None)
+    monkeypatch.setattr(rival_experiments, "_told", failing)
+    found = rival_experiments.simulate_rivals(
+        None, {}, {"one": Setting("v100"), "two": Setting("v100")}, lambda text, share: None
+    )
     assert [t.note for t in found] == ["ZeroDivisionError: by zero"] * 2 and not found[0].recordings
     with pytest.raises(Cancelled):
-        telling.tell_apart(None, {}, {"cancelled": Setting("v100")}, lambda text, share: None)
+        rival_experiments.simulate_rivals(None, {}, {"cancelled": Setting("v100")}, lambda text, share: None)

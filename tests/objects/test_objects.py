@@ -294,9 +294,12 @@ def test_a_fit_says_which_parameters_are_tied(base):
     strongest = found.iloc[0]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("stickslip.objects.fit.TIED", abs(strongest.correlation) - 1e-6)
-        assert f"tied by the data: {strongest['of']} and {strongest['and']} ({strongest.correlation:.2f})" in repr(base)
+        assert (
+            f"determined only together: {strongest['of']} and {strongest['and']} ({strongest.correlation:.2f})"
+            in repr(base)
+        )
         patch.setattr("stickslip.objects.fit.TIED", 1.0)
-        assert "tied" not in repr(base)
+        assert "determined only together" not in repr(base)
 
 
 def test_fits_are_compared_by_what_they_predict(campaign, base, aged):

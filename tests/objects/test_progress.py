@@ -9,7 +9,7 @@ import pytest
 import stickslip as ss
 from stickslip.simulation.scenario.demonstration import RIG
 from stickslip.system import progress
-from stickslip.system.progress import cancellable, portion, telling
+from stickslip.system.progress import cancellable, portion, reporting
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
 
@@ -47,12 +47,12 @@ def test_a_simulation_shows_one_too(monkeypatch):
 
 def test_the_callers_own_is_told_and_no_bar_is_shown(monkeypatch):
     screen, heard = terminal(monkeypatch), []
-    with telling("work", lambda text, share: heard.append((text, share))) as tell:
+    with reporting("work", lambda text, share: heard.append((text, share))) as tell:
         tell("a step", 0.5)
-    with cancellable(lambda: False), telling("work", None) as tell:  # as in the workbench, which shows it itself
+    with cancellable(lambda: False), reporting("work", None) as tell:  # as in the workbench, which shows it itself
         tell("a step", 0.5)
     assert screen.getvalue() == "" and heard == [("a step", 0.5)]
-    with telling("work", None) as tell:
+    with reporting("work", None) as tell:
         tell("a step", 0.5)
     assert "a step" in screen.getvalue()
 
@@ -60,7 +60,7 @@ def test_the_callers_own_is_told_and_no_bar_is_shown(monkeypatch):
 def test_a_script_is_silent(monkeypatch):
     log = terminal(monkeypatch, io.StringIO)
     monkeypatch.setattr(progress, "EVERY", -1.0)
-    with telling("work", None) as tell:
+    with reporting("work", None) as tell:
         tell("a step", 0.5)
     assert log.getvalue() == ""
 
@@ -91,7 +91,7 @@ from IPython.display import HTML
 seen = []
 plain = HTML.__init__
 HTML.__init__ = lambda self, data: (seen.append(data), plain(self, data))[1]
-with progress.telling("<work>", None) as tell:
+with progress.reporting("<work>", None) as tell:
     tell("a step", 0.5)
     tell("another", 0.75)
 print(seen)

@@ -6,10 +6,11 @@ import pytest
 from stickslip.data.checks.spring_force import force_findings, gain_is_wrong, stick_gain
 from stickslip.data.displacements import true_gains
 from stickslip.data.segment import segment
+from stickslip.data.segment.stick_ripple import stick_ripple, stick_spectrum
 from stickslip.data.trace import Drive, Trace
-from stickslip.objects.abilities import abilities
+from stickslip.objects.data_abilities import abilities
 from stickslip.show.report.describe import describe_trace
-from stickslip.show.report.ripple import stick_ripple, stick_spectrum
+from stickslip.show.report.ripple_text import ripple_text
 
 
 def sawtooth(
@@ -78,7 +79,7 @@ def test_ripple_of_the_drive_is_found_below_the_noise():
     assert found["lines"][0]["period"] == pytest.approx(0.4, rel=0.005)
     assert found["lines"][0]["amplitude"] == pytest.approx(150e-9, rel=0.3)
     assert len(found["lines"]) == 1
-    assert "µm of drive" in found["text"]
+    assert "µm of drive" in ripple_text(found["lines"], trace, found["unit"])
 
 
 def test_a_ripple_whose_phase_wanders_shows_in_the_spectra_without_phase():
@@ -99,7 +100,7 @@ def test_no_ripple_where_there_is_none(seed):
 
 def test_hum_is_called_by_its_name():
     trace = sawtooth(ripple=500e-9, period=0.02)
-    assert "mains, 50 Hz" in stick_ripple(trace, segment(trace))["text"]
+    assert "mains, 50 Hz" in ripple_text(stick_ripple(trace, segment(trace))["lines"], trace, "m")
 
 
 def test_one_velocity_identifies_nothing_and_three_do():

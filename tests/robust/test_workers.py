@@ -17,7 +17,7 @@ SWEEP = """
 import os, sys, time
 from pathlib import Path
 from joblib import Parallel, delayed
-from stickslip.system.lifeline import end_with
+from stickslip.system.parent_watch import end_with
 def job(parent, folder):
     end_with(parent)
     Path(folder, str(os.getpid())).touch()

@@ -15,9 +15,9 @@ from typing import Any
 import panel as pn
 
 from stickslip.workbench import app, figures
-from stickslip.workbench.controls import Knobs, Signs, Words
-from stickslip.workbench.parts import Sentences, Table
+from stickslip.workbench.page_parts import Sentences, Table
 from stickslip.workbench.session import Session
+from stickslip.workbench.widgets import Knobs, Signs, Words
 
 OUTLINE = Path(__file__).parents[2] / "docs" / "images" / "workbench.txt"
 STYLES = Path(figures.__file__).parent / "static"

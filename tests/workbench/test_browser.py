@@ -335,7 +335,7 @@ def test_a_server_that_is_killed_in_the_midst_of_long_work_comes_back_with_what_
         browser.wait(lambda: browser.text(".errors") == errors, 60)
         assert "2 of 2: by hand" in browser.text(".model")
         going_on = browser.text(".bar")  # a page that comes back looks at the data; nothing else does
-        assert not going_on or (what == "diagnosis" and going_on.startswith("looking at the data"))
+        assert not going_on or (what == "diagnosis" and going_on.startswith("analysing the data"))
         browser.wait(lambda: browser.text(".line") == cycle)
         if what == "fit":
             browser.press("button", "Fit")

@@ -15,16 +15,16 @@ import pytest
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.objects.campaign import Campaign
-from stickslip.workbench import adding_form, data_page
-from stickslip.workbench.adding import NONE, Choice, add, appended, entry_text, guess, look
-from stickslip.workbench.adding_form import FirstRun, Form
-from stickslip.workbench.beside import close_all
+from stickslip.workbench import data_page, new_run_form
+from stickslip.workbench.background_work import close_all
 from stickslip.workbench.event_view import PARTS, EventView, part
+from stickslip.workbench.file_names import new_place
+from stickslip.workbench.new_run import NONE, Choice, add, appended, entry_text, guess, look
+from stickslip.workbench.new_run_form import FirstRun, Form
 from stickslip.workbench.overview import AROUND, DISPLACEMENT, FORCE, GAP, Levels, Window, record, reduced
-from stickslip.workbench.places import new_place
 from stickslip.workbench.session import Session
 from stickslip.workbench.signals import Signals
-from stickslip.workbench.work import Worker
+from stickslip.workbench.worker import Worker
 
 MARKUP = "<img src=x onerror=alert(1)>"
 CSV = "time [s],x [um],F [mN]\n"
@@ -250,7 +250,7 @@ def test_a_dropped_file_is_read_beside_and_only_its_own_window_asks(own, monkeyp
         assert begin.wait(20)
         return look(name, content)
 
-    monkeypatch.setattr(adding_form, "look", slow)
+    monkeypatch.setattr(new_run_form, "look", slow)
     session = Session(campaign=own, worker=Worker())
     try:
         form, other = Form(session), Form(session)
@@ -269,7 +269,7 @@ def test_a_dropped_file_is_read_beside_and_only_its_own_window_asks(own, monkeyp
 
 
 def test_a_file_that_is_too_large_is_refused_by_the_server(own, monkeypatch):
-    monkeypatch.setattr(adding_form, "LARGEST", 0.01)
+    monkeypatch.setattr(new_run_form, "LARGEST", 0.01)
     form = Form(Session(campaign=own))
 
     def send(name: str, content: bytes, chunks: int) -> None:
@@ -356,7 +356,7 @@ def test_events_are_listed_in_the_unit_and_to_the_place_of_their_deviations(camp
 def test_what_the_data_tell_is_said(campaign):
     session = Session(campaign=campaign)
     assert data_page.page(session) is not None
-    found = data_page.beside(session, "inspection").found
+    found = data_page.background(session, "inspection").found
     told = {g["head"]: g["items"] for g in data_page.groups(found)}
     assert told["Can tell"] == campaign.inspect().can and told["Repaired or left out"] == ["nothing"]
     columns, rows = data_page.event_rows(found, "v100")

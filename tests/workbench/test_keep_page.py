@@ -13,11 +13,11 @@ from stickslip.objects import experiments
 from stickslip.objects.experiments import Setting
 from stickslip.objects.fitted_run import load_run
 from stickslip.system.units import shown_with
-from stickslip.workbench import folders_view, history, keep_page, kept, kept_simulations
-from stickslip.workbench.asked import Asked
-from stickslip.workbench.beside import beside
+from stickslip.workbench import folders_view, history_text, keep_page, run_folders, simulation_folders
+from stickslip.workbench.background_work import background
 from stickslip.workbench.rivals_view import Rivals
 from stickslip.workbench.simulated_view import SimulatedView
+from stickslip.workbench.simulation_form import SimulationForm
 from stickslip.workbench.sweep_view import SweepView
 
 from .conftest import numbers
@@ -29,7 +29,7 @@ SCRIPT = "<script>alert(1)</script>"
 
 @pytest.fixture(scope="module")
 def saved(campaign, base):
-    return kept.save(base, campaign, "first")
+    return run_folders.save(base, campaign, "first")
 
 
 def _plain(path):
@@ -55,16 +55,16 @@ def test_the_command_writes_the_same_numbers(saved, folder, tmp_path):
 def test_a_folder_elsewhere_or_one_that_is_there_is_refused(saved, base, campaign, folder, name):
     before = sorted(p.name for p in folder.iterdir())
     with pytest.raises(InputError):
-        kept.save(base, campaign, name)
+        run_folders.save(base, campaign, name)
     assert sorted(p.name for p in folder.iterdir()) == before
 
 
 def test_what_was_saved_is_listed_with_its_error(saved, base, folder):
-    own = next(k for k in kept.listed(folder) if k.name == "first")
+    own = next(k for k in run_folders.listed(folder) if k.name == "first")
     assert own.kind == "fit" and own.report and own.folder == saved
     assert f"error {shown_with(base.error, base.error_std)}" in own.words and "±" in own.words
     assert f"on unseen runs {shown_with(base.unseen_error, base.unseen_error_std)}" in own.words
-    assert "<html" in kept.report(own).lower()
+    assert "<html" in run_folders.report(own).lower()
 
 
 def test_a_folder_that_is_damaged_or_leads_elsewhere_is_left_out(tmp_path, saved):
@@ -76,7 +76,7 @@ def test_a_folder_that_is_damaged_or_leads_elsewhere_is_left_out(tmp_path, saved
     (home / "bad" / "result.json").write_text("{")
     (home / ".hidden" / "result.json").write_text("{}")
     (home / "link").symlink_to(saved)
-    assert {k.name: k.words for k in kept.listed(home)} == {"good": "missing: a", "odd": "of another form"}
+    assert {k.name: k.words for k in run_folders.listed(home)} == {"good": "missing: a", "odd": "of another form"}
 
 
 def test_a_report_is_shown_in_a_frame_that_runs_nothing(tmp_path):
@@ -91,20 +91,20 @@ def test_the_page_saves_lists_and_shows(session, folder):
     made = folders_view.Folders(session)
     made.name.value = "by the page"
     made.save()
-    assert beside(session, "saving").said == "saved as by the page"
+    assert background(session, "saving").said == "saved as by the page"
     names = [row[0] for row in made._table.rows]
     assert "by the page" in names
     told = json.loads((folder / "by the page" / "result.json").read_text())["history"]
     assert [row["step"] for row in told["steps"]] == ["the base model"]
     assert told["python"] == session.code().splitlines()
-    assert told["commands"] == history.commands(session).splitlines()
+    assert told["commands"] == history_text.commands(session).splitlines()
     made._table._handle_msg({"kind": "row", "row": names.index("by the page")})
     assert "<iframe" in made._frame.object and made._tab.visible
     made.save()
-    assert "already" in beside(session, "saving").said
+    assert "already" in background(session, "saving").said
     made.what.value = folders_view.DIAGNOSIS
     made.save()
-    assert "not there yet" in beside(session, "saving").said
+    assert "not there yet" in background(session, "saving").said
     for message in ({"kind": "row", "row": 10**6}, {"kind": "row", "row": "x"}, {"row": 0}, {}):
         made._table._handle_msg(message)
 
@@ -116,7 +116,7 @@ def test_the_lines_of_python_come_to_the_same_error(session, base, folder, monke
     exec(session.code(), names)  # noqa: S102
     assert names["fit"].error == pytest.approx(session.fit.error, rel=1e-9)
     assert session.fit.error != pytest.approx(base.error, rel=1e-6)
-    text = history.commands(session)
+    text = history_text.commands(session)
     assert "stickslip fit campaign.toml --out fit" in text and "by hand" in text
 
 
@@ -137,7 +137,7 @@ def _saved_by_the_page(session, folder, what, name):
     made = folders_view.Folders(session)
     made.what.value, made.name.value = what, name
     made.save()
-    assert beside(session, "saving").said == f"saved as {name}"
+    assert background(session, "saving").said == f"saved as {name}"
     return json.loads((folder / name / "result.json").read_text())
 
 
@@ -165,10 +165,10 @@ def _by_python(told, folder, monkeypatch):
 def test_a_simulation_is_kept_as_the_command_keeps_it(session, folder, monkeypatch):
     """Of a model that was moved by hand, with a hold, a heavier block and twice the load."""
     session.by_hand({"weakening.drop": session.fit.values["weakening.drop"] * 1.01})
-    asked = Asked(session)
+    asked = SimulationForm(session)
     asked.run.value, asked.hold.value, asked.mass.value, asked.load.value = "v400", "1 s", "1.3 kg", "2"
     SimulatedView(session, asked).start()
-    recording = beside(session, "simulation").found.recording
+    recording = background(session, "simulation").found.recording
     told = _saved_by_the_page(session, folder, "the simulation", "one run")
     its, out = _by_command(told, folder, monkeypatch)
     _the_same(told, its, ("events", "facts", "scenario"))
@@ -181,12 +181,12 @@ def test_a_simulation_is_kept_as_the_command_keeps_it(session, folder, monkeypat
     again = _by_python(told, folder, monkeypatch)["recording"]
     assert again["onset"].values == pytest.approx(recording["onset"].values, rel=1e-9)
     assert load_run(folder / "one run").fitted.values == pytest.approx(session.fit.fitted.values, rel=1e-12)
-    text = history.python(session)
-    assert "recording = ss.simulate(scenario)" in text and "saved as a run folder" in history.commands(session)
+    text = history_text.python(session)
+    assert "recording = ss.simulate(scenario)" in text and "saved as a run folder" in history_text.commands(session)
 
 
 def test_a_sweep_is_kept_as_the_command_keeps_it(session, folder, monkeypatch):
-    made = SweepView(session, Asked(session))
+    made = SweepView(session, SimulationForm(session))
     made.low.value, made.high.value, made.points.value = "200 um/s", "800 um/s", 2
     made.start()
     told = _saved_by_the_page(session, folder, "the sweep", "a sweep")
@@ -199,20 +199,20 @@ def test_a_sweep_is_kept_as_the_command_keeps_it(session, folder, monkeypatch):
     assert (folder / "a sweep" / "series.csv").read_text() == (out / "series.csv").read_text()
     recordings = _by_python(told, folder, monkeypatch)["recordings"]
     assert [len(r["slip"]) for r in recordings] == [len(r["events"]) for r in told["runs"]]
-    assert "stickslip simulate fit --trace" in history.commands(session)
+    assert "stickslip simulate fit --trace" in history_text.commands(session)
 
 
 def test_rivals_are_kept_each_in_every_experiment(session, base, aged, folder, monkeypatch):
     fits = {"contact-ageing": aged, "nothing": base}
     options = {"as driven": Setting("v400", "400 um/s", events=3, load="2"), "wrong": Setting("v400", mass="0 kg")}
-    made = Rivals(session, Asked(session))
-    found = experiments.tell_apart(base, fits, options, _silent, code=session.code())
-    beside(session, "rivals").found = found
+    made = Rivals(session, SimulationForm(session))
+    found = experiments.simulate_rivals(base, fits, options, _silent, code=session.code())
+    background(session, "rivals").found = found
     assert made._table.rows[0][0] == "as driven"
     folders = folders_view.Folders(session)
     folders.what.value, folders.name.value = "the experiments", "experiments"
     folders.save()
-    assert beside(session, "saving").said == "saved as experiments"
+    assert background(session, "saving").said == "saved as experiments"
     told = json.loads((folder / "experiments" / "result.json").read_text())
     first, failed = told["experiments"]
     assert first["experiment"] == "as driven" and first["margin"] >= 0.0 and "mass" in failed["note"]
@@ -225,9 +225,9 @@ def test_rivals_are_kept_each_in_every_experiment(session, base, aged, folder, m
     again = _by_python(told, folder, monkeypatch)["recordings"]
     for tag, recording in found[0].recordings.items():
         assert again[tag]["onset"].values == pytest.approx(recording["onset"].values, rel=1e-7), tag
-    assert [k.name for k in kept.listed(folder) if k.name.startswith("experiments")][-1] == "experiments"
-    own = next(k for k in kept.listed(folder) if k.name == "experiments")
-    assert kept.report(own).count("<img") == 4 and "trace.png" in kept.report(own)
+    assert [k.name for k in run_folders.listed(folder) if k.name.startswith("experiments")][-1] == "experiments"
+    own = next(k for k in run_folders.listed(folder) if k.name == "experiments")
+    assert run_folders.report(own).count("<img") == 4 and "trace.png" in run_folders.report(own)
 
 
 def test_what_was_not_simulated_cannot_be_saved(session, folder):
@@ -235,10 +235,10 @@ def test_what_was_not_simulated_cannot_be_saved(session, folder):
     for what in folders_view.SIMULATED:
         made.what.value, made.name.value = what, "nothing there"
         made.save()
-        assert "not there yet" in beside(session, "saving").said
-    wrong = [experiments.Telling("a", Setting("v400"), session.fit, {}, {}, note="no")]
+        assert "not there yet" in background(session, "saving").said
+    wrong = [experiments.SimulatedExperiment("a", Setting("v400"), session.fit, {}, {}, note="no")]
     with pytest.raises(InputError, match="no experiment"):
-        kept_simulations.save(wrong, session.campaign, "nothing there", _silent)
+        simulation_folders.save(wrong, session.campaign, "nothing there", _silent)
     assert not (folder / "nothing there").exists()
 
 

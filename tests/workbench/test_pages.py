@@ -23,22 +23,22 @@ from stickslip.workbench import (
     app,
     backbone_view,
     curves,
-    folding,
     heat_view,
-    history,
+    history_text,
     keep_page,
     ladder_view,
     missing_page,
     model_page,
+    phase_period,
     residual_view,
 )
 from stickslip.workbench.evidence import best_forms, bins, rows, signature
 from stickslip.workbench.figures import DARK, LIGHT
 from stickslip.workbench.free_panel import Free
-from stickslip.workbench.knobs import Knob, given, knobs
-from stickslip.workbench.knobs import rows as knob_rows
+from stickslip.workbench.parameter_sliders import Knob, given, knobs
+from stickslip.workbench.parameter_sliders import rows as knob_rows
 from stickslip.workbench.session import Session
-from stickslip.workbench.watching import Place
+from stickslip.workbench.session_callbacks import Place
 
 from .outline import OUTLINE, outline
 
@@ -140,7 +140,7 @@ def test_errors_and_the_law_of_the_backbone_have_their_deviations(session, base)
     errors = [shown_with(base.error, base.error_std), shown_with(base.unseen_error, base.unseen_error_std)]
     assert all("±" in text for text in errors)
     assert app.frame(session).errors == f"error {errors[0]} fitted, {errors[1]} unseen"
-    assert history.rows(session)[0][3:5] == errors
+    assert history_text.rows(session)[0][3:5] == errors
     ladder = ladder_view.Ladder(session)
     assert all(text in ladder.table.object for text in errors)
     hover = [ladder._data.data[name][-1] for name in ("fitted_text", "unseen_text")]
@@ -209,7 +209,7 @@ def test_the_phase_of_the_drive_is_of_what_is_stated_or_of_a_periodic_effect_in_
         effect = SimpleNamespace(tag=tag)
         problem = SimpleNamespace(composition=SimpleNamespace(effects=(effect,)))
         fit = SimpleNamespace(force_fit=SimpleNamespace(problem=problem), values={f"{tag}.{name}": value})
-        assert folding.drive("", fit) == found
+        assert phase_period.drive("", fit) == found
 
 
 def test_the_effect_that_is_laid_over_is_drawn_over_all_else(session, base, promises):

@@ -19,9 +19,9 @@ from stickslip.inference.fit.serialised import KEY, record
 from stickslip.objects import example as example_file
 from stickslip.objects.example import copied, example, to_work_in
 from stickslip.system.runstore import json_text
-from stickslip.workbench import own
-from stickslip.workbench.journal import FOLDER
-from stickslip.workbench.opening import campaign_of, offered, opened
+from stickslip.workbench import own_effects
+from stickslip.workbench.history_file import FOLDER
+from stickslip.workbench.open_paths import campaign_of, offered, opened
 from stickslip.workbench.serve import PATIENCE, _free
 from stickslip.workbench.session import Note, Session
 
@@ -306,7 +306,7 @@ def test_an_effect_that_is_saved_is_loaded_anew(tmp_path, campaign):
     path = Path(tmp_path / "own_effect.py")
     path.write_text(EFFECT)
     session = Session(campaign=campaign, effects=(path,))
-    ended = own.watch(session, (path,))
+    ended = own_effects.watch(session, (path,))
     try:
         time.sleep(0.5)
         path.write_text(EFFECT.replace("A constant pull", "Another pull"))

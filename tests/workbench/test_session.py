@@ -11,8 +11,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.system.progress import Cancelled
-from stickslip.workbench import searches
-from stickslip.workbench.journal import FOLDER, Journal
+from stickslip.workbench import search_process
+from stickslip.workbench.history_file import FOLDER, HistoryFile
 from stickslip.workbench.selection import choose, cycles, follow, selected, worst
 from stickslip.workbench.session import Session
 from stickslip.workbench.steps import Step, complete, fewer, moved
@@ -89,7 +89,7 @@ def test_moved_by_hand_the_last_fit_is_still_at_hand(session, base):
 
 @pytest.mark.slow
 def test_what_was_open_comes_back(campaign, base, session, monkeypatch):
-    session._keeper.journal = Journal(campaign)
+    session._keeper.journal = HistoryFile(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
     session.lock(DROP, True)
     choose(session, "v200", 3)
@@ -112,10 +112,10 @@ def test_what_was_open_comes_back(campaign, base, session, monkeypatch):
 
 @pytest.mark.slow
 def test_a_history_does_not_depend_on_how_its_path_is_written(campaign, base, session, folder, monkeypatch):
-    session._keeper.journal = Journal(campaign)
+    session._keeper.journal = HistoryFile(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
     monkeypatch.chdir(folder)
-    assert len(Journal(ss.load_campaign("campaign.toml")).read()[0]) == 2
+    assert len(HistoryFile(ss.load_campaign("campaign.toml")).read()[0]) == 2
 
 
 def _elsewhere(kept):
@@ -126,7 +126,7 @@ def _elsewhere(kept):
 @pytest.mark.slow
 @pytest.mark.parametrize("damage", [_elsewhere, lambda kept: [], lambda kept: {**kept, "event": None}])
 def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, monkeypatch, damage):
-    session._keeper.journal = Journal(campaign)
+    session._keeper.journal = HistoryFile(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
     path = session._keeper.journal.file
     path.write_text(json.dumps(damage(json.loads(path.read_text()))))
@@ -138,19 +138,19 @@ def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, monke
 
 @pytest.mark.slow
 def test_a_history_of_other_data_is_left_alone(campaign, base, session, folder):
-    session._keeper.journal = Journal(campaign)
+    session._keeper.journal = HistoryFile(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
     file = folder / "campaign.toml"
     text = file.read_text()
     try:
         file.write_text(text + "# another day\n")
-        other = Journal(ss.load_campaign(file))
+        other = HistoryFile(ss.load_campaign(file))
         assert other.read() == ([], [], {})
         other.write([{"text": "base"}], [base], {})
         assert len(other.read()[0]) == 1
     finally:
         file.write_text(text)
-    assert len(Journal(campaign).read()[0]) == 2
+    assert len(HistoryFile(campaign).read()[0]) == 2
 
 
 def test_a_base_that_was_cancelled_can_be_fitted(campaign, base, monkeypatch):
@@ -184,7 +184,7 @@ def test_steps_that_are_dropped_leave_their_lines(base, session, monkeypatch):
 
 
 def test_models_of_forgotten_steps_are_removed(campaign, base, session, folder):
-    session._keeper.journal = Journal(campaign)
+    session._keeper.journal = HistoryFile(campaign)
     for share in (1.01, 1.02, 1.03):
         session.by_hand({DROP: base.values[DROP] * share})
     count = len(list((folder / FOLDER).glob("*.npz")))
@@ -244,7 +244,7 @@ def test_a_second_window_leaves_the_listing_that_goes_on(session, base, monkeypa
         def cancel(self):
             cancelled.append(self)
 
-    monkeypatch.setattr(searches, "promises", lambda fit, *rest: begun.append((fit, rest[1])) or Fake())
+    monkeypatch.setattr(search_process, "promises", lambda fit, *rest: begun.append((fit, rest[1])) or Fake())
     session.list_promises()
     begun[0][1](["one"], 0.5)
     session.list_promises()
@@ -293,9 +293,9 @@ def test_a_law_of_ones_own_that_fails_does_not_end_the_listing(base, monkeypatch
             raise ValueError("of the law")
         return tag
 
-    monkeypatch.setattr(searches, "promise", fails)
-    monkeypatch.setattr(searches, "blamed", lambda error: ss.InputError("its law failed") if foreign else None)
-    listing = partial(searches._promises, base.force_fit, ["tilt", "wear"], lambda tag, share: told.append(tag))
+    monkeypatch.setattr(search_process, "promise", fails)
+    monkeypatch.setattr(search_process, "blamed", lambda error: ss.InputError("its law failed") if foreign else None)
+    listing = partial(search_process._promises, base.force_fit, ["tilt", "wear"], lambda tag, share: told.append(tag))
     if foreign:
         listing()
         assert set(told) == {"tilt"}

@@ -12,17 +12,17 @@ from stickslip.errors import InputError
 from stickslip.objects import experiments
 from stickslip.objects.diagnosis import Diagnosis
 from stickslip.objects.experiments import Setting
-from stickslip.objects.experiments.telling import CREEP as HELD
-from stickslip.objects.experiments.telling import farthest, signs
+from stickslip.objects.experiments.rival_experiments import CREEP as HELD
+from stickslip.objects.experiments.rival_experiments import farthest, signs
 from stickslip.simulation.scenario import make_scenario
 from stickslip.system.progress import Cancelled, cancellable
 from stickslip.system.units import to_si
-from stickslip.workbench import simulate_page, synthetic
-from stickslip.workbench.asked import Asked
-from stickslip.workbench.beside import beside
+from stickslip.workbench import simulate_page, vibrometer_files
+from stickslip.workbench.background_work import background
 from stickslip.workbench.rivals_view import Rivals, _undecided
 from stickslip.workbench.session import Session
 from stickslip.workbench.simulated_view import SimulatedView
+from stickslip.workbench.simulation_form import SimulationForm
 from stickslip.workbench.sweep_view import SweepView, reach, ticks
 
 CREEP = "creep before slip"
@@ -85,11 +85,11 @@ def test_a_hold_begins_amid_a_stick(base):
 @pytest.mark.slow
 def test_a_simulation_is_shown_beside_the_measurement(session):
     simulate_page.page(session)
-    asked = Asked(session)
+    asked = SimulationForm(session)
     made = SimulatedView(session, asked)
     asked.run.value, asked.velocity.value, asked.events.value = "v400", "400 um/s", 7
     made.start()
-    assert beside(session, "simulation").said == ""
+    assert background(session, "simulation").said == ""
     assert len(made._model.data["t"]) > 500 and len(made._measured.data["t"]) > 500
     own, model = (float(np.max(d.data["x"])) for d in (made._measured, made._model))
     assert model == pytest.approx(own, rel=0.15)
@@ -100,24 +100,24 @@ def test_a_simulation_is_shown_beside_the_measurement(session):
     assert creep[1] == pytest.approx(creep[0], rel=0.05) and creep[0] > 1e-6
     assert rows[1][0] == made._name.label.value == "model: static + inertia"
     session.by_hand({"weakening.drop": session.fit.values["weakening.drop"] * 1.05})
-    assert made._table.rows[1][0] == made._name.label.value == "a model before: static + inertia"
+    assert made._table.rows[1][0] == made._name.label.value == "an earlier model: static + inertia"
 
 
 def test_a_wrong_quantity_is_said_and_nothing_else_happens(session):
-    asked = Asked(session)
+    asked = SimulationForm(session)
     made = SimulatedView(session, asked)
     asked.mass.value = "heavy"
     made.start()
-    work = beside(session, "simulation")
+    work = background(session, "simulation")
     assert "mass" in work.said and work.found is None and work.doing == ""
 
 
 def test_without_a_model_it_is_said(campaign):
     session = Session(campaign=campaign)
     simulate_page.page(session)
-    asked = Asked(session)
+    asked = SimulationForm(session)
     SimulatedView(session, asked).start()
-    assert "no model yet" in beside(session, "simulation").said
+    assert "no model yet" in background(session, "simulation").said
 
 
 @pytest.mark.slow
@@ -146,7 +146,7 @@ def test_a_sweep_comes_to_the_measured_recurrence(session, campaign, base):
 
 
 def test_the_sweep_is_drawn_with_measured_points(session):
-    asked = Asked(session)
+    asked = SimulationForm(session)
     made = SweepView(session, asked)
     assert list(made._measured.data["run"]) == ["v050", "v100", "v200", "v400"]
     made.low.value, made.high.value, made.points.value, asked.events.value = "200 um/s", "400 um/s", 2, 3
@@ -154,13 +154,13 @@ def test_the_sweep_is_drawn_with_measured_points(session):
     assert len(made._model.data["v"]) == 2 and np.isfinite(made._model.data["recurrence"]).all()
     assert [row["text"] for row in made.signs.rows] == ["measured", "model: static + inertia"]
     session.by_hand({"weakening.drop": session.fit.values["weakening.drop"] * 1.05})
-    assert [row["text"] for row in made.signs.rows] == ["measured", "a model before: static + inertia"]
+    assert [row["text"] for row in made.signs.rows] == ["measured", "an earlier model: static + inertia"]
     session.undo()
     assert [row["text"] for row in made.signs.rows] == ["measured", "model: static + inertia"]
 
 
 def test_a_synthetic_record_can_be_opened(campaign, base, folder):
-    made = synthetic.write(base, Setting("v400", "400 um/s", events=4), campaign, "synthetic run", _silent)
+    made = vibrometer_files.write(base, Setting("v400", "400 um/s", events=4), campaign, "synthetic run", _silent)
     assert made == folder / "synthetic run" and not list(folder.glob(".synthetic*"))
     read = ss.load_campaign(made / "campaign.toml")
     assert len(read.events[0].events) >= 3 and read.traces[0].drive_velocity == pytest.approx(4e-4)
@@ -176,7 +176,7 @@ def test_a_synthetic_record_can_be_opened(campaign, base, folder):
     assert np.abs(counted).max() < 1.01 * trace.resolution
     for name in ("synthetic run", "../elsewhere", "a/b", ".hidden", ""):
         with pytest.raises(InputError):
-            synthetic.write(base, Setting("v400"), campaign, name, _silent)
+            vibrometer_files.write(base, Setting("v400"), campaign, name, _silent)
 
 
 @pytest.mark.slow
@@ -191,16 +191,16 @@ def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(
     hold, wrong = Setting("v200", "200 um/s", "10 s"), Setting("v200", "200 um/s", mass="0 kg")
     options = {"as driven": plain, "a hold of 10 s": hold, "wrong": wrong}
     shown = []
-    found = experiments.tell_apart(base, fits, options, _silent, shown.append)
+    found = experiments.simulate_rivals(base, fits, options, _silent, shown.append)
     assert [t.words for t in found] == ["a hold of 10 s", "as driven", "wrong"] and len(shown) == 3
     assert found[0].margin > found[1].margin > 0.0 and found[0].information == pytest.approx(np.log(2.0))
     assert "mass" in found[2].note and not found[2].recordings
     assert set(found[0].recordings) == set(RIVALS)
     drives = [r["drive_position"].values for r in found[0].recordings.values()]
     np.testing.assert_array_equal(*drives)  # each is put to the very same
-    made = Rivals(session, Asked(session))
+    made = Rivals(session, SimulationForm(session))
     assert "holds of 1 s and 10 s" in made._said.text and made.effects.value == list(RIVALS)
-    beside(session, "rivals").found = found
+    background(session, "rivals").found = found
     assert made._table.rows[0][0] == "a hold of 10 s" and made._table.chosen == 0
     words, _, table = made._place
     assert (
@@ -254,15 +254,15 @@ def test_models_that_differ_in_a_hold_only_are_told_apart(base):
 
 
 def test_where_nothing_was_proposed_effects_can_be_chosen(session):
-    made = Rivals(session, Asked(session))
+    made = Rivals(session, SimulationForm(session))
     assert "Choose effects" in made._said.text and {"wear", *RIVALS} <= set(made.effects.options)
     made.effects.value = ["wear"]
     made.start()
-    assert "two effects" in beside(session, "rivals").said
+    assert "two effects" in background(session, "rivals").said
 
 
 def test_what_is_offered_follows_the_promises_until_others_are_chosen(session):
-    made = Rivals(session, Asked(session))
+    made = Rivals(session, SimulationForm(session))
     falls = {"wear": 0.1, **dict(zip(RIVALS, (9.0, 5.0), strict=True))}
     promised = [SimpleNamespace(tag=tag, fall=fall) for tag, fall in falls.items()]
     session.promises = promised[:1]
@@ -314,7 +314,7 @@ def test_a_logarithmic_axis_has_two_numbers_and_all_values_however_close_these_a
 def test_the_sweep_beside_one_run_has_numbers_on_its_axes(session, monkeypatch):
     one = {"v200": experiments.steady_runs(session.campaign)["v200"]}
     monkeypatch.setattr(experiments, "steady_runs", lambda campaign: one)
-    made = SweepView(session, Asked(session)).figures["recurrence"]
+    made = SweepView(session, SimulationForm(session)).figures["recurrence"]
     for axis, shown in ((made.xaxis, made.x_range), (made.yaxis, made.y_range)):
         assert sum(shown.start <= v <= shown.end for v in axis.ticker.ticks) >= 2
 

@@ -36,7 +36,7 @@ def _least(work, times: int) -> float:
 
 def test_the_first_page_is_made_before_models_and_what_fits_them_are_loaded(folder):
     code = (
-        "import sys; from pathlib import Path; from stickslip.workbench.opening import opened\n"
+        "import sys; from pathlib import Path; from stickslip.workbench.open_paths import opened\n"
         "from stickslip.workbench import app, data_page, serve, session\n"
         f"made = opened(Path({str(folder / 'campaign.toml')!r})); made.busy = session.LOOKING\n"
         "from bokeh.document import Document; app.view(made).server_doc(Document()).to_json()\n"

@@ -10,9 +10,9 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.system.progress import Cancelled, breathe, portion, showing
-from stickslip.workbench.beside import beside, close_all
+from stickslip.workbench.background_work import background, close_all
 from stickslip.workbench.session import Session
-from stickslip.workbench.work import Search, Worker
+from stickslip.workbench.worker import Search, Worker
 
 
 def until(true, seconds=20.0):
@@ -189,7 +189,7 @@ def test_work_beside_ends_with_the_server(campaign):
             tell("turning", 0.5)
             time.sleep(0.01)
 
-    work = beside(session, "simulation")
+    work = background(session, "simulation")
     work.do("turning", endless)
     begun.wait()
     close_all(session)

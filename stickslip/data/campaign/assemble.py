@@ -54,7 +54,7 @@ class _Assembly:
 
     def _placed(self, error: InputError) -> InputError:
         placed = error.at(file=self.campaign.path, key=f"{self.place} ('{self.entry.label}')")
-        noticed = "first look at what was noticed before: " + "; ".join(self.warnings)
+        noticed = "check first what was noted while reading: " + "; ".join(self.warnings)
         return placed.with_hint(noticed) if self.warnings else placed
 
     def _trace(self) -> Trace:

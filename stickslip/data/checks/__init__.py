@@ -1,4 +1,4 @@
-"""The rig as the file states it, held against what the measured motion says of it, before any model is fitted."""
+"""The rig as the file states it, compared with what the measured motion shows of it, before any model is fitted."""
 
 from .finding import Finding, refuse_impossible, stopping
 from .rig import rig_against_motion

@@ -11,9 +11,9 @@ from ...system.units import shown, to_si
 from ..resolution import noise_level
 from ..trace import Drive, Trace
 from .choose import choose_settings
+from .find_slips import directions, half_of, pick
 from .kinematics import Array, block_motion, position_at, velocity
 from .phases import divide
-from .pick import directions, half_of, pick
 from .records import PHASES, Dropped, Event, Segmentation, Settings
 from .reduce import reduce_trace, thin
 from .ringing import LAWS

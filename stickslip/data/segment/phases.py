@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trace import Drive
+from .find_slips import half_of
 from .kinematics import velocity_noise
-from .pick import half_of
 from .records import Event, Phase, Settings
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ...system.shown import Shown, facts, table
+from ...system.object_repr import Shown, facts, table
 
 if TYPE_CHECKING:
     import pandas

@@ -11,8 +11,8 @@ import numpy as np
 from ...physics.effects import catalogue
 from ..force.candidates import Candidate, with_start
 from ..force.fit import Fit, at
+from ..force.fit_arrays import fit_arrays, fit_of, point_arrays, point_of, scatter_arrays, scatter_of
 from ..force.problem import Problem
-from ..force.stored import fit_arrays, fit_of, point_arrays, point_of, scatter_arrays, scatter_of
 
 _FACTS = ("tag", "form", "promise", "note", "members", "visible", "start")
 

@@ -4,9 +4,9 @@
    members of its family, among as many effects; and the likelihood of unseen runs is better by more than 2.5 standard
    errors over their events. Parameters beyond where such values lie (``usual`` in the catalogue) have their price in
    it: the range is four standard deviations wide. The amplitude lies inside its bounds by more than its standard
-   deviation: at one of them the law would have to be stronger than such laws are, and stands for another. And the error
-   of unseen runs with all events alike does not rise by more than its standard error: a law may describe the forces
-   within events better, and leave what is foretold of an event worse.
+   deviation: at one of them the law would have to be stronger than such laws are, and imitates another. And the error
+   of unseen runs with all events equal does not rise by more than its standard error: a law may describe the forces
+   within events better, and predict an event worse.
 2. *Named*: the seen effect that predicts unseen runs best. It is kept if the model that it leads to, settled and
    without what it has made superfluous, still predicts them better than the one before, with all amplitudes inside
    their bounds.
@@ -14,9 +14,9 @@
    contains another of the set leaves it, unless it gains more than its further parameters cost (Schwarz's criterion).
 4. *A wrong entry*: a stiffness or mass of the rig other than stated is tried like an effect. Where it is seen and no
    effect predicts unseen runs better than it, nothing is named.
-5. *Held back*: where an effect that only its bound, or only the error with all events alike, keeps from being seen
-   predicts unseen runs better than all that are seen, nothing is named: what is there acts like it, and is stronger
-   than such effects are, or is not all that is there.
+5. *Held back*: where an effect that only its bound, or only the error with all events equal, keeps from being seen
+   predicts unseen runs better than all that are seen, nothing is named: what is missing acts like it, but is stronger
+   than such effects are, or is not all that is missing.
 6. *Unknown*: nothing more is seen, but an effect is held back; or the residual force is a function of a variable,
    and that would explain more than half of what the named effects do; or the misfit within events is larger than is
    expected of any law.
@@ -53,7 +53,7 @@ class Compared:
         gain: fall of the cost.
         chance: of such a fall by chance, corrected for all that was tried.
         unseen: fall of the predictive cost of every event left out, shape (E,).
-        nearer: fall of the squares of its error with all events alike, in units of their expected ones, shape (E,).
+        nearer: fall of the squares of its error with all events equal, in units of their expected ones, shape (E,).
     """
 
     fit: Fit
@@ -131,7 +131,7 @@ class Judged(Compared):
 
     @property
     def held_back(self) -> bool:
-        """Whether nothing but its bound, or nothing but the error with all events alike, keeps it from being seen."""
+        """Whether nothing but its bound, or nothing but the error with all events equal, keeps it from being seen."""
         return self.likely and self.inside != self.no_farther
 
 

@@ -18,10 +18,11 @@ from ...system.threads import processors
 from ..force.fit import Fit, deviations, fit_base
 from ..force.linearised import Array
 from ..force.prescribed import applies
+from ..force.profile_deviations import LEVEL, widened
 from ..force.residual import Structure, structures
 from ..force.rig import slips_finding, within_knowledge
 from ..force.signatures import Explained
-from ..force.valleys import LEVEL, widened
+from .backbone_laws import Shape, shape_of, unshaped
 from .checkpoints import Store, kept
 from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Judged, as_well
@@ -29,7 +30,6 @@ from .level import TAG, Level, level_of
 from .prepare import FEWEST, Prepared, prepare
 from .rounds import Round
 from .search import Rung, Search
-from .shape import Shape, shape_of, unshaped
 from .trials import Tell
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
@@ -65,7 +65,7 @@ class Diagnosis:
 
     Attributes:
         verdict, ladder, rounds: what was found, and how.
-        named: effects of the last model, each with the round in which it was last told from others.
+        named: effects of the last model, each with the round in which it was last distinguished from others.
         prepared: the data.
         floor: of the force at every point: noise and scatter of the last model (N), shape (p,).
         shape: the backbone that the last model measured, and its laws.
@@ -143,7 +143,7 @@ def diagnose(
             "out to test an effect",
             file=campaign.path,
             key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in prepared.traces[:4]),
-            hint="record it again: two loops, or a step up and down; stickslip fit takes it as it is",
+            hint="record it again: two loops, or a step up and down; stickslip fit accepts it as it is",
         )
     dropped = list(prepared.dropped)
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]

@@ -20,10 +20,10 @@ from .decide import DISPERSION
 TAG = "wandering-friction"
 FORMS = {"place": "place", "slip path": "slip", "time": "time"}
 SEPARATED = {
-    frozenset({"slip path", "time"}): "hold the drive for as long as several slips take: along the slip path the level "
-    "stands still, in time it goes on",
-    frozenset({"slip path", "place"}): "go back over the same track: what belongs to the place comes back",
-    frozenset({"place", "time"}): "go back over the same track: what belongs to the place comes back",
+    frozenset({"slip path", "time"}): "hold the drive for as long as several slips take: a level that wanders in time "
+    "changes meanwhile, one that wanders along the slip path does not",
+    frozenset({"slip path", "place"}): "go back over the same track: a level that depends on place repeats",
+    frozenset({"place", "time"}): "go back over the same track: a level that depends on place repeats",
 }
 
 
@@ -60,10 +60,10 @@ class Level:
     def text(self) -> str:
         """The same in a few sentences."""
         unit = "s" if self.coordinate == "time" else "m"
-        like = f" (or {' or '.join(self.alike)}: these data cannot tell)" if self.alike else ""
+        like = f" (or {' or '.join(self.alike)}: these data cannot distinguish them)" if self.alike else ""
         return (
             f"From event to event the strength wanders by {100 * self.size:.2g} % along {self.coordinate}{like}, with "
-            f"a length of {shown(self.length, unit, 2)}; {100 * self.own:.2g} % are an event's own. "
+            f"a length of {shown(self.length, unit, 2)}; {100 * self.own:.2g} % differ independently between events. "
             "All effects are tried on top of this."
         )
 

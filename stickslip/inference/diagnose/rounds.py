@@ -10,7 +10,7 @@ from ..force.fit import Fit
 from ..force.rig import spring_freed
 from .checkpoints import Store
 from .decide import Compared, Judge, Judged, as_well, held_back, named
-from .finals import Finals, finalists
+from .final_comparison import Finals, finalists
 from .trials import Tell, trials
 
 

@@ -16,7 +16,7 @@ from ..force.problem import Problem
 from ..force.rig import EXACT, SPRING
 from .checkpoints import Store, kept
 from .decide import Judge, Judged, best_forms, inside, named
-from .finals import settled
+from .final_comparison import settled
 from .rounds import Round, one_round
 from .trials import Tell
 
@@ -30,7 +30,7 @@ class Rung:
 
     Attributes:
         model: tags of its parts. added: the last of them, None where the ladder begins.
-        residual: of the force with all events alike, on the runs it was fitted to (N), shape (p,).
+        residual: of the force with all events equal, on the runs it was fitted to (N), shape (p,).
         unseen: the same of runs left out (:func:`..force.heldout.apart`); None for the static model, which has no fit
             of its own.
         fit: None for the static model.
@@ -57,7 +57,7 @@ class Search:
         base: the model as it stands.
         ladder: its steps.
         rounds: all effects on top of each model.
-        named: effects of the model, each with the round in which it was last told from others.
+        named: effects of the model, each with the round in which it was last distinguished from others.
         gone: effects that were taken out again; they are not tried any more, so that the search ends.
     """
 
@@ -95,8 +95,8 @@ class Search:
         last = self.ladder[-1]
         self.ladder[-1] = Rung.of(last.model, last.added, self.base, last.removed)
         return (
-            f"spring: {shown(self.base.values[SPRING], 'N/m', 4)} as the slips want, not {shown(stated, 'N/m', 4)} as "
-            f"stated: springs are not known better than to {100 * EXACT:g} %"
+            f"spring: {shown(self.base.values[SPRING], 'N/m', 4)} as the slips require, not {shown(stated, 'N/m', 4)} "
+            f"as stated: springs are not known better than to {100 * EXACT:g} %"
         )
 
     def add(self, done: Round) -> None:

@@ -21,6 +21,7 @@ from ..force.knots import PHASES
 from ..force.linearised import Array
 from ..force.prescribed import placeholders
 from ..force.residual import coordinates
+from .backbone_laws import Law, named_text, section
 from .decide import CHANCE, ERRORS, Judged, best_forms
 from .engine import Diagnosis
 from .fitted import fitted_model
@@ -29,7 +30,6 @@ from .free_words import cautions, free_variables, left_out
 from .level import TAG
 from .rounds import Round
 from .search import Rung
-from .shape import Law, named_text, section
 
 Variables = dict[str, Any]
 FARTHER = "the error of unseen runs rises where the random effects of events are zero"

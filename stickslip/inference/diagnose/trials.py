@@ -17,13 +17,13 @@ from ...physics.contact import Bank
 from ...physics.effects import catalogue
 from ...physics.effects.base import Memory
 from ...system import process, threads
-from ...system.lifeline import end_with
+from ...system.parent_watch import end_with
 from ...system.progress import Tell as Tell
 from ..force.candidates import Candidate, every_form, try_effect
 from ..force.fit import Fit
 from ..force.signatures import Explained
-from .carriage import Carriage
 from .checkpoints import Store, load_candidate, name_of, save_candidate
+from .fit_pickling import FitPickler
 
 
 def trials(
@@ -83,10 +83,10 @@ def _made(base: Fit, work: Sequence[Job], jobs: int) -> Iterator[list[Candidate]
     with warnings.catch_warnings(), TemporaryDirectory(prefix="stickslip-") as folder:
         warnings.filterwarnings("ignore", message="A worker stopped")
         job = Path(folder) / "base"
-        carriage = Carriage.packed(base, job)
+        pickler = FitPickler.packed(base, job)
         pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
         jobs_of = (delayed(_in_worker)(job, tag, forms, files, os.getpid()) for tag, forms in work)
-        yield from map(carriage.unpack, pool(jobs_of))
+        yield from map(pickler.unpack, pool(jobs_of))
 
 
 def _size(base: Fit, tag: str, forms: Sequence[Mapping[str, str]]) -> int:
@@ -101,7 +101,7 @@ def _size(base: Fit, tag: str, forms: Sequence[Mapping[str, str]]) -> int:
     return total
 
 
-_kept: dict[Path, tuple[Carriage, Explained]] = {}
+_kept: dict[Path, tuple[FitPickler, Explained]] = {}
 
 
 def _in_worker(job: Path, tag: str, forms: list[dict[str, str]], files: tuple[str, ...], parent: int) -> bytes:
@@ -114,9 +114,9 @@ def _in_worker(job: Path, tag: str, forms: list[dict[str, str]], files: tuple[st
             catalogue.load_file(file)
     if job not in _kept:
         _kept.clear()
-        carriage = Carriage(job)
-        _kept[job] = (carriage, Explained(carriage.base))
-    carriage, explained = _kept[job]
-    made = carriage.pack(try_effect(carriage.base, explained, tag, forms))
+        pickler = FitPickler(job)
+        _kept[job] = (pickler, Explained(pickler.base))
+    pickler, explained = _kept[job]
+    made = pickler.pack(try_effect(pickler.base, explained, tag, forms))
     process.forget_programs()
     return made

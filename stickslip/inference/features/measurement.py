@@ -171,7 +171,7 @@ def _one_way(trace: Trace, found: Segmentation) -> tuple[tuple[Trace, Segmentati
     count = len(found.events) - back
     text = (
         f"{trace.name}: slips from number {back + 1} on ({count} of {len(found.events)}) are left out, because there "
-        f"the block is pulled backwards. To mend: {_FORWARDS}"
+        f"the block is pulled backwards. To correct: {_FORWARDS}"
     )
     return (trace, replace(found, events=found.events[:back])), text
 
@@ -191,8 +191,8 @@ def _integrable(trace: Trace, found: Segmentation, most: float) -> tuple[tuple[T
     first, lasts = long[0], found.events[long[0]].t_arrest - begins[long[0]]
     text = (
         f"{trace.name}: slips from number {first + 1} on ({len(found.events) - first} of {len(found.events)}) are left "
-        f"out, because the cycle before lasts {lasts:.3g} s, more than the {most:.3g} s that the dynamic model can "
-        "be taken through"
+        f"out, because the cycle before lasts {lasts:.3g} s, more than the {most:.3g} s over which the dynamic model "
+        "can be integrated"
     )
     return (trace, replace(found, events=found.events[:first])), text
 

@@ -219,5 +219,5 @@ def tied_quantities(fit: CreepFit, rig: StaticRig) -> str:
     power = float(np.mean(dq))
     law = f"u_max ~ h_rms^{1 - power:.2f} (F_n / (E* L))^{power:.2f}"
     if numbers == 1:
-        return f"h_rms, L, F_n and E* act only together: of the four the curve holds one number, {law}"
-    return f"of h_rms, L, F_n and E* the curve holds {numbers} numbers, the first of them {law}"
+        return f"h_rms, L, F_n and E* act only together: of the four the curve determines one number, {law}"
+    return f"of h_rms, L, F_n and E* the curve determines {numbers} numbers, the first of them {law}"

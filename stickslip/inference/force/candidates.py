@@ -33,7 +33,7 @@ LARGE = 4.0  # times the promised amplitude: the model without the effect has ta
 FAR = 0.25  # of the way to a bound, from where an effect is begun of which nothing small is seen
 PROMISING = 3.0  # fall of the cost that chance alone promises
 BESIDE = 0.03  # of the amplitude from which a refit gained nothing, from where it is begun anew
-ALIKE = 0.9  # cosine between what two members do to the residuals, from which one start serves both
+SIMILAR = 0.9  # cosine between what two members do to the residuals, from which one start serves both
 
 
 class Start(NamedTuple):
@@ -216,7 +216,7 @@ def _unlike(apart: Array, falls: Array) -> list[int]:
     unit = apart / (np.sqrt((apart**2).sum(axis=0)) + 1e-300)
     chosen: list[int] = []
     for i in np.argsort(-falls).tolist():
-        if all(abs(float(unit[:, i] @ unit[:, j])) < ALIKE for j in chosen):
+        if all(abs(float(unit[:, i] @ unit[:, j])) < SIMILAR for j in chosen):
             chosen.append(i)
         if len(chosen) == STARTS:
             break

@@ -14,8 +14,8 @@ from ...physics.contact import Bank
 from ...physics.effects.base import Effect, Sensor
 from ...physics.model import Block, LoadPoint, Model, Weakening
 from ...system.traced import Program, of_this_package
-from .along import Way, along, lead, undone
 from .composition import DAMPING, PULL
+from .force_along_motion import Way, along, lead, undone
 from .point import OWN
 
 PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530

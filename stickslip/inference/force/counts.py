@@ -1,7 +1,8 @@
 """Counts of a sensor without what rounding adds to them in the mean.
 
 Between two counts the mean of rounded readings is not the motion's, unless noise of about half a count goes with it
-(Widrow & Kollár, Quantization Noise, 2008, ch. 4 and 9). What is left goes with the position, alike in all events.
+(Widrow & Kollár, Quantization Noise, 2008, ch. 4 and 9). What is left depends on the position, in the
+same way in all events.
 """
 
 from __future__ import annotations

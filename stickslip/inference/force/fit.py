@@ -41,8 +41,8 @@ FIRST = 0.6  # share of the rounds of a fit that begins in what it takes, at mos
 MOST_JUMPS = 4  # of the reading in a campaign: they are rare
 ADJUSTED = 0.8  # share of a base fit before the motion is adjusted
 FEWEST = 12  # events from which on it is asked whether their strengths follow each other
-ALIKE = 6.0  # of the cost, by which coordinates that can be told apart differ at least: a likelihood ratio of twenty
-LARGER = 1.0  # e-folds by which sizes are taken for larger where a search may stand in a dent
+DISTINCT = 6.0  # of the cost, by which distinguishable coordinates differ at least: a likelihood ratio of twenty
+LARGER = 1.0  # e-folds by which sizes are assumed larger where a search may have ended in a local minimum
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Fit:
         strength: force of the contact at full strength (N).
         evaluations: of the model.
         valleys: changes of all that is shared, one standard deviation each, that the derivatives do not show (see
-            :mod:`.valleys`).
+            :mod:`.profile_deviations`).
     """
 
     problem: Problem
@@ -144,7 +144,7 @@ class Fit:
 
     @property
     def marginal(self) -> Array:
-        """Residual force with all events alike (N), shape (p,)."""
+        """Residual force with all events equal (N), shape (p,)."""
         return self.forces.residual - (self.forces.local * self.point.events[self.problem.of]).sum(axis=1)
 
     @property
@@ -225,7 +225,7 @@ def fit(
 
 
 def _arrived(found: Fit) -> Fit:
-    """The better of a fit and of one that goes on from it with all that is random taken for larger than it is.
+    """The better of a fit and of one that goes on from it with all that is random assumed larger than it is.
 
     Where an element begins to slide the force has a kink, and the floor of the valley is rough: in one of its dents the
     search may stand still before it has arrived, and then every law that is added gains by leaving it.
@@ -298,7 +298,7 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
     """A refit with sizes of its own of what is random; what carries the noise to a force stays that of its base.
 
     Under the sizes of a model that lacks an effect, events look as scattered as the effect makes them, and laws that
-    describe it more or less well look alike.
+    describe it well or badly look equally good.
 
     Args:
         found: where to go on from.
@@ -343,7 +343,7 @@ def wandering(found: Fit) -> Fit:
     assert best.scatter.follows is not None
     if found.cost - best.cost < len(WANDER) * np.log(problem.events):  # Schwarz's criterion
         return found
-    alike = tuple(name for name, f in tried.items() if f is not best and f.cost - best.cost < ALIKE)
+    alike = tuple(name for name, f in tried.items() if f is not best and f.cost - best.cost < DISTINCT)
     own = replace(best.scatter, follows=replace(best.scatter.follows, alike=alike))
     best = replace(best, scatter=own)
     best = _arrived(adapted(refit(problem, best.point, best)))

@@ -21,9 +21,9 @@ from ...physics.model import LoadPoint, Model
 from ...simulation.shooting import MOST_STEPS, Cycles, Track, run_cycles
 from ...simulation.solve.stepper import Tolerance
 from ...system.traced import Program, of_this_package
-from .along import departures
 from .compiled_force import EMPTY, model_of
 from .composition import PULL
+from .force_along_motion import departures
 from .point import Point
 from .problem import Problem
 
@@ -42,7 +42,7 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
         run: number of the run in the problem, whose phases and pull at the start are taken.
         cycles: of that run, arrays (n,).
         events: logarithms of factors on strength and on yield displacements, and the power by which these are
-            stretched besides, in every cycle, shape (n, 3); default all events alike.
+            stretched besides, in every cycle, shape (n, 3); default all events equal.
 
     Returns:
         The tracks, with a leading axis of cycles.

@@ -29,7 +29,7 @@ class Unseen:
 
     Attributes:
         cost: twice the negative logarithm of the predictive likelihood of each event, shape (E,).
-        residual: residual force of the prediction, events alike (N), shape (p,).
+        residual: residual force of the prediction, events equal (N), shape (p,).
         spread: standard deviation of the prediction by what the others do not tell (N), shape (p,).
     """
 
@@ -128,7 +128,7 @@ def unseen(fit: Fit, left_out: list[NDArray[np.intp]] | None = None) -> Unseen:
 
 
 def apart(fit: Fit) -> Array:
-    """Residual force of runs left out, events alike (N), shape (p,), to be seen over the floor.
+    """Residual force of runs left out, events equal (N), shape (p,), to be seen over the floor.
 
     It is as much smaller as the deviation of the prediction is larger than the floor: where only one run tells a
     parameter, that run's being off is no error of the model. Not a number where there is one event only.
@@ -157,7 +157,7 @@ def _predictive(predicted: Array, unsure: Array) -> Array:
 
 
 def points(fit: Fit, left_out: list[NDArray[np.intp]]) -> list[Point]:
-    """The parameters that a fit without each of these folds would find, within their bounds; all events alike.
+    """The parameters that a fit without each of these folds would find, within their bounds; all events equal.
 
     The step of :func:`unseen` would do for the force, but a model is to be run with them: where a parameter hardly
     counts the step is far, and the valley is bent. So it is gone as far as it lowers the cost of the other events, and

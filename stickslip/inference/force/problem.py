@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from ...physics.effects.base import Sensor
 from ...system.threads import side_by_side
 from ..fit.parameters import to_si
-from .along import Way
 from .compiled_force import EMPTY, Own, compiled
 from .composition import BESIDE, DAMPING, Composition
+from .force_along_motion import Way
 from .knots import PHASES, Knots
 from .linked_events import Chain
 from .point import OWN, Forces, Point, Slopes

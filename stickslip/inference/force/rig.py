@@ -50,7 +50,7 @@ def with_free_spring(problem: Problem) -> Problem | None:
 
 
 def within_knowledge(base: Fit, freed: Fit) -> bool:
-    """Whether the stiffness that the slips want is as near to the stated one as that is known."""
+    """Whether the stiffness that the slips require is as near to the stated one as that is known."""
     return abs(freed.values[SPRING] / base.values[SPRING] - 1.0) < EXACT
 
 
@@ -59,7 +59,7 @@ def slips_finding(base: Fit, freed: Fit) -> Finding:
     stated, mass = base.values[SPRING], base.values["rig.mass"]
     value, std = freed.values[SPRING], freed.std()[SPRING]
     sentence = (
-        f"mass and spring: the slips want {shown(value, 'N/m', 4)} +- {shown(std, 'N/m', 2)} on a block of "
+        f"mass and spring: the slips require {shown(value, 'N/m', 4)} +- {shown(std, 'N/m', 2)} on a block of "
         f"{shown(mass, 'kg', 3)}, or a block of {shown(mass * stated / value, 'kg', 3)} on the spring of "
         f"{shown(stated, 'N/m', 4)} of the file. Weigh the block with what moves along, and measure the spring."
     )

@@ -15,10 +15,10 @@ from ...physics.contact import Bank
 from ...physics.effects.base import Effect, Sensor
 from ...physics.params import specs
 from ...system.traced import Program, of_this_package
-from .along import Way, along, undone
 from .compiled_force import EMPTY, PROGRAMS, Own, model_of, of_events
 from .composition import PULL
 from .fit import Fit
+from .force_along_motion import Way, along, undone
 from .linearised import Array, prior_rows, reach
 from .problem import Problem
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from .past import Past
+from .known_record import Past
 
 Array = NDArray[np.float64]
 POINTS = 400  # of travel at which curves are kept

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from .known_record import Past
 from .loading import Curves
-from .past import Past
 from .wander import ARREST, FEWEST, KEYS, ONSET, Component, Coordinate, Filter, Nearby, Wander, fit
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...data.trace import Trace
 from ...errors import InputError
 from ...system.progress import Tell
-from .past import Past
+from .known_record import Past
 from .predict import METHODS, Compared, Forecaster, compare, training_slips
 from .scoring import gains, score
 from .wander import Wander, fit

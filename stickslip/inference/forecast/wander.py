@@ -257,7 +257,7 @@ def fit(arrays: Mapping[str, Array], components: tuple[Component, ...], number: 
     ]
     best = min(found, key=lambda f: f.fun)
     if best.fun >= 1e30:
-        raise FitError("no wander has a finite likelihood for these levels")
+        raise FitError("no law of wandering levels has a finite likelihood here")
     size, length, noise = _sizes(best.x, m, np)
     made = tuple(
         Component(c.kernel, c.coordinate, (float(unit * s[0]), float(unit * s[1])), float(d * x))

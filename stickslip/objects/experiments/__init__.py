@@ -1,11 +1,27 @@
 """What the present model predicts: one run under another drive or rig, a sweep, and rivals in one experiment."""
 
 from .events import MEASURES, Simulated, measured, part, run, simulated, spread, steady_runs
+from .rival_experiments import SimulatedExperiment, rivals, simulate_rivals, where
 from .setting import Setting, changes, practicable, scenario
 from .sweeps import Swept, sweep
-from .telling import Telling, rivals, tell_apart, where
 
 __all__ = [
-    "MEASURES", "Setting", "Simulated", "Swept", "Telling", "changes", "measured", "part", "practicable", "rivals",
-    "run", "scenario", "simulated", "spread", "steady_runs", "sweep", "tell_apart", "where",
+    "MEASURES",
+    "Setting",
+    "Simulated",
+    "SimulatedExperiment",
+    "Swept",
+    "changes",
+    "measured",
+    "part",
+    "practicable",
+    "rivals",
+    "run",
+    "scenario",
+    "simulate_rivals",
+    "simulated",
+    "spread",
+    "steady_runs",
+    "sweep",
+    "where",
 ]  # fmt: skip

@@ -15,7 +15,7 @@ from ...simulation.scenario.simulation import record
 from ...system.progress import breathe
 from ..campaign import Campaign
 from ..fit import Fit
-from ..run import Tell
+from ..result_base import Tell
 from .setting import Setting
 
 Spread = tuple[float, float, int]  # mean, deviation, number

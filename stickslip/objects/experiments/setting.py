@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...inference.diagnose.telling import Changed
+from ...inference.diagnose.expected_information import Changed
 from ...simulation.scenario import Scenario
 from ...system.units import to_si
 from ..fit import Fit

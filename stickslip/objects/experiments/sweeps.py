@@ -13,7 +13,7 @@ from ...simulation.scenario.schema import SweepTable
 from ...simulation.scenario.series import scenarios_of
 from ...system.units import to_si
 from ..fit import Fit
-from ..run import Tell
+from ..result_base import Tell
 from .events import Spread, part, run, simulated
 from .setting import Setting, scenario
 

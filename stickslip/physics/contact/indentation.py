@@ -131,8 +131,8 @@ def check_saturation(share: ArrayLike, *, key: str | None = None) -> None:
     if largest > 0.5:
         warnings.warn(
             f"{int((shares > 0.5).sum())} of {shares.size} lines touch over more than half of their length (up to "
-            f"{100 * largest:.0f} %): the curve begins to depend on the length of the line. To mend: lengthen the line "
-            "(line_length L), roughen it (h_rms) or lower the normal force (F_n).",
+            f"{100 * largest:.0f} %): the curve begins to depend on the length of the line. To correct: lengthen the "
+            "line (line_length L), roughen it (h_rms) or lower the normal force (F_n).",
             SaturationWarning,
             stacklevel=2,
         )

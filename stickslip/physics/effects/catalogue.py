@@ -15,7 +15,7 @@ from types import CodeType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError, nearest
-from ...system import shown
+from ...system import object_repr
 from ...system.registry import Registry
 from ...system.units import to_si
 from ..params import Spec, check, specs, variants
@@ -136,7 +136,7 @@ def table() -> pandas.DataFrame:
         }
         for tag, cls in all().items()
     }
-    return shown.table(rows, "tag")
+    return object_repr.table(rows, "tag")
 
 
 def get(tag: str) -> type[Effect]:

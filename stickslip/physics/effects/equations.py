@@ -11,8 +11,8 @@ import numpy as np
 from ..params import specs, variants
 from . import symbols
 from .base import BodyForce, Drive, Effect, Flow, Geometry, Inertia, Sensor, Spring, Stiffness, Threshold
-from .named import STATIC, effects_of
-from .printed import Equations, Line, Row, pieces
+from .effects_from_text import STATIC, effects_of
+from .equation_text import Equations, Line, Row, pieces
 
 # role -> what its equation does to the base model
 _ACTS = {
@@ -119,7 +119,8 @@ def of_tags(
     """The equations of a list such as ``["static", "inertia", "rate-and-state:law=slip:evolution=0.01"]``.
 
     Args:
-        words: as of :func:`stickslip.physics.effects.named.effects_of`; what is not chosen is at its default.
+        words: as of :func:`stickslip.physics.effects.effects_from_text.effects_of`; what is not chosen is at its
+            default.
         block, weakening: as of :func:`equations`.
         contact: default the rig of the paper.
 

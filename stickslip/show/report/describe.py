@@ -9,6 +9,7 @@ import numpy as np
 
 from ...data.checks.spring_force import stick_gain
 from ...data.segment import LEVELS, Event, Segmentation, Shape, Shapes, event_shapes
+from ...data.segment.left_out import unused_channels
 from ...data.trace import Trace
 
 _OF_EVENT = (
@@ -101,26 +102,6 @@ def _why(name: str, shapes: Shapes, events: int) -> str:
     if name == "decay_time" and "ring" not in shapes.missing:
         return "the ring-downs do not fall far enough above the noise"
     return shapes.missing.get(keys.get(name, name), "no event allows it")
-
-
-def left_out(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> list[str]:
-    """What of the traces no fit uses, and why: channels and slips, each with the trace's name."""
-    return [
-        f"{t.name}: {text}"
-        for t, s in zip(traces, segmentations, strict=True)
-        for text in (*unused_channels(t), *map(str, s.dropped))
-    ]
-
-
-def unused_channels(trace: Trace) -> list[str]:
-    """Channels that were measured and that no model takes up, in words."""
-    if trace.normal_load is None:
-        return []
-    mean, low, high = (float(f(trace.normal_load)) for f in (np.mean, np.min, np.max))
-    return [
-        f"normal_load is not used by the models, which take the constant one of [rig]: mean {mean:.3g} N, "
-        f"{low:.3g} to {high:.3g} N"
-    ]
 
 
 def describe_trace(trace: Trace, found: Segmentation) -> dict[str, Any]:

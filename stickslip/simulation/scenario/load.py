@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from ...data.campaign.place import Place, key_lines, readable, shown_place
 from ...data.campaign.toml_file import read_toml
 from ...errors import InputError
-from ...system.shown import Shown, facts
+from ...system.object_repr import Shown, facts
 from .overrides import parse_assignment, with_overrides
 from .schema import ScenarioFile, file_model
 

@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...physics.effects.base import Drive, Spring
 from ...physics.model import Model
 from ...physics.sensor import Vibrometer, measure
-from ...system.progress import Tell, telling
+from ...system.progress import Tell, reporting
 from ..solve import Stats, Steps, Trajectory, integrate
 from ..solve.trajectory import energy_error
 from .build import Setup, build
@@ -65,7 +65,7 @@ def record(scenario: Scenario, progress: Tell | None = None) -> Recording:
     setup = build(scenario)
     file = scenario.file
     sliding = steady_sliding(file.block, file.weakening, setup.contact.strength, setup.motion.fastest)
-    with telling("simulating", progress) as tell:
+    with reporting("simulating", progress) as tell:
         trajectory, events, end = _run(scenario, setup, sliding, tell)
     samples = math.floor(end * file.output.sampling_rate) + 1
     if samples > _MOST_SAMPLES:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...system.shown import Shown, facts
+from ...system.object_repr import Shown, facts
 from ...system.units import ends, shown
 from .stepper import hermite
 

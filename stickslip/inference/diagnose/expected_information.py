@@ -1,0 +1,159 @@
+"""How well an experiment would separate models: what they hold along its motion, over what is known of either.
+
+Along the motion of an experiment two models hold forces that differ by ``d``. With ``S`` the covariance of the
+residual force there (noise, scatter of events, and what the campaign leaves unknown of the parameters of both),
+``d' S^-1 d / 2`` is the logarithm of the likelihood ratio that the experiment is expected to give for the one that is
+true. From that follows the expected information about which model it is (Lindley, Ann. Math. Stat. 27 (1956) 986).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from ..force.composition import PULL
+from ..force.fit import Fit
+from ..force.knots import Knots
+from ..force.linearised import Array
+from ..force.noise import by_reading, known_of
+from ..force.point import LOCAL, Point
+from ..force.problem import Problem
+from ..force.scatter import Blocks
+from ..force.whitening import Whitening, WithEvents
+from .decide import DISPERSION
+
+MASS = "rig.mass"
+KNOWN = 0.01  # of a mass, a load or a spring that is put in for the experiment, and of what a load does to the contact
+STRETCH = LOCAL.index("stretch")
+TURNS = 4  # phases of a run's own that are tried: the experiment may meet any
+
+
+@dataclass(frozen=True)
+class Changed:
+    """What an experiment changes of the rig: factors on mass, normal load, spring, and on all yield displacements.
+
+    What is changed is known to one per cent, and so is by how much a load stretches the contact. The stiffness of the
+    spring is that of the run itself.
+    """
+
+    mass: float = 1.0
+    load: float = 1.0
+    spring: float = 1.0
+    stretch: float = 1.0
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A model along a run that its fit has not seen.
+
+    Attributes:
+        residual: force, all events equal (N), shape (p,).
+        unsure: what a standard deviation of each independent combination of its parameters does (N), shape (p, q).
+        white: the covariance of the residuals, the parameters known.
+        blocks: points by event.
+    """
+
+    residual: Array
+    unsure: Array
+    white: WithEvents
+    blocks: Blocks
+
+
+def margins(fits: Sequence[Fit], runs: Sequence[Knots], changed: Changed | None = None) -> Array:
+    """Expected logarithm of the likelihood ratio of each model, were it true, over each other one, shape (m, m).
+
+    In units in which chance spreads as it should (the cost over its dispersion).
+
+    Args:
+        fits: models of one campaign.
+        runs: the motion of the experiment by each of them.
+        changed: what the experiment changes of the rig.
+    """
+    out = np.zeros((len(fits), len(fits)))
+    for i, run in enumerate(runs):
+        held = [_held(fit, run, changed or Changed()) for fit in fits]
+        for j in range(len(fits)):
+            if i != j:
+                out[i, j] = min(_margin(one, other) for one in held[i] for other in held[j])
+    return out
+
+
+def information(margins: Array) -> float:
+    """Expected information about which of some models is true, beforehand alike likely (nat), from :func:`margins`.
+
+    At most the logarithm of their number, where the experiment decides.
+    """
+    m = len(margins)
+    return float(np.log(m) - np.mean(logsumexp(-margins, axis=1)))
+
+
+def _margin(one: _Held, other: _Held) -> float:
+    side = np.column_stack([other.residual - one.residual, one.unsure, other.unsure])
+    white = one.white(one.blocks(side)).reshape(-1, side.shape[1])
+    difference, unsure = white[:, 0], white[:, 1:]
+    root = np.linalg.cholesky(unsure.T @ unsure + np.eye(unsure.shape[1]))
+    told = np.linalg.solve(root, unsure.T @ difference)
+    return 0.5 * float(difference @ difference - told @ told) / DISPERSION
+
+
+def _held(fit: Fit, run: Knots, changed: Changed) -> list[_Held]:
+    """The model along the run, at each phase that the run may have of its own."""
+    periodic = [f.name for f in fit.problem.composition.phases if f.name != PULL]
+    return [_along(fit, run, changed, 2.0 * np.pi * i / TURNS) for i in range(TURNS if periodic else 1)]
+
+
+def _along(fit: Fit, run: Knots, changed: Changed, turn: float) -> _Held:
+    known, z = fit.problem.composition, fit.point.z
+    (level, width), names = known.nominal, [f.name for f in known.shared]
+    if MASS in names:
+        z = z + np.log(changed.mass) * (np.array(names) == MASS)
+    problem = Problem(
+        replace(
+            known, mass=changed.mass * known.mass, reach=changed.stretch * known.reach,
+            nominal=(changed.load * level, width),
+        ),
+        [run],
+    )  # fmt: skip
+    phases = known.phases
+    own = np.array([[0.0 if f.name == PULL else turn / float(f.scale)] for f in phases]).reshape(len(phases), 1)
+    alike = problem.alike
+    common = np.concatenate([fit.point.common[:alike], np.zeros(problem.usual.size - alike)])
+    events = np.zeros((problem.events, fit.point.events.shape[1]))
+    point = Point(z, own, changed.load * fit.point.weights, events, common)
+    blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
+    rows, none = by_reading(problem, point, slopes), np.zeros(problem.of.size, bool)
+    noise = known_of(problem, slopes, rows, blocks, none, fit.scatter.follows)
+    white = Whitening(fit.scatter.sizes, noise)
+    unsure = [slopes.shared @ _deviations(fit, problem, changed.load)]
+    first = z.size + own.size
+    if changed.load != 1.0:
+        unsure.append(slopes.shared[:, first : first + point.weights.size] @ point.weights[:, None] * KNOWN)
+        unsure.append(slopes.local[:, [STRETCH]] * KNOWN)
+    if changed.mass != 1.0:
+        unsure.append((slopes.share * problem.composition.mass * run.acceleration)[:, None] * KNOWN)
+    if changed.spring != 1.0 and run.stiffness is not None:
+        unsure.append((slopes.share * (run.mean @ (run.stiffness * (run.drive - run.x))))[:, None] * KNOWN)
+    return _Held(slopes.residual, np.hstack(unsure), white.with_events(blocks(slopes.local)), blocks)
+
+
+def _deviations(fit: Fit, problem: Problem, load: float) -> Array:
+    """Of parameters of a problem of one run, by independent combinations: those of the campaign, and the run's own."""
+    a, k = fit.point.z.size, fit.point.weights.size
+    there, here = fit.point.phases.size, len(problem.composition.phases)
+    alike = problem.alike
+    known = np.concatenate([np.arange(a), a + there + np.arange(k + alike)])
+    part = fit.covariance[np.ix_(known, known)]
+    scale = np.sqrt(np.maximum(np.diag(part), 1e-300))  # metres beside newtons
+    values, vectors = np.linalg.eigh(part / scale[:, None] / scale)
+    told = np.concatenate([np.arange(a), a + here + np.arange(k + alike)])
+    total = a + here + k + problem.usual.size
+    own = np.setdiff1d(np.arange(total), told)
+    out = np.zeros((total, known.size + own.size))
+    out[np.ix_(told, np.arange(known.size))] = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    out[a + here : a + here + k] *= load
+    usual = [0.0 if f.name == PULL else np.pi / np.sqrt(3.0) / float(f.scale) for f in problem.composition.phases]
+    out[own, known.size + np.arange(own.size)] = np.concatenate([usual, problem.usual[alike:]])
+    return out
