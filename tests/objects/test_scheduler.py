@@ -41,7 +41,7 @@ def test_a_study_on_a_scheduler(running):
     assert found.note.values.tolist() == [""] and told == ["shipped"]
     assert found.campaign.values.tolist() == ["shipped"] and found.cycles.values.tolist() == [38]
     assert float(found.value.sel(parameter="contact.strength")[0]) > 0.0
-    assert float(found.unseen_error[0]) > 2.0  # the campaign hides an effect
+    assert float(found.unseen_error[0]) > 1.0  # in floors of this fit, which lacks the hidden effect
     assert worker.poll() is None
 
 
