@@ -22,6 +22,7 @@ PARTS = {
     "left-out": "one effect, which is left out of the catalogue",
     "nothing": "nothing hidden",
 }
+RARE = 0.01  # p-value below which ranks are said not to be uniform
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 Rows = Iterable[Sequence[object]]
 
@@ -62,6 +63,11 @@ def power(x: float, digits: int = 1) -> str:
     """2.2 · 10⁻⁴ for 2.2e-4."""
     mantissa, exponent = f"{x:.{digits}e}".split("e")
     return f"{mantissa} · 10{str(int(exponent)).translate(SUPERSCRIPT)}"
+
+
+def chance(p: float) -> str:
+    """A p-value: two digits after the point, or a power of ten where these would say nothing."""
+    return f"{p:.2f}" if p >= RARE else power(p)
 
 
 def _drawn(draw: Callable[[dict[str, Any]], str]) -> Callable[[dict[str, Any]], str]:
@@ -174,7 +180,7 @@ def _sealed_case(case: dict[str, Any]) -> list[object]:
 def ranks(found: dict[str, Any]) -> str:
     """How well the posterior contains the true values, a row for each parameter of ``posterior.json``."""
     rows = [
-        [f"`{name}`", f"{p['chance']:.2f}", *(f"{100 * share:.0f} %" for share in p["within"].values()),
+        [f"`{name}`", chance(p["chance"]), *(f"{100 * share:.0f} %" for share in p["within"].values()),
          f"{p['mean off']:+.2f} ± {found['campaigns'] ** -0.5:.2f}", f"{p['of the fit']:.2f}"]
         for name, p in found["parameters"].items()
     ]  # fmt: skip
@@ -182,6 +188,18 @@ def ranks(found: dict[str, Any]) -> str:
     within = [f"in the {share.replace('%', ' %')} interval" for share in shares]
     head = ["parameter", "p-value of uniform ranks", *within, "mean error / std", "std / that of the fit"]
     return table(head, rows)
+
+
+def biases(found: dict[str, Any]) -> str:
+    """Parameters whose ranks are not uniform, and by how many standard deviations they are off in the mean."""
+    off = {name: p["mean off"] for name, p in found["parameters"].items() if p["chance"] < RARE}
+    told = [f"`{name}` is {x:+.1f}" for name, x in off.items()]
+    ratios = [p["of the fit"] for p in found["parameters"].values()]
+    return (
+        f"but the ranks of {len(told)} of {len(ratios)} parameters are not uniform (p-value below {RARE:g}). In the "
+        f"mean {', '.join(told[:-1])} and {told[-1]} standard deviations off. The standard deviation of the draws is "
+        f"{min(ratios):.1f} to {max(ratios):.1f} times that of a fit."
+    )
 
 
 @_drawn
@@ -199,14 +217,18 @@ def experiments(found: dict[str, Any]) -> str:
             left = tags(c["left"]) or f"none, `{c['after']}`" if "left" in c else ""
             made = c["experiment"] or "none of the drive alone" if "experiment" in c else "not made"
             rows.append([f"`{c['hidden']}`", others + within, made, left])
-    made, alone, left = found["made"], found["alone"], len(rows) - found["made"]
+    made, alone, sets = found["made"], found["alone"], [c for c in found["cases"] if c["before"] == "ambiguous"]
     low, high = (100 * end for end in binomtest(alone, made).proportion_ci(0.95, method="wilson"))
+    lacking = sum(c["hidden"] not in c["set"] for c in sets)
+    wrong = sum(c["set"] == [c["hidden"]] for c in sets)  # the rival is an entry of the rig
     told = (
-        f"Of {found['campaigns']} campaigns {len(rows)} end with a set. For {made} of them such an experiment is "
+        f"Of {found['campaigns']} campaigns {len(sets)} end with a set. For {made} of them such an experiment is "
         f"proposed and made. In {alone} of these only this one remains: {100 * alone / made:.0f} %, with Wilson's "
-        f"interval at 95 % from {low:.0f} to {high:.0f} %; the target is 80 %. For the other {left} the set is without "
-        "the hidden effect, or no proposed experiment changes only the drive (they change mass, spring or load, which "
-        "this test does not make)."
+        f"interval at 95 % from {low:.0f} to {high:.0f} %; the target is 80 %. Of all {len(sets)} sets these are "
+        f"{100 * alone / len(sets):.0f} %. The other {len(sets) - made} were not tested: {lacking} is without the "
+        f"hidden effect; in {wrong} the rival is a wrong entry of the rig, for which no experiment is proposed; for "
+        f"{len(sets) - made - lacking - wrong} no experiment of the drive alone makes the true model twice as likely "
+        "within 30 s (others change mass, spring or load, which this test does not make)."
     )
     return f"{told}\n\n{table(['hidden', 'others in the set', 'proposed experiment', 'named with its run'], rows)}"
 

@@ -228,6 +228,26 @@ def test_the_table_of_rates_has_the_parts_that_are_measured(tables: ModuleType) 
     assert "Version 0.1.0, 2026-01-01, seed 1" in tables.cases(part)
 
 
+def test_small_p_values_are_no_zeros(tables: ModuleType) -> None:
+    assert [tables.chance(p) for p in (0.5, 0.01, 9.6e-6)] == ["0.50", "0.01", "9.6 · 10⁻⁶"]
+
+
+def test_ambiguous_campaigns_are_all_accounted_for(tables: ModuleType) -> None:
+    named = {"hidden": "wear", "set": ["wear", "tilt"], "before": "ambiguous", "experiment": "back", "after": "missing"}
+    cases = [
+        {**named, "left": ["wear"]},
+        {"hidden": "wear", "set": ["wear", "tilt"], "before": "ambiguous", "experiment": ""},
+        {"hidden": "inertia", "set": ["inertia"], "before": "ambiguous", "experiment": ""},
+        {"hidden": "wear", "set": ["tilt", "creep"], "before": "ambiguous"},
+        {"hidden": "wear", "set": ["wear"], "before": "missing"},
+    ]
+    found = {"version": "0.1.0", "date": "2026-01-01", "campaigns": 5, "made": 1, "alone": 1, "cases": cases}
+    told = tables.experiments(found)
+    assert "Of 5 campaigns 4 end with a set" in told and "Of all 4 sets these are 25 %" in told
+    assert "The other 3 were not tested: 1 is without the hidden effect; in 1 the rival" in told
+    assert "for 1 no experiment of the drive alone" in told
+
+
 def test_pages_that_draw_a_picture_show_it() -> None:
     pages = [
         path for path in DOCS.glob("*.md") if re.search(r"^import pictures$", path.read_text("utf-8"), re.MULTILINE)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from contextlib import suppress
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
 CONVERGED = 1.05  # largest R-hat of chains that agree
 FEW = 100  # effective draws below which a 95 % interval is rough
+LOOK = 0.1  # s between two looks at whether the chains are done
 
 
 def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int, tell: Tell) -> arviz.InferenceData:
@@ -34,25 +37,38 @@ def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int, tell: Tell) 
     from nutpie.compiled_pyfunc import from_pyfunc
 
     way, names = walked(fit.force_fit), [f.name for f in fit.free]
-    done, total = itertools.count(1), chains * (draws + tune)
+    done, drawn, total = itertools.count(1), SimpleQueue[int](), chains * (draws + tune)
 
-    def drawn(x: np.ndarray) -> dict[str, Any]:
-        n = next(done)
-        tell(f"{n} of {total} draws", n / total)
+    def expand(x: np.ndarray) -> dict[str, Any]:
+        drawn.put(next(done))
         return _expanded(way, names, x)
 
     model = from_pyfunc(
         way.size,
         lambda: lambda x, **_: way.at(np.asarray(x))[1:],
-        lambda *_: lambda x, **__: drawn(np.asarray(x)),
+        lambda *_: lambda x, **__: expand(np.asarray(x)),
         [np.dtype(np.float64)] * (len(names) + 1),
         [()] * (len(names) + 1),
         [*names, STRENGTH],
         make_initial_point_fn=lambda s: 0.5 * np.random.default_rng(s).standard_normal(way.size),
     )
-    found: Any = nutpie.sample(
-        model, draws=draws, tune=tune, chains=chains, cores=chains, seed=seed, progress_bar=False, save_warmup=False
-    )
+    sampler: Any = nutpie.sample(
+        model, draws=draws, tune=tune, chains=chains, cores=chains, seed=seed, progress_bar=False, save_warmup=False,
+        blocking=False,
+    )  # fmt: skip
+    # told in this thread, which an interruption reaches: nutpie by itself ends with the draws so far as the sample
+    found: Any = None
+    try:
+        while found is None:
+            with suppress(TimeoutError):
+                found = sampler.wait(timeout=LOOK)
+            while not drawn.empty():
+                n = drawn.get()
+                tell(f"{n} of {total} draws", n / total)
+    except BaseException:
+        if found is None:
+            sampler.cancel()
+        raise
     units = {f.name: f.unit for f in fit.free} | {STRENGTH: "N"}
     for name, unit in units.items():
         found.posterior[name].attrs["units"] = unit

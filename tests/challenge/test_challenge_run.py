@@ -6,11 +6,9 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +24,7 @@ from stickslip.blind.table import score_text
 from stickslip.cli import run
 from stickslip.errors import InputError
 from stickslip.system.cluster import cluster
+from tests.loopback import loopback_cluster, worker
 
 NAMES = [f"case-{i:03d}" for i in range(1, 7)]
 
@@ -39,7 +38,6 @@ def invented_diagnosis(log: Path, slow: float = 0.0, failing: str = "", dying: s
 
     def diagnosis(campaign: Path, out: Path) -> None:
         import os
-        import time
 
         from stickslip.system.runstore import file_record, open_run
 
@@ -316,42 +314,6 @@ def test_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture, monkeypa
     assert "no challenge" in capsys.readouterr().err
     with pytest.raises(InputError, match=r"^workers: .* own workers"):
         run_challenge(folder, scheduler="tcp://127.0.0.1:9", workers=2)
-
-
-def spawn(kind: str, *arguments: str) -> subprocess.Popen:
-    command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *arguments, "--no-dashboard"]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-
-def worker(address: str, folder: Path) -> subprocess.Popen:
-    return spawn("worker", address, "--no-nanny", "--nthreads", "1", "--host", "127.0.0.1", "--local-directory",
-                 str(folder))  # fmt: skip
-
-
-@contextmanager
-def loopback_cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen]]]:
-    """A scheduler and workers as separate processes; gives its address and the workers."""
-    file = folder / "scheduler.json"
-    processes = [spawn("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))]
-    try:
-        address = wait_for(lambda: json.loads(file.read_text())["address"])
-        processes += [worker(address, folder / f"worker{i}") for i in range(workers)]
-        yield address, processes[1:]
-    finally:
-        for process in reversed(processes):
-            process.kill()
-        for process in processes:
-            process.wait(10)
-
-
-def wait_for(what: Callable[[], Any], patience: float = 30.0) -> Any:
-    end = time.monotonic() + patience
-    while time.monotonic() < end:
-        with suppress(OSError, ValueError, KeyError):
-            if (found := what()) is not None:
-                return found
-        time.sleep(0.05)
-    raise TimeoutError
 
 
 @pytest.mark.slow

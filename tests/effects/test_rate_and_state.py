@@ -19,6 +19,7 @@ STRENGTH = 0.26
 MASS = 0.0894
 RIGID = bank_of(1e10, STRENGTH)  # an element that yields 26 pm before it slides
 LAWS = ["ageing", "slip"]
+ONE_QUICK = ["ageing", pytest.param("slip", marks=pytest.mark.slow)]
 
 
 def state_rate(law, phi, v, d_c, v_star):
@@ -179,7 +180,7 @@ def onsets(t, v, threshold):
     return t[i] + (t[i + 1] - t[i]) * np.log(threshold / v[i]) / np.log(v[i + 1] / v[i])
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", ONE_QUICK)
 def test_stick_slip(law):
     """Far below the critical stiffness the block slips by bursts: their times, displacements between them, and forces.
 
@@ -213,7 +214,7 @@ def growth(t, swing, start):
     return complex(*found[2:])
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", ONE_QUICK)
 def test_critical_stiffness(law):
     """Steady sliding loses stability at (b - a) F/D_c (1 + m v^2/(a F D_c)) (Rice & Ruina 1983).
 

@@ -30,7 +30,7 @@ def slips(name: str) -> driven.Slips:
     return driven.simulated(driven.effects_with(law, SHARES.get(law[0], 0.1)))
 
 
-QUICK = {"contact-ageing", "viscous-drag", "position-dependent-friction wave"}
+QUICK = {"viscous-drag"}
 
 
 def every_law(laws):

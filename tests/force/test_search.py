@@ -32,6 +32,7 @@ def objective(base, problem, point) -> float:
     return Linearised(problem, point, slopes, base.scatter, base.blocks, white).objective(point, slopes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tag, size", [("tilt", 1e-3), ("inertia", 2e-3)])
 def test_a_model_that_makes_room_stays_near_its_optimum(base, tag, size):
     """To first order what is left of an effect is what the model's own parameters cannot take."""
@@ -96,6 +97,7 @@ def test_a_refit_ends_no_higher_than_it_began(base, tag):
         assert -SETTLED < base.cost - found.fit.cost < 9.0 + found.promise
 
 
+@pytest.mark.slow
 def test_a_search_comes_back_from_the_side_of_the_valley(base):
     """Off by a tenth of the strength that a slip loses the cost is thousands higher; all of it is found again."""
     names = [f.name for f in base.free]
@@ -110,6 +112,7 @@ def test_a_search_comes_back_from_the_side_of_the_valley(base):
     assert count < 30
 
 
+@pytest.mark.slow
 def test_derivatives_that_no_covariance_holds_end_a_search_in_words(base):
     """Of a candidate, which is then left out: one of a record with counts of a micrometre once ended the diagnosis."""
     bad = replace(base.slopes, local=1e200 * base.slopes.local)

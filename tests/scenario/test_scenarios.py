@@ -82,6 +82,7 @@ def test_the_paper_rig_has_its_numbers(outcome):
     assert result["seeds"] == {"lines": 2014, "sensor": 1}
 
 
+@pytest.mark.slow
 def test_recurrence_falls_with_velocity(outcome):
     _, result = outcome("velocity_sweep")
     recurrence = result["table"]["recurrence"]

@@ -14,6 +14,7 @@ from .rig import STRENGTH, rig, tighter
 from .slip_events import run
 
 
+@pytest.mark.slow
 def test_energy_balance_closes():
     """Work of the spring = kinetic + stored + lost in friction + lost in damping, through a slip and its ringing."""
     made = run(rig(), 5.6, tighter(1000.0))

@@ -47,6 +47,7 @@ def _agree(both):
         assert np.max(np.abs(gap)) < 1e-9
 
 
+@pytest.mark.slow
 def test_holds_steps_of_velocity_and_reversal_agree():
     """Slip, hold of 1.5 s, pull backwards until it slips that way; then at twice the speed."""
     load_point = drive((5.5, 5e-5), (1.5, 0.0), (2.4, -2e-4), (FAR_ENOUGH, -4e-4))

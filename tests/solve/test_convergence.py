@@ -16,6 +16,7 @@ def test_second_order_for_a_damped_oscillator():
     assert errors[-1] < 1e-3
 
 
+@pytest.mark.slow
 def test_second_order_within_a_slip():
     steps = np.array([125, 250, 500, 1000])
     errors = slip_errors(steps)

@@ -18,6 +18,8 @@ from stickslip.simulation.solve import Tolerance, integrate
 from .derivatives import BASE, NAMES, Outcome, build, creep_displacements, differences, outcome, trace
 from .rig import DEFAULT, tighter
 
+pytestmark = pytest.mark.slow
+
 START, EARLY, END = 5.13, 5.16, 5.23  # s; the slip begins at 5.18 s
 
 
@@ -58,7 +60,6 @@ def test_creep_and_onset_hold_on_coarser_rungs():
         assert seen == pytest.approx(exact[smooth, :2] / scale, abs=2e-3)
 
 
-@pytest.mark.slow
 def test_creep_curve_with_adaptive_steps():
     function = creep_displacements(DEFAULT, (2.0, 4.0))
     exact = _columns(function)

@@ -49,6 +49,7 @@ def test_an_event_of_diffrax_ends_the_integration_there(field, rising, shortly_b
     assert getattr(events(trajectory), field)[0] == pytest.approx(t, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_times_and_peaks_lie_between_the_steps():
     """Three slips by coarse steps; taken at the steps, peaks would be low by up to a thousandth."""
     trajectory, _ = integrate(rig(), 7.1, tolerance=tighter(0.1))

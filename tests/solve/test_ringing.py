@@ -21,7 +21,7 @@ def test_microslip_alone_damps_hyperbolically(amplitude):
     assert abs(exponential / ringing.amplitude[middle] - 1.0) > 0.05
 
 
-@pytest.mark.parametrize("spring_stiffness", [1000.0, 1e5])
+@pytest.mark.parametrize("spring_stiffness", [1000.0, pytest.param(1e5, marks=pytest.mark.slow)])
 def test_ring_frequency_is_that_of_the_virgin_contact(spring_stiffness):
     seen, expected = frequency(spring_stiffness=spring_stiffness)
     assert seen == pytest.approx(expected, rel=0.02)

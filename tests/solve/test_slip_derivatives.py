@@ -30,6 +30,7 @@ def test_slips_are_those_of_brute_force():
         assert seen[name] == pytest.approx(expected[name], rel=3e-4)
 
 
+@pytest.mark.slow
 def test_derivatives_of_every_slip_in_every_parameter_agree_with_differences_by_brute_force():
     """First onset, recurrences, slips and peak velocities, of which the later ones follow two slips."""
     seen = solved()[1]
@@ -115,11 +116,13 @@ def test_steps_of_the_default_tolerance_will_do_for_two_per_cent():
     assert all(error < 0.02 for error in errors(solved(1.0, 1, GRIDS)[1], brute_differences(1e-3)).values())
 
 
+@pytest.mark.slow
 def test_steps_that_miss_an_arrest_are_refused():
     with pytest.raises(SolveError, match="too coarse to meet an arrest"):
         solved(1e-4, 1, GRIDS)
 
 
+@pytest.mark.slow
 def test_a_run_without_a_slip_is_refused():
     with pytest.raises(SolveError, match="no slip is complete within the run"):
         slip_derivatives(build, np.zeros(len(BASE)), 2.0)

@@ -119,6 +119,7 @@ class _Jump(BodyForce):
         return jnp.where(motion.x > 1e-7, -10.0, 10.0)
 
 
+@pytest.mark.slow
 def test_a_number_lost_on_the_way_is_reported_with_its_time():
     with pytest.raises(SolveError, match=r"t = [1-3]\.\d+ s .*no longer a number|force that jumps") as told:
         integrate(rig(effects=(_Lost(),)), 4.0)
@@ -146,6 +147,7 @@ def test_a_force_that_jumps_is_given_up_with_advice():
         integrate(rig(effects=(_Jump(),)), 4.0, most_steps=4000)
 
 
+@pytest.mark.slow
 def test_steps_that_lead_nowhere_are_given_up_at_once():
     seen = []
     with pytest.raises(SolveError, match=r"steps advanced it by only .* force that jumps"):

@@ -17,6 +17,8 @@ from stickslip.workbench.selection import choose, cycles, follow, selected, wors
 from stickslip.workbench.session import Session
 from stickslip.workbench.steps import Step, complete, fewer, moved
 
+pytestmark = pytest.mark.slow  # of a fit that takes a quarter of a minute
+
 DROP = "weakening.drop"
 
 
@@ -87,7 +89,6 @@ def test_moved_by_hand_the_last_fit_is_still_at_hand(session, base):
     assert session.fit.error > 2.0 * base.error
 
 
-@pytest.mark.slow
 def test_what_was_open_comes_back(campaign, base, session, monkeypatch):
     session._keeper.journal = HistoryFile(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
@@ -110,7 +111,6 @@ def test_what_was_open_comes_back(campaign, base, session, monkeypatch):
     assert again.code() == session.code().rsplit("\n", 1)[0]
 
 
-@pytest.mark.slow
 def test_a_history_does_not_depend_on_how_its_path_is_written(campaign, base, session, folder, monkeypatch):
     session._keeper.journal = HistoryFile(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
@@ -123,7 +123,6 @@ def _elsewhere(kept):
     return kept
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("damage", [_elsewhere, lambda kept: [], lambda kept: {**kept, "event": None}])
 def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, monkeypatch, damage):
     session._keeper.journal = HistoryFile(campaign)
@@ -136,7 +135,6 @@ def test_a_damaged_history_is_told_and_begun_anew(campaign, base, session, monke
     assert "begins again" in again.said and again.fit is base
 
 
-@pytest.mark.slow
 def test_a_history_of_other_data_is_left_alone(campaign, base, session, folder):
     session._keeper.journal = HistoryFile(campaign)
     session.by_hand({DROP: base.values[DROP] * 1.02})
@@ -218,7 +216,6 @@ def test_the_worst_cycle_of_a_phase(base):
     assert worst(base, "nowhere", "all") is None
 
 
-@pytest.mark.slow
 def test_a_refit_leaves_what_is_locked(session, base):
     moved = base.values[DROP] * 1.02
     session.by_hand({DROP: moved})
@@ -228,7 +225,6 @@ def test_a_refit_leaves_what_is_locked(session, base):
     assert not session.fit.by_hand
 
 
-@pytest.mark.slow
 def test_a_campaign_can_be_begun_again(campaign, base, monkeypatch):
     monkeypatch.setattr(type(campaign), "fit", lambda self: base)
     with closing(Session(campaign=campaign)) as session:
@@ -259,7 +255,6 @@ def test_a_second_window_leaves_the_listing_that_goes_on(session, base, monkeypa
     assert len(begun) == 3 and session.promises == () and len(cancelled) == 2
 
 
-@pytest.mark.slow
 def test_old_steps_hold_no_more_than_they_must(base):
     """A model keeps what was found when asked for, some 20 MB; when a step is shown again it is found again."""
     found = complete(base)
@@ -274,7 +269,6 @@ def test_old_steps_hold_no_more_than_they_must(base):
     assert [step.fit.error for step in kept] == told
 
 
-@pytest.mark.slow
 def test_a_fit_tells_how_far_it_is(session):
     shares: list[float] = []
     session.param.watch(lambda event: shares.append(event.new), "share")

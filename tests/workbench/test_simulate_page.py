@@ -53,6 +53,7 @@ def test_what_is_left_empty_is_as_in_the_measured_run(base):
     ]
 
 
+@pytest.mark.slow
 def test_velocity_spring_and_mass_are_taken_with_their_units(base):
     made = experiments.scenario(base, Setting("v100", "0.3 mm/s", "", "0.5 N/mm", "100 g", 2))
     file = made.file
@@ -103,6 +104,7 @@ def test_a_simulation_is_shown_beside_the_measurement(session):
     assert made._table.rows[1][0] == made._name.label.value == "an earlier model: static + inertia"
 
 
+@pytest.mark.slow
 def test_a_wrong_quantity_is_said_and_nothing_else_happens(session):
     asked = SimulationForm(session)
     made = SimulatedView(session, asked)
@@ -132,6 +134,7 @@ def test_a_simulation_can_be_cancelled(base):
         experiments.run(experiments.scenario(base, Setting("v050", events=60)))
 
 
+@pytest.mark.slow
 def test_a_sweep_comes_to_the_measured_recurrence(session, campaign, base):
     shown = []
     found = experiments.sweep(base, Setting("v100", events=3), "100 um/s", "400 um/s", 3, _silent, shown.append)
@@ -145,6 +148,7 @@ def test_a_sweep_comes_to_the_measured_recurrence(session, campaign, base):
             experiments.sweep(base, Setting("v100"), low, high, points, _silent, shown.append)
 
 
+@pytest.mark.slow
 def test_the_sweep_is_drawn_with_measured_points(session):
     asked = SimulationForm(session)
     made = SweepView(session, asked)
@@ -159,6 +163,7 @@ def test_the_sweep_is_drawn_with_measured_points(session):
     assert [row["text"] for row in made.signs.rows] == ["measured", "model: static + inertia"]
 
 
+@pytest.mark.slow
 def test_a_synthetic_record_can_be_opened(campaign, base, folder):
     made = vibrometer_files.write(base, Setting("v400", "400 um/s", events=4), campaign, "synthetic run", _silent)
     assert made == folder / "synthetic run" and not list(folder.glob(".synthetic*"))
@@ -212,6 +217,7 @@ def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(
     assert made._table.chosen == 1 and made._drawn is found[1]
 
 
+@pytest.mark.slow
 def test_practicable_experiments_change_one_thing_each(base):
     options = experiments.practicable(Setting("v200", events=2), 2e-4, 1000.0, 0.1)
     made = {words: experiments.scenario(base, setting).file for words, setting in options.items()}
@@ -253,6 +259,7 @@ def test_models_that_differ_in_a_hold_only_are_told_apart(base):
     assert (key, number) == (HELD, 0) and creep[1] - creep[0] == pytest.approx(4e-8, rel=0.05)
 
 
+@pytest.mark.slow
 def test_where_nothing_was_proposed_effects_can_be_chosen(session):
     made = Rivals(session, SimulationForm(session))
     assert "Choose effects" in made._said.text and {"wear", *RIVALS} <= set(made.effects.options)
@@ -261,6 +268,7 @@ def test_where_nothing_was_proposed_effects_can_be_chosen(session):
     assert "two effects" in background(session, "rivals").said
 
 
+@pytest.mark.slow
 def test_what_is_offered_follows_the_promises_until_others_are_chosen(session):
     made = Rivals(session, SimulationForm(session))
     falls = {"wear": 0.1, **dict(zip(RIVALS, (9.0, 5.0), strict=True))}
@@ -276,6 +284,7 @@ def test_what_is_offered_follows_the_promises_until_others_are_chosen(session):
     assert made.effects.value == ["wear", "viscous-drag"]
 
 
+@pytest.mark.slow
 def test_models_that_differ_in_nothing_are_said_to(base):
     same = experiments.run(experiments.scenario(base, Setting("v400", "400 um/s", events=2)))
     assert farthest({"a": same, "b": same}) is None
@@ -311,6 +320,7 @@ def test_a_logarithmic_axis_has_two_numbers_and_all_values_however_close_these_a
     assert reach(np.array([])) == (1.0, 10.0)
 
 
+@pytest.mark.slow
 def test_the_sweep_beside_one_run_has_numbers_on_its_axes(session, monkeypatch):
     one = {"v200": experiments.steady_runs(session.campaign)["v200"]}
     monkeypatch.setattr(experiments, "steady_runs", lambda campaign: one)
@@ -319,6 +329,7 @@ def test_the_sweep_beside_one_run_has_numbers_on_its_axes(session, monkeypatch):
         assert sum(shown.start <= v <= shown.end for v in axis.ticker.ticks) >= 2
 
 
+@pytest.mark.slow
 def test_nothing_is_proposed_where_nothing_is_undecided(session, campaign):
     assert _undecided(None) == []
     found = Diagnosis(campaign, None, {"verdict": {"kind": "complete"}, "next_experiment": None}, {})

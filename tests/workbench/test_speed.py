@@ -47,6 +47,7 @@ def test_the_first_page_is_made_before_models_and_what_fits_them_are_loaded(fold
     assert found.returncode == 0, found.stderr
 
 
+@pytest.mark.slow
 def test_a_move_of_a_slider_is_worked_out_within_a_tenth_of_a_second(campaign, base, monkeypatch):
     """The model, its force and errors, and all that the page of the model draws of them."""
     monkeypatch.setattr(Session, "run_freely", lambda self, run: None)  # which waits until the hand stands still
