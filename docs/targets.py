@@ -139,8 +139,8 @@ def _springs(found: dict[str, Any]) -> tuple[str, str, str, str]:
 def _rigs(found: dict[str, Any]) -> tuple[str, str, str, str]:
     rows = {row[0]: row for row in found["many"]["rows"]}
     one, two = rows["one process"], rows["two processes"]
-    told = f"{one[2]} ms a rig, with two processes {two[2]}; {one[4]} MiB more, at most {one[5]} MiB on disk"
-    return "many", f"{one[1]} rigs by `ss.sweep`, bounded memory", told, "yes"
+    told = f"{two[2]} ms a rig with two processes ({one[2]} with one); {two[4]} MiB more, at most {two[5]} MiB on disk"
+    return "many", f"{two[1]} rigs by `ss.sweep`, bounded memory", told, "yes"
 
 
 def _gpu(found: dict[str, Any]) -> tuple[str, str, str, str]:
