@@ -34,7 +34,8 @@ def main() -> None:
     answers = [(case, read_answer(options.folder / RUNS, case["name"])) for case in read_truth(options.folder)["cases"]]
     found = figures([mark(case, answer, 0) for case, answer in answers if answer.kind != "not run"])
     result = {
-        "version": ss.__version__, "date": date.today().isoformat(), "seed": whole["seed"], "seal": whole["seal"],
+        "version": ss.__version__, "date": date.today().isoformat(),
+        "command": "python docs/make_challenge.py FOLDER --seal DIGEST", "seed": whole["seed"], "seal": whole["seal"],
         "made": whole["cases"], "failed": whole["failed"], **{key: found[key] for key in KEPT},
         "list": [{key: line[key] for key in LINE} for line in found["list"]],
     }  # fmt: skip

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, StickslipError
+from ..errors import ArgumentError, InputError, StickslipError
 from ..system import process
 from ..system.cluster import cluster
 from ..system.parent_watch import end_with
 from ..system.progress import reporting, silent
-from .campaign import load_campaign
+from .campaign import Campaign, load_campaign
 from .result_base import Tell, several
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ WHOLE = ("error", "unseen_error", "cost", "cycles")
 
 
 def study(
-    campaigns: Mapping[str, str | Path] | str | Path | Sequence[str | Path],
+    campaigns: Mapping[str, str | Path | Campaign] | str | Path | Sequence[str | Path],
     effects: str | Sequence[str] = (),
     *,
     files: str | Path | Sequence[str | Path] = (),
@@ -35,7 +35,7 @@ def study(
     """Fit the dynamic model to every campaign.
 
     Args:
-        campaigns: campaign files, by a name of each or by their folders.
+        campaigns: campaign files by a name of each or by their folders, or campaigns by name.
         effects: added to the base in each, as of :meth:`Campaign.fit`.
         files: Python files with effects of one's own; they must be there on every worker.
         scheduler: address of a running dask scheduler, ``tcp://host:8786``; default a cluster on this machine.
@@ -50,6 +50,8 @@ def study(
     Raises:
         InputError: no campaign, two of one name, no scheduler at that address, or dask.distributed is missing.
     """
+    if isinstance(campaigns, Campaign):
+        raise ArgumentError("a campaign by itself has no name", key="campaigns", hint='give {"name": campaign}')
     campaigns = campaigns if isinstance(campaigns, Mapping) else several(campaigns)
     named = dict(campaigns) if isinstance(campaigns, Mapping) else {_name(Path(p)): p for p in campaigns}
     if not named or len(named) != len(campaigns):
@@ -60,9 +62,8 @@ def study(
 
         local = None if scheduler else os.getpid()
         own = (several(effects), tuple(map(str, several(files))), local)
-        work = {
-            client.submit(_fitted, str(Path(path).resolve()), *own, pure=False): name for name, path in named.items()
-        }
+        given = {n: c if isinstance(c, Campaign) else str(Path(c).resolve()) for n, c in named.items()}
+        work = {client.submit(_fitted, one, *own, pure=False): name for name, one in given.items()}
         for done in as_completed(work):
             name = work[done]
             found[name] = done.result()
@@ -74,19 +75,31 @@ def _name(path: Path) -> str:
     return path.resolve().parent.name if path.name == "campaign.toml" else path.stem
 
 
-def _fitted(path: str, effects: tuple[str, ...], files: tuple[str, ...], parent: int | None) -> dict[str, Any]:
+def _fitted(
+    given: str | Campaign, effects: tuple[str, ...], files: tuple[str, ...], parent: int | None
+) -> dict[str, Any]:
     """One campaign, in a worker."""
     if parent is not None:
         end_with(parent)
     process.begin()
     try:
-        fit = load_campaign(path, files).fit(effects, progress=silent)
+        fit = _loaded(given, files).fit(effects, progress=silent)
     except StickslipError as error:
         return {"note": str(error).split("\n")[0]}
     frame = fit.parameters
     cycles = sum(len(s.events) for s in fit.climbed.prepared.segmentations)
     whole = {"error": fit.error, "unseen_error": fit.unseen_error, "cost": fit.climbed.fit.cost, "cycles": cycles}
     return {"note": "", **whole, "parameters": {n: (r["value"], r["std"], r["unit"]) for n, r in frame.iterrows()}}
+
+
+def _loaded(given: str | Campaign, files: tuple[str, ...]) -> Campaign:
+    if not isinstance(given, Campaign):
+        return load_campaign(given, files)
+    if files or given.effects:  # its own are known in the process that sent it
+        from ..simulation.conformance import load_effects
+
+        load_effects([*given.effects, *map(Path, files)])
+    return given
 
 
 def _together(found: Mapping[str, Mapping[str, Any]]) -> xarray.Dataset:

@@ -116,7 +116,7 @@ def margin(result: dict[str, Any], tag: str) -> float | None:
     return 0.5 * (gains[tag] - max([*rivals, 0.0])) / DISPERSION
 
 
-def tally(folder: Path, seed: int) -> dict[str, Any]:
+def tally(folder: Path, part: str, seed: int) -> dict[str, Any]:
     """The answers so far, with their rates (Wilson's intervals at 95 %)."""
     marked = [mark(truth, read_answer(folder / RUNS, truth["name"])) for truth in read_truth(folder)["cases"]]
     marked = [m for m in marked if m.answer.kind != "not run"]
@@ -128,6 +128,7 @@ def tally(folder: Path, seed: int) -> dict[str, Any]:
         "seed": seed,
         "version": __version__,
         "date": date.today().isoformat(),
+        "command": f"python -m tests.diagnose.development FOLDER {part} --seed {seed}",
         "rates": {
             "exact": rate(m.exact for m in marked),
             "right": rate(m.right for m in marked),
@@ -211,7 +212,7 @@ def measure(
         diagnosis = LeftOut({case["name"]: case["effects"][0]["tag"] for case in read_truth(folder)["cases"]})
     names = None if only is None else [f"case-{i:03d}" for i in only]
     run_challenge(folder, workers=workers, only=names, diagnosis=diagnosis, tell=tell)
-    return tally(folder, seed)
+    return tally(folder, part, seed)
 
 
 def main() -> None:

@@ -9,6 +9,13 @@ import stickslip as ss
 from stickslip.errors import InputError
 
 SHIPPED = Path(__file__).parents[2] / "scenarios" / "hidden-effect" / "campaign.toml"
+RIG = {
+    "mass": "89.4 g",
+    "spring_stiffness": "980.218 N/m",
+    "contacts": 4,
+    "normal_force": "0.31 N",
+    "friction_coefficient": {"guess": 0.21, "lower": 0.15, "upper": 0.3},
+}
 
 
 @pytest.mark.slow
@@ -33,6 +40,16 @@ def test_a_study_has_the_numbers_of_the_fits_and_says_what_failed(tmp_path):
 
 
 @pytest.mark.slow
+def test_a_campaign_without_a_file_is_sent_as_it_is():
+    campaign = ss.load_campaign(SHIPPED)
+    made = ss.Campaign.from_traces([campaign["v100"], campaign["v200"]], rig=RIG)
+    found = ss.study({"made": made}, workers=1)
+    fit = made.fit()
+    for name, value in fit.values.items():
+        assert float(found.value.sel(campaign="made", parameter=name)) == pytest.approx(value, rel=1e-9)
+
+
+@pytest.mark.slow
 def test_a_single_campaign_and_a_single_effect_stand_for_themselves():
     found = ss.study(SHIPPED, "waer", workers=1)
     assert list(found.campaign.values) == ["hidden-effect"] and "'waer'" in str(found.note.values[0])
@@ -45,3 +62,5 @@ def test_campaigns_need_names_of_their_own():
         ss.study([])
     with pytest.raises(InputError, match=r"^workers: "):  # by the argument's name, which is no option here
         ss.study(SHIPPED, workers=0)
+    with pytest.raises(InputError, match="has no name"):
+        ss.study(ss.load_example())
