@@ -19,6 +19,7 @@ from tests.solve.rig import tighter
 
 from .case import C_S, D_C, DAMPING, MASS, RATIO, T_H, Answer, Case, on_grid
 
+HOLDING = 10.0  # s, the longest step of runs with a hold
 _TERM = diffrax.ODETerm(lambda t, y, args: y)
 
 
@@ -46,7 +47,8 @@ def binned(case: Case, n: int) -> tuple[Bank, float]:
 
 def own_answer(case: Case, factor: float, bank: Bank | None = None) -> tuple[Answer, Stats]:
     """By `integrate`, at the default tolerance divided by ``factor``."""
-    trajectory, _ = integrate(model(case, bank=bank), case.duration, tolerance=tighter(factor))
+    held = {"stops": case.drive[0][1:], "largest_step": HOLDING} if case.hold else {}
+    trajectory, _ = integrate(model(case, bank=bank), case.duration, tolerance=tighter(factor), **held)
     steps = trajectory.steps
     return on_grid(case, steps.t, steps.x, steps.v), trajectory.stats
 
