@@ -107,7 +107,9 @@ def _peers(found: dict[str, Any]) -> Iterable[tuple[str, str, str, str]]:
             # one that was stopped takes longer than it was given
             given = min(r.get("limit_s", found["solvers"]["limit_s"]) for r in peers)
             ratio = (min(ended) if ended else given) / runs["own"]["processor_s"]
-            told.append(f"{'' if ended else 'over '}{ratio:.2g} ({events} at {1e6 * v:g} µm/s)")
+            size = f"{ratio:.0f}" if ratio >= 100.0 else f"{ratio:.2g}"
+            known = f"{'' if ended else 'over '}{size}" if ended or ratio > 1.0 else "stopped too early to know"
+            told.append(f"{known} ({events} at {1e6 * v:g} µm/s)")
             reached.append(ratio >= wanted)
         yield "solvers", f"{aim} (events at a velocity)", ", ".join(told), f"in {sum(reached)} of {len(reached)}"
 
@@ -140,7 +142,7 @@ def _rigs(found: dict[str, Any]) -> tuple[str, str, str, str]:
     rows = {row[0]: row for row in found["many"]["rows"]}
     one, two = rows["one process"], rows["two processes"]
     told = f"{two[2]} ms a rig with two processes ({one[2]} with one); {two[4]} MiB more, at most {two[5]} MiB on disk"
-    return "many", f"{two[1]} rigs by `ss.sweep`, bounded memory", told, "yes"
+    return "many", f"{int(two[1]):,} rigs by `ss.sweep`, bounded memory".replace(",", " "), told, "yes"
 
 
 def _gpu(found: dict[str, Any]) -> tuple[str, str, str, str]:
@@ -157,14 +159,21 @@ def _writing(found: dict[str, Any]) -> tuple[str, str, str, str]:
 
 
 def _simulate(found: dict[str, Any]) -> tuple[str, str, str, str]:
-    wall = [float(row[2]) for row in found["command-line"]["rows"]]
-    told = f"{wall[3]:.1f} s and {wall[2]:.0f} s"
+    first, second = (_wall(found, name) for name in ("nothing compiled before", "the same again"))
+    told = (
+        f"{second:.1f} s and {first:.0f} s; importing JAX and its libraries takes {_wall(found, 'importing JAX'):.1f} s"
+    )
     return "command-line", "second `simulate` under 1.2 s, first under 4 s", told, "no"
 
 
 def _help(found: dict[str, Any]) -> tuple[str, str, str, str]:
-    wall = float(found["command-line"]["rows"][1][2])
+    wall = _wall(found, "--help")
     return "command-line", "`--help` under 0.2 s", f"{wall:.2f} s", "yes" if wall < 0.2 else "no"
+
+
+def _wall(found: dict[str, Any], name: str) -> float:
+    """Wall time (s) of a command."""
+    return next(float(row[2]) for row in found["command-line"]["rows"] if name in row[0])
 
 
 def _date(part: dict[str, Any]) -> str:

@@ -45,13 +45,15 @@ def command_line(small: bool = False) -> None:
         simulate = ["simulate", "scenarios/grzemba2014.toml"]
         kept = [*simulate, "--out", f"{folder}/out", "--force"]
         for name, arguments, repeats in (
-            ("python, a sum of 10 million numbers", [], 3),
+            ("python, a sum of 10 million numbers", "sum(range(10_000_000))", 3),
+            ("python, importing JAX, equinox and diffrax", "import jax, equinox, diffrax", 5),
+            ("python, importing `stickslip.simulate` with them", "import stickslip; stickslip.simulate", 5),
             ("stickslip --help", ["--help"], 5),
             ("stickslip simulate scenarios/grzemba2014.toml, nothing compiled before", simulate, 1),
             ("the same again", simulate, 5),
             ("with --out: pictures, arrays, trace", kept, 5),
         ):
-            command = [program, *arguments] if arguments else [sys.executable, "-c", "sum(range(10_000_000))"]
+            command = [sys.executable, "-c", arguments] if isinstance(arguments, str) else [program, *arguments]
             cpu, wall = [], []
             for _ in range(repeats):
                 before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
