@@ -142,7 +142,7 @@ def _rigs(found: dict[str, Any]) -> tuple[str, str, str, str]:
     rows = {row[0]: row for row in found["many"]["rows"]}
     one, two = rows["one process"], rows["two processes"]
     told = f"{two[2]} ms a rig with two processes ({one[2]} with one); {two[4]} MiB more, at most {two[5]} MiB on disk"
-    return "many", f"{int(two[1]):,} rigs by `ss.sweep`, bounded memory".replace(",", " "), told, "yes"
+    return "many", f"{int(two[1]) // 1000} 000 rigs by `ss.sweep`, bounded memory", told, "yes"
 
 
 def _gpu(found: dict[str, Any]) -> tuple[str, str, str, str]:
