@@ -298,7 +298,7 @@ def brute_force() -> plt.Figure:
         worst.append([np.max(np.abs(g)) * 1e9 for _, g in gaps])
         late = (made.events.onset - both.reference.onset)[0] / period
         rows.append((str(n), *(f"{nm:.1f} nm" if nm < 1000 else f"{nm / 1000:.1f} µm" for nm in worst[-1][:2]),
-                     f"{late:.1g}" if abs(late) < 1e-3 else f"{late:.2g}"))  # fmt: skip
+                     short(late, 1) if abs(late) < 1e-3 else f"{late:.2g}"))  # fmt: skip
     columns = ("elements", "virgin creep", "later creep", "first onset, share of the period")
     table("elements", "brute_force", columns, rows)
     for phase in (0, 1):

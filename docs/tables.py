@@ -197,7 +197,7 @@ def biases(found: dict[str, Any]) -> str:
     ratios = [p["of the fit"] for p in found["parameters"].values()]
     return (
         f"but the ranks of {len(told)} of {len(ratios)} parameters are not uniform (p-value below {RARE:g}). In the "
-        f"mean {', '.join(told[:-1])} and {told[-1]} standard deviations off. The standard deviation of the draws is "
+        f"mean {', '.join(told)} standard deviations off. The standard deviation of the draws is "
         f"{min(ratios):.1f} to {max(ratios):.1f} times that of a fit."
     )
 
@@ -225,8 +225,8 @@ def experiments(found: dict[str, Any]) -> str:
         f"Of {found['campaigns']} campaigns {len(sets)} end with a set. For {made} of them such an experiment is "
         f"proposed and made. In {alone} of these only this one remains: {100 * alone / made:.0f} %, with Wilson's "
         f"interval at 95 % from {low:.0f} to {high:.0f} %; the target is 80 %. Of all {len(sets)} sets these are "
-        f"{100 * alone / len(sets):.0f} %. The other {len(sets) - made} were not tested: {lacking} is without the "
-        f"hidden effect; in {wrong} the rival is a wrong entry of the rig, for which no experiment is proposed; for "
+        f"{100 * alone / len(sets):.0f} %. The other {len(sets) - made} were not tested: in {lacking} the hidden "
+        f"effect is missing; in {wrong} the rival is a wrong entry of the rig, for which none is proposed; for "
         f"{len(sets) - made - lacking - wrong} no experiment of the drive alone makes the true model twice as likely "
         "within 30 s (others change mass, spring or load, which this test does not make)."
     )
@@ -298,4 +298,4 @@ def sizes(found: dict[str, Any]) -> str:
         rows.append([f"{factor * n:g}", *("" if p is None else f"{p['processor_s']:.3g}" for p in at)])
     slopes = [points[0].get("slope") for points in series.values()]
     rows.append(["slope", *("" if s is None else f"{round(s, 2) + 0.0:.2f}" for s in slopes)])
-    return table(["µm/s" if factor > 1.0 else "number", *(f"{name}, s" for name in series)], rows)
+    return table(["µm/s" if factor > 1.0 else found.get("size", "number"), *(f"{name}, s" for name in series)], rows)

@@ -194,6 +194,19 @@ def test_results_say_their_version_date_and_command(path: Path) -> None:
             assert part["version"] and kept["date"] and (former or kept["command"])
 
 
+def test_targets_are_computed_from_the_kept_figures(tables: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS))
+    targets = importlib.import_module("targets")
+    found = tables.results("performance")
+    help_row = "| `--help` under 0.2 s | 0.10 s | yes |"
+    rows = {row[0]: row for row in found["command-line"]["rows"]}
+    rows["stickslip --help"][2] = "0.10"
+    text = targets.targets(found)
+    assert help_row in text and text.count("| `python -m tests.benchmark") >= 15
+    rows["stickslip --help"][2] = "0.30"
+    assert "| `--help` under 0.2 s | 0.30 s | no |" in targets.targets(found)
+
+
 def test_tables_say_what_is_not_measured(tables: ModuleType) -> None:
     assert tables.part("no-such-file", "part") == {}
     for draw in (
@@ -246,7 +259,7 @@ def test_ambiguous_campaigns_are_all_accounted_for(tables: ModuleType) -> None:
     found = {"version": "0.1.0", "date": "2026-01-01", "campaigns": 5, "made": 1, "alone": 1, "cases": cases}
     told = tables.experiments(found)
     assert "Of 5 campaigns 4 end with a set" in told and "Of all 4 sets these are 25 %" in told
-    assert "The other 3 were not tested: 1 is without the hidden effect; in 1 the rival" in told
+    assert "The other 3 were not tested: in 1 the hidden effect is missing; in 1 the rival" in told
     assert "for 1 no experiment of the drive alone" in told
 
 

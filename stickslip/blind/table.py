@@ -132,7 +132,7 @@ def _confusion(s: Mapping[str, Any]) -> list[str]:
 
 
 def _confidence(s: Mapping[str, Any]) -> list[str]:
-    """Stated confidence against how often the claim correct, by amplitude; nothing where no verdict states one."""
+    """Stated confidence against how often the claim is correct, by amplitude; nothing where no verdict states one."""
     parts = [(WORDS["nothing"], s["calibration"]["nothing"])]
     parts += [(f"{_edge(b)} times detection", b["confidence"]) for b in s["by_amplitude"]]
     rows = [

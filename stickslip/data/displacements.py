@@ -35,7 +35,7 @@ def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[
     sizes = ", ".join(f"{100 * (g['value'] - 1):+.1f} % (+-{100 * g['std']:.1f} %, {n})" for n, g in wrong.items())
     return out, [
         f"sensor-gain of {sizes}: while the block sticks, the force rises faster than stiffness times drive by this "
-        "much. It was divided by it; stiffness or drive velocity may be what is wrong instead."
+        "much. The force was divided by the gain; stiffness or drive velocity may be what is wrong instead."
     ]
 
 

@@ -226,7 +226,8 @@ def _next(past: Past, law: Wander, rise: bool) -> dict[str, float] | None:
 
 def _notes(past: Past, at: float | None, law: Wander, rise: bool) -> list[str]:
     """What should be known of how it was made."""
-    where = "at times spread evenly over the record" if at is None else f"{at:g} mean recurrences after each arrest"
+    later = "at times spread evenly over the part after training"
+    where = later if at is None else f"{at:g} mean recurrences after each arrest"
     how = f"{law}, {'with' if rise else 'without'} the recent rise of the level"
     said = [
         f"Forecasts are made {where}; each uses only what was measured by then.",

@@ -50,7 +50,8 @@ def study(
     Raises:
         InputError: no campaign, two of one name, no scheduler at that address, or dask.distributed is missing.
     """
-    if isinstance(campaigns, Campaign):
+    bare = [campaigns] if isinstance(campaigns, Campaign | str | Path | Mapping) else campaigns
+    if any(isinstance(one, Campaign) for one in bare):
         raise ArgumentError("a campaign by itself has no name", key="campaigns", hint='give {"name": campaign}')
     campaigns = campaigns if isinstance(campaigns, Mapping) else several(campaigns)
     named = dict(campaigns) if isinstance(campaigns, Mapping) else {_name(Path(p)): p for p in campaigns}

@@ -1,4 +1,4 @@
-"""Workers that end with the process they work for: a killed one cannot end them, and some of a pool wait for ever."""
+"""Workers that end with the process they work for: one that is killed cannot tell them, and they would wait."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ EVERY = 1.0  # s between looks
 def end_with(parent: int) -> None:
     """Have this process end when its ``parent`` (a process id) is gone; one that is no child of it is left alone."""
     if os.getppid() == parent:
-        Thread(target=_watch, args=(parent,), name="lifeline", daemon=True).start()
+        Thread(target=_watch, args=(parent,), name="parent watch", daemon=True).start()
 
 
 def _watch(parent: int) -> None:

@@ -69,7 +69,10 @@ def command_line(small: bool = False) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.benchmark", description=__doc__)
     parser.add_argument(
-        "--limit", type=float, default=10.0, help="processor seconds for each run of a peer among the solvers"
+        "--limit",
+        type=float,
+        default=10.0,
+        help="processor seconds for each run of a peer among the solvers, or 100 times the own solver's, 60 s at most",
     )
     parser.add_argument("--springs", type=int, nargs="+", help="numbers of springs of the solvers")
     parser.add_argument("--sets", type=int, default=1000, help="parameter sets of the batches")

@@ -23,7 +23,7 @@ def sweeps(small: bool = False) -> None:
     """Velocity, drop of friction and damping drawn for every rig; a tenth in this process, all by two."""
     scenario = ss.make_scenario(rig())
     ss.simulate(scenario)
-    head("ss.sweep", "rigs", "wall ms a rig", "events a rig", "grown MiB", "largest folder MiB")
+    head("ss.sweep", "rigs", "wall ms a rig", "events a rig", "calling process grown MiB", "largest folder MiB")
     for name, workers, rigs in (("one process", 1, RIGS // 10), ("two processes", 2, RIGS)):
         rigs, before = 40 if small else rigs, _memory()
         rng = np.random.default_rng(0)
@@ -37,10 +37,12 @@ def sweeps(small: bool = False) -> None:
             watch = threading.Thread(target=_watch, args=(Path(folder), sizes, ended))
             watch.start()
             start = time.perf_counter()
-            found = ss.sweep(scenario, changes, out=Path(folder) / "out", workers=workers)
+            try:
+                found = ss.sweep(scenario, changes, out=Path(folder) / "out", workers=workers)
+            finally:
+                ended.set()
+                watch.join()
             wall = time.perf_counter() - start
-            ended.set()
-            watch.join()
         row(name, rigs, f"{1e3 * wall / rigs:.1f}", f"{float(found.events.mean()):.1f}", f"{_memory() - before:.0f}",
             f"{max(sizes) / 2**20:.1f}")  # fmt: skip
     if not small:

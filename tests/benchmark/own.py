@@ -13,7 +13,7 @@ from jax import Array
 
 from stickslip.physics.contact import Bank, bank_from_backbone, binning_error, default_edges
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
-from stickslip.simulation.solve import ContactStepper, Stats, Tolerance, integrate
+from stickslip.simulation.solve import ContactStepper, Tolerance, Trajectory, integrate
 from stickslip.simulation.solve.integrate import step_control
 from tests.solve.rig import tighter
 
@@ -45,12 +45,17 @@ def binned(case: Case, n: int) -> tuple[Bank, float]:
     return bank_from_backbone(every.backbone, far, edges), float(binning_error(every.backbone, far, edges))
 
 
-def own_answer(case: Case, factor: float, bank: Bank | None = None) -> tuple[Answer, Stats]:
+def own_run(case: Case, factor: float, bank: Bank | None = None) -> Trajectory:
     """By `integrate`, at the default tolerance divided by ``factor``."""
     held = {"stops": case.drive[0][1:], "largest_step": HOLDING} if case.hold else {}
     trajectory, _ = integrate(model(case, bank=bank), case.duration, tolerance=tighter(factor), **held)
+    return trajectory
+
+
+def answer(case: Case, trajectory: Trajectory) -> Answer:
+    """On the grid on which traces are compared, finer than any step: no part of what is timed."""
     steps = trajectory.steps
-    return on_grid(case, steps.t, steps.x, steps.v), trajectory.stats
+    return on_grid(case, steps.t, steps.x, steps.v)
 
 
 def displacement(theta: Array, case: Case, tolerance: Tolerance) -> Array:

@@ -12,7 +12,7 @@ from . import own, peers
 from .case import CREEP, REFERENCE, STEPS, TIMES, Accuracy, Answer, Case, events_of, leapfrog, measure
 from .measuring import head, keep, row, timed
 
-ENOUGH, MOST = 100.0, 60.0  # times the own solver's, s: how long a peer may take at most
+ENOUGH, MOST = 100.0, 60.0  # times the own solver's, s: how long a peer may take, if that is more than the limit
 FACTORS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)  # the default tolerance is divided by
 
 
@@ -31,11 +31,11 @@ def coarsest_own(
 ) -> Found:
     """The own solver with the loosest tolerance that is accurate enough; the tightest tried if none is."""
     events = len(events_of(case, reference).onset)
-    own.own_answer(case, FACTORS[0], bank)  # compiles
+    own.own_run(case, FACTORS[0], bank)  # compiles
     for factor in FACTORS:
-        (answer, stats), cpu, _ = timed(lambda f=factor: own.own_answer(case, f, bank))
-        accuracy = measure(case, answer, reference)
-        found = Found(factor, cpu, stats.steps, accuracy, accuracy.enough(events))
+        made, cpu, _ = timed(lambda f=factor: own.own_run(case, f, bank))
+        accuracy = measure(case, own.answer(case, made), reference)
+        found = Found(factor, cpu, made.stats.steps, accuracy, accuracy.enough(events))
         tell(found)
         if found.good:
             break
@@ -86,7 +86,7 @@ def table(case: Case, limit: float) -> list[dict[str, Any]]:
             spent[name] = found.cpu
 
     best = coarsest_own(case, reference, tell=lambda f: tell("own", f"tolerance/{f.setting:g}", f.steps, f))
-    limit = min(max(limit, ENOUGH * best.cpu), MOST)
+    limit = max(limit, min(ENOUGH * best.cpu, MOST))
     coarsest_leapfrog(case, reference, lambda f: tell("leapfrog, numba", f"{f.setting * 1e6:g} us", f.steps, f))
     for name in (*(f"scipy {m}" for m in peers.SCIPY), *(f"diffrax {m}" for m in peers.DIFFRAX)):
         library, method = name.split()

@@ -201,7 +201,10 @@ def many(sets: int = 10_000, loads: int = 400, hursts: int = 4) -> dict[str, flo
         f"loads in one call: {1e3 * cpu / h.size:.2f} ms of processor time a set ({cpu:.1f} s in all, {wall:.1f} s "
         f"wall, compiling included); memory grew by {grown / 1024:.0f} MiB, the result takes {u.nbytes / 2**20:.0f}"
     )
-    return {"sets": h.size, "processor s": cpu, "wall s": wall, "grown MiB": grown / 1024}
+    return {
+        "sets": h.size, "processor s": round(cpu, 1), "ms a set": round(1e3 * cpu / h.size, 2),
+        "grown MiB": round(grown / 1024), "result MiB": round(u.nbytes / 2**20),
+    }  # fmt: skip
 
 
 def report(small: bool = False) -> dict:

@@ -259,7 +259,9 @@ def test_the_command_says_what_the_object_says(tmp_path, capsys):
     path = write(tmp_path, record(150, 7))
     assert run(["forecast", path, "--at", "0.5", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    found = ss.load_campaign(path).forecast(at=0.5)
+    shares: list[float] = []
+    found = ss.load_campaign(path).forecast(at=0.5, progress=lambda text, share: shares.append(share))
+    assert len(shares) > 10 and shares[0] == 0.0 and max(shares) > 0.9
     assert told["score"] == json.loads(json.dumps(found.score))
     assert {"crps", "crps_mean_recurrence", "coverage_50", "coverage_90", "r2", "mae"} <= set(told["score"])
     assert set(told["methods"]) == {"wandering strength", "mean recurrence", "constant strength", "slip-predictable"}

@@ -64,3 +64,5 @@ def test_campaigns_need_names_of_their_own():
         ss.study(SHIPPED, workers=0)
     with pytest.raises(InputError, match="has no name"):
         ss.study(ss.load_example())
+    with pytest.raises(InputError, match="has no name"):
+        ss.study([ss.load_example()])

@@ -42,7 +42,7 @@ class Rolled:
     def ahead(self, lead: float) -> Rolled:
         """Those made ``lead`` seconds or more before the onset.
 
-        Where a record was smoothed over that long, what came later than it no longer shows in what they use.
+        If the record is smoothed over less than ``lead``, nothing of the slip is in the samples that they use.
         """
         early = np.flatnonzero(self.truth >= lead)
         members = {name: [found[i] for i in early] for name, found in self.members.items()}
