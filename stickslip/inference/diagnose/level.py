@@ -63,7 +63,7 @@ class Level:
         like = f" (or {' or '.join(self.alike)}: these data cannot distinguish them)" if self.alike else ""
         return (
             f"From event to event the strength wanders by {100 * self.size:.2g} % along {self.coordinate}{like}, with "
-            f"a length of {shown(self.length, unit, 2)}; {100 * self.own:.2g} % differ independently between events. "
+            f"a length of {shown(self.length, unit, 2)}; {100 * self.own:.2g} % is independent from event to event. "
             "All effects are tried on top of this."
         )
 
