@@ -306,23 +306,55 @@ def test_interrupting_a_run_leaves_nothing(scenario, capsys, monkeypatch):
     assert os.listdir() == ["rig.toml"]  # noqa: PTH208
 
 
-def test_interrupting_a_series_keeps_what_is_finished(scenario, capsys, monkeypatch):
+def in_series(monkeypatch, interrupted: int) -> list[float]:
+    """Interrupts one of the runs of a series; what is returned are the exponents of all that were begun."""
     from stickslip.objects import sweep
 
-    real, calls = sweep.simulate, []
+    real, begun = sweep.simulate, []
 
-    def second_time(*args, **kwargs):
-        calls.append(1)
-        if len(calls) == 2:
+    def simulate(scenario, *args):
+        begun.append(scenario.file.contact.p)
+        if len(begun) == interrupted:
             raise KeyboardInterrupt
-        return real(*args, **kwargs)
+        return real(scenario, *args)
 
-    monkeypatch.setattr(sweep, "simulate", second_time)
-    assert run(["simulate", scenario, "--out", "out", "--sweep", "contact.p=2:4:3"]) == 130
-    result = json.loads(Path("out/result.json").read_text())
-    assert len(result["runs"]) == 1
-    assert "1 of 3" in result["interrupted"]
-    assert "1 of 3" in capsys.readouterr().out
+    monkeypatch.setattr(sweep, "simulate", simulate)
+    return begun
+
+
+def kept(folder: str) -> dict:
+    """Everything that a run folder says but how long it took."""
+    found = json.loads(Path(folder, "result.json").read_text())
+    return {key: value for key, value in found.items() if key != "seconds"}
+
+
+def test_an_interrupted_series_resumes_from_its_finished_runs(scenario, capsys, monkeypatch):
+    series = ["simulate", scenario, "--sweep", "contact.p=2,3,4"]
+    begun = in_series(monkeypatch, 2)
+    assert run([*series, "--out", "out"]) == 130
+    assert "1 of 3 runs are kept, and the same command resumes from them" in capsys.readouterr().err
+    assert not Path("out").exists()
+    assert run([*series, "--out", "out"]) == 0
+    assert begun == [2, 3, 3, 4]
+    assert run([*series, "--out", "at-once"]) == 0
+    assert kept("out") == kept("at-once")
+    for name in ("arrays.nc", "series.csv"):
+        assert Path("out", name).read_bytes() == Path("at-once", name).read_bytes()
+    assert sorted(p.name for p in Path("out").iterdir()) == sorted(p.name for p in Path("at-once").iterdir())
+
+
+@pytest.mark.slow
+def test_a_series_does_not_resume_from_another_or_from_damaged_runs(scenario, monkeypatch):
+    begun = in_series(monkeypatch, 3)
+    assert run(["simulate", scenario, "--sweep", "contact.p=2,3,4", "--out", "out"]) == 130
+    first, _ = sorted(Path("out.partial/pieces").glob("*.nc"))
+    first.write_bytes(first.read_bytes()[:1000])
+    assert run(["simulate", scenario, "--sweep", "contact.p=2,3,4", "--out", "out"]) == 0
+    assert begun == [2, 3, 4, 2, 4]
+    begun = in_series(monkeypatch, 2)
+    assert run(["simulate", scenario, "--sweep", "contact.p=2,3,4", "--out", "other"]) == 130
+    assert run(["simulate", scenario, "contact.bins=80", "--sweep", "contact.p=2,3,4", "--out", "other"]) == 0
+    assert begun == [2, 3, 2, 3, 4]
 
 
 def test_an_interrupt_that_falls_into_a_destructor_is_not_lost():

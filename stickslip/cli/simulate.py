@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from contextlib import nullcontext
@@ -42,7 +43,8 @@ def simulate(
     out:
         Folder for result.json, arrays.nc, the pictures and the synthetic measurement.
     sweep:
-        Run a series: --sweep drive.velocity=20um/s:1mm/s:8 (start, stop, number), or values with commas.
+        Run a series: --sweep drive.velocity=20um/s:1mm/s:8 (start, stop, number), or values with commas. With --out an
+        interrupted series resumes from its finished runs.
     json:
         Print the result as JSON instead of a table.
     jobs:
@@ -59,7 +61,7 @@ def simulate(
     series = loaded.file.sweep
     if series is None and jobs != 1:
         raise ArgumentError("only the runs of a series are shared", key="jobs", value=jobs, hint="add --sweep")
-    with open_run(out, force=force) if out is not None else nullcontext() as run:
+    with open_run(out, force=force, resume=series is not None) if out is not None else nullcontext() as run:
         work = _single(loaded, run) if series is None else _series(loaded, series, run, jobs)
         work["warnings"] = [*outside(loaded), *work["warnings"]]
         result = {**head(loaded), **work, "seconds": round(time.perf_counter() - began, 3)}
@@ -68,7 +70,7 @@ def simulate(
     for text in result["warnings"]:
         show.warn(text)
     print(json_text(result) if json else _report(result, out))
-    return 130 if result.get("interrupted") else 0
+    return 0
 
 
 def _load(
@@ -127,25 +129,26 @@ def _single(scenario: Scenario, run: Run | None) -> dict[str, Any]:
 
 
 def _series(scenario: Scenario, sweep: SweepTable, run: Run | None, jobs: int) -> dict[str, Any]:
-    from ..objects.sweep import one_by_one
+    from ..objects.series import runs_of_series
     from ..show.simulated import series_numbers, write_series
     from ..simulation.scenario.series import scenarios_of, summary
 
     members = scenarios_of(scenario, sweep)
-    done: list[xarray.Dataset] = []
-    try:
-        for made, (value, _) in zip(one_by_one([member for _, member in members], jobs), members, strict=True):
-            done.append(made)
-            if sys.stderr.isatty():
-                verdict = done[-1].attrs["verdict"]
-                print(f"{len(done)} of {len(members)}: {sweep.key} = {value:.4g}: {verdict}", file=sys.stderr)
-    except KeyboardInterrupt:
-        if run is None or not done:
-            raise
-    table = summary(scenario, sweep.key, [value for value, _ in members], done)
+    values = [value for value, _ in members]
+
+    def tell(number: int, data: xarray.Dataset) -> None:
+        if sys.stderr.isatty():
+            said = f"{number + 1} of {len(members)}: {sweep.key} = {values[number]:.4g}: {data.attrs['verdict']}"
+            print(said, file=sys.stderr)
+
+    done = runs_of_series(scenario, sweep.key, members, run, jobs, tell)
+    table = summary(scenario, sweep.key, values, done)
     if run is not None:
         write_series(run, members, table, done)
-    return series_numbers(sweep, members, table, done)
+    result = series_numbers(sweep, members, table, done)
+    if run is not None:
+        shutil.rmtree(run.folder / "pieces")
+    return result
 
 
 def _report(result: dict[str, Any], out: Path | None) -> str:
@@ -160,8 +163,6 @@ def _report(result: dict[str, Any], out: Path | None) -> str:
         lines += ["", _event_table(result)]
     if result["kind"] == "simulate":
         lines += ["", _facts(result["facts"])]
-    if result.get("interrupted"):
-        lines.append(f"interrupted: {result['interrupted']}")
     lines.append(f"{result['seconds']:.1f} s")
     if out is not None:
         written = sorted((p.name for p in out.iterdir()), key=lambda name: (not name.endswith(".png"), name))

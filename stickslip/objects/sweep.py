@@ -86,7 +86,7 @@ def sweep(
         reporting("sweeping", progress) as tell,
         open_run(out, force=force, resume=True) if out else nullcontext() as run,
     ):
-        pieces = None if run is None else Pieces(run, json_text(_given(loaded, members, rows)))
+        pieces = None if run is None else Pieces(run, json_text(what_runs_depend_on(loaded, members, rows)))
         found = {key: kept for key in chunks if pieces is not None and (kept := pieces.load(key)) is not None}
         try:
             for key, made in _made({k: c for k, c in chunks.items() if k not in found}, scheduler, workers):
@@ -122,8 +122,8 @@ def _rows(changes: Mapping[str, Sequence[Any]]) -> list[Changes]:
     return [tuple(zip(columns, row, strict=True)) for row in zip(*plain, strict=True)]
 
 
-def _given(loaded: Scenario, members: Sequence[Scenario], rows: Sequence[Changes]) -> dict[str, Any]:
-    """What finished runs depend on: the scenario with its changes, the files that it names, versions and code."""
+def what_runs_depend_on(loaded: Scenario, members: Sequence[Scenario], rows: Sequence[Changes]) -> dict[str, Any]:
+    """The scenario with its changes, the files that it names, versions and code."""
     naming = {(m.file.drive.file, getattr(m.file.contact, "file", None)): m for m in members}
     inputs = [input_records(m) for m in naming.values()]
     code = code_digest([str(module.__file__) for module in catalogue.user_modules()])
@@ -157,7 +157,7 @@ def one_by_one(members: Sequence[Scenario], workers: int) -> Iterator[xarray.Dat
     if workers < 1:
         raise ArgumentError("out of range", key="jobs", value=workers, allowed="1 or more")
     workers = min(workers, len(members))
-    if workers == 1:
+    if workers <= 1:
         yield from map(simulate, members)
         return
     with cluster(None, workers) as client, client.as_current():

@@ -74,20 +74,17 @@ def write_single(run: Run, scenario: Scenario, recorded: Recorded) -> None:
 def series_numbers(
     sweep: SweepTable, members: Sequence[tuple[float, Scenario]], table: xarray.Dataset, done: Sequence[Recorded]
 ) -> dict[str, Any]:
-    """What `result.json` says of a series of which the first so many ``members`` are done."""
-    warnings = {text: None for data in done for text in str(data.attrs["warnings"]).split("\n") if text}
-    result: dict[str, Any] = {
+    """What `result.json` says of a series."""
+    runs = [{"value": value, **numbers(data)} for (value, _), data in zip(members, done, strict=True)]
+    return {
         "kind": "series",
         "key": sweep.key,
-        "runs": [{"value": value, **numbers(data)} for (value, _), data in zip(members, done, strict=False)],
+        "runs": runs,
         "table": {str(name): table[name].values.tolist() for name in table},
         "units": {str(name): table[name].attrs["units"] for name in table},
-        "verdict": f"{sum(1 for d in done if d.sizes['event'])} of {len(done)} runs show slip events",
-        "warnings": list(warnings),
+        "verdict": f"{sum(1 for told in runs if told['events'])} of {len(runs)} runs show slip events",
+        "warnings": list(dict.fromkeys(text for told in runs for text in told["warnings"])),
     }
-    if len(done) < len(members):
-        result["interrupted"] = f"{len(done)} of {len(members)} runs were finished and are kept"
-    return result
 
 
 def write_series(
@@ -101,11 +98,11 @@ def write_series(
     save(series_figure(table), run.path("series.png"))
     unit = table["value"].attrs["units"]
     labels = [shown(float(value), unit, 3) if np.isfinite(value) else "-" for value in table["value"].values]
-    save(static_against_inertial(list(done), labels), run.path("static_vs_inertial.png"))
+    save(static_against_inertial(done, labels), run.path("static_vs_inertial.png"))
     if members[0][1].file.output.trace:
         from ..simulation.scenario.writers import write_campaign
 
-        write_campaign(run.folder, [member for _, member in members[: len(done)]], done)
+        write_campaign(run.folder, [member for _, member in members], done)
 
 
 def _csv(table: Mapping[Any, Any]) -> str:
