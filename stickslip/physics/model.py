@@ -227,8 +227,8 @@ class Model(Parametrised):
         zero = jnp.zeros(())
         bank = self.shaped()
         return State(
-            x=jnp.asarray(x, float) + zero,
-            v=jnp.asarray(v, float) + zero,
+            x=jnp.asarray(x, float),
+            v=jnp.asarray(v, float),
             force=jnp.zeros_like(self.bank.stiffness),
             cap=bank.strength,
             stiffness=bank.stiffness,

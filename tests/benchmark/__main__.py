@@ -18,7 +18,8 @@ from .measuring import head, keep, last_table, row, timed
 
 ROOT = Path(__file__).resolve().parents[2]
 SIZES = ("springs", "drive", "holds", "events")
-PARTS = ("static", "solvers", "sizes", *SIZES, "jacobian", "batches", "many", "writing", "command-line", "workbench")
+_LAST = ("jacobian", "batches", "many", "writing", "command-line", "workbench")
+PARTS = ("static", "solvers", "step", "sizes", *SIZES, *_LAST)
 FACTOR = 3.0  # of tolerance, accurate enough at 256 springs (table of solvers)
 
 
@@ -91,6 +92,10 @@ def main() -> None:
         from . import solvers
 
         solvers.report(arguments.limit, small, arguments.springs or solvers.SPRINGS)
+    if only in (None, "step"):
+        from . import step
+
+        step.report(small)
     sizes_wanted = [part for part in SIZES if only in (None, "sizes", part)]
     if sizes_wanted:
         from . import sizes

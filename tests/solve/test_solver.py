@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 
 import diffrax
 import jax
@@ -17,7 +18,8 @@ from stickslip.physics.effects.catalogue import make
 from stickslip.physics.effects.inertia import AddedMass
 from stickslip.physics.model import LoadPoint
 from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
-from stickslip.simulation.solve.integrate import step_control
+from stickslip.simulation.solve.integrate import observe, step_control
+from stickslip.simulation.solve.trajectory import Steps
 from stickslip.system.traced import Program
 
 from .rig import bank, rig
@@ -56,7 +58,7 @@ def test_goes_on_from_a_state(first_event):
 
 
 def test_a_trace_is_read_off_between_the_steps():
-    """`SaveAt(ts=...)` of diffrax, `Trajectory.at`, and the integral of the velocity.
+    """`SaveAt(ts=...)` of diffrax, `Trajectory.at` on its steps and on those of `integrate`, the velocity as slope.
 
     Both go on from one state shortly before the slip: over seconds of creep rounding drives the two apart.
     """
@@ -64,16 +66,25 @@ def test_a_trace_is_read_off_between_the_steps():
     _, state = integrate(model, 5.14)
     event, _ = integrate(model, 5.26, t0=5.14, state=state)
     ts = np.linspace(5.15, 5.25, 1237)
+    subs = [
+        diffrax.SubSaveAt(ts=ts, fn=lambda t, y, args: (y.x, y.v, y.psi)),
+        diffrax.SubSaveAt(t0=True, steps=True, fn=observe),
+    ]
     solution = jax.jit(
         lambda model: diffrax.diffeqsolve(
             diffrax.ODETerm(lambda t, y, args: y), ContactStepper(Tolerance()), 5.14, 5.26, 1e-5, state,
-            args=(model, model.shaped()), saveat=diffrax.SaveAt(ts=ts, fn=lambda t, y, args: (y.x, y.v, y.psi)),
-            stepsize_controller=step_control(0.02), adjoint=diffrax.ForwardMode(), max_steps=4096,
-        ).ys
+            args=(model, model.shaped()), saveat=diffrax.SaveAt(subs=subs), stepsize_controller=step_control(0.02),
+            adjoint=diffrax.ForwardMode(), max_steps=4096,
+        )
     )(model)  # fmt: skip
+    stock, steps = solution.ys
+    count = int(solution.stats["num_accepted_steps"])
+    same = replace(event, steps=Steps(*(np.asarray(a)[: count + 1] for a in steps)))
+    for name, found in zip(("x", "v", "psi"), map(np.asarray, stock), strict=True):
+        size = np.max(np.abs(found))
+        assert getattr(same.at(ts), name) == pytest.approx(found, rel=1e-12, abs=1e-14 * size)
+        assert getattr(event.at(ts), name) == pytest.approx(found, rel=1e-9, abs=1e-9 * size)
     at = event.at(ts)
-    for own, stock in zip((at.x, at.v, at.psi), solution, strict=True):
-        assert own == pytest.approx(np.asarray(stock), rel=1e-9, abs=1e-13)
     assert not np.any(np.isin(ts, event.steps.t))
     fine = np.linspace(5.15, 5.25, 40_001)
     slope = np.gradient(event.at(fine).x, fine)

@@ -60,7 +60,8 @@ class Motion(NamedTuple):
         """Solve ``y' = gain - (rest_rate + slip_rate |v|) y`` over the increment from ``y = value``.
 
         The speed goes linearly to its end value with the path's mean, which is second order whether the relaxation is
-        slow or fast against the increment (a constant mean speed is first order where it is fast).
+        slow or fast against the increment (a constant mean speed is first order where it is fast). Logarithms and
+        exponentials of that correction are approximated: they would be half of what a step costs.
 
         Args:
             value: ``y`` at the start; scalar or one per element.
@@ -69,10 +70,25 @@ class Motion(NamedTuple):
         """
         total = rest_rate * self.dt + slip_rate * self.path
         end = rest_rate + slip_rate * abs(self.v) + 1e-12
-        bend = 2.0 * (end * self.dt - total) / self.dt**2
-        done = -jnp.expm1(-end * self.dt)
-        mean = sum(w * jnp.exp(jnp.minimum(0.5 * bend * (jnp.log1p(-s * done) / end) ** 2, 50.0)) for s, w in _GAUSS)
+        whole = end * self.dt
+        done = -jnp.expm1(-whole)
+        bend = (whole - total) / whole**2
+        mean = sum(w * _near_exp(bend * _near_log(s * done) ** 2) for s, w in _GAUSS)
         return value * jnp.exp(-total) + gain * mean * done / end
+
+
+def _near_log(z: Array) -> Array:
+    """``-log(1 - z)`` for z in (0, 0.89): its Padé approximant in z/(2 - z), off by 0.5 % at the upper end."""
+    d = 2.0 - z
+    n2, d2 = z * z, d * d
+    return 2.0 * z * d * (105.0 * d2 - 55.0 * n2) / (105.0 * d2 * d2 - 90.0 * n2 * d2 + 9.0 * n2 * n2)
+
+
+def _near_exp(x: Array) -> Array:
+    """``exp(x)`` for x < 1.1, by a series for the eighth root of its inverse: off by 1e-13 at 0.1, by 1e-5 at 1."""
+    y = jnp.maximum(x, -500.0) / 8.0
+    root = 1.0 - y * (1.0 - y * (1.0 / 2.0 - y * (1.0 / 6.0 - y / 24.0)))
+    return 1.0 / (root * root) ** 4
 
 
 class Contact(NamedTuple):

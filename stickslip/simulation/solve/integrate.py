@@ -27,6 +27,7 @@ SMALLEST_STEP = 1e-10  # s; four orders below the period of any contact resonanc
 LEAST_ADVANCE = 4e-2  # of the contact's period in PIECE steps; the tightest tolerance takes a hundred times as much
 
 _TERM = Increments()
+_ARRAY = "an array"  # in the place of an argument's leaf that is traced
 _BLANK: Any = 0
 _CARRIED: Any = jax.tree.structure((Step(_BLANK, _BLANK), (_BLANK, _BLANK, _BLANK)))  # by solver and controller
 
@@ -114,24 +115,25 @@ def _piece(model: Model, bank: Bank, tolerance: Tolerance, times: Any, y: State,
 
 
 @lru_cache(maxsize=64)
-def _program(arrays: Any, rest: Any, values: tuple, effects: Any) -> Program:
-    """`_piece` of arguments of one structure: of their arrays and, with its ``values``, of the rest.
+def _program(structure: Any, fixed: tuple, effects: Any) -> Program:
+    """`_piece` of arguments of one structure: of their arrays and, with its values, of what is ``fixed``.
 
     Its trace is kept where all effects are this package's own.
     """
 
-    def piece(*leaves: Any) -> tuple:
-        return _piece(*eqx.combine(jax.tree.unflatten(arrays, leaves), jax.tree.unflatten(rest, values)))
+    def piece(*arrays: Any) -> tuple:
+        given = iter(arrays)
+        return _piece(*jax.tree.unflatten(structure, [next(given) if f is _ARRAY else f for f in fixed]))
 
-    return Program(piece, f"piece {arrays} {rest} {values}" if of_this_package(effects) else None)
+    return Program(piece, f"piece {structure} {fixed}" if of_this_package(effects) else None)
 
 
 def _run_piece(*args: Any) -> tuple:
     """`_piece`, compiled; as by ``equinox.filter_jit`` what is no array is not traced."""
-    arrays, rest = eqx.partition(args, eqx.is_array)
-    leaves, structure = jax.tree.flatten(arrays)
-    values, others = jax.tree.flatten(rest)
-    found: tuple = _program(structure, others, tuple(values), jax.tree.structure(args[0].effects))(*leaves)
+    leaves, structure = jax.tree.flatten(args)
+    fixed = tuple(_ARRAY if eqx.is_array(leaf) else leaf for leaf in leaves)
+    arrays = (leaf for leaf, f in zip(leaves, fixed, strict=True) if f is _ARRAY)
+    found: tuple = _program(structure, fixed, jax.tree.structure(args[0].effects))(*arrays)
     return found
 
 
