@@ -273,26 +273,27 @@ class Model(Parametrised):
                 body = body + e.force(m, motion, contact)
         slides = jnp.abs(state.force) >= (1.0 - 1e-9) * state.cap
         mean_cap = jnp.where(slides, 0.5 * (state.cap + cap), cap)
-        force = _stuck_within(state.force, stiffness, state.cap, cap, motion)
+        compliance = _compliance(stiffness)
+        force = _stuck_within(state.force, stiffness, compliance, state.cap, cap, motion)
         slid = jnp.abs(state.force - force)
         trial = force + stiffness * motion.dx
         flow = jnp.zeros(())
         for e, m in zip(self.effects, memory, strict=True):
             if isinstance(e, Flow):
                 flowed = e.flow(m, motion, trial, contact)
-                flow = flow + jnp.sum((_held(trial, cap) - _held(flowed, cap)) * _compliance(stiffness))
+                flow = flow + jnp.sum((_held(trial, cap) - _held(flowed, cap)) * compliance)
                 trial = flowed
         force = _held_back(trial, cap)
         slid = slid + jnp.abs(trial - force)
         given = jnp.zeros(())
         if any(isinstance(e, Stiffness) for e in self.effects):
-            given = 0.5 * jnp.sum(state.force**2 * (_compliance(stiffness) - _compliance(state.stiffness)))
+            given = 0.5 * jnp.sum(state.force**2 * (compliance - _compliance(state.stiffness)))
         forces = Forces(
             spring=jnp.asarray(motion.pull),
             contact=jnp.sum(force),
             viscous=self.block.damping * motion.v,
             body=body,
-            dissipated=flow + jnp.sum(slid * _compliance(stiffness) * mean_cap),
+            dissipated=flow + jnp.sum(slid * compliance * mean_cap),
             given=given,
         )
         return State(motion.x, motion.v, force, cap, stiffness, psi, memory, state.work), forces
@@ -333,7 +334,7 @@ def _held_back(trial: Array, cap: Array) -> Array:
     return jnp.where(jnp.abs(trial) <= cap, trial, jnp.where(trial < 0.0, -cap, cap))
 
 
-def _stuck_within(force: Array, stiffness: Array, cap: Array, after: Array, motion: Motion) -> Array:
+def _stuck_within(force: Array, stiffness: Array, compliance: Array, cap: Array, after: Array, motion: Motion) -> Array:
     """Forces (N) from which elements go elastically to the end of the increment, its end apart.
 
     A block that slows down lets go of what slides: an element sticks where its cap, on a line from ``cap`` to
@@ -342,10 +343,11 @@ def _stuck_within(force: Array, stiffness: Array, cap: Array, after: Array, moti
     if motion.bend is None:
         return force
     sign = jnp.where(motion.bend < 0.0, -1.0, 1.0)
-    whole = 2.0 * jnp.abs(motion.bend) * stiffness
+    whole = 2.0 * jnp.abs(motion.bend)
     outgrown = sign * (motion.dx + motion.bend) * stiffness - (after - cap)
-    sticks = (outgrown > 0.0) & (outgrown < whole)
-    least = cap - 0.5 * outgrown**2 / jnp.where(sticks, whole, 1.0)
+    sticks = (outgrown > 0.0) & (outgrown < whole * stiffness)
+    # a division for all elements: one for each is half of what they cost
+    least = cap - (0.5 / jnp.where(whole > 0.0, whole, 1.0)) * outgrown**2 * compliance
     return jnp.where(sticks & (sign * force > least), sign * least, force)
 
 
