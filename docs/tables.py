@@ -17,6 +17,7 @@ RESULTS = Path(__file__).resolve().parent / "results"
 MISSING = "*Not measured yet.*"
 PARTS = {
     "one": "one effect, at ten times its detection limit",
+    "fresh": "the same, another seed, the first in random order",
     "strong": "one effect, at the largest plausible amplitude",
     "two": "two effects",
     "left-out": "one effect, which is left out of the catalogue",
