@@ -332,7 +332,7 @@ def test_an_interrupted_series_resumes_from_its_finished_runs(scenario, capsys, 
     series = ["simulate", scenario, "--sweep", "contact.p=2,3,4"]
     begun = in_series(monkeypatch, 2)
     assert run([*series, "--out", "out"]) == 130
-    assert "1 of 3 runs are kept, and the same command resumes from them" in capsys.readouterr().err
+    assert "1 finished runs are kept, and the same command resumes from them" in capsys.readouterr().err
     assert not Path("out").exists()
     assert run([*series, "--out", "out"]) == 0
     assert begun == [2, 3, 3, 4]
@@ -347,14 +347,58 @@ def test_an_interrupted_series_resumes_from_its_finished_runs(scenario, capsys, 
 def test_a_series_does_not_resume_from_another_or_from_damaged_runs(scenario, monkeypatch):
     begun = in_series(monkeypatch, 3)
     assert run(["simulate", scenario, "--sweep", "contact.p=2,3,4", "--out", "out"]) == 130
-    first, _ = sorted(Path("out.partial/pieces").glob("*.nc"))
-    first.write_bytes(first.read_bytes()[:1000])
+    first, _ = sorted(Path("out.partial/pieces").iterdir(), key=lambda path: path.stat().st_mtime_ns)
+    damaged = bytearray(first.read_bytes())
+    middle = len(damaged) // 2
+    damaged[middle : middle + 4096] = bytes(4096)  # a page that a failing disk did not write
+    first.write_bytes(damaged)
     assert run(["simulate", scenario, "--sweep", "contact.p=2,3,4", "--out", "out"]) == 0
     assert begun == [2, 3, 4, 2, 4]
     begun = in_series(monkeypatch, 2)
     assert run(["simulate", scenario, "--sweep", "contact.p=2,3,4", "--out", "other"]) == 130
     assert run(["simulate", scenario, "contact.bins=80", "--sweep", "contact.p=2,3,4", "--out", "other"]) == 0
     assert begun == [2, 3, 2, 3, 4]
+
+
+@pytest.mark.slow
+def test_a_series_takes_up_finished_runs_of_its_values_and_nothing_else_that_lies_there(scenario, monkeypatch):
+    begun = in_series(monkeypatch, 3)
+    assert run(["simulate", scenario, "--sweep", "contact.p=2,3,4", "--out", "out"]) == 130
+    for name in ("trace-05.csv", "models.npz"):  # of a command that was killed while it wrote
+        Path("out.partial", name).write_text("old")
+    assert run(["simulate", scenario, "--sweep", "contact.p=3,2.5", "--out", "out", "--jobs", "2"]) == 0
+    assert begun[:3] == [2, 3, 4] and 3 not in begun[3:]
+    assert [r["value"] for r in json.loads(Path("out/result.json").read_text())["runs"]] == [3, 2.5]
+    assert sorted(os.listdir("out")) == [  # noqa: PTH208
+        "arrays.nc", "result.json", "series.csv", "series.png", "static_vs_inertial.png"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("fails", ["a run", "a picture"])
+def test_a_series_that_cannot_go_on_says_what_is_kept(scenario, capsys, monkeypatch, fails):
+    from stickslip.errors import SolveError
+    from stickslip.objects import sweep
+    from stickslip.show import simulated
+
+    real, done = sweep.simulate, []
+
+    def simulate(*args):
+        if fails == "a run" and done:
+            raise SolveError("the integration stopped at t = 1 s: loosen the tolerance")
+        done.append(1)
+        return real(*args)
+
+    def drawn(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sweep, "simulate", simulate)
+    if fails == "a picture":
+        monkeypatch.setattr(simulated, "write_series", drawn)
+    code = run(["simulate", scenario, "--out", "out", "--sweep", "contact.p=2,3"])
+    said = capsys.readouterr().err
+    assert code == (1 if fails == "a run" else 130)
+    assert f"{len(done)} finished runs are kept, and the same command resumes from them" in said
+    assert ("loosen the tolerance" in said) == (fails == "a run")
 
 
 def test_an_interrupt_that_falls_into_a_destructor_is_not_lost():

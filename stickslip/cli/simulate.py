@@ -5,20 +5,21 @@ from __future__ import annotations
 import shutil
 import sys
 import time
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ArgumentError, InputError
+from ..errors import ArgumentError, InputError, StickslipError
 from ..system.runstore import Run, json_text, open_run, refuse_existing
 from . import show
 from .parameters import Changes, Flag, Force, MoreChanges, OwnEffects
 
 if TYPE_CHECKING:
-    import xarray
-
     from ..simulation.scenario import Scenario
     from ..simulation.scenario.schema import SweepTable
+
+PIECES = "pieces"  # folder of a series' finished runs
 
 
 def simulate(
@@ -61,12 +62,16 @@ def simulate(
     series = loaded.file.sweep
     if series is None and jobs != 1:
         raise ArgumentError("only the runs of a series are shared", key="jobs", value=jobs, hint="add --sweep")
-    with open_run(out, force=force, resume=series is not None) if out is not None else nullcontext() as run:
+    with (
+        open_run(out, force=force, resume=series is not None) if out is not None else nullcontext() as run,
+        _resumable(run) if series is not None else nullcontext(),
+    ):
         work = _single(loaded, run) if series is None else _series(loaded, series, run, jobs)
         work["warnings"] = [*outside(loaded), *work["warnings"]]
         result = {**head(loaded), **work, "seconds": round(time.perf_counter() - began, 3)}
         if run is not None:
             run.json(result)
+            shutil.rmtree(run.folder / PIECES, ignore_errors=True)
     for text in result["warnings"]:
         show.warn(text)
     print(json_text(result) if json else _report(result, out))
@@ -134,21 +139,33 @@ def _series(scenario: Scenario, sweep: SweepTable, run: Run | None, jobs: int) -
     from ..simulation.scenario.series import scenarios_of, summary
 
     members = scenarios_of(scenario, sweep)
-    values = [value for value, _ in members]
-
-    def tell(number: int, data: xarray.Dataset) -> None:
-        if sys.stderr.isatty():
-            said = f"{number + 1} of {len(members)}: {sweep.key} = {values[number]:.4g}: {data.attrs['verdict']}"
-            print(said, file=sys.stderr)
-
-    done = runs_of_series(scenario, sweep.key, members, run, jobs, tell)
-    table = summary(scenario, sweep.key, values, done)
+    if run is not None:
+        run.clear(PIECES)
+    done = runs_of_series(scenario, sweep.key, members, run, jobs, _tell)
+    table = summary(scenario, sweep.key, [value for value, _ in members], done)
     if run is not None:
         write_series(run, members, table, done)
-    result = series_numbers(sweep, members, table, done)
-    if run is not None:
-        shutil.rmtree(run.folder / "pieces")
-    return result
+    return series_numbers(sweep, members, table, done)
+
+
+def _tell(text: str) -> None:
+    if sys.stderr.isatty():
+        print(text, file=sys.stderr)
+
+
+@contextmanager
+def _resumable(run: Run | None) -> Iterator[None]:
+    """Say of a series that is not finished how many of its runs its folder keeps."""
+    try:
+        yield
+    except (KeyboardInterrupt, StickslipError) as error:
+        kept = 0 if run is None else sum(1 for _ in run.folder.glob(f"{PIECES}/*.npz"))
+        text = f"{kept} finished runs are kept, and the same command resumes from them"
+        if isinstance(error, KeyboardInterrupt):
+            raise KeyboardInterrupt(text if kept else "") from None
+        if kept:
+            show.warn(text)
+        raise
 
 
 def _report(result: dict[str, Any], out: Path | None) -> str:

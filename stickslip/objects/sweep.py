@@ -123,7 +123,7 @@ def _rows(changes: Mapping[str, Sequence[Any]]) -> list[Changes]:
 
 
 def what_runs_depend_on(loaded: Scenario, members: Sequence[Scenario], rows: Sequence[Changes]) -> dict[str, Any]:
-    """The scenario with its changes, the files that it names, versions and code."""
+    """The scenario, the ``rows`` of changes to it, the files that its ``members`` name, versions and code."""
     naming = {(m.file.drive.file, getattr(m.file.contact, "file", None)): m for m in members}
     inputs = [input_records(m) for m in naming.values()]
     code = code_digest([str(module.__file__) for module in catalogue.user_modules()])
@@ -148,8 +148,8 @@ def _made(
             yield waiting[done], _result(done)
 
 
-def one_by_one(members: Sequence[Scenario], workers: int) -> Iterator[xarray.Dataset]:
-    """The whole data set of every run in their order, by processes of this machine (1: in this one).
+def one_by_one(members: Sequence[Scenario], workers: int) -> Iterator[tuple[int, xarray.Dataset]]:
+    """Number and whole data set of every run as it is finished, by processes of this machine (1: in this one).
 
     Raises:
         ArgumentError: no number of processes.
@@ -158,13 +158,15 @@ def one_by_one(members: Sequence[Scenario], workers: int) -> Iterator[xarray.Dat
         raise ArgumentError("out of range", key="jobs", value=workers, allowed="1 or more")
     workers = min(workers, len(members))
     if workers <= 1:
-        yield from map(simulate, members)
+        yield from enumerate(map(simulate, members))
         return
     with cluster(None, workers) as client, client.as_current():
+        from distributed import as_completed
+
         submit = _submitting(client, os.getpid())
-        waiting = [submit(simulate, member) for member in members]
-        while waiting:
-            yield _result(waiting.pop(0))
+        waiting = {submit(simulate, member): number for number, member in enumerate(members)}
+        for done in as_completed(waiting):
+            yield waiting.pop(done), _result(done)
 
 
 def _submitting(client: Client, parent: int | None) -> Callable[..., Future]:

@@ -52,6 +52,14 @@ class Run:
     def __init__(self, folder: Path, target: Path, resumed: bool) -> None:
         self.folder, self.target, self.resumed = folder, target, resumed
 
+    def clear(self, kept: str) -> None:
+        """Remove all that an interrupted run left behind but the folder ``kept``."""
+        for path in self.folder.iterdir():
+            if path.is_dir() and path.name != kept:
+                shutil.rmtree(path)
+            elif path.is_file():
+                path.unlink()
+
     def path(self, name: str) -> Path:
         """Where a file of this name is written; its folder is made."""
         path = self.folder / name

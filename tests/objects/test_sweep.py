@@ -94,8 +94,10 @@ def test_processes_have_the_same_numbers(scenario):
     told: list[float] = []
     same(ss.sweep(scenario, TABLE, workers=2, progress=lambda _, share: told.append(share)), scenario)
     assert told[-1] == 1.0 and len(told) >= len(VELOCITIES)
-    alone = next(iter(module.one_by_one([scenario], 1)))
-    for run in module.one_by_one([scenario, scenario], 2):
+    ((_, alone),) = module.one_by_one([scenario], 1)
+    found = dict(module.one_by_one([scenario, scenario], 2))
+    assert sorted(found) == [0, 1]
+    for run in found.values():
         assert run.time.size == alone.time.size and (run.displacement.values == alone.displacement.values).all()
 
 

@@ -61,7 +61,7 @@ class Motion(NamedTuple):
 
         The speed goes linearly to its end value with the path's mean, which is second order whether the relaxation is
         slow or fast against the increment (a constant mean speed is first order where it is fast). Logarithms and
-        exponentials of that correction are approximated: they would be half of what a step costs.
+        exponentials of that correction are approximated: exact ones are an eighth of what a step costs.
 
         Args:
             value: ``y`` at the start; scalar or one per element.
@@ -85,7 +85,10 @@ def _near_log(z: Array) -> Array:
 
 
 def _near_exp(x: Array) -> Array:
-    """``exp(x)`` for x < 1.1, by a series for the eighth root of its inverse: off by 1e-13 at 0.1, by 1e-5 at 1."""
+    """``exp(x)`` for x < 1.2, by a series for the eighth root of its inverse.
+
+    Off by 2e-11 at 0.1, 2e-6 at 1, 5e-5 at -2 and 3 % at -8 of its value.
+    """
     y = jnp.maximum(x, -500.0) / 8.0
     root = 1.0 - y * (1.0 - y * (1.0 / 2.0 - y * (1.0 / 6.0 - y / 24.0)))
     return 1.0 / (root * root) ** 4
