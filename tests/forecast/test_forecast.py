@@ -17,13 +17,24 @@ from stickslip.cli import run
 from stickslip.data.trace import Trace
 from stickslip.errors import InputError
 from stickslip.inference.forecast.known_record import Past
-from stickslip.inference.forecast.predict import MEMBERS, METHODS, Forecaster, times, waiting
+from stickslip.inference.forecast.predict import (
+    MEMBERS,
+    METHODS,
+    Forecaster,
+    coordinates,
+    predictor,
+    spread,
+    take,
+    times,
+    waiting,
+)
 from stickslip.inference.forecast.rolling import choose, moments, prepare, roll
 from stickslip.inference.forecast.scoring import crps, quantiles, score, standard_error
+from stickslip.inference.forecast.wander import ONSET, Wander, fit
 from stickslip.objects.forecast import QUANTILES, ForecastPlots
 from stickslip.system.runstore import read_result
 
-from .synthetic import LAW, SPEED, STIFFNESS, record
+from .synthetic import LAW, SPEED, STIFFNESS, record, series
 
 
 def test_the_score_is_the_integral_of_the_squared_difference():
@@ -88,6 +99,26 @@ def test_waiting_goes_on_beyond_the_longest_recurrence():
     seen = np.array([1.0, 2.0, 4.0])
     np.testing.assert_allclose(waiting(seen, 1.5), [0.5, 2.5])
     assert (waiting(seen, 5.0) > 0).all()
+
+
+@pytest.mark.parametrize("tails", ["long", "normal"])
+def test_the_spread_about_a_prediction_has_the_tails_of_the_errors(tails):
+    """Of levels whose scatter is now small, now large, the normal law's 50 % interval holds far more than half."""
+    scatter, rng = 3.0 * LAW.scatter[0], np.random.default_rng(2)
+    arrays = series(1600, Wander(LAW.components, (1e-9, LAW.scatter[1])), 1)
+    arrays["onset"] += scatter * (rng.standard_t(3, 1600) / np.sqrt(3.0) if tails == "long" else rng.normal(size=1600))
+    law = fit(arrays, LAW.components, 800)
+    found = spread(arrays, law, 800)
+    own, errors = predictor(law), []
+    for i in range(1600):
+        if i >= 800:
+            mean, std = own.predict(coordinates(arrays, i, "onset"), ONSET)
+            errors.append(float((arrays["onset"][i] - mean) / std))
+        take(own, arrays, i)
+    held = {name: [np.mean(np.abs(errors) < d.ppf(0.5 + 0.5 * share)) for share in (0.5, 0.9)]
+            for name, d in (("found", found), ("normal", norm()))}  # fmt: skip
+    assert held["found"] == pytest.approx([0.5, 0.9], abs=0.04)
+    assert (held["normal"][0] > 0.56) == (tails == "long")
 
 
 @pytest.fixture(scope="module")

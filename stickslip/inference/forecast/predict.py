@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from ...errors import InputError
 from .known_record import Past
@@ -14,6 +16,8 @@ from .loading import Curves
 from .wander import ARREST, FEWEST, KEYS, ONSET, Component, Coordinate, Filter, Nearby, Wander, fit
 
 Array = NDArray[np.float64]
+Shape = Callable[[Array], Array]  # log density of an error in its standard deviations
+FIRST = 6  # slip from which predictions are judged: the means are known by then
 MEMBERS = 100  # equally likely times that stand for a distribution of them
 METHODS = ("wandering strength", "mean recurrence", "constant strength", "slip-predictable")
 
@@ -82,6 +86,33 @@ def compare(arrays: Mapping[str, Array], training: int) -> list[Compared]:
     return sorted(out, key=lambda c: c.law.aic)
 
 
+def spread(arrays: Mapping[str, Array], law: Wander, training: int) -> Any:
+    """How the level at an onset spreads about its prediction, in its standard deviations.
+
+    Student's t about zero, its degrees of freedom and scale fitted to the slips for training, each predicted from those
+    before it; the normal law where Akaike's criterion does not pay for these two parameters. A law has one scatter for
+    all levels; where some scatter more than others, as arrests after long slips do, their mixture has long tails.
+
+    Args:
+        arrays: levels of all slips.
+        law: fitted to the ``training`` first ones.
+
+    Returns:
+        A distribution of scipy.
+    """
+    own, errors = predictor(law), []
+    for i in range(training):
+        if i >= FIRST:
+            mean, std = own.predict(coordinates(arrays, i, "onset"), ONSET)
+            errors.append((float(arrays["onset"][i]) - float(mean)) / float(std))
+        take(own, arrays, i)
+    normal = stats.norm()
+    freedom, _, scale = stats.t.fit(errors, floc=0.0)
+    found = stats.t(freedom, scale=scale)
+    gain = found.logpdf(errors).sum() - normal.logpdf(errors).sum()
+    return found if gain > 2.0 else normal
+
+
 def _unseen(arrays: Mapping[str, Array], law: Wander, training: int) -> Array:
     """Log densities of later levels at onset."""
     own = predictor(law)
@@ -118,9 +149,11 @@ class Forecaster:
         self.training = n
         self._own = predictor(law)
         self._taken = 0
+        self._spread: Shape = spread(arrays, law, n).logpdf
         gained = arrays["onset"][1:n] - arrays["arrest"][: n - 1]
         waits = np.diff(arrays["time_onset"][:n])
         self.curves = Curves.of(past, np.arange(1, n))
+        self._creep = float(np.mean(arrays["path_onset"][1:n] - arrays["path_arrest"][: n - 1]))
         self._strength = float(np.mean(arrays["onset"][:n])), float(np.std(arrays["onset"][:n], ddof=1))
         self._gain = float(np.mean(gained)), float(np.std(gained, ddof=1))
         self.recurrence, self._waits = float(np.mean(waits)), np.sort(waits)
@@ -151,7 +184,7 @@ class Forecaster:
         missing = self.curves.missing_at(gone := float(past.way_gone[i]) - arrest_at)
         at_onset = level + missing
         return {
-            "wandering strength": times(until, at_onset, mean, std, self._seen(i, before, gone, missing)),
+            "wandering strength": times(until, at_onset, mean, std, self._seen(i, before, gone, missing), self._spread),
             "mean recurrence": waiting(self._waits, t - float(arrays["time_onset"][before])),
             "constant strength": times(until, at_onset, *self._strength),
             "slip-predictable": times(until, at_onset, start, self._gain[1]),
@@ -159,8 +192,11 @@ class Forecaster:
 
     def _next(self, before: int, then: Array) -> tuple[Array, Array]:
         """Mean and standard deviation of the level at the next onset, for every time at which it could be."""
-        there = coordinates(self.past.arrays, before, "arrest")  # creep on the way is small beside a slip
-        at = {**there, "time": then} if "time" in self.law.coordinates else there
+        at: dict[Coordinate, float | Array] = {**coordinates(self.past.arrays, before, "arrest")}
+        at["slip path"] += self._creep
+        at["place"] += self._creep * float(self.past.arrays["direction"][before])
+        if "time" in self.law.coordinates:
+            at["time"] = then
         mean, std = self._own.predict({c: at[c] for c in self.law.coordinates or ("time",)}, ONSET)
         return np.broadcast_to(mean, then.shape), np.broadcast_to(std, then.shape)
 
@@ -175,16 +211,20 @@ class Forecaster:
         return self.curves.seen(float(past.level[i]) - earlier, gone, missing)
 
 
-def times(until: Array, level: Array, mean: Array | float, std: Array | float, seen: Array | None = None) -> Array:
-    """Equally likely times to a slip whose level at onset is normally distributed.
+def times(
+    until: Array, level: Array, mean: Array | float, std: Array | float, seen: Array | None = None,
+    shape: Shape = stats.norm.logpdf,
+) -> Array:  # fmt: skip
+    """Equally likely times to a slip whose level at onset has a known distribution.
 
     Args:
         until: times (s) at which it could come, ascending, of even travel, shape (k,).
         level: what the level at onset would be then, by every curve, shape (sticks, k).
         mean, std: of that level, shape (k,).
         seen: likelihood of what else was seen, shape (k,).
+        shape: of that distribution; default normal.
     """
-    logs = -0.5 * ((level - mean) / std) ** 2 - np.log(std)
+    logs = shape((level - mean) / std) - np.log(std)
     if seen is not None:
         logs = logs + np.log(np.maximum(seen, 1e-300))
     density = np.exp(logs - logs.max()).sum(axis=0)
