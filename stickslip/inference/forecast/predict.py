@@ -95,7 +95,8 @@ def spread(arrays: Mapping[str, Array], law: Wander, training: int) -> Any:
 
     Args:
         arrays: levels of all slips.
-        law: fitted to the ``training`` first ones.
+        law: fitted to the first ones.
+        training: how many these are.
 
     Returns:
         A distribution of scipy.
