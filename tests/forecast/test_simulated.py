@@ -7,12 +7,9 @@ from stickslip.inference.forecast.predict import METHODS
 
 from .simulated import FORMS, forecasts, record
 
-# what the law lacks: an arrest's level is told by the friction all along the slip, and scatters more after a long one
-SLIP = pytest.mark.xfail(strict=True, reason="the 50 % interval holds 57 % where friction wanders with the slip path")
-
 
 @pytest.mark.long
-@pytest.mark.parametrize("along", [pytest.param(a, marks=SLIP if a == "slip" else ()) for a in FORMS])
+@pytest.mark.parametrize("along", FORMS)
 def test_intervals_of_simulated_slips_are_right_within_three_per_cent(along):
     """Three per cent are three standard errors of two thousand slips or more; the law is found from the first part."""
     law, found = forecasts(record(along))
