@@ -10,7 +10,7 @@ import pytest
 import xarray
 from matplotlib.figure import Figure
 from scipy.integrate import quad
-from scipy.stats import norm, truncnorm
+from scipy.stats import norm, t, truncnorm
 
 import stickslip as ss
 from stickslip.cli import run
@@ -20,8 +20,8 @@ from stickslip.inference.forecast.known_record import Past
 from stickslip.inference.forecast.predict import (
     MEMBERS,
     METHODS,
+    Ahead,
     Forecaster,
-    coordinates,
     predictor,
     spread,
     take,
@@ -109,16 +109,43 @@ def test_the_spread_about_a_prediction_has_the_tails_of_the_errors(tails):
     arrays["onset"] += scatter * (rng.standard_t(3, 1600) / np.sqrt(3.0) if tails == "long" else rng.normal(size=1600))
     law = fit(arrays, LAW.components, 800)
     found = spread(arrays, law, 800)
-    own, errors = predictor(law), []
+    later = {name: np.where(np.arange(1600) < 800, v, 2.0 * v + 1.0) for name, v in arrays.items()}
+    assert spread(later, law, 800) == found, "nothing after the training tells"
+    assert (found is None) == (tails == "normal")
+    own, ahead, errors = predictor(law), Ahead.of(arrays, 800), []
     for i in range(1600):
         if i >= 800:
-            mean, std = own.predict(coordinates(arrays, i, "onset"), ONSET)
+            mean, std = own.predict({c: ahead(arrays, i - 1)[c] for c in law.coordinates}, ONSET)
             errors.append(float((arrays["onset"][i] - mean) / std))
         take(own, arrays, i)
-    held = {name: [np.mean(np.abs(errors) < d.ppf(0.5 + 0.5 * share)) for share in (0.5, 0.9)]
-            for name, d in (("found", found), ("normal", norm()))}  # fmt: skip
+    laws = {"found": t(found[0], scale=found[1]) if found else norm(), "normal": norm()}
+    held = {n: [np.mean(np.abs(errors) < d.ppf(0.5 + 0.5 * share)) for share in (0.5, 0.9)] for n, d in laws.items()}
     assert held["found"] == pytest.approx([0.5, 0.9], abs=0.04)
     assert (held["normal"][0] > 0.56) == (tails == "long")
+
+
+def test_a_time_with_long_tails_is_the_truncated_t():
+    rate, level, mean, std, freedom, scale = 0.02, 1.0, 1.05, 0.04, 3.0, 0.7
+    until = np.linspace(0.0, 200.0, 400_000)
+    found = times(until, level + rate * until[None, :], mean, std, None, (freedom, scale))
+    law = t(freedom, loc=mean, scale=scale * std)
+    begun = law.cdf(level)
+    expected = (law.ppf(begun + (1.0 - begun) * (np.arange(MEMBERS) + 0.5) / MEMBERS) - level) / rate
+    np.testing.assert_allclose(found, expected, rtol=2e-3, atol=1e-3)
+
+
+def test_creep_leads_from_an_arrest_to_the_next_onset_and_turns_do_not_count():
+    arrays = {
+        "time_arrest": np.arange(5.0),
+        "path_onset": np.array([0.0, 1.1, 2.1, 3.1, 4.1]), "path_arrest": np.arange(5.0) + 1.0,
+        "place_onset": np.array([0.0, 1.1, 1.0, 0.9, -0.1]), "place_arrest": np.array([1.0, 2.0, 1.9, 0.0, -1.0]),
+        "direction": np.array([1.0, 1.0, -1.0, -1.0, -1.0]),
+    }  # fmt: skip
+    ahead = Ahead.of(arrays, 5)
+    assert ahead.path == pytest.approx(0.1)
+    # the third slip goes back: what lies between its arrest and the one before it is a turn
+    assert ahead.place == pytest.approx(np.mean([0.1, 1.0, 0.1]))
+    assert ahead(arrays, 4)["place"] == pytest.approx(-1.0 - ahead.place)
 
 
 @pytest.fixture(scope="module")

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from ...errors import InputError
 from .known_record import Past
@@ -16,7 +14,6 @@ from .loading import Curves
 from .wander import ARREST, FEWEST, KEYS, ONSET, Component, Coordinate, Filter, Nearby, Wander, fit
 
 Array = NDArray[np.float64]
-Shape = Callable[[Array], Array]  # log density of an error in its standard deviations
 FIRST = 6  # slip from which predictions are judged: the means are known by then
 MEMBERS = 100  # equally likely times that stand for a distribution of them
 METHODS = ("wandering strength", "mean recurrence", "constant strength", "slip-predictable")
@@ -86,12 +83,40 @@ def compare(arrays: Mapping[str, Array], training: int) -> list[Compared]:
     return sorted(out, key=lambda c: c.law.aic)
 
 
-def spread(arrays: Mapping[str, Array], law: Wander, training: int) -> Any:
+@dataclass(frozen=True)
+class Ahead:
+    """Where the next onset is expected after an arrest: creep moves the block on.
+
+    Attributes:
+        path, place: mean creep of the sticks for training, along the way and in the direction of the slip before (m).
+    """
+
+    path: float
+    place: float
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Array], training: int) -> Ahead:
+        """Of the first sticks; those in which the block turns do not count for the place."""
+        crept = arrays["path_onset"][1:training] - arrays["path_arrest"][: training - 1]
+        sign = arrays["direction"][:training]
+        moved = (arrays["place_onset"][1:training] - arrays["place_arrest"][: training - 1]) * sign[:-1]
+        kept = moved[sign[1:] == sign[:-1]]
+        return cls(float(np.mean(crept)), float(np.mean(kept)) if kept.size else 0.0)
+
+    def __call__(self, arrays: Mapping[str, Array], before: int) -> dict[Coordinate, float]:
+        """Slip path and place of the onset after a slip, and the time of its arrest."""
+        at = coordinates(arrays, before, "arrest")
+        at["slip path"] += self.path
+        at["place"] += self.place * float(arrays["direction"][before])
+        return at
+
+
+def spread(arrays: Mapping[str, Array], law: Wander, training: int) -> tuple[float, float] | None:
     """How the level at an onset spreads about its prediction, in its standard deviations.
 
-    Student's t about zero, its degrees of freedom and scale fitted to the slips for training, each predicted from those
-    before it; the normal law where Akaike's criterion does not pay for these two parameters. A law has one scatter for
-    all levels; where some scatter more than others, as arrests after long slips do, their mixture has long tails.
+    A law has one scatter for all levels; where some scatter more than others, as arrests after long slips do, their
+    mixture has long tails. Student's t about zero is fitted to the slips for training, each predicted from those
+    before it.
 
     Args:
         arrays: levels of all slips.
@@ -99,19 +124,29 @@ def spread(arrays: Mapping[str, Array], law: Wander, training: int) -> Any:
         training: how many these are.
 
     Returns:
-        A distribution of scipy.
+        Degrees of freedom (two or more) and scale; None, for the normal law, where Akaike's criterion for few data does
+        not pay for these two.
     """
-    own, errors = predictor(law), []
+    from scipy import stats
+    from scipy.optimize import minimize
+
+    own, ahead, found = predictor(law), Ahead.of(arrays, training), []
     for i in range(training):
         if i >= FIRST:
-            mean, std = own.predict(coordinates(arrays, i, "onset"), ONSET)
-            errors.append((float(arrays["onset"][i]) - float(mean)) / float(std))
+            at = {**ahead(arrays, i - 1), "time": float(arrays["time_onset"][i])}
+            mean, std = own.predict({c: at[c] for c in law.coordinates or ("time",)}, ONSET)
+            found.append((float(arrays["onset"][i]) - float(mean)) / float(std))
         take(own, arrays, i)
-    normal = stats.norm()
-    freedom, _, scale = stats.t.fit(errors, floc=0.0)
-    found = stats.t(freedom, scale=scale)
-    gain = found.logpdf(errors).sum() - normal.logpdf(errors).sum()
-    return found if gain > 2.0 else normal
+    errors = np.array(found)
+
+    def cost(theta: Array) -> float:
+        return -float(stats.t.logpdf(errors, 2.0 + np.exp(theta[0]), scale=np.exp(theta[1])).sum())
+
+    best = minimize(cost, [1.0, -0.2], method="Nelder-Mead")
+    gain = -best.fun - float(stats.norm.logpdf(errors).sum())
+    if not gain > 2.0 + 6.0 / max(errors.size - 3, 1):
+        return None
+    return 2.0 + float(np.exp(best.x[0])), float(np.exp(best.x[1]))
 
 
 def _unseen(arrays: Mapping[str, Array], law: Wander, training: int) -> Array:
@@ -150,11 +185,11 @@ class Forecaster:
         self.training = n
         self._own = predictor(law)
         self._taken = 0
-        self._spread: Shape = spread(arrays, law, n).logpdf
+        self._spread = spread(arrays, law, n)
         gained = arrays["onset"][1:n] - arrays["arrest"][: n - 1]
         waits = np.diff(arrays["time_onset"][:n])
         self.curves = Curves.of(past, np.arange(1, n))
-        self._creep = float(np.mean(arrays["path_onset"][1:n] - arrays["path_arrest"][: n - 1]))
+        self._ahead = Ahead.of(arrays, n)
         self._strength = float(np.mean(arrays["onset"][:n])), float(np.std(arrays["onset"][:n], ddof=1))
         self._gain = float(np.mean(gained)), float(np.std(gained, ddof=1))
         self.recurrence, self._waits = float(np.mean(waits)), np.sort(waits)
@@ -193,9 +228,7 @@ class Forecaster:
 
     def _next(self, before: int, then: Array) -> tuple[Array, Array]:
         """Mean and standard deviation of the level at the next onset, for every time at which it could be."""
-        at: dict[Coordinate, float | Array] = {**coordinates(self.past.arrays, before, "arrest")}
-        at["slip path"] += self._creep
-        at["place"] += self._creep * float(self.past.arrays["direction"][before])
+        at: dict[Coordinate, float | Array] = {**self._ahead(self.past.arrays, before)}
         if "time" in self.law.coordinates:
             at["time"] = then
         mean, std = self._own.predict({c: at[c] for c in self.law.coordinates or ("time",)}, ONSET)
@@ -214,7 +247,7 @@ class Forecaster:
 
 def times(
     until: Array, level: Array, mean: Array | float, std: Array | float, seen: Array | None = None,
-    shape: Shape = stats.norm.logpdf,
+    tails: tuple[float, float] | None = None,
 ) -> Array:  # fmt: skip
     """Equally likely times to a slip whose level at onset has a known distribution.
 
@@ -223,9 +256,14 @@ def times(
         level: what the level at onset would be then, by every curve, shape (sticks, k).
         mean, std: of that level, shape (k,).
         seen: likelihood of what else was seen, shape (k,).
-        shape: of that distribution; default normal.
+        tails: degrees of freedom and scale (in ``std``) of Student's t; None: it is normal.
     """
-    logs = shape((level - mean) / std) - np.log(std)
+    z = (level - mean) / std
+    if tails is None:
+        logs = -0.5 * z**2 - np.log(std)
+    else:
+        freedom, scale = tails
+        logs = -0.5 * (freedom + 1.0) * np.log1p((z / scale) ** 2 / freedom) - np.log(std)
     if seen is not None:
         logs = logs + np.log(np.maximum(seen, 1e-300))
     density = np.exp(logs - logs.max()).sum(axis=0)
