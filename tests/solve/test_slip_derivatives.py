@@ -57,6 +57,12 @@ def test_derivatives_are_those_of_finer_tied_steps_more_closely():
 
 
 @pytest.mark.slow
+@pytest.mark.xfail(strict=False, reason="of the peak velocity over the stiffness a difference of 1e-5 is off by 0.53 %")
+def test_differences_of_a_hundred_thousandth_of_finer_tied_steps():
+    _climb(30.0, 1, (1e-5, 5e-3))
+
+
+@pytest.mark.slow
 def test_shifted_grids_take_the_ripple_out():
     """By one grid alone the rung of 3e-4 was 2 % off with one release of JAX and 3.3 % with another."""
     _climb(10.0, GRIDS, (3e-4, 0.03), (1e-4, 0.02), (1e-5, 0.01))
