@@ -255,11 +255,12 @@ class Model(Parametrised):
             The state at the end (its ``work`` is not touched) and the forces there.
         """
         motion = motion._replace(pull=self.pull(motion.load_point - motion.x))
+        psi = self.weakening.advance(state.psi, motion)
+        contact = contact._replace(rested=psi / jnp.maximum(self.weakening.strength(psi), 1e-300))
         memory = tuple(
             e.advance(m, motion, contact) if isinstance(e, Memory) else m
             for e, m in zip(self.effects, state.memory, strict=True)
         )
-        psi = self.weakening.advance(state.psi, motion)
         cap = bank.strength * self.weakening.strength(psi)
         stiffness = bank.stiffness
         body = jnp.zeros(())

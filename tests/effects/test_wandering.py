@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -73,22 +75,70 @@ def test_every_form_goes_with_its_own():
     assert np.ptp(found["time"][30:50]) > 0.01
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("along", "coordinate"), [("place", "place"), ("slip", "slip path"), ("time", "time")])
-def test_what_is_simulated_is_found_in_the_levels_of_the_slips(tmp_path, along, coordinate):
-    """Size and length of the wander from the forces at onset and arrest, by the forecast's law."""
+def test_static_and_sliding_friction_wander_together_or_apart():
+    """Caps of a model, rested and slid: mu_s or mu_k alone is multiplied, and both parts together make the whole."""
+    where, level = 20e-6, float(jnp.exp(SIZE * make("wandering-friction", size=SIZE).course(20e-6 / LENGTH)))
+    drive = ss.LoadPoint([0.0, 1.0], [0.0, 0.0])
+    base = ss.Model(ss.Block(), ss.power_law_bank(0.26, 1e-6, 2.0), ss.Weakening(ratio=0.8), drive)
+    full = float(base.bank.total_strength)
+
+    def cap(psi: float, of: str | None) -> float:
+        own = () if of is None else (make("wandering-friction", size=SIZE, length=LENGTH, of=of),)
+        model = replace(base, effects=own)
+        state = replace(model.rest(x=where), psi=jnp.asarray(psi))
+        now, still = jnp.zeros(()), jnp.asarray(1e-12)
+        motion = Motion(now, still, jnp.asarray(where), now, now, now, now)
+        after, _ = model.advance(state, model.shaped(), model.contact(state, model.shaped(), now), motion)
+        return float(after.cap.sum()) / full
+
+    assert abs(level - 1.0) > 0.02
+    for of, rested, slid in (("both", level, 0.8 * level), ("static", level, 0.8), ("sliding", 1.0, 0.8 * level)):
+        assert cap(1.0, of) == pytest.approx(rested, rel=1e-9)
+        assert cap(0.0, of) == pytest.approx(slid, rel=1e-9)
+        assert cap(0.3, of) == pytest.approx(0.7 * slid + 0.3 * rested, rel=1e-9)
+    assert cap(0.3, "static") + cap(0.3, "sliding") - cap(0.3, None) == pytest.approx(cap(0.3, "both"), rel=1e-12)
+
+
+def simulated(folder: Path, seconds: int, **fields: float | str) -> dict[str, np.ndarray]:
+    """Levels of the paper slider's slips at 42 um/s with friction that wanders."""
     text = (SCENARIOS / "paper_slider.toml").read_text(encoding="utf-8")
     before, after = text.index("[[effect]]"), text.index("[sensor]")
-    own = f'[[effect]]\ntype = "wandering-friction"\nalong = "{along}"\nsize = {SIZE}\nlength = "300 um"\n'
-    own += f'time = "{TIME} s"\ndraw = 3\n\n'
-    path = tmp_path / "wander.toml"
-    path.write_text((text[:before] + own + text[after:]).replace('"40 s"', '"250 s"'), encoding="utf-8")
+    own = {"type": "wandering-friction", "size": SIZE, "length": LENGTH, "time": TIME, "draw": 3, **fields}
+    lines = "".join(f"{name} = {json.dumps(value)}\n" for name, value in own.items())
+    path = folder / "wander.toml"
+    path.write_text(f"{text[:before]}[[effect]]\n{lines}\n{text[after:]}".replace('"40 s"', f'"{seconds} s"'), "utf-8")
     data = ss.simulate(load_scenario(path))
     trace = ss.Trace.from_arrays(
         "wander", time=data.time.values, displacement=data.displacement.values, drive_velocity="42 um/s"
     )
-    found = segment(trace)
-    levels = level_arrays(found.events, 168.0, lambda t: 42e-6 * t)
+    return level_arrays(segment(trace).events, 168.0, lambda t: 42e-6 * t)
+
+
+@pytest.mark.slow
+def test_levels_at_onset_and_arrest_follow_the_friction_that_wanders(tmp_path):
+    """A spring that lets go at F_s and is caught by F_k stops at F_k - q (F_s - F_k), q from its damping."""
+    found = {}
+    for of in ("both", "static", "sliding"):
+        levels = simulated(tmp_path, 120, along="time", of=of)
+        w = make("wandering-friction", along="time", size=SIZE, time=TIME, draw=3).course
+        sizes = []
+        for end in ("onset", "arrest"):
+            course = SIZE * np.asarray(w(levels[f"time_{end}"] / TIME))
+            sizes.append(np.polyfit(course, levels[end] / levels["onset"].mean(), 1)[0])
+        found[of] = np.array(sizes)
+    assert found["static"][0] == pytest.approx(1.0, abs=0.05)
+    assert found["sliding"][0] == pytest.approx(0.0, abs=0.02)
+    overshoot = -found["static"][1]
+    assert 0.2 < overshoot < 0.5
+    assert found["sliding"][1] == pytest.approx(0.9 * (1.0 + overshoot), rel=0.1)  # mu_k / mu_s = 0.9
+    np.testing.assert_allclose(found["both"], found["static"] + found["sliding"], atol=0.08)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("along", "coordinate"), [("place", "place"), ("slip", "slip path"), ("time", "time")])
+def test_what_is_simulated_is_found_in_the_levels_of_the_slips(tmp_path, along, coordinate):
+    """Size and length of the wander from the forces at onset and arrest, by the forecast's law."""
+    levels = simulated(tmp_path, 250, along=along)
     assert levels["onset"].std() > 0.05 * levels["onset"].mean()
     law = fit(levels, (Component("matern-3/2", coordinate),))
     (wander,) = law.components

@@ -104,6 +104,8 @@ class Contact(NamedTuple):
         spring_force: force of the driving spring at the end of the last increment (N).
         cap: cap of every element as it was last (N), shape (n,).
         mass: inertia of the block (kg).
+        rested: share of the caps that is static friction's, mu_s psi over mu_k (1 - psi) + mu_s psi, at the end of the
+            increment (1).
     """
 
     force: Array
@@ -112,6 +114,7 @@ class Contact(NamedTuple):
     spring_force: Array
     cap: Array
     mass: Array | float = 0.0
+    rested: Array | float = 1.0
 
 
 class Effect(Parametrised):

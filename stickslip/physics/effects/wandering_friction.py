@@ -26,13 +26,16 @@ class WanderingFriction(Memory, Threshold):
 
     Its covariance is Matern's, eps^2 (1 + sqrt(3) r) exp(-sqrt(3) r) at a distance of r correlation lengths. The draw
     is a sum of waves of one size, spread as the spectral density of the process is (Shinozuka & Deodatis 1991), whose
-    phases the number of the draw turns.
+    phases the number of the draw turns. Static and sliding friction wander together or one of them alone: with mu =
+    mu_k (1 - psi) + mu_s psi it is mu, mu_s or mu_k that is multiplied.
     """
 
     tag = "wandering-friction"
     summary = "the level of friction wanders along the track, with the slip path or in time"
     equation = (
-        r"\mu \to \mu\,e^{w},\quad w = \varepsilon\,\sqrt{2/M}\,\sum_j \cos(q_j s/\ell + \varphi_j + n \gamma_j),"
+        r"\mu \to \mu\,e^{w} \;\mathrm{or}\; \mu + \mu_s\,\psi\,(e^{w} - 1) \;\mathrm{or}\; "
+        r"\mu + \mu_k\,(1 - \psi)\,(e^{w} - 1),"
+        r"\quad w = \varepsilon\,\sqrt{2/M}\,\sum_j \cos(q_j s/\ell + \varphi_j + n \gamma_j),"
         r"\quad s = x \;\mathrm{or}\; \dot s = |\dot x| \;\mathrm{or}\; s = t,\ \ell = \tau"
     )
     symbols = {
@@ -94,12 +97,18 @@ class WanderingFriction(Memory, Threshold):
         doc="number of the draw: another one, half apart or more, is another course",
     )
     along: str = variant("place", ("place", "slip", "time"), "what the level goes with")
+    of: str = variant("both", ("both", "static", "sliding"), "which friction wanders")
 
     def formula(self) -> str:
+        level = {
+            "both": r"\mu\,e^{w}",
+            "static": r"\mu + \mu_s\,\psi\,(e^{w} - 1)",
+            "sliding": r"\mu + \mu_k\,(1 - \psi)\,(e^{w} - 1)",
+        }[self.of]
         goes = {"place": "s = x", "slip": r"\dot s = |\dot x|,\quad s(0) = 0", "time": "s = t"}[self.along]
         length = r"\tau" if self.along == "time" else r"\ell"
         return (
-            rf"\mu \to \mu\,e^{{w}},\quad w = \varepsilon\,\sqrt{{2/M}}\,\sum_j "
+            rf"\mu \to {level},\quad w = \varepsilon\,\sqrt{{2/M}}\,\sum_j "
             rf"\cos(q_j s/{length} + \varphi_j + n \gamma_j),\quad {goes}"
         )
 
@@ -117,4 +126,7 @@ class WanderingFriction(Memory, Threshold):
 
     def strength(self, state: Array, motion: Motion, contact: Contact) -> Array:
         at = {"place": motion.x / self.length, "slip": state / self.length, "time": motion.t / self.time}[self.along]
-        return jnp.exp(self.size * self.course(at))
+        more = jnp.expm1(self.size * self.course(at))
+        if self.of == "both":
+            return 1.0 + more
+        return 1.0 + more * (contact.rested if self.of == "static" else 1.0 - contact.rested)
