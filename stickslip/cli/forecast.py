@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,8 @@ def forecast(
         The run to be forecast. Default: the one with the most slips.
     train:
         Share of the run's length from which everything is learned; the rest is forecast.
+    out:
+        Folder for result.json, arrays.nc and report.html; an interrupted forecast resumes from its finished parts.
     at:
         Forecast once in each stick, so many mean recurrences after the arrest (0.5: half of one). Default: moments
         all along, ten in a mean recurrence.
@@ -37,14 +38,10 @@ def forecast(
     from ..objects.campaign import load_campaign
 
     refuse_existing(out, force)
-    began = time.perf_counter()
     loaded = load_campaign(campaign)
     with working("forecasting") as tell:
-        found = loaded.forecast(run, train, at, tell)
-    seconds = {"seconds": round(time.perf_counter() - began, 3)}
-    if out is not None:
-        found.save(out, force, **seconds)
-    print(json_text({**found.result, **seconds}) if json else _text({**found.result, **seconds}, out))
+        result = loaded.forecast(run, train, at, out=out, force=force, progress=tell).result
+    print(json_text(result) if json else _text(result, out))
     return 0
 
 

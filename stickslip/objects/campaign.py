@@ -259,8 +259,9 @@ class Campaign(Shown, Mapping[str, Trace]):
             raise error.at(file=self._file) from None
 
     def forecast(
-        self, run: str | None = None, train: float = 0.5, at: float | None = None, progress: Tell | None = None
-    ) -> Forecast:
+        self, run: str | None = None, train: float = 0.5, at: float | None = None, *,
+        out: str | Path | None = None, force: bool = False, progress: Tell | None = None,
+    ) -> Forecast:  # fmt: skip
         """Forecast the slips of the later part of a run, each from what was measured before it, and score it:
         ``campaign.forecast("v050", at=0.5)``.
 
@@ -269,14 +270,18 @@ class Campaign(Shown, Mapping[str, Trace]):
             train: share of its length from which everything is learned.
             at: mean recurrences after an arrest at which a forecast is made, once in each stick; default moments all
                 along, ten in a mean recurrence.
+            out: run folder for ``result.json``, ``arrays.nc``, ``report.html``, and until it is finished for the parts
+                from which an interrupted forecast goes on; default none.
+            force: replace an existing run folder.
             progress: told what is done and the share of it; default a bar in a terminal or a notebook.
 
         Raises:
             InputError: no run of that name, too few slips, no load point or force, shares out of range.
+            RunFolderError: the folder cannot be written.
         """
         from .forecast import forecast
 
-        return forecast(self, run, train, at, progress)
+        return forecast(self, run, train, at, out=out, force=force, progress=progress)
 
     def to_xarray(self, run: str) -> xarray.Dataset:
         """Signals of a run; see :meth:`stickslip.Trace.to_xarray`."""

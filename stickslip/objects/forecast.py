@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
+import shutil
+import time
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError, nearest
 from ..inference.forecast.coordinate_text import steps, told
+from ..inference.forecast.known_record import Past
 from ..inference.forecast.levels import levels, wandering
-from ..inference.forecast.predict import METHODS, Compared, Forecaster, goes_back, training_slips
-from ..inference.forecast.rolling import SHARES, Rolled, choose, prepare, roll
+from ..inference.forecast.predict import (
+    METHODS,
+    Compared,
+    Forecaster,
+    best_first,
+    candidates,
+    compared,
+    goes_back,
+    training_slips,
+)
+from ..inference.forecast.rolling import SHARES, Rolled, choose, roll
 from ..inference.forecast.scoring import quantiles
 from ..inference.forecast.wander import Wander
 from ..system.object_repr import facts, table
 from ..system.progress import reporting
-from .result_base import Savable, Tell, dataset, head
+from ..system.runstore import json_text, open_run, versions
+from .checkpoints import Pieces, code_digest
+from .kept_forecast import Kept
+from .result_base import Savable, Tell, dataset, finish, head
 from .wander import most_slips
 
 if TYPE_CHECKING:
@@ -26,7 +42,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..inference.forecast.known_record import Past
     from .campaign import Campaign
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -135,24 +150,48 @@ class ForecastPlots:
 
 
 def forecast(
-    campaign: Campaign, run: str | None = None, train: float = 0.5, at: float | None = None,
-    progress: Tell | None = None,
+    campaign: Campaign, run: str | None = None, train: float = 0.5, at: float | None = None, *,
+    out: str | Path | None = None, force: bool = False, progress: Tell | None = None,
 ) -> Forecast:  # fmt: skip
     """See :meth:`Campaign.forecast`."""
     number = _chosen(campaign, run)
     if at is not None and not at >= 0.0:
         raise InputError("a moment before the stick begins", key="at", value=at, allowed="0 or more")
-    with reporting("forecasting", progress) as tell:
-        return _forecast(campaign, number, train, at, tell)
+    if out is None:
+        with reporting("forecasting", progress) as tell:
+            return _forecast(campaign, number, train, at, Kept(), tell)
+    with open_run(out, force=force, resume=True) as folder, reporting("forecasting", progress) as tell:
+        folder.clear("pieces")
+        # what was forecast of another run, or from another part of it, is of no use
+        asked = {"run": campaign.names[number], "train": train}
+        key = {"inputs": campaign.inputs(), **asked, "versions": versions(), "code": code_digest()}
+        pieces = Pieces(folder, json_text(key))
+        if ready := pieces.ready():
+            tell(f"resuming from {ready} finished parts", 0.0)
+        try:
+            found = _forecast(campaign, number, train, at, Kept(pieces), tell)
+        except KeyboardInterrupt:
+            text = f"{pieces.ready()} finished parts are kept, and the same command resumes from them"
+            raise KeyboardInterrupt(text) from None
+        folder.arrays(found.arrays)
+        folder.json(found.result)
+        finish(folder)
+        shutil.rmtree(folder.path("pieces"))
+    return found
 
 
-def _forecast(campaign: Campaign, number: int, train: float, at: float | None, tell: Tell) -> Forecast:
-    trace = campaign.traces[number]
+def _forecast(
+    campaign: Campaign, number: int, train: float, at: float | None, kept: Kept, tell: Tell
+) -> Forecast:  # fmt: skip
+    began, trace = time.perf_counter(), campaign.traces[number]
     try:
         tell(f"levels of {trace.name}", 0.0)
-        past, laws = prepare(trace, train)
-        law, rise = choose(past, laws, tell)
-        rolled = roll(past, law, at, tell, rise)
+        past = Past.of(trace, train)
+        laws = _laws(past, kept, tell)
+        law, rise = kept.choice(laws, lambda: choose(past, laws, tell))
+        rolled = kept.rolled(_key(at), lambda: roll(past, law, at, tell, rise))
+        if isinstance(rolled, InputError):
+            raise rolled
     except InputError as error:
         raise error.at(file=campaign.description.path if campaign.description.filed else None) from None
     scores, gained = rolled.score(), rolled.gains()
@@ -172,10 +211,11 @@ def _forecast(campaign: Campaign, number: int, train: float, at: float | None, t
         "score": {**counts, **own, **others},
         "methods": scores,
         "gains": gained,
-        "by_moment": _by_moment(past, law, rise, tell),
+        "by_moment": _by_moment(past, law, rise, kept, tell),
         "next": _next(past, law, rise),
         "dropped": [str(d) for d in past.learned.dropped],
         "notes": _notes(past, at, law, rise),
+        "seconds": round(time.perf_counter() - began, 3),
     }
     return Forecast(campaign, past, laws, rolled, result)
 
@@ -189,8 +229,23 @@ def _chosen(campaign: Campaign, run: str | None) -> int:
     return campaign.names.index(run)
 
 
-def _law(compared: Compared) -> dict[str, Any]:
-    law = compared.law
+def _laws(past: Past, kept: Kept, tell: Tell) -> list[Compared]:
+    """Every law of the wandering level, the best first."""
+    training, arrays = training_slips(past), past.arrays
+    every, found = candidates(arrays["direction"][:training]), []
+    for n, components in enumerate(every):
+        tell(f"laws of the level of {past.trace.name}", n / len(every))
+        found.append(kept.law(components, partial(compared, arrays, components, training)))
+    return best_first(found)
+
+
+def _key(at: float | None) -> str:
+    """Name of forecasts at a moment of each stick, or all along, among the parts that are kept."""
+    return "rolled" if at is None else f"rolled-{at:.17g}"
+
+
+def _law(one: Compared) -> dict[str, Any]:
+    law = one.law
     return {
         "law": str(law),
         "components": [dict(vars(c)) for c in law.components],
@@ -198,17 +253,16 @@ def _law(compared: Compared) -> dict[str, Any]:
         "std": law.std,
         "log_likelihood": law.log_likelihood,
         "aic": law.aic,
-        "unseen": float(compared.unseen.mean()) if compared.unseen.size else None,
+        "unseen": float(one.unseen.mean()) if one.unseen.size else None,
     }
 
 
-def _by_moment(past: Past, law: Wander, rise: bool, tell: Tell) -> list[dict[str, Any]]:
+def _by_moment(past: Past, law: Wander, rise: bool, kept: Kept, tell: Tell) -> list[dict[str, Any]]:
     """Scores at moments so many mean recurrences after an arrest, once in each stick."""
     out = []
     for share in SHARES:
-        try:
-            rolled = roll(past, law, share, tell, rise)
-        except InputError:
+        rolled = kept.rolled(_key(share), partial(roll, past, law, share, tell, rise))
+        if isinstance(rolled, InputError):
             continue  # no stick lasts so long
         scores = rolled.score()
         out.append({"at": share, "slips": int(rolled.truth.size), **scores[METHODS[0]],

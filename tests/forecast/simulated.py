@@ -18,12 +18,14 @@ import numpy as np
 import stickslip as ss
 from stickslip.data.trace import Trace
 from stickslip.inference.forecast.predict import METHODS
-from stickslip.inference.forecast.rolling import Rolled, choose, prepare, roll
+from stickslip.inference.forecast.rolling import Rolled, choose, roll
 from stickslip.inference.forecast.scoring import quantiles
 from stickslip.inference.forecast.wander import Wander
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, styled
 from stickslip.simulation.scenario import load_scenario
+
+from .synthetic import prepare
 
 ROOT = Path(__file__).parents[2]
 FORMS = {"place": 'length = "300 um"', "slip": 'length = "300 um"', "time": 'time = "30 s"'}

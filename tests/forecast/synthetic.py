@@ -5,12 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from stickslip.data.trace import Trace
+from stickslip.inference.forecast.known_record import Past
+from stickslip.inference.forecast.predict import Compared, compare, training_slips
 from stickslip.inference.forecast.wander import Component, Wander, covariance
 
 STIFFNESS, SPEED = 168.0, 42e-6  # N/m, m/s
 MEANS = (0.08, 0.06)  # N, at onset and arrest
 LAW = Wander((Component("ornstein-uhlenbeck", "slip path", (0.008, 0.008), 5e-3),), (0.0025, 0.003))
 SLIP = 0.05  # s
+
+
+def prepare(trace: Trace, train: float) -> tuple[Past, list[Compared]]:
+    """A run divided, and laws of its wandering level compared on the first part."""
+    past = Past.of(trace, train)
+    return past, compare(past.arrays, training_slips(past))
 
 
 def wander(kernel: str, at: np.ndarray, length: float, rng: np.random.Generator) -> np.ndarray:

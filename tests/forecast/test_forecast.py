@@ -28,13 +28,14 @@ from stickslip.inference.forecast.predict import (
     times,
     waiting,
 )
-from stickslip.inference.forecast.rolling import choose, moments, prepare, roll
+from stickslip.inference.forecast.rolling import choose, moments, roll
 from stickslip.inference.forecast.scoring import crps, quantiles, score, standard_error
 from stickslip.inference.forecast.wander import ONSET, Wander, fit
+from stickslip.objects import forecast
 from stickslip.objects.forecast import QUANTILES, ForecastPlots
-from stickslip.system.runstore import read_result
+from stickslip.system.runstore import json_text, read_result
 
-from .synthetic import LAW, SPEED, STIFFNESS, record, series
+from .synthetic import LAW, SPEED, STIFFNESS, prepare, record, series
 
 
 def test_the_score_is_the_integral_of_the_squared_difference():
@@ -345,6 +346,50 @@ def test_the_command_keeps_a_run_folder(tmp_path, capsys):
     assert "Forecast of the next slip" in page and page.count("<img") == 2
     assert run(["forecast", path, "--out", str(out)]) == 2
     assert "exists" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stage", [("laws", 0.5), ("choosing", 0.0), ("forecasts", 0.9)])
+def test_an_interrupted_forecast_resumes(tmp_path, monkeypatch, stage):
+    """From the laws that were fitted and what was forecast, with the same answer as one that was never interrupted."""
+    campaign, out = ss.load_campaign(write(tmp_path, record(120, 7))), tmp_path / "kept"
+    whole = campaign.forecast(progress=lambda text, share: None)
+
+    def stop(text: str, share: float) -> None:
+        if text.startswith(stage[0]) and share >= stage[1]:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="finished parts are kept, and the same command resumes"):
+        campaign.forecast(out=out, progress=stop)
+    assert not out.exists()
+    ready = len(list((tmp_path / "kept.partial" / "pieces").glob("*.npz")))
+    made = []
+    fitted = forecast.compared
+    monkeypatch.setattr(forecast, "compared", lambda *given: made.append(given) or fitted(*given))
+    said: list[str] = []
+    found = campaign.forecast(out=out, progress=lambda text, share: said.append(text))
+    assert f"resuming from {ready} finished parts" in said
+    assert len(made) == len(whole.laws) - min(ready, len(whole.laws))
+    plain, again = (json.loads(json_text({**f.result, "seconds": 0.0})) for f in (whole, found))
+    assert plain == again == read_result(out) | {"seconds": 0.0}
+    xarray.testing.assert_identical(whole.arrays, found.arrays)
+    assert not (out / "pieces").exists()
+    assert found.next == whole.next
+
+
+def test_parts_of_another_forecast_are_not_taken_up(tmp_path):
+    campaign, out = ss.load_campaign(write(tmp_path, record(40, 7))), tmp_path / "kept"
+    said: list[str] = []
+
+    def stop(text: str, share: float) -> None:
+        said.append(text)
+        if text.startswith("laws") and share > 0.15:
+            raise KeyboardInterrupt
+
+    for train in (0.5, 0.6, 0.6):
+        with pytest.raises(KeyboardInterrupt, match="2 finished parts"):
+            campaign.forecast(train=train, out=out, progress=stop)
+        assert any("resuming" in text for text in said) == (said.count("levels of saw") == 3)
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -67,20 +67,28 @@ def take(own: Filter | Nearby, arrays: Mapping[str, Array], slip: int) -> None:
 
 
 def compare(arrays: Mapping[str, Array], training: int) -> list[Compared]:
-    """Every candidate, the best by its criterion first.
+    """Every candidate, the best by its criterion first; arguments and errors as of :func:`compared`."""
+    return best_first(compared(arrays, c, training) for c in candidates(arrays["direction"][:training]))
+
+
+def compared(arrays: Mapping[str, Array], components: tuple[Component, ...], training: int) -> Compared:
+    """A law fitted to the first slips.
 
     Args:
         arrays: levels of all slips.
-        training: how many of them laws are fitted to; the rest is predicted slip by slip.
+        components: of the law.
+        training: how many slips it is fitted to; the rest is predicted slip by slip.
 
     Raises:
         InputError: too few slips for training.
     """
-    out = []
-    for components in candidates(arrays["direction"][:training]):
-        law = fit(arrays, components, training)
-        out.append(Compared(law, _unseen(arrays, law, training)))
-    return sorted(out, key=lambda c: c.law.aic)
+    law = fit(arrays, components, training)
+    return Compared(law, _unseen(arrays, law, training))
+
+
+def best_first(found: Iterable[Compared]) -> list[Compared]:
+    """In the order of their criterion."""
+    return sorted(found, key=lambda c: c.law.aic)
 
 
 @dataclass(frozen=True)

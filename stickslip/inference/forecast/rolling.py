@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...data.trace import Trace
 from ...errors import InputError
 from ...system.progress import Tell
 from .known_record import Past
-from .predict import METHODS, Compared, Forecaster, compare, training_slips
+from .predict import METHODS, Compared, Forecaster, training_slips
 from .scoring import gains, score
 from .wander import Wander, fit
 
@@ -56,16 +55,6 @@ class Rolled:
         """By what share the CRPS lies below that of the plain methods."""
         others = {name: found for name, found in self.members.items() if name != METHODS[0]}
         return gains(self.members[METHODS[0]], others, self.truth, self.slip)
-
-
-def prepare(trace: Trace, train: float) -> tuple[Past, list[Compared]]:
-    """Divide a run and compare laws of its wandering level on the first part.
-
-    Raises:
-        InputError: too few slips, or nothing to tell levels by.
-    """
-    past = Past.of(trace, train)
-    return past, compare(past.arrays, training_slips(past))
 
 
 def choose(past: Past, laws: Sequence[Compared], progress: Tell | None = None) -> tuple[Wander, bool]:
