@@ -12,6 +12,7 @@ the data and the two columns of the means at once, for its gains do not depend o
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -24,6 +25,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
 from ...errors import FitError, InputError
@@ -379,15 +381,16 @@ class Nearby:
 
     def __init__(self, law: Wander, most: int = 200) -> None:
         self._law, self._most = law, most
-        self._at: list[float] = []
-        self._kind: list[int] = []
-        self._value: list[float] = []
+        # of either kind, in the order of their places
+        self._places: tuple[list[float], list[float]] = [], []
+        self._values: tuple[list[float], list[float]] = [], []
 
     def add(self, at: Coordinates, kind: int, value: float) -> None:
         """Take up a level at its coordinates."""
-        self._at.append(float(at["place"]))
-        self._kind.append(kind)
-        self._value.append(value)
+        place = float(at["place"])
+        i = bisect_right(self._places[kind], place)
+        self._places[kind].insert(i, place)
+        self._values[kind].insert(i, value)
 
     def predict(self, at: Coordinates, kind: int) -> tuple[Array, Array]:
         """Means and standard deviations of a level at coordinates (arrays of one shape), the means' errors included.
@@ -395,7 +398,7 @@ class Nearby:
         Raises:
             ValueError: too few levels were taken up to know the means.
         """
-        if not {ONSET, ARREST} <= set(self._kind):
+        if not all(self._places):
             raise ValueError("no level of each kind yet")
         asked = np.asarray(at["place"], float)
         distinct, back = np.unique(asked, return_inverse=True)
@@ -403,11 +406,9 @@ class Nearby:
         return found[:, 0][back].reshape(asked.shape), found[:, 1][back].reshape(asked.shape)
 
     def _one(self, coordinate: float, kind: int) -> tuple[float, float]:
-        at, of, value = np.array(self._at), np.array(self._kind, int), np.array(self._value)
-        near = [np.flatnonzero(of == k) for k in (ONSET, ARREST)]
-        near = [p[np.argsort(np.abs(at[p] - coordinate), kind="stable")[: self._most // 2]] for p in near]
-        chosen = np.concatenate(near)
-        at, of, value = at[chosen], of[chosen], value[chosen]
+        parts = [self._nearest(k, coordinate) for k in (ONSET, ARREST)]
+        at, value = np.concatenate(parts, axis=1)
+        of = np.repeat([ONSET, ARREST], [part.shape[1] for part in parts])
         law = self._law
         whole, to = np.diag(np.array(law.scatter)[of] ** 2), np.zeros(at.size)
         own = law.scatter[kind] ** 2
@@ -417,10 +418,19 @@ class Nearby:
             to += c.size[kind] * size * covariance(c.kernel, np.abs(at - coordinate), c.length)
             own += c.size[kind] ** 2
         columns = np.eye(2)[of]
-        solved = np.linalg.solve(whole, np.column_stack([value, columns, to]))
+        factor = cho_factor(whole, lower=True, overwrite_a=True, check_finite=False)
+        solved = cho_solve(factor, np.column_stack([value, columns, to]), overwrite_b=True, check_finite=False)
         inverse = np.linalg.inv(columns.T @ solved[:, 1:3])
         means = inverse @ (columns.T @ solved[:, 0])
         column = np.eye(2)[kind] - to @ solved[:, 1:3]
         middle = to @ solved[:, 0] + column @ means
         variance = own - to @ solved[:, 3] + column @ inverse @ column
         return float(middle), math.sqrt(float(variance))
+
+    def _nearest(self, kind: int, coordinate: float) -> Array:
+        """Places of the nearest levels of a kind, and the levels, shape (2, n)."""
+        places, most = self._places[kind], self._most // 2
+        i = bisect_left(places, coordinate)
+        around = slice(max(i - most, 0), i + most)
+        both = np.array([places[around], self._values[kind][around]])
+        return both[:, np.argsort(np.abs(both[0] - coordinate), kind="stable")[:most]]
