@@ -194,13 +194,15 @@ def ranks(found: dict[str, Any]) -> str:
 def biases(found: dict[str, Any]) -> str:
     """Parameters whose ranks are not uniform, and by how many standard deviations they are off in the mean."""
     off = {name: p["mean off"] for name, p in found["parameters"].items() if p["chance"] < RARE}
-    told = [f"`{name}` is {x:+.1f}" for name, x in off.items()]
     ratios = [p["of the fit"] for p in found["parameters"].values()]
-    return (
-        f"but the ranks of {len(told)} of {len(ratios)} parameters are not uniform (p-value below {RARE:g}). In the "
-        f"mean {', '.join(told)} standard deviations off. The standard deviation of the draws is "
-        f"{min(ratios):.1f} to {max(ratios):.1f} times that of a fit."
-    )
+    words = f"No parameter has ranks that are not uniform (p-value below {RARE:g})."
+    if off:
+        told = ", ".join(f"`{name}` is {x:+.1f}" for name, x in off.items())
+        words = (
+            f"The ranks of {len(off)} of {len(ratios)} parameters are not uniform (p-value below {RARE:g}). In the "
+            f"mean {told} standard deviations off."
+        )
+    return f"{words} The standard deviation of the draws is {min(ratios):.1f} to {max(ratios):.1f} times that of a fit."
 
 
 @_drawn
