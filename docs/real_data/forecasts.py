@@ -10,7 +10,7 @@ import pandas
 
 import stickslip as ss
 from stickslip.inference.forecast.predict import METHODS, Forecaster
-from stickslip.inference.forecast.rolling import prepare, roll
+from stickslip.inference.forecast.rolling import roll
 from stickslip.inference.forecast.scoring import quantiles
 from stickslip.inference.forecast.wander import Wander
 from stickslip.objects.forecast import Forecast
@@ -134,8 +134,8 @@ def forecasts(data: Path, work: Path) -> dict[str, Any]:
     fault = next((work / "laboratory-fault").glob("*.csv"))
     results["laboratory fault"]["learners"] = learners(found["laboratory fault"], fault)
     # the same law through the slip path: how strongly the choice of coordinate matters
-    past, laws = prepare(found["paper slider"].past.trace, 0.5)
-    alone = {str(c.law): roll(past, c.law).score()[METHODS[0]]["crps"] for c in laws}
+    slider = found["paper slider"]
+    alone = {str(c.law): roll(slider.past, c.law).score()[METHODS[0]]["crps"] for c in slider.laws}
     results["paper slider"]["crps by law"] = alone
     keep(picture(found["paper slider"], found["laboratory fault"]), "forecast", 90)
     return {"records": results}

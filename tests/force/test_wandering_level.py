@@ -49,3 +49,15 @@ def test_the_level_is_found_and_a_wave_that_is_not_there_gains_little(prepared, 
     assert without.scatter.follows is None and level_of(without) is None
     assert without.cost - base.cost > 500.0
     assert gain(base, "position-dependent-friction") < 0.6 * gain(without, "position-dependent-friction")
+
+
+@pytest.mark.slow
+def test_a_way_back_tells_that_the_level_follows_the_place():
+    """There and back over the same track: friction that wanders with the place is met again, in the other order."""
+    effect = make("wandering-friction", size=SIZE, length=LENGTH, draw=2, along="place")
+    campaign = read([moved(1e-4, 26.0, 1e-4, [effect], turn=13.0)], 5)
+    given = prepare(campaign.description, campaign.traces, [segment(t) for t in campaign.traces])
+    assert given.problem.along == ("time", "slip path", "place")
+    base = fitting.fit_base(given.problem, given.start)
+    assert base.scatter.follows.coordinate == "place" and base.scatter.follows.alike == ()
+    assert level_of(base).form == {"along": "place"}

@@ -1,9 +1,11 @@
 """Forecasts of the next slip: scored rightly, calibrated on a known law, and blind to what comes later."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +30,7 @@ from stickslip.inference.forecast.predict import (
     times,
     waiting,
 )
-from stickslip.inference.forecast.rolling import choose, moments, roll
+from stickslip.inference.forecast.rolling import SHARES, choose, moments, roll
 from stickslip.inference.forecast.scoring import crps, quantiles, score, standard_error
 from stickslip.inference.forecast.wander import ONSET, Wander, fit
 from stickslip.objects import forecast
@@ -364,12 +366,19 @@ def test_an_interrupted_forecast_resumes(tmp_path, monkeypatch, stage):
     assert not out.exists()
     ready = len(list((tmp_path / "kept.partial" / "pieces").glob("*.npz")))
     made = []
-    fitted = forecast.compared
-    monkeypatch.setattr(forecast, "compared", lambda *given: made.append(given) or fitted(*given))
+
+    def counting(name: str, made_by: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda *given: made.append(name) or made_by(*given)
+
+    for name in ("compared", "choose", "roll"):
+        monkeypatch.setattr(forecast, name, counting(name, getattr(forecast, name)))
     said: list[str] = []
     found = campaign.forecast(out=out, progress=lambda text, share: said.append(text))
     assert f"resuming from {ready} finished parts" in said
-    assert len(made) == len(whole.laws) - min(ready, len(whole.laws))
+    laws = len(whole.laws)
+    assert made.count("compared") == laws - min(ready, laws)
+    assert made.count("choose") == (ready <= laws)
+    assert len(made) == laws + 2 + len(SHARES) - ready
     plain, again = (json.loads(json_text({**f.result, "seconds": 0.0})) for f in (whole, found))
     assert plain == again == read_result(out) | {"seconds": 0.0}
     xarray.testing.assert_identical(whole.arrays, found.arrays)
