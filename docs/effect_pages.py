@@ -73,8 +73,8 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         "In a scenario file:",
         "```toml\n" + _entry(cls) + "\n```",
         f"No fit takes it up (`stickslip fit --add {cls.tag}` says so): it is a random process, and another "
-        "draw is another course. What a measurement says of it, how large it is and what it follows, is "
-        "[told by a diagnosis and by a forecast](../forecast.md)."
+        "draw is another course. How large it is in a measurement and what it follows is part of "
+        "[every base fit](../diagnosis.md#the-force-along-the-measured-motion) and of a [forecast](../forecast.md)."
         if cls.drawn
         else f"The same in a fit: `stickslip fit campaign.toml --add {cls.tag}`.",
         "## In a measurement",

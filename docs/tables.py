@@ -195,7 +195,13 @@ def biases(found: dict[str, Any]) -> str:
     """Parameters whose ranks are not uniform, and by how many standard deviations they are off in the mean."""
     off = {name: p["mean off"] for name, p in found["parameters"].items() if p["chance"] < RARE}
     ratios = [p["of the fit"] for p in found["parameters"].values()]
-    words = f"No parameter has ranks that are not uniform (p-value below {RARE:g})."
+    error = found["campaigns"] ** -0.5
+    words = (
+        f"With {found['campaigns']} rigs no deviation from uniform ranks is detected (p-value below {RARE:g}). A mean "
+        f"error of {2.0 * error:.1f} standard deviations would be two standard errors."
+    )
+    if far := {name: p["mean off"] for name, p in found["parameters"].items() if abs(p["mean off"]) > 2.0 * error}:
+        words += f" It is larger for {', '.join(f'`{name}` with {x:+.2f}' for name, x in far.items())}."
     if off:
         told = ", ".join(f"`{name}` is {x:+.1f}" for name, x in off.items())
         words = (
@@ -231,7 +237,8 @@ def experiments(found: dict[str, Any]) -> str:
         f"{100 * alone / len(sets):.0f} %. The other {len(sets) - made} were not tested: in {lacking} the hidden "
         f"effect is missing; in {wrong} the rival is a wrong entry of the rig, for which none is proposed; for "
         f"{len(sets) - made - lacking - wrong} no experiment of the drive alone makes the true model twice as likely "
-        "within 30 s (others change mass, spring or load, which this test does not make)."
+        "within 30 s (others change mass, spring or load, which this test does not make). "
+        f"Experiments that were made: {', '.join(dict.fromkeys(c['experiment'] for c in sets if 'left' in c))}."
     )
     return f"{told}\n\n{table(['hidden', 'others in the set', 'proposed experiment', 'named with its run'], rows)}"
 

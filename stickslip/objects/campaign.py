@@ -12,7 +12,7 @@ from ..data.checks import Finding, refuse_impossible, rig_against_motion
 from ..data.displacements import true_gains, with_displacements
 from ..data.readers.repair import from_load_point
 from ..data.segment import Segmentation, segment
-from ..data.segment.left_out import left_out
+from ..data.segment.left_out import left_out as not_used
 from ..data.trace import Trace
 from ..errors import InputError, nearest
 from ..system.object_repr import Shown, facts, table
@@ -133,20 +133,20 @@ class Campaign(Shown, Mapping[str, Trace]):
 
     @cached_property
     def scaled(self) -> tuple[tuple[Segmentation, ...], tuple[str, ...]]:
-        """Slips with the scale of spring forces set right where sticks show it wrong, and a sentence for each."""
+        """Slips of all runs, the scale of the spring force corrected where sticks show it wrong, and a note on each."""
         segmentations, notes = true_gains(self.traces, self.events)
         return tuple(segmentations), tuple(notes)
 
     @cached_property
     def displaced(self) -> tuple[tuple[Trace, ...], tuple[str, ...]]:
-        """The runs with displacements, derived where they were not measured, and a sentence for each of these."""
+        """Runs with a displacement, derived where it was not measured, and a note on each of these."""
         traces, notes = with_displacements(self.traces, self.scaled[0])
         return tuple(traces), tuple(notes)
 
     @cached_property
-    def lost(self) -> tuple[str, ...]:
-        """What was left out of the data, in words."""
-        return tuple(left_out(self.traces, self.scaled[0]))
+    def left_out(self) -> tuple[str, ...]:
+        """Data that are not used, and why."""
+        return tuple(not_used(self.traces, self.scaled[0]))
 
     def prepare(self, holdout: str | Sequence[str] = ()) -> Prepared:
         """The problem of the force along the measured motion, and where the fit of the base begins.
@@ -168,7 +168,7 @@ class Campaign(Shown, Mapping[str, Trace]):
         """Events of every run, what was mended or left out, and what these data can tell.
 
         Args:
-            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
+            progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
         """
         from .inspection import inspect
 
@@ -273,7 +273,7 @@ class Campaign(Shown, Mapping[str, Trace]):
             out: run folder for ``result.json``, ``arrays.nc``, ``report.html``, and until it is finished for the parts
                 from which an interrupted forecast goes on; default none.
             force: replace an existing run folder.
-            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
+            progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
 
         Raises:
             InputError: no run of that name, too few slips, no load point or force, shares out of range.

@@ -27,9 +27,9 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
 
     Returns:
         A row for each: ``model``; ``error`` and ``unseen error`` in floors of the first one, with their standard
-        deviations; ``behind``, by how much less likely than by the first one the runs are that are left out, each in
-        turn (twice the logarithm of the likelihood), and ``+-``, its standard error, by how much events differ. Fits
-        within two or three of it predict equally well.
+        deviations; ``behind``, twice the difference in log-likelihood of the left-out runs (each left out in turn) to
+        the first row, and ``+-``, its standard error from event to event. Fits within two or three of it predict
+        equally well.
 
     Raises:
         InputError: no fit, fits without names, fits of other runs, or a single event, which leaves nothing to predict

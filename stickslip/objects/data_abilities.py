@@ -148,11 +148,11 @@ def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
     for t, s in pairs:
         if t.name in force and t.spring_stiffness is None and s.settings.unit == "m" and s.settings.gain:
             bad.append(
-                f"{t.name}: the spring's stiffness is not given. Lengths are as if the block stood still early in a "
-                f"stick: c_s = {shown(s.settings.gain, 'N/m', 3)}."
+                f"{t.name}: the spring's stiffness is not given. It is estimated from the loading rate early in a "
+                f"stick, where the block hardly moves: c_s = {shown(s.settings.gain, 'N/m', 3)}."
             )
         if s.settings.unit != "m":
-            bad.append(f"{t.name}: neither stiffness nor drive is known, so lengths are in seconds of loading.")
+            bad.append(f"{t.name}: neither stiffness nor drive is known, so lengths are given as loading time (s).")
     return good, bad
 
 

@@ -259,7 +259,7 @@ def _made(campaign: Campaign, done: Found, able: Any, began: float, limit: float
         ],
         "can": list(able.can),
         "cannot": list(able.cannot),
-        "dropped": [*campaign.lost, *sections["dropped"]],
+        "dropped": [*campaign.left_out, *sections["dropped"]],
         **described,
         "seconds": round(time.perf_counter() - began, 1),
     }

@@ -69,7 +69,7 @@ class Fit(Savable):
         self._confirmation: Confirmation | None = None
 
     def bare(self) -> Fit:
-        """The same without what was found when asked for (some 20 MB), which is found again when asked for again."""
+        """A copy without cached results (some 20 MB), which are computed again on demand."""
         if self._moved is not None:
             made = Fit(self.campaign, self._climbed, replace(self._moved))
         else:
@@ -87,7 +87,7 @@ class Fit(Savable):
 
     @cached_property
     def climbed(self) -> Climbed:
-        """The models on the way here, the last of which is the model as it stands."""
+        """The fitted models in order, from the static one to the present one."""
         return self._climbed if self._moved is None else replaced(self._climbed, self._moved)
 
     @property
@@ -293,7 +293,7 @@ class Fit(Savable):
         """Errors of the model run freely, from arrest to arrest, through runs it was not fitted to.
 
         Args:
-            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
+            progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
 
         Returns:
             A row for each run: relative errors (1) of recurrence, slip and creep before the onset; slips missed.
@@ -301,7 +301,7 @@ class Fit(Savable):
         return free_run_errors(self.confirm(progress), self.parts)
 
     def freely(self, run: str) -> xarray.Dataset:
-        """The model as it stands, run freely through a measured run, each cycle from the measured arrest before it.
+        """Free simulation of every cycle of a measured run, each begun at the measured arrest before it.
 
         Returns:
             Over ``cycle`` and ``step``: ``time`` (s, of the record) and ``displacement`` (m, as the sensor shows it); a
@@ -365,13 +365,16 @@ class Fit(Savable):
     ) -> arviz.InferenceData:
         """Draw from the posterior by the No-U-Turn sampler (Hoffman & Gelman, JMLR 15 (2014) 1593; by nutpie).
 
-        The covariance of the residuals is that of the fit, every event is marginalised; gradients are exact.
+        Sampled are the free parameters, with exact gradients. The covariance of the residuals is held as the fit found
+        it, what differs from event to event is marginalised, and what the force is linear in (the strengths of the
+        elements, errors that all cycles share, phases) is at its best for every draw, so that its uncertainty is not
+        in the sample.
 
         Args:
             draws, tune: of each chain, kept and for adaptation.
             chains: side by side.
             seed: of the draws.
-            progress: told what is done and the share of it; default a bar in a terminal or a notebook.
+            progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
 
         Returns:
             ``posterior`` holds the free parameters (SI, ``attrs["units"]``) and ``contact.strength``; its

@@ -61,7 +61,7 @@ def contact_force(fit: Fit, where: dict[str, np.ndarray], floor: np.ndarray) -> 
     }  # fmt: skip
     units = {"stiffness": "N/m"}
     made = {k: ("point", v, {"units": units.get(k, "N")}) for k, v in data.items()}
-    made["left_out"] = ("point", found.dropped, {"long_name": "beyond what is random: a jump of the sensor"})
+    made["left_out"] = ("point", found.dropped, {"long_name": "outlier, not used in the fit"})
     return xarray.Dataset(made, coords=coords, attrs={"title": fit.campaign.title, "model": " + ".join(fit.parts)})
 
 

@@ -37,6 +37,6 @@ def fit_result(fit: Fit, confirmation: Confirmation) -> tuple[dict[str, Any], di
         },
         "rig": [finding.plain() for finding in campaign.findings],
         "notes": [*campaign.scaled[1], *campaign.displaced[1]],
-        "dropped": [*campaign.lost, *sections["dropped"]],
+        "dropped": [*campaign.left_out, *sections["dropped"]],
     }
     return result, variables | pictured

@@ -78,7 +78,7 @@ class Inspection(Savable):
 
     def _parts(self) -> list[Any]:
         said = [("contradicted by the motion", self.findings), ("can tell", self.can), ("cannot", self.cannot)]
-        lines = [facts({name: "; ".join(line.removesuffix(".") for line in lines)}) for name, lines in said if lines]
+        lines = ["\n".join([f"{name}:", *(f"- {line}" for line in lines)]) for name, lines in said if lines]
         return [facts({"campaign": self.result["title"]}), self.campaign.summary, *lines]
 
 

@@ -104,4 +104,7 @@ def trust(found: Any) -> list[str]:
     few = [name for name in names if float(size[name]) < FEW]
     if few:
         said.append(f"Fewer than {FEW} independent draws of {', '.join(few)}: intervals are rough.")
-    return said or [f"No divergence in {total} draws; the chains agree."]
+    if said:
+        return said
+    chains = "; the chains agree" if found.posterior.sizes["chain"] > 1 else " of a single chain"
+    return [f"No divergence in {total} draws{chains}."]

@@ -98,6 +98,6 @@ def fit_static(
         **described,
         "rig": [finding.plain() for finding in campaign.findings],
         "notes": notes,
-        "dropped": [*campaign.lost, *result["dropped"]],
+        "dropped": [*campaign.left_out, *result["dropped"]],
     }
     return StaticFit(campaign, whole, variables | pictured)

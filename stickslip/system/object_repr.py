@@ -50,7 +50,9 @@ def _text(part: Any) -> str:
 
 def _html(part: Any) -> str:
     if isinstance(part, str):
-        return f"<p>{escape(part)}</p>"
+        first, *lines = part.split("\n")
+        items = "".join(f"<li>{escape(line.removeprefix('- '))}</li>" for line in lines)
+        return f"<p>{escape(first)}</p>" + (f"<ul>{items}</ul>" if items else "")
     return str(part.to_html(max_rows=ROWS, float_format=_number, border=0, escape=True))
 
 

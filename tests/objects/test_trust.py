@@ -42,6 +42,7 @@ def test_a_single_chain_is_not_compared_with_others():
     """R-hat compares chains: of one alone, its count of independent draws is what is said."""
     (said,) = trust(sampled(draws=60, chains=1, shift=3.0))
     assert said.startswith("Fewer than")
+    assert trust(sampled(chains=1)) == [f"No divergence in {DRAWS} draws of a single chain."]
 
 
 def test_all_that_speaks_against_a_sample_is_said():

@@ -32,7 +32,7 @@ from .rounds import Round
 from .search import Rung
 
 Variables = dict[str, Any]
-FARTHER = "the error of unseen runs rises where the random effects of events are zero"
+FARTHER = "the prediction error on left-out runs rises when the random effects of events are set to zero"
 LISTED = 6  # effects whose smallest visible amplitude is said in the verdict
 
 
@@ -212,12 +212,12 @@ def nearest_text(j: Judged) -> str:
     nearest = f"{j.tag} comes nearest, with {j.candidate.name} = {amount}"
     if j.inside:
         return (
-            f"Something is missing that no effect of the catalogue explains alone: {nearest}, which makes the forces "
-            "within events more likely, but events that are left out are predicted worse with it."
+            f"Something is missing that no effect of the catalogue explains alone: {nearest}, which raises the "
+            "likelihood within events but predicts left-out events worse."
         )
     return (
-        f"Something is missing that no effect of the catalogue explains in its range: {nearest}, at its bound or known "
-        "no better than its distance from it."
+        f"Something is missing that no effect of the catalogue explains in its range: {nearest}, at a bound or within "
+        "one standard deviation of it."
     )
 
 

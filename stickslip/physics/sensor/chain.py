@@ -22,7 +22,7 @@ _LEAST = {"gain": -1.0, "drift": -1.0, "clock_error": -0.5}  # of what may be ne
 
 @dataclass(frozen=True, repr=False)
 class Vibrometer:
-    """Settings; zero switches a part off.
+    """Settings of a simulated vibrometer; a value of zero switches that error off.
 
     Args:
         resolution: one count (m).
