@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 MANY = 30  # slips, or strokes, from which on it is said what their level follows
 LEARNED = 0.7  # of them, from which that is learned
+MOSTLY = 0.5  # of a level's variance in strokes, from which on it follows the place
 
 
 def most_slips(campaign: Campaign) -> int:
@@ -62,10 +63,14 @@ def _of_strokes(campaign: Campaign) -> dict[str, Any] | None:
     name, found = max(every, key=lambda one: one[1].time.size, default=("", None))
     if found is None or found.time.size < MANY:
         return None
-    mean = float(found.level.mean())
+    mean, shares = float(found.level.mean()), found.shares
+    followed = _followed(found.arrays, mean, "stroke")
+    if (by_place := shares["by the place"]) > MOSTLY:
+        text = f"The level follows the place: {100 * by_place:.0f} % of its variance are the same in every stroke."
+        followed |= {"coordinate": "place", "text": f"{text} From stroke to stroke: {followed['text']}"}
     return {
         "run": name, "strokes": int(found.time.size), "track": float(np.ptp(found.place)),
-        "variation": float(found.level.std()) / mean, "shares": found.shares, **_followed(found.arrays, mean, "stroke"),
+        "variation": float(found.level.std()) / mean, "shares": shares, **followed,
     }  # fmt: skip
 
 

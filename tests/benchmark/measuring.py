@@ -97,6 +97,7 @@ def slower(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     ratios = {name: new[name] / old[name] for name in new if old.get(name, 0.0) > 0.0 and new[name] > 0.0}
     lost = [name for name, seconds in new.items() if seconds == 0.0 and old.get(name, 0.0) > 0.0]
     lines = [f"no longer finished: {name}, {old[name]:.3g} s in the kept results" for name in lost]
+    lines += [f"no longer measured under this name: {name}" for name in old if name not in new]
     if not ratios:
         return lines
     was, among = before.get("yardstick_s"), "plain Python"

@@ -44,6 +44,11 @@ def test_what_is_no_longer_finished_is_said():
     assert "no longer finished: own size 10, 0.1 s" in line
 
 
+def test_what_is_measured_under_another_name_is_said():
+    renamed = {**TABLE, "rows": [["first", *TABLE["rows"][0][1:]], *TABLE["rows"][1:]]}
+    assert slower(TABLE, renamed) == ["no longer measured under this name: one, processor s"]
+
+
 def test_former_times_stay_when_a_part_is_measured_anew(tmp_path, monkeypatch):
     monkeypatch.setattr(measuring, "RESULTS", tmp_path / "performance.json")
     monkeypatch.setattr(measuring, "yardstick", lambda: 0.2)

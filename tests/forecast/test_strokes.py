@@ -52,7 +52,7 @@ def test_what_strokes_follow(follows):
     share = found["shares"]["by the place" if follows == "place" else "from stroke to stroke"]
     assert share > 0.9 and sum(found["shares"].values()) == pytest.approx(1.0)
     if follows == "place":
-        assert found["coordinate"] in ("", "nothing")
+        assert found["coordinate"] == "place" and "the same in every stroke" in found["text"]
     else:
         assert found["coordinate"] == follows and "nats a stroke" in found["text"]
     assert "slid both ways" in wander_sentence(found)
