@@ -33,6 +33,18 @@ def test_a_course_has_the_covariance_of_the_process():
             assert np.mean(w[k:] * w[:-k]) == pytest.approx(covariance("matern-3/2", lag, 1.0), abs=0.05)
 
 
+@pytest.mark.parametrize("lag", [0.02, 0.04, 0.1, 0.24, 1.0])
+def test_a_course_is_as_rough_over_short_ways_as_the_process(lag):
+    """Mean squares of first and second differences, from the covariance; the slope of the process jumps everywhere."""
+    s = np.arange(0.0, 1000.0, 0.02)
+    w = np.asarray(make("wandering-friction", size=0.1, draw=2.0).course(s))
+    k = round(lag / 0.02)
+    at = [float(covariance("matern-3/2", n * lag, 1.0)) for n in range(3)]
+    assert np.mean((w[k:] - w[:-k]) ** 2) == pytest.approx(2.0 * (at[0] - at[1]), rel=0.1)
+    second = w[2 * k :] - 2.0 * w[k:-k] + w[: -2 * k]
+    assert np.mean(second**2) == pytest.approx(6.0 * at[0] - 8.0 * at[1] + 2.0 * at[2], rel=0.1)
+
+
 def test_draws_are_independent_and_normal():
     s = np.arange(0.0, 400.0, 8.0)  # hardly correlated
     w = np.stack([np.asarray(make("wandering-friction", size=0.1, draw=n / 2).course(s)) for n in range(60)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from scipy.special import stdtrit
+from scipy.special import stdtr
 
 from ..contact import Bank
 from ..params import parameter, variant
@@ -13,9 +13,15 @@ from .base import Contact, Memory, Motion, Threshold
 from .catalogue import register
 
 WAVES = 128
-# even in the spectral density of the process (Student's t with three degrees of freedom), at places without a period
-_SHARE = (np.arange(WAVES) + np.mod(np.arange(1, WAVES + 1) * 0.5 * (np.sqrt(5.0) - 1.0), 1.0)) / WAVES
-FREQUENCY = stdtrit(3, 0.5 + 0.5 * _SHARE)
+HIGHEST = 200.0  # wave number in correlation lengths, beyond which 3e-7 of the variance is left out
+# bands evenly spaced up to half a wave number, and in its logarithm beyond: the few parts of the variance at high wave
+# numbers make the process as rough over short ways as it is
+_EDGES = 0.5 * np.sinh(np.linspace(0.0, np.arcsinh(2.0 * HIGHEST), WAVES + 1))
+# one wave in each, at places without a period
+_PLACES = np.mod(np.arange(1, WAVES + 1) * 0.5 * (np.sqrt(5.0) - 1.0), 1.0)
+FREQUENCY = _EDGES[:-1] + _PLACES * np.diff(_EDGES)
+# of the spectral density of the process, Student's t with three degrees of freedom
+AMPLITUDE = np.sqrt(4.0 * np.diff(stdtr(3, _EDGES)))
 # turned on by numbers without a common period, whatever the draw
 TURN = 2.0 * np.pi * np.mod(np.arange(1, WAVES + 1) ** 2 * np.sqrt(2.0), 1.0), np.sqrt(np.arange(2, WAVES + 2))
 
@@ -25,9 +31,9 @@ class WanderingFriction(Memory, Threshold):
     """The logarithm of the caps is one draw of a Gaussian process, along place, slip path or time.
 
     Its covariance is Matern's, eps^2 (1 + sqrt(3) r) exp(-sqrt(3) r) at a distance of r correlation lengths. The draw
-    is a sum of waves of one size, spread as the spectral density of the process is (Shinozuka & Deodatis 1991), whose
-    phases the number of the draw turns. Static and sliding friction wander together or one of them alone: with mu =
-    mu_k (1 - psi) + mu_s psi it is mu, mu_s or mu_k that is multiplied.
+    is a sum of waves, each as large as the spectral density of the process is in its band (Shinozuka & Deodatis 1991),
+    whose phases the number of the draw turns. Static and sliding friction wander together or one of them alone: with
+    mu = mu_k (1 - psi) + mu_s psi it is mu, mu_s or mu_k that is multiplied.
     """
 
     tag = "wandering-friction"
@@ -35,14 +41,14 @@ class WanderingFriction(Memory, Threshold):
     equation = (
         r"\mu \to \mu\,e^{w} \;\mathrm{or}\; \mu + \mu_s\,\psi\,(e^{w} - 1) \;\mathrm{or}\; "
         r"\mu + \mu_k\,(1 - \psi)\,(e^{w} - 1),"
-        r"\quad w = \varepsilon\,\sqrt{2/M}\,\sum_j \cos(q_j s/\ell + \varphi_j + n \gamma_j),"
+        r"\quad w = \varepsilon\,\sum_j a_j \cos(q_j s/\ell + \varphi_j + n \gamma_j),"
         r"\quad s = x \;\mathrm{or}\; \dot s = |\dot x| \;\mathrm{or}\; s = t,\ \ell = \tau"
     )
     symbols = {
         "w": "logarithm of the level of friction (1)",
         "s": "what the level goes with: place (m), slip path (m) or time (s)",
-        "M": "number of waves, 128",
-        "q_j": "wave numbers in correlation lengths, spread as the spectral density of the process is (1)",
+        "a_j": "amplitudes of 128 waves: a_j^2/2 is the share of the variance in a band of the spectral density (1)",
+        "q_j": "wave numbers in correlation lengths, one in each band, up to 200 (1)",
         r"\varphi_j": "phases of the first draw (rad)",
         r"\gamma_j": "turn of a phase from draw to draw (rad)",
     }
@@ -108,8 +114,8 @@ class WanderingFriction(Memory, Threshold):
         goes = {"place": "s = x", "slip": r"\dot s = |\dot x|,\quad s(0) = 0", "time": "s = t"}[self.along]
         length = r"\tau" if self.along == "time" else r"\ell"
         return (
-            rf"\mu \to {level},\quad w = \varepsilon\,\sqrt{{2/M}}\,\sum_j "
-            rf"\cos(q_j s/{length} + \varphi_j + n \gamma_j),\quad {goes}"
+            rf"\mu \to {level},\quad w = \varepsilon\,\sum_j "
+            rf"a_j \cos(q_j s/{length} + \varphi_j + n \gamma_j),\quad {goes}"
         )
 
     def start(self, bank: Bank) -> Array:
@@ -122,7 +128,7 @@ class WanderingFriction(Memory, Threshold):
         """Logarithm of the level at coordinates in correlation lengths, over its standard deviation; shape as ``s``."""
         first, turns = TURN
         waves = jnp.cos(FREQUENCY * jnp.asarray(s)[..., None] + (first + turns * self.draw))
-        return np.sqrt(2.0 / WAVES) * jnp.sum(waves, axis=-1)
+        return jnp.sum(AMPLITUDE * waves, axis=-1)
 
     def strength(self, state: Array, motion: Motion, contact: Contact) -> Array:
         at = {"place": motion.x / self.length, "slip": state / self.length, "time": motion.t / self.time}[self.along]
