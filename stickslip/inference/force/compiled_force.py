@@ -123,5 +123,9 @@ def of_events(way: Way, event: Any, of: Any) -> Way:
     """The way with what differs from event to event, shapes (e, 4) and (n, 4)."""
     strength, stretch, _, offset = (event[of[:, i], i] for i in range(OWN))
     return way._replace(
-        x=way.x + offset, strength=jnp.exp(strength), stretch=jnp.exp(stretch), shape=event[:, 2], of=of[:, 2]
+        x=way.x + offset,
+        strength=way.strength * jnp.exp(strength),
+        stretch=jnp.exp(stretch),
+        shape=event[:, 2],
+        of=of[:, 2],
     )

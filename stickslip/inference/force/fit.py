@@ -15,6 +15,7 @@ from ..fit.parameters import Free
 from .bank import placed
 from .descent import DAMPING, descend
 from .jumps import jumping
+from .level_within_events import with_level
 from .linearised import FARTHEST, Array, Linearised, moved
 from .linked_events import WALK, grown
 from .noise import FAR, bands, beyond, by_reading, carrier, known_of, left_out, reading_errors
@@ -211,6 +212,7 @@ def fit(
                 out = out | more
                 made = made.without(blocks(left_out(problem, out)))
                 sizes = estimate(sizes, marginal, made, NEWTON)
+        problem, slopes = with_level(problem, point, slopes, sizes, made, blocks)
         point, slopes, total, count, damping = descend(problem, point, slopes, sizes, made, blocks, steps, damping)
         evaluations += count
         if turn > PLACED + 2 and total < 1.0:
@@ -317,6 +319,7 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
         fallen = before - misfit(sizes.sizes, marginal, known)
         if turn == rounds:
             break
+        problem, slopes = with_level(problem, point, slopes, sizes, known, blocks)
         point, slopes, total, count, damping = descend(problem, point, slopes, sizes, known, blocks, steps, damping)
         evaluations += count
         if fallen + total < 1.0:
@@ -353,7 +356,7 @@ def wandering(found: Fit) -> Fit:
 def independent(found: Fit) -> Fit:
     """The fit with strengths of events that do not follow each other."""
     own = replace(found, scatter=found.scatter.independent(), known=found.known.following(None))
-    return adapted(refit(found.problem, found.point, own))
+    return adapted(refit(found.problem.with_beyond(np.zeros_like(found.problem.beyond)), found.point, own))
 
 
 def at(problem: Problem, point: Point, scatter: Scatter, base: Fit) -> Fit:

@@ -60,6 +60,7 @@ def fit_arrays(found: Fit) -> dict[str, np.ndarray]:
         "carrier": np.asarray([] if problem.carrier is None else problem.carrier),
         "errors": np.concatenate(problem.errors),
         "offset": problem.offset,
+        "beyond": problem.beyond,
         "jumps": np.array(problem.jumps, int),
         "bands": problem.bands,
         "valleys": np.array(found.valleys),
@@ -81,6 +82,8 @@ def fit_of(problem: Problem, kept: Mapping[str, np.ndarray]) -> Fit:
     if "errors" in kept:  # files of before have none
         ends = np.cumsum([e.size for e in problem.errors])[:-1]
         problem = problem.moved(np.split(np.asarray(kept["errors"], float), ends), np.asarray(kept["offset"], float))
+    if "beyond" in kept:
+        problem = problem.with_beyond(np.asarray(kept["beyond"], float))
     if "bands" in kept:
         problem = problem.in_bands(np.asarray(kept["bands"], float))
     if "jumps" in kept:

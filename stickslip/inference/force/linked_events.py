@@ -141,6 +141,10 @@ class Chain:
         slides = self.slides[..., None]
         return np.asarray(strength[..., None] * (slides * own + (1.0 - slides) * held))
 
+    def course(self, share: Array, event: Index, states: Array) -> Array:
+        """Level at shares of the ways of events (n,), from the states of all events (E, 4), shape (n,)."""
+        return np.asarray((_cubic(share, self.way[event]) * states[event]).sum(axis=1))
+
     def bridge(self) -> Array:
         """Covariance between its nodes of a level whose slope gains a variance of 1 over a unit, shape (E, n, n).
 

@@ -60,7 +60,8 @@ class Problem:
     strength is another, what is left of the hum, and jumps of the reading before some events (:meth:`with_jumps`).
     Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
     the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`). Another
-    spring or mass leaves it as it is: residuals grow as errors of the reading do, not as forces.
+    spring or mass leaves it as it is: residuals grow as errors of the reading do, not as forces. What a level of the
+    strength does within events ``beyond`` first order (N), shape (p,), is added as well (:mod:`.level_within_events`).
     """
 
     def __init__(self, composition: Composition, runs: Sequence[Knots]) -> None:
@@ -100,7 +101,7 @@ class Problem:
         self.jumps: tuple[int, ...] = ()
         self.bands = np.full(len(PHASES), float(np.mean([k.band for k in runs])))
         self.errors = tuple(np.zeros(k.t.size) for k in runs)
-        self.offset = np.zeros(self.at.size)
+        self.offset, self.beyond = np.zeros(self.at.size), np.zeros(self.at.size)
         self.coordinates = _coordinates(runs)
 
     @property
@@ -208,6 +209,19 @@ class Problem:
         other.runs = tuple(replace(k, x=k.x + step) for k, step in zip(self.runs, steps, strict=True))
         rooms = (np.pad(step, (0, way.x.size - step.size), "edge") for step, way in zip(steps, self.ways, strict=True))
         other.ways = tuple(way._replace(x=way.x + room) for way, room in zip(self.ways, rooms, strict=True))
+        return other
+
+    def with_beyond(self, beyond: Array) -> Problem:
+        """The same with other forces ``beyond`` first order (N), shape (p,)."""
+        other = self.with_composition(self.composition)
+        other.beyond = beyond
+        return other
+
+    def with_courses(self, courses: Sequence[Array]) -> Problem:
+        """The same where the strength (e-folds) has a given course at the knots of every run, shape (n,) each."""
+        other = self.with_beyond(np.zeros(self.at.size))
+        rooms = (np.pad(course, (0, way.x.size - course.size)) for course, way in zip(courses, self.ways, strict=True))
+        other.ways = tuple(way._replace(strength=np.exp(room)) for room, way in zip(rooms, self.ways, strict=True))
         return other
 
     def recarried(self, slopes: Slopes, point: Point) -> Slopes:
@@ -336,9 +350,14 @@ class Problem:
             kept.append(((tangent[:n] + beside) * shares, slides, sliding * shares, psi))
             p += run.at.size
         slopes[:, a + b * runs + k :] = self._carried(tangents, local)
-        residual += self.offset + slopes[:, a + b * runs + k :] @ point.common
+        residual += self.offset + self.beyond + slopes[:, a + b * runs + k :] @ point.common
         sticking, sliding, forces, states = zip(*kept, strict=True)
         return Forces(residual, local, springs, tangents, sticking, sliding, forces, states, held, share), slopes
+
+
+def coordinate(k: Knots, name: str) -> Array:
+    """What a level may follow (one of :data:`ALONG`), at the knots of a run (s or m), shape (n,)."""
+    return {"time": k.t, "slip path": np.append(0.0, np.cumsum(np.abs(np.diff(k.x)))), "place": k.x}[name]
 
 
 def _coordinates(runs: Sequence[Knots]) -> list[tuple[Array, Array, Array, Array]]:
@@ -350,7 +369,7 @@ def _coordinates(runs: Sequence[Knots]) -> list[tuple[Array, Array, Array, Array
     for name in ALONG:
         parts = []
         for k in runs:
-            way = {"time": k.t, "slip path": np.append(0.0, np.cumsum(np.abs(np.diff(k.x)))), "place": k.x}[name]
+            way = coordinate(k, name)
             limits, values = np.interp(_limits(k), k.t, way), k.at if name == "time" else _mean(k, way)
             far = np.diff(limits)[k.of]
             share = (values - limits[k.of]) / np.where(far == 0.0, 1.0, far)

@@ -80,5 +80,8 @@ class WithEvents:
         """Mean level (share of the strength) of each event for residuals (E, n), shape (E,); zero where none is."""
         if self.known.chain is None:
             return np.zeros(values.shape[0])
-        stands = self.linked.found(self._apart(self.back @ values[..., None]))
-        return np.asarray((self.known.chain.mean * stands[:, WALK:, 0]).sum(axis=1))
+        return np.asarray((self.known.chain.mean * self.stands(values)[:, WALK:]).sum(axis=1))
+
+    def stands(self, values: Array) -> Array:
+        """Most likely nodes of each event for residuals (E, n), shape (E, 2), with levels (E, 6)."""
+        return np.asarray(self.linked.found(self._apart(self.back @ values[..., None]))[..., 0])

@@ -1,0 +1,68 @@
+"""What a level of the strength that wanders does within an event beyond first order.
+
+The likelihood is linear in the level (:mod:`.linked_events`). A level that changes by a per cent within an event leaves
+a few ten-thousandths of the strength to that, as much as all else that is random, and a wave of the place would take
+it up. So the model is driven once with the most likely course of the level, and what its forces differ by from those
+of first order is added to the residuals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .linearised import Array
+from .linked_events import WALK
+from .point import Forces, Point, Slopes
+from .problem import Problem, coordinate
+from .scatter import Blocks, Follows, Known, Scatter
+from .whitening import Whitening
+
+
+def with_level(
+    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks
+) -> tuple[Problem, Slopes]:
+    """The problem with the most likely course of the level at a point, and what :meth:`Problem.evaluate` says there.
+
+    Args:
+        problem, point, slopes: where.
+        scatter, known: sizes of what is random, and what the covariance is made of.
+        blocks: points by event.
+    """
+    if scatter.follows is None or known.chain is None:
+        return problem, slopes
+    own = known.with_local(blocks(slopes.local))
+    states = _states(problem, point, slopes, scatter, own, blocks)
+    beyond = _beyond(problem, point, slopes, scatter.follows, own, states, blocks)
+    return problem.with_beyond(beyond), replace(slopes, residual=slopes.residual - problem.beyond + beyond)
+
+
+def _states(problem: Problem, point: Point, forces: Forces, scatter: Scatter, known: Known, blocks: Blocks) -> Array:
+    """Values and slopes of the level (e-folds) at both ends of every event, shape (E, 4)."""
+    white = Whitening(scatter.sizes, known).with_events(known.local)
+    marginal = blocks(forces.residual) - np.einsum("eia,ea->ei", known.local, point.events)
+    return np.asarray(-white.stands(marginal)[:, WALK:])
+
+
+def _beyond(
+    problem: Problem, point: Point, slopes: Slopes, follows: Follows, known: Known, states: Array, blocks: Blocks
+) -> Array:  # fmt: skip
+    """Residual along the course of the level less that of first order (N), shape (p,)."""
+    chain = known.chain
+    assert chain is not None
+    mean = (chain.mean * states).sum(axis=1)
+    courses = []
+    for first, run in zip(problem.first, problem.runs, strict=True):
+        there = (run.event >= 0) & (run.event < run.events)
+        e = first + np.where(there, run.event, 0)
+        whole = chain.end[e] - chain.begin[e]
+        share = (coordinate(run, follows.coordinate) - chain.begin[e]) / np.where(whole == 0.0, 1.0, whole)
+        course = chain.course(np.clip(share, 0.0, 1.0), e, states)
+        courses.append(np.where(there, course - mean[e], 0.0))
+    strength = known.local[..., 0]
+    first_order = np.einsum("eik,ek->ei", chain.loads(strength), states) - strength * mean[:, None]
+    along = problem.with_courses(courses).evaluate(point).residual
+    out = along - (slopes.residual - problem.beyond)
+    out[blocks.index[blocks.there]] -= first_order[blocks.there]
+    return out
