@@ -125,7 +125,7 @@ def of_events(way: Way, event: Any, of: Any) -> Way:
     return way._replace(
         x=way.x + offset,
         strength=way.strength * jnp.exp(strength),
-        stretch=jnp.exp(stretch),
+        stretch=way.stretch * jnp.exp(stretch),
         shape=event[:, 2],
         of=of[:, 2],
     )

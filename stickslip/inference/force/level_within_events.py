@@ -60,8 +60,7 @@ def _beyond(
         share = (coordinate(run, follows.coordinate) - chain.begin[e]) / np.where(whole == 0.0, 1.0, whole)
         course = chain.course(np.clip(share, 0.0, 1.0), e, states)
         courses.append(np.where(there, course - mean[e], 0.0))
-    strength = known.local[..., 0]
-    first_order = np.einsum("eik,ek->ei", chain.loads(strength), states) - strength * mean[:, None]
+    first_order = np.einsum("eik,ek->ei", chain.loads(known.caps), states) - known.caps * mean[:, None]
     along = problem.with_courses(courses).evaluate(point).residual
     out = along - (slopes.residual - problem.beyond)
     out[blocks.index[blocks.there]] -= first_order[blocks.there]

@@ -13,7 +13,7 @@ from .composition import PULL
 from .point import Forces, Point, Slopes
 from .problem import Problem
 from .scatter import EVENTS, Blocks, Scatter
-from .whitening import Whitening
+from .whitening import LEVELLED, Whitening
 
 Array = NDArray[np.float64]
 BEND = 1.0  # standard deviation of the second difference of neighbouring weights, over their mean
@@ -79,7 +79,7 @@ class Linearised:
         """The events' own values where what is shared is changed, shape (E, 4)."""
         rest = self.marginal + self.shared @ change
         events = -self.random * np.einsum("eia,ei->ea", self.local, self.white.weighted(rest))
-        events[:, 0] -= self.white.level(rest)
+        events[:, :LEVELLED] -= self.white.level(rest)[:, None]
         return np.asarray(events)
 
     def covariance(self) -> Array:

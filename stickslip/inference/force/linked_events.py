@@ -5,11 +5,12 @@ from it, and what sticks (k) remembers where it was at the arrest t0. With w_0 a
 a time T apart, w(t) = (1 - s) w_0 + s w_1 and a Brownian bridge, s = (t - t0) / T. The bridge is an event's own. The
 nodes hang together from event to event of a run, w_1 - w_0 ~ N(0, size^2 T), and begin at zero.
 
-*Level.* The strength of an event is partly its own and partly a level, a Matern process of order 3/2 along time, slip
-path or place: cov = size^2 (1 + q) exp(-q) with q = sqrt(3) |s_i - s_j| / length in a run, nothing between runs. It has
-a slope, and value and slope together are Markov (Hartikainen & Sarkka 2010); its nodes are where events end, in the
-middle of slips. Between two nodes it goes as a cubic but for the bridge of an integrated Brownian motion, which is an
-event's own: so does the process where events are short beside its length, and a smoother one with less of the bridge.
+*Level.* The caps of an event are partly its own and partly a level, which leaves the stiffnesses as they are. It is a
+Matern process of order 3/2 along time, slip path or place: cov = size^2 (1 + q) exp(-q) with q = sqrt(3) |s_i - s_j| /
+length in a run, nothing between runs. It has a slope, and value and slope together are Markov (Hartikainen & Sarkka
+2010); its nodes are where events end, in the middle of slips. Between two nodes it goes as a cubic but for the bridge of
+an integrated Brownian motion, which is an event's own: so does the process where events are short beside its length,
+and a smoother one with less of the bridge.
 
 Given the nodes events are independent, so that these are eliminated with a banded matrix (Rue & Held 2005, Gaussian
 Markov Random Fields, ch. 2).
@@ -135,11 +136,11 @@ class Chain:
         half = np.full_like(self.way, 0.5)
         return np.stack([half, self.way / 12.0, half, -self.way / 12.0], axis=1)
 
-    def loads(self, strength: Array) -> Array:
-        """What the four states of an event do, given what its strength does: (E, n) to (E, n, 4)."""
+    def loads(self, caps: Array) -> Array:
+        """What the four states of an event do, given what an e-fold of its caps does: (E, n) to (E, n, 4)."""
         own, held = _cubic(self.share, self.way[:, None]), _cubic(self.held, self.way)[:, None]
         slides = self.slides[..., None]
-        return np.asarray(strength[..., None] * (slides * own + (1.0 - slides) * held))
+        return np.asarray(caps[..., None] * (slides * own + (1.0 - slides) * held))
 
     def course(self, share: Array, event: Index, states: Array) -> Array:
         """Level at shares of the ways of events (n,), from the states of all events (E, 4), shape (n,)."""

@@ -25,7 +25,7 @@ from .force_along_motion import Way
 from .knots import PHASES, Knots
 from .linked_events import Chain
 from .point import OWN, Forces, Point, Slopes
-from .scatter import Blocks, Follows
+from .scatter import Blocks, Follows, caps
 
 Array = NDArray[np.float64]
 CREEPING = PHASES.index("creep")
@@ -136,7 +136,7 @@ class Problem:
             return None
         begin, end, share, held = self.coordinates[ALONG.index(follows.coordinate)]
         slide = np.concatenate([_mean(k, s) for k, s in zip(self.runs, forces.sliding, strict=True)])
-        whole = -forces.local[:, 0]
+        whole = -caps(forces.local)
         slides = np.clip(slide / np.where(whole == 0.0, np.inf, whole), 0.0, 1.0)
         return Chain(begin, end, self.event_run, follows.unit, blocks(share), blocks(slides), held)
 
@@ -218,10 +218,11 @@ class Problem:
         return other
 
     def with_courses(self, courses: Sequence[Array]) -> Problem:
-        """The same where the strength (e-folds) has a given course at the knots of every run, shape (n,) each."""
+        """The same where the caps (e-folds) have a given course at the knots of every run, shape (n,) each."""
         other = self.with_beyond(np.zeros(self.at.size))
         rooms = (np.pad(course, (0, way.x.size - course.size)) for course, way in zip(courses, self.ways, strict=True))
-        other.ways = tuple(way._replace(strength=np.exp(room)) for room, way in zip(rooms, self.ways, strict=True))
+        both = [(way, np.exp(room)) for room, way in zip(rooms, self.ways, strict=True)]
+        other.ways = tuple(way._replace(strength=caps, stretch=caps) for way, caps in both)
         return other
 
     def recarried(self, slopes: Slopes, point: Point) -> Slopes:

@@ -244,7 +244,7 @@ class Known:
         """What all nodes that go on from event to event do to the residual force, shape (E, n, 2 or 6)."""
         if self.chain is None:
             return self.nodes
-        return np.concatenate([self.nodes, self.chain.loads(self.local[..., 0])], axis=2)
+        return np.concatenate([self.nodes, self.chain.loads(self.caps)], axis=2)
 
     @cached_property
     def bridge(self) -> Array:
@@ -252,11 +252,15 @@ class Known:
         assert self.chain is not None
         return np.asarray(self.strengths * self.chain.bridge())
 
+    @property
+    def caps(self) -> Array:
+        """What an e-fold of the caps, stiffnesses as they are, does to the residual force (N), shape (E, n)."""
+        return caps(self.local)
+
     @cached_property
     def strengths(self) -> Array:
-        """Covariance (N^2) by strengths of events that differ by an e-fold, shape (E, n, n)."""
-        local = self.local[..., 0]
-        return np.asarray(local[:, :, None] * local[:, None, :])
+        """Covariance (N^2) by levels of events that differ by an e-fold, shape (E, n, n)."""
+        return np.asarray(self.caps[:, :, None] * self.caps[:, None, :])
 
     @cached_property
     def links(self) -> Links:
@@ -276,6 +280,11 @@ class Known:
     def spread(self, sizes: Array) -> Array:
         """Standard deviation of the sensor's walk over each event (m), shape (E,)."""
         return np.asarray(np.exp(sizes[_WALK]) * np.sqrt(self.lasting))
+
+
+def caps(local: Array) -> Array:
+    """Derivative in the caps, stiffnesses as they are: strength and yield displacement together, (..., 4) to (...)."""
+    return np.asarray(local[..., 0] + local[..., 1])
 
 
 def covariance(sizes: Array, k: Known) -> tuple[Array, Array]:

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .linked_events import WALK
-from .scatter import OWN, Known, covariance_alone, inverse
+from .scatter import OWN, Known, caps, covariance_alone, inverse
 
 Array = NDArray[np.float64]
+LEVELLED = 2  # of an event's own: strength and yield displacements go with the level
 
 
 class Whitening:
@@ -25,8 +26,9 @@ class Whitening:
         self.loads = self.back @ known.loads
         loads = self.loads
         if known.chain is not None:
-            # given its strength, an event tells of its levels by their difference, and by how they stand to it
-            own, least = self.back @ known.local[..., :1], np.exp(-sizes[0])
+            # given strength and yield displacements, an event tells of its levels by their difference, and by how they
+            # stand to both
+            own, least = self.back @ known.caps[..., None], np.exp(-sizes[:LEVELLED, None])
             mean = np.pad(known.chain.mean, ((0, 0), (WALK, 0)))[:, None]
             loads = np.concatenate([loads - own * mean, least * mean], axis=1)
         self.linked = known.linked(sizes, loads)
@@ -35,7 +37,7 @@ class Whitening:
         """Of residuals (E, n) with what is the events' own, (E, 4), under the covariance of both."""
         white, own = self.back @ values[..., None], events / np.exp(self.sizes[:OWN])
         if self.known.chain is not None:
-            white, own = np.concatenate([white, -own[:, None, :1]], axis=1), own[:, 1:]
+            white, own = np.concatenate([white, -own[:, :LEVELLED, None]], axis=1), own[:, LEVELLED:]
         return float((self.linked.apart(white) ** 2).sum() + (own**2).sum())
 
     def with_events(self, local: Array) -> WithEvents:
@@ -56,7 +58,7 @@ class WithEvents:
         self.known = known = plain.known
         loads = plain.loads
         if known.chain is not None:
-            loads = np.concatenate([loads[..., :WALK], self.back @ known.chain.loads(local[..., 0])], axis=2)
+            loads = np.concatenate([loads[..., :WALK], self.back @ known.chain.loads(caps(local))], axis=2)
         self.linked = known.linked(plain.sizes, self._apart(loads))
         self.logs = plain.logs + np.log1p(values).sum(axis=1) + self.linked.logs
 
@@ -77,7 +79,7 @@ class WithEvents:
         return np.asarray((np.swapaxes(self.back, 1, 2) @ white)[..., 0])
 
     def level(self, values: Array) -> Array:
-        """Mean level (share of the strength) of each event for residuals (E, n), shape (E,); zero where none is."""
+        """Mean level (share of the caps) of each event for residuals (E, n), shape (E,); zero where none is."""
         if self.known.chain is None:
             return np.zeros(values.shape[0])
         return np.asarray((self.known.chain.mean * self.stands(values)[:, WALK:]).sum(axis=1))
