@@ -128,7 +128,7 @@ def test_and_the_answer_says_what_keeps_each_from_being_named():
 
 def test_the_answer_says_which_law_comes_nearest_and_with_which_amplitude():
     text = nearest_text(replace(judged("sensor-drift", 600.0, 12.0), amplitude=2e-8, std=0.0))
-    assert "sensor-drift comes nearest, with sensor-drift.rate = 20 nm/s, at its bound" in text
+    assert "sensor-drift comes nearest, with sensor-drift.rate = 20 nm/s, at a bound" in text
 
 
 def test_what_only_the_error_of_events_keeps_from_being_seen_stops_a_name_as_well():
@@ -141,7 +141,7 @@ def test_what_only_the_error_of_events_keeps_from_being_seen_stops_a_name_as_wel
     assert done.beyond is farther
     assert failures(other, done) == ["wear makes unseen runs more likely, but " + FARTHER]
     assert failures(farther, done) == [FARTHER]
-    assert "predicted worse" in nearest_text(farther) and "wear comes nearest" in nearest_text(farther)
+    assert "predicts left-out events worse" in nearest_text(farther) and "wear comes nearest" in nearest_text(farther)
 
 
 def test_and_does_not_stop_what_predicts_them_as_well():

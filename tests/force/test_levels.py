@@ -104,7 +104,7 @@ def test_between_its_nodes_a_level_is_the_process_too():
     s = chain.begin[:, None] + chain.share * (chain.end - chain.begin)[:, None]
     q = rate * np.abs(np.subtract.outer(s.ravel(), s.ravel()))
     group = np.repeat(chain.group, POINTS)
-    strength = known.local[..., 0].ravel()
+    strength = known.local[..., :2].sum(axis=2).ravel()  # the caps alone: yield displacements go with them
     whole = LEVEL**2 * (1.0 + q) * np.exp(-q) * np.equal.outer(group, group) * np.multiply.outer(strength, strength)
     off, bridged = np.abs(found - whole).max(), Levels(chain, LEVEL, length).bend ** 2 * np.abs(known.bridge).max()
     assert off < 0.05 * bridged, (off, bridged)
@@ -118,7 +118,7 @@ def test_given_strengths_and_marginalised_ones_have_the_same_least_cost(way):
     plain = Whitening(sizes(), known)
     white, random = plain.with_events(known.local), np.exp(2.0 * true()[:4])
     events = -random * np.einsum("eia,ei->ea", known.local, white.weighted(marginal))
-    events[:, 0] -= white.level(marginal)
+    events[:, :2] -= white.level(marginal)[:, None]
 
     def cost(own):
         return plain.squares(marginal + np.einsum("eia,ea->ei", known.local, own), own)

@@ -43,7 +43,7 @@ def dense(sizes: np.ndarray, known: Known) -> np.ndarray:
         slides = chain.slides[..., None]
         load = slides * cubic(chain.share) + (1.0 - slides) * cubic(chain.held)[:, None]
         load *= np.stack([np.ones(events), chain.way, np.ones(events), chain.way], axis=1)[:, None]
-        load *= known.local[..., :1]
+        load *= known.local[..., :2].sum(axis=2, keepdims=True)  # the caps alone: yield displacements go with them
         whole = of_states.reshape(events, 4, events, 4)
         out += np.einsum("eia,eafb,fjb->eifj", load, whole, load, optimize=True)
     return out.reshape(events * points, events * points)

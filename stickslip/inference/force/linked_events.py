@@ -8,8 +8,8 @@ nodes hang together from event to event of a run, w_1 - w_0 ~ N(0, size^2 T), an
 *Level.* The caps of an event are partly its own and partly a level, which leaves the stiffnesses as they are. It is a
 Matern process of order 3/2 along time, slip path or place: cov = size^2 (1 + q) exp(-q) with q = sqrt(3) |s_i - s_j| /
 length in a run, nothing between runs. It has a slope, and value and slope together are Markov (Hartikainen & Sarkka
-2010); its nodes are where events end, in the middle of slips. Between two nodes it goes as a cubic but for the bridge of
-an integrated Brownian motion, which is an event's own: so does the process where events are short beside its length,
+2010); its nodes are where events end, in the middle of slips. Between two nodes it goes as a cubic but for the bridge
+of an integrated Brownian motion, which is an event's own: so does the process where events are short beside its length,
 and a smoother one with less of the bridge.
 
 Given the nodes events are independent, so that these are eliminated with a banded matrix (Rue & Held 2005, Gaussian
