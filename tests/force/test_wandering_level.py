@@ -50,16 +50,11 @@ def test_the_level_is_found_and_a_wave_that_is_not_there_gains_little(prepared, 
         without = fitting.fit_base(prepared.problem, prepared.start)
     assert without.scatter.follows is None and level_of(without) is None
     assert without.cost - base.cost > 500.0
-    assert gain(base, "position-dependent-friction") < 0.6 * gain(without, "position-dependent-friction")
-
-
-BESIDE = "within events a level is of first order: at 1 % what that leaves is a wave of the place, which is named"
+    assert gain(base, "position-dependent-friction") < 40.0 and gain(without, "position-dependent-friction") > 300.0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "size", [0.003, pytest.param(SIZE, marks=[pytest.mark.long, pytest.mark.xfail(reason=BESIDE)])]
-)
+@pytest.mark.parametrize("size", [0.003, pytest.param(SIZE, marks=pytest.mark.long)])
 def test_a_diagnosis_names_the_wander_and_nothing_else(size):
     found = wanders(size).diagnose(
         candidates=["position-dependent-friction", "wear", "velocity-weakening", "contact-ageing"], jobs=1
