@@ -119,25 +119,25 @@ def scatter(m: Measurement, fit: Fit, runs: list[int]) -> Measures:
         runs: number in the problem of each run of the measurement.
     """
     size = fit.scatter.named()
-    sizes = [size[name] for name in EVENTS]
-    sizes[0] = float(np.hypot(sizes[0], size.get("level", 0.0)))
     n = np.shape(m.cycles.start)[1]
     even = (np.arange(n) % 2 == 0).astype(float)
     usual = float(np.median(m.values[..., m.layout.slices()["size"].start][np.asarray(m.cycles.used)]))
     steps = (*STEPS[:-1], STEPS[-1] * usual)
     plain = _all(m, fit, runs, np.zeros((n, len(EVENTS))))
     total = {k: a + b for (k, a), b in zip(_sensor(m).items(), _misfit(m, fit, runs), strict=True)}
-    for j, (step, deviation) in enumerate(zip(steps, sizes, strict=True)):
+    alone = np.eye(len(EVENTS))
+    changes = [(row, step, size[name]) for row, step, name in zip(alone, steps, EVENTS, strict=True)]
+    if "level" in size:  # moves the caps: strength and yield displacements together
+        changes.append((alone[0] + alone[1], steps[0], size["level"]))
+    for j, (row, step, deviation) in enumerate(changes):
         every: Any = dict.fromkeys(NAMES, 0.0)
         for own in (even, 1.0 - even):
-            change = np.zeros((n, len(EVENTS)))
-            change[:, j] = step * own
-            moved = _all(m, fit, runs, change)
+            moved = _all(m, fit, runs, step * own[:, None] * row)
             # the own event's influence where it was changed, that of the one before elsewhere
             influence = {k: np.nan_to_num(moved[k] - plain[k]) / step for k in NAMES}
             total = {k: total[k] + (influence[k] * deviation) ** 2 for k in NAMES}
             every = {k: every[k] + influence[k] for k in NAMES}
-        if EVENTS[j] == "strength":
+        if j == EVENTS.index("strength"):
             total = {k: total[k] + (every[k] * LEVEL) ** 2 for k in NAMES}
     return Measures(**{k: np.sqrt(total[k]) for k in NAMES})
 
