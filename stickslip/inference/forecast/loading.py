@@ -13,8 +13,9 @@ from .known_record import Past
 Array = NDArray[np.float64]
 POINTS = 400  # of travel at which curves are kept
 MOST = 60  # sticks whose curves are kept, even over the part for training
+TURNED = 5  # of them in which the drive turns, at least, where there are as many
 SAMPLES = 100  # of a stick, and
-PARTS = 30  # of the travel, by which the spread of its rises is told
+PARTS = 30  # of the travel of sticks without a turn, by which the spread of its rises is told
 REACH = 1.5  # travel that is looked ahead, in the longest stick's
 LAG = 0.1  # travel over which the rise of the level is taken, in that of a mean recurrence
 FEWEST = 3  # sticks
@@ -44,6 +45,10 @@ class Curves:
     lag: float
     spread: Array
 
+    def ahead(self, turned: bool) -> int:
+        """How many points of the travel are looked ahead in a stick: only one in which the drive has turned is long."""
+        return self.travel.size if turned else POINTS
+
     @classmethod
     def of(cls, past: Past, slips: NDArray[np.intp]) -> Curves:
         """From sticks of the first part.
@@ -58,17 +63,20 @@ class Curves:
         arrays, time, way = past.arrays, past.trace.time, past.way_gone
         onset_way, arrest_way = (np.interp(arrays[f"time_{end}"], time, way) for end in ("onset", "arrest"))
         lag = LAG * float(np.mean(onset_way[slips] - onset_way[slips - 1]))
+        turned = arrays["direction"][slips] != arrays["direction"][slips - 1]
         chosen = slips[np.unique(np.linspace(0, slips.size - 1, min(MOST, slips.size)).astype(int))]
-        travel = np.linspace(0.0, REACH * float(np.max(onset_way[chosen] - arrest_way[chosen - 1])), POINTS)
+        chosen = np.union1d(chosen, slips[turned][:TURNED])
+        travel = _grid(onset_way[slips] - arrest_way[slips - 1], turned, np.isin(slips, chosen))
         missing, length, seen = [], [], []
         for j in chosen:
             low, high = np.searchsorted(time, [past.known[j - 1], arrays["time_onset"][j]])
+            low = _after_turn(past.way, int(low), int(high))
             if high - low < 3:
                 continue
             wanted = onset_way[j] - travel
             level = np.interp(wanted, way[low : high + 1], past.level[low : high + 1])
             missing.append(np.where(wanted >= way[low], arrays["onset"][j] - level, np.nan))
-            length.append(onset_way[j] - arrest_way[j - 1])
+            length.append(onset_way[j] - max(arrest_way[j - 1], way[low] if turned[j - slips[0]] else -np.inf))
             at = np.unique(np.linspace(low, high - 1, min(high - low, SAMPLES)).astype(int))
             at = at[way[at] - lag >= way[low]]
             earlier = np.interp(way[at] - lag, way[low : high + 1], past.level[low : high + 1])
@@ -81,7 +89,7 @@ class Curves:
         table, lengths = np.array(missing), np.array(length)
         full = _extended(table.copy())
         growth = _growth(travel, table, full, lengths)
-        first = cls(travel, full, lengths, growth, lag, np.zeros(POINTS))
+        first = cls(travel, full, lengths, growth, lag, np.zeros(travel.size))
         return cls(travel, full, lengths, growth, lag, first._spread(seen))
 
     def missing_at(self, gone: float, more: float = 0.0) -> Array:
@@ -121,17 +129,18 @@ class Curves:
             each = [self._of_length(i, length, self.lag) - self._of_length(i, length) for i in range(self.length.size)]
             rest.append(risen - np.interp(to_come, self.travel, np.mean(each, axis=0)))
         every, at = np.concatenate(rest), np.concatenate([s[0] for s in seen])
-        part = np.minimum((at / self.travel[-1] * PARTS).astype(int), PARTS - 1)
+        parts = round(PARTS * (self.travel.size - 1) / (POINTS - 1))
+        part = np.minimum((at / self.travel[-1] * parts).astype(int), parts - 1)
         if every.size < FEWEST:
-            return np.full(POINTS, np.inf)
+            return np.full(self.travel.size, np.inf)
         whose = np.repeat(np.arange(len(rest)), [r.size for r in rest])
-        count = np.bincount(part, minlength=PARTS)
-        sticks = np.bincount(np.unique(part * len(rest) + whose) // len(rest), minlength=PARTS)
+        count = np.bincount(part, minlength=parts)
+        sticks = np.bincount(np.unique(part * len(rest) + whose) // len(rest), minlength=parts)
         known = np.flatnonzero(count)
-        own = np.bincount(part, every**2, minlength=PARTS)[known] / count[known]
+        own = np.bincount(part, every**2, minlength=parts)[known] / count[known]
         # what few sticks tell leans on what all of them do
         square = (sticks[known] * own + FEWEST * float(np.mean(every**2))) / (sticks[known] + FEWEST)
-        middle = (known + 0.5) / PARTS * self.travel[-1]
+        middle = (known + 0.5) / parts * self.travel[-1]
         n = self.length.size
         return np.sqrt(np.interp(self.travel, middle, square) * n / (n - 1))
 
@@ -141,6 +150,22 @@ class Curves:
         alike = np.interp(asked, self.travel, self.missing[i])
         grown = whole / length * np.interp(asked / whole * length, self.travel, self.missing[i])
         return alike + self.growth * (grown - alike)
+
+
+def _grid(length: Array, turned: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> Array:
+    """Travel at which curves are kept: as fine as sticks without a turn need it, as far as any is looked ahead."""
+    usual, longest = chosen & ~turned, float(np.max(length[chosen]))
+    step = REACH * (float(np.max(length[usual])) if usual.any() else longest) / (POINTS - 1)
+    points = max(int(np.ceil(REACH * longest / step - 1e-9)) + 1, POINTS)
+    return np.linspace(0.0, step * (points - 1), points)
+
+
+def _after_turn(way: Array | float, low: int, high: int) -> int:
+    """First sample of a stick from which the drive does not turn any more: what is loaded before is unloaded again."""
+    if not isinstance(way, np.ndarray):
+        return low
+    other = np.flatnonzero(way[low : high + 1] != way[high])
+    return low + int(other[-1]) + 1 if other.size else low
 
 
 def _growth(travel: Array, table: Array, full: Array, length: Array) -> float:

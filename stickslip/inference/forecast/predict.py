@@ -221,14 +221,18 @@ class Forecaster:
             take(self._own, arrays, j)
         self._taken = max(self._taken, before + 1)
         level, arrest = float(past.level[i]), float(arrays["arrest"][before])
-        until = past.arrival(i, self.curves.travel, self.recurrence)
+        begun = int(np.searchsorted(past.trace.time, arrays["time_arrest"][before]))
+        ahead = self.curves.ahead(isinstance(past.way, np.ndarray) and bool((past.way[begun:i] != past.way[i]).any()))
+        until = past.arrival(i, self.curves.travel[:ahead], self.recurrence)
         mean, std = self._next(before, t + until)
         start = arrest + self._gain[0]
         arrest_at = float(np.interp(arrays["time_arrest"][before], past.trace.time, past.way_gone))
         missing = self.curves.missing_at(gone := float(past.way_gone[i]) - arrest_at)
-        at_onset = level + missing
+        seen = self._seen(i, before, gone, missing)
+        seen = None if seen is None else seen[:ahead]
+        at_onset = level + missing[:, :ahead]
         return {
-            "wandering strength": times(until, at_onset, mean, std, self._seen(i, before, gone, missing), self._spread),
+            "wandering strength": times(until, at_onset, mean, std, seen, self._spread),
             "mean recurrence": waiting(self._waits, t - float(arrays["time_onset"][before])),
             "constant strength": times(until, at_onset, *self._strength),
             "slip-predictable": times(until, at_onset, start, self._gain[1]),

@@ -36,6 +36,7 @@ Coordinate = Literal["time", "slip path", "place"]
 KEYS: dict[Coordinate, str] = {"time": "time", "slip path": "path", "place": "place"}
 FEWEST = 12  # slips: two means and up to eight sizes and lengths are estimated from two levels each
 ONSET, ARREST = 0, 1
+NUGGET = 1e-9  # of a wander's variance, at which its covariance is positive definite in double precision
 _LENGTHS = (1.0, 4.0, 16.0, 64.0)  # in mean distances of slips, where the search begins
 _WIDEST = 12.0  # e-folds of sizes and length around where the search begins
 
@@ -415,6 +416,7 @@ class Nearby:
         for c in law.components:
             size = np.array(c.size)[of]
             whole += size[:, None] * covariance(c.kernel, np.abs(at[:, None] - at), c.length) * size
+            whole += np.diag(NUGGET * size**2)  # places are passed again, and a fitted scatter may be next to nothing
             to += c.size[kind] * size * covariance(c.kernel, np.abs(at - coordinate), c.length)
             own += c.size[kind] ** 2
         columns = np.eye(2)[of]
