@@ -12,12 +12,13 @@ from stickslip.inference.forecast.scoring import crps
 from .simulated import FORMS, one, record, tally
 from .synthetic import prepare
 
-DRAWS = (3, 4, 5)
+DRAWS = (3, 4)
 LAWS = {"time": "time", "place, there and back": "place"}  # else the slip path, for the block never goes back
 
 
 # 55 % of the 50 % interval: in the sticks in which the drive turns, a quarter of the time, forecasts lean on few such
 BACK = pytest.mark.xfail(strict=False, reason="of a drive that turns the 50 % interval holds 55 %")
+BEHIND = {"place": 0.55, "place, there and back": 0.45, "slip": 0.6, "time": 0.4}  # of the CRPS of a mean recurrence
 
 
 @cache
@@ -30,17 +31,21 @@ def drawn(form):
 def test_the_law_of_simulated_slips_is_found_and_predicts(form):
     for found in drawn(form):
         assert found["slips"] > 1500
-        assert LAWS.get(form, "slip path") in found["law"]
-        assert found["crps"] < 0.7 * found["crps_mean_recurrence"]
+        assert found["law"].split(" + ")[0].endswith(f" in {LAWS.get(form, 'slip path')}")
+        assert found["crps"] < BEHIND[form] * found["crps_mean_recurrence"]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("form", [pytest.param(f, marks=BACK if f.endswith("back") else ()) for f in FORMS])
 def test_intervals_of_simulated_slips_are_right_within_three_per_cent(form):
-    """Of three draws of two thousand slips; the law is found from the first part of each."""
-    found = tally(list(drawn(form)))
-    assert found["coverage_50"] == pytest.approx(0.5, abs=0.03)
-    assert found["coverage_90"] == pytest.approx(0.9, abs=0.03)
+    """Of two draws of two thousand slips; the law is found from the first part of each."""
+    assert tally(list(drawn(form)))["coverage_50"] == pytest.approx(0.5, abs=0.03)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("form", FORMS)
+def test_wide_intervals_of_simulated_slips_are_right_within_three_per_cent(form):
+    assert tally(list(drawn(form)))["coverage_90"] == pytest.approx(0.9, abs=0.03)
 
 
 @pytest.mark.slow

@@ -1,9 +1,9 @@
-"""What a level of the strength that wanders does within an event beyond first order.
+"""What a level of the caps that wanders does within an event beyond what the likelihood has of it.
 
-The likelihood is linear in the level (:mod:`.linked_events`). A level that changes by a per cent within an event leaves
-a few ten-thousandths of the strength to that, as much as all else that is random, and a wave of the place would take
-it up. So the model is driven once with the most likely course of the level, and what its forces differ by from those
-of first order is added to the residuals.
+The likelihood is linear in the level, and what sticks has the level of its arrest (:mod:`.linked_events`). Where
+friction wanders by a per cent this is off by a few ten-thousandths of the strength, as much as all else that is random,
+and a wave of the place would take it up. So the model is driven once with the most likely course of the level, and what
+its forces differ by from the linear ones is added to the residuals.
 """
 
 from __future__ import annotations
@@ -53,11 +53,12 @@ def _beyond(
     assert chain is not None
     mean = (chain.mean * states).sum(axis=1)
     courses = []
-    for first, run in zip(problem.first, problem.runs, strict=True):
+    for first, run, error in zip(problem.first, problem.runs, problem.errors, strict=True):
         there = (run.event >= 0) & (run.event < run.events)
         e = first + np.where(there, run.event, 0)
         whole = chain.end[e] - chain.begin[e]
-        share = (coordinate(run, follows.coordinate) - chain.begin[e]) / np.where(whole == 0.0, 1.0, whole)
+        way = coordinate(replace(run, x=run.x + error), follows.coordinate)  # the chain is of the motion as it was read
+        share = (way - chain.begin[e]) / np.where(whole == 0.0, 1.0, whole)
         course = chain.course(np.clip(share, 0.0, 1.0), e, states)
         courses.append(np.where(there, course - mean[e], 0.0))
     first_order = np.einsum("eik,ek->ei", chain.loads(known.caps), states) - known.caps * mean[:, None]

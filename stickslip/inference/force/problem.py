@@ -61,7 +61,7 @@ class Problem:
     Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
     the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`). Another
     spring or mass leaves it as it is: residuals grow as errors of the reading do, not as forces. What a level of the
-    strength does within events ``beyond`` first order (N), shape (p,), is added as well (:mod:`.level_within_events`).
+    caps does within events ``beyond`` first order (N), shape (p,), is added as well (:mod:`.level_within_events`).
     """
 
     def __init__(self, composition: Composition, runs: Sequence[Knots]) -> None:

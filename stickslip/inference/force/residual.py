@@ -78,7 +78,7 @@ def smooth_force(fit: Fit, name: str, values: Array) -> tuple[Array, Array]:
     if name == PULLED and nodes.size > 1:  # it makes the spring another one, for which a reading counts differently
         steeper = np.stack([_slope(scaled, nodes, row) for row in np.eye(nodes.size)], axis=1)
         common = fit.point.common
-        forces = fit.residual - fit.problem.offset - fit.slopes.shared[:, -common.size :] @ common
+        forces = fit.residual - fit.problem.offset - fit.problem.beyond - fit.slopes.shared[:, -common.size :] @ common
         columns += steeper * (forces * (fit.problem.phase == CREEPING))[:, None]
     return np.interp(nodes, np.sort(scaled), np.sort(values)), columns * fit.strength
 

@@ -63,20 +63,22 @@ class Curves:
         arrays, time, way = past.arrays, past.trace.time, past.way_gone
         onset_way, arrest_way = (np.interp(arrays[f"time_{end}"], time, way) for end in ("onset", "arrest"))
         lag = LAG * float(np.mean(onset_way[slips] - onset_way[slips - 1]))
-        turned = arrays["direction"][slips] != arrays["direction"][slips - 1]
+        limits = np.searchsorted(time, np.stack([past.known[slips - 1], arrays["time_onset"][slips]]))
+        turns = np.array([after_turn(past.way, int(a), int(b)) for a, b in limits.T])
+        turned = turns > limits[0]
         chosen = slips[np.unique(np.linspace(0, slips.size - 1, min(MOST, slips.size)).astype(int))]
         chosen = np.union1d(chosen, slips[turned][:TURNED])
         travel = _grid(onset_way[slips] - arrest_way[slips - 1], turned, np.isin(slips, chosen))
         missing, length, seen = [], [], []
         for j in chosen:
-            low, high = np.searchsorted(time, [past.known[j - 1], arrays["time_onset"][j]])
-            low = _after_turn(past.way, int(low), int(high))
+            (own,) = np.flatnonzero(slips == j)
+            low, high = int(turns[own]), int(limits[1, own])
             if high - low < 3:
                 continue
             wanted = onset_way[j] - travel
             level = np.interp(wanted, way[low : high + 1], past.level[low : high + 1])
             missing.append(np.where(wanted >= way[low], arrays["onset"][j] - level, np.nan))
-            length.append(onset_way[j] - max(arrest_way[j - 1], way[low] if turned[j - slips[0]] else -np.inf))
+            length.append(onset_way[j] - (way[low] if turned[own] else arrest_way[j - 1]))
             at = np.unique(np.linspace(low, high - 1, min(high - low, SAMPLES)).astype(int))
             at = at[way[at] - lag >= way[low]]
             earlier = np.interp(way[at] - lag, way[low : high + 1], past.level[low : high + 1])
@@ -160,7 +162,7 @@ def _grid(length: Array, turned: NDArray[np.bool_], chosen: NDArray[np.bool_]) -
     return np.linspace(0.0, step * (points - 1), points)
 
 
-def _after_turn(way: Array | float, low: int, high: int) -> int:
+def after_turn(way: Array | float, low: int, high: int) -> int:
     """First sample of a stick from which the drive does not turn any more: what is loaded before is unloaded again."""
     if not isinstance(way, np.ndarray):
         return low

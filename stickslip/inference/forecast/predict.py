@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from .known_record import Past
-from .loading import Curves
+from .loading import Curves, after_turn
 from .wander import ARREST, FEWEST, KEYS, ONSET, Component, Coordinate, Filter, Nearby, Wander, fit
 
 Array = NDArray[np.float64]
@@ -222,11 +222,14 @@ class Forecaster:
         self._taken = max(self._taken, before + 1)
         level, arrest = float(past.level[i]), float(arrays["arrest"][before])
         begun = int(np.searchsorted(past.trace.time, arrays["time_arrest"][before]))
-        ahead = self.curves.ahead(isinstance(past.way, np.ndarray) and bool((past.way[begun:i] != past.way[i]).any()))
+        ahead = self.curves.ahead(after_turn(past.way, begun, i) > begun)
         until = past.arrival(i, self.curves.travel[:ahead], self.recurrence)
         mean, std = self._next(before, t + until)
         start = arrest + self._gain[0]
         arrest_at = float(np.interp(arrays["time_arrest"][before], past.trace.time, past.way_gone))
+        turn = after_turn(past.way, begun, i)
+        if turn > begun:  # what was loaded before is unloaded again, and a stick counts from there
+            arrest_at = max(arrest_at, float(past.way_gone[turn]))
         missing = self.curves.missing_at(gone := float(past.way_gone[i]) - arrest_at)
         seen = self._seen(i, before, gone, missing)
         seen = None if seen is None else seen[:ahead]
@@ -249,7 +252,7 @@ class Forecaster:
     def _seen(self, i: int, before: int, gone: float, missing: Array) -> Array | None:
         """Likelihood of the rise of late at each travel to go; None where the stick is too young to tell."""
         past, lag = self.past, self.curves.lag
-        begun = int(np.searchsorted(past.trace.time, past.known[before]))
+        begun = after_turn(past.way, int(np.searchsorted(past.trace.time, past.known[before])), i)
         if not self._rising or past.way_gone[i] - lag < past.way_gone[begun]:
             return None
         part = slice(begun, i + 1)
