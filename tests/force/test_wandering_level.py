@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from stickslip.data.segment import segment
@@ -10,6 +11,7 @@ from stickslip.inference.diagnose.level import level_of
 from stickslip.inference.diagnose.prepare import prepare
 from stickslip.inference.force import fit as fitting
 from stickslip.inference.force.candidates import try_effect
+from stickslip.inference.force.fit_arrays import fit_arrays, fit_of
 from stickslip.inference.force.signatures import Explained
 
 from .counted import moved, read
@@ -45,6 +47,9 @@ def test_the_level_is_found_and_a_wave_that_is_not_there_gains_little(prepared, 
     assert level.form == {"along": "slip"} and level.gain > 500.0
     assert (level.size, level.length) == (size["level"], size["length"])
     assert gain(base, "velocity-weakening") < 30.0
+    assert np.std(base.problem.beyond) > 1e-6 * base.strength
+    assert not fitting.independent(base).problem.beyond.any()
+    assert fit_of(prepared.problem.with_composition(base.problem.composition), fit_arrays(base)).cost == base.cost
     with monkeypatch.context() as patch:
         patch.setattr(fitting, "FEWEST", 10**6)
         without = fitting.fit_base(prepared.problem, prepared.start)

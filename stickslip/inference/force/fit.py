@@ -334,9 +334,11 @@ def wandering(found: Fit) -> Fit:
     are most likely.
     """
     problem, tried = found.problem, {}
-    for coordinate in problem.along if problem.events >= FEWEST else ():
+    along = problem.along if problem.events >= FEWEST else ()
+    forces = problem.evaluate(found.around) if along else found.forces  # as of a fit that is read back
+    for coordinate in along:
         follows = Follows(coordinate, problem.distance(coordinate))
-        chain = problem.chain(follows, found.blocks, found.forces)
+        chain = problem.chain(follows, found.blocks, forces)
         assert chain is not None
         start = replace(found, scatter=found.scatter.following(follows), known=found.known.following(chain))
         tried[coordinate] = adapted(start, rounds=0)

@@ -47,7 +47,7 @@ class WanderingFriction(Memory, Threshold):
     symbols = {
         "w": "logarithm of the level of friction (1)",
         "s": "what the level goes with: place (m), slip path (m) or time (s)",
-        "a_j": "amplitudes of 128 waves: half of the square is the share of the variance in a band of the spectral density (1)",
+        "a_j": "amplitudes of 128 waves: half of the square is the variance of a band of the spectral density (1)",
         "q_j": "wave numbers in correlation lengths, one in each band, up to 200 (1)",
         r"\varphi_j": "phases of the first draw (rad)",
         r"\gamma_j": "turn of a phase from draw to draw (rad)",
