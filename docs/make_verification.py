@@ -25,6 +25,7 @@ import jax
 import jax.numpy as jnp
 
 from stickslip import __version__
+from stickslip.blind.generator import Surface, make_bank
 from stickslip.physics.contact import (
     flat_punch,
     indentation,
@@ -36,6 +37,7 @@ from stickslip.physics.contact import (
 )
 from stickslip.show.plots.style import logarithmic
 from stickslip.simulation.solve import Tolerance, integrate
+from tests.challenge import test_generator_dynamics as dynamics
 from tests.contact import test_indentation, test_tangential
 from tests.solve import (
     books,
@@ -47,6 +49,7 @@ from tests.solve import (
     slip_events,
     static_limit,
     test_events,
+    test_rough_derivatives,
 )
 from tests.solve.rig import STRENGTH, order, rig, tighter
 
@@ -198,6 +201,12 @@ def slips() -> plt.Figure:
     left.axvline(told.duration * 1e3, color="k", ls="--", lw=0.8)
     left.set(xlabel="time since onset (ms)", ylabel="velocity (mm/s)", title="A slip; dashed: block on a spring")
     left.set_ylim(top=1.1e3 * told.peak)
+    whole = [e.size / told.slip, (e.arrest - e.onset) / told.duration, e.peak / told.peak]
+    rows = [
+        (name, *(f"{share[i]:.2f}" for share in whole))
+        for name, i in (("second", 1), ("first, which starts from a virgin contact before full friction is reached", 0))
+    ]
+    table("slip events", "slips", ("event, share of the reference", "slip", "duration", "peak velocity"), rows)
     for c_s, mark in zip((500.0, 1000.0, 2000.0), MARKS, strict=False):
         e = slip_events.run(rig(damping=0.5, spring_stiffness=c_s), 9.0 * np.sqrt(1000.0 / c_s) + 3.0).events
         told = slip_events.classical(c_s, 0.5)
@@ -382,15 +391,46 @@ def times() -> None:
 
 @figure
 def scatter() -> plt.Figure:
-    fig, (left,) = axes(1)
-    kicks = np.linspace(0.0, 2e-6, 12)
-    for damping, mark in ((0.0, "o"), (1.0, "s"), (10.0, "^")):
-        onsets = convergence.onset_scatter(damping, kicks)
-        print(f"c = {damping:g}: range of onsets, ms", np.ptp(onsets, axis=0) * 1e3)
-        left.plot(kicks * 1e6, (onsets[:, 1] - onsets[:, 1].mean()) * 1e3, mark + "-", label=f"c = {damping:g} N s/m")
-    left.set(xlabel="kick at the start (µm/s)", ylabel="second onset, from its mean (ms)")
+    fig, (left, right) = axes(2)
+    kicks, rows = np.linspace(0.0, 2e-6, 12), []
+    exact = {}
+    for damping, mark in zip((0.0, 1.0, 10.0), MARKS, strict=False):
+        exact[damping] = onsets = convergence.brute_onsets(damping, kicks)
+        left.plot(kicks * 1e6, (onsets[:, 1] - onsets[:, 1].mean()) * 1e3, mark, label=f"c = {damping:g} N s/m")
+        moved, wrong = [], []
+        for (name, factor), own in zip(TOLERANCES.items(), MARKS, strict=True):
+            found = convergence.onset_scatter(damping, kicks, tighter(factor))
+            moved.append(np.ptp(found, axis=0).max())
+            wrong.append(np.abs(found - onsets[:, : found.shape[1]]).max())
+            if damping == 1.0:
+                right.plot(kicks * 1e6, (found - onsets)[:, 1] * 1e3, own, label=name)
+        ranges = [np.ptp(onsets, axis=0).max(), *moved]
+        rows.append((f"{damping:g} N s/m", "range", *(f"{m * 1e3:.2g}" for m in ranges)))
+        if damping:
+            rows.append(("", "error", "", *(f"{w * 1e3:.2g}" for w in wrong)))
+    left.set(xlabel="kick at the start (µm/s)", ylabel="second onset, from its mean (ms)", title="Leapfrog")
+    right.set(xlabel="kick at the start (µm/s)", ylabel="second onset, error (ms)", title="Solver, c = 1 N s/m")
     left.legend()
+    right.legend()
+    right.set_yscale("log")
+    columns = ("damping", "of the onsets, ms", "leapfrog", *(f"solver, {name}" for name in TOLERANCES))
+    table("kicks", "scatter", columns, rows)
     return fig
+
+
+@figure
+def roughness() -> None:
+    found = [percent(error) for error in test_rough_derivatives.against_brute_force(2e-3).values()]
+    columns = ("", "first onset", "recurrence", "slip", "peak velocity")
+    table("derivatives in the roughness", "roughness", columns, [("error over the largest of their kind", *found)])
+
+
+@figure
+def generator() -> None:
+    bank = make_bank(Surface(points=4096), dynamics.LOADS, 1)
+    missing = {dt: dynamics.missing_work(dynamics.four_slips(bank, dt)) for dt in (4e-5, 2e-5, 1e-5)}
+    rows = [(f"{dt * 1e6:g} µs", short(share)) for dt, share in missing.items()]
+    table("energy of the generator", "generator", ("step", "share of the work that is missing"), rows)
 
 
 @figure
@@ -471,16 +511,22 @@ def derivative() -> plt.Figure:
     left.legend()
     which = derivatives.NAMES.index("spring_stiffness")
     direction = jnp.eye(size)[which]
-    for factor, colour in ((1.0, "C0"), (100.0, "C1")):
+    plain = []
+    for name, factor, colour in (("default tolerance", 1.0, "C0"), ("default/100", 100.0, "C1")):
         function = derivatives.two_events(tighter(factor), most=32768)
         moves = np.linspace(-0.02, 0.02, 41)
         t = np.array([np.asarray(function(m * np.asarray(direction))) for m in moves])[:, 1]
         slope = float(jax.jvp(function, (zero,), (direction,))[1][1])
         wide = np.polyfit(moves, t, 1)[0]
-        print(f"recurrence by ln c_s, tolerance/{factor:g}: derivative {slope:.3f} s, slope of the curve {wide:.3f} s")
-        right.plot(moves * 100, t, ".-", color=colour, lw=0.6, label=f"default tolerance/{factor:g}")
+        plain.append((f"adaptive steps, {name}", f"{slope:.3f}", f"{wide:.3f}"))
+        right.plot(moves * 100, t, ".-", color=colour, lw=0.6, label=name)
         near = np.array([-0.004, 0.004])
         right.plot(near * 100, t[20] + slope * near, color=colour, lw=2.5, alpha=0.5)
+    even = derivatives.two_events(Tolerance(), most=round(6.3 / 2e-5), fixed=True)
+    slope = float(jax.jvp(even, (zero,), (direction,))[1][1])
+    wide = float(derivatives.differences(even, 1e-3, [which])[0][1])
+    plain.append(("fixed steps of 20 µs", f"{slope:.3f}", f"{wide:.3f}"))
+    table("plain derivatives", "derivative", ("derivative by", "derivative, s", "difference, s"), plain)
     expected = slip_differences.brute_differences(1e-3)
     kinds = {
         "default tolerance": (1.0, 1, 1), "default/10": (10.0, 1, 1),

@@ -1,4 +1,4 @@
-"""Convergence in step, tolerance and number of elements, and what does not converge: the phase of the ringing."""
+"""Convergence in step, tolerance and number of elements, and with the phase of the ringing."""
 
 from __future__ import annotations
 
@@ -150,12 +150,27 @@ def event_orders(steps: Sequence[float]) -> dict[str, tuple[float, list[float]]]
     return {name: (order(np.array(steps), np.array(e)), e) for name, e in errors.items()}
 
 
-def onset_scatter(damping: float, kicks: np.ndarray, duration: float = 9.0) -> np.ndarray:
+def onset_scatter(damping: float, kicks: np.ndarray, tolerance: Tolerance, duration: float = 9.0) -> np.ndarray:
     """Onsets (s) after kicks (m/s) to the block at the start, shape (kicks, events common to all)."""
     model = rig(damping=damping)
-    made = [
-        integrate(model, duration, state=model.rest(v=float(kick)), tolerance=tighter(10.0))[0].steps for kick in kicks
-    ]
-    onsets = [slips(s.t, s.x, s.v).onset for s in made]
+    made = [integrate(model, duration, state=model.rest(v=float(kick)), tolerance=tolerance)[0].steps for kick in kicks]
+    return _common([slips(s.t, s.x, s.v).onset for s in made])
+
+
+def brute_onsets(damping: float, kicks: np.ndarray, duration: float = 9.0, dt: float = 1e-6) -> np.ndarray:
+    """The same by brute force."""
+    elements = bank()
+    paths = [
+        brute_force.simulate(
+            np.asarray(elements.stiffness), np.asarray(elements.strength), duration=duration, mass=MASS,
+            spring_stiffness=1000.0, damping=damping, ratio=0.85, slip_distance=1e-6, healing_time=0.02,
+            times=[0.0, 1.0], positions=[0.0, 5e-5], dt=dt, every=round(2e-5 / dt), v=float(kick),
+        )
+        for kick in kicks
+    ]  # fmt: skip
+    return _common([slips(p.t, p.x, p.v).onset for p in paths])
+
+
+def _common(onsets: Sequence[np.ndarray]) -> np.ndarray:
     number = min(len(o) for o in onsets)
     return np.array([o[:number] for o in onsets])

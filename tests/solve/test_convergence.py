@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from .convergence import event_orders, onset_scatter, oscillator_errors, second_event, slip_errors, slip_to_slip
-from .rig import order
+from .convergence import (
+    brute_onsets,
+    event_orders,
+    onset_scatter,
+    oscillator_errors,
+    second_event,
+    slip_errors,
+    slip_to_slip,
+)
+from .rig import order, tighter
 
 
 def test_second_order_for_a_damped_oscillator():
@@ -57,8 +65,20 @@ def test_event_quantities_converge_with_the_number_of_elements():
 
 @pytest.mark.long
 def test_undamped_ringing_decides_the_onset():
-    """A kick too small to matter, of another phase at each onset: milliseconds without damping, none with it."""
+    """Kicks too small to matter, of another phase at each onset: milliseconds without damping, nothing with it."""
     kicks = np.linspace(0.0, 2e-6, 6)
-    bare, damped = (np.ptp(onset_scatter(c, kicks), axis=0) for c in (0.0, 10.0))
+    bare, weak, damped = (np.ptp(brute_onsets(c, kicks, dt=1e-5), axis=0) for c in (0.0, 1.0, 10.0))
     assert np.max(bare) > 1e-3
-    assert np.max(damped) < 5e-5
+    assert np.max(weak) < 1e-9 and np.max(damped) < 1e-9
+    assert np.max(np.ptp(onset_scatter(0.0, kicks, tighter(10.0)), axis=0)) > 1e-3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("damping", [1.0, 10.0])
+def test_onsets_of_a_damped_block_converge_whatever_the_kick(damping):
+    """Kicks shift the steps, and with them the errors: both fall with the tolerance, towards the leapfrog's onsets."""
+    kicks = np.linspace(0.0, 2e-6, 6)
+    exact = brute_onsets(damping, kicks, dt=2.5e-6)
+    rough, fine = (np.abs(onset_scatter(damping, kicks, tighter(f)) - exact).max() for f in (10.0, 1000.0))
+    assert rough < (2e-3 if damping == 1.0 else 5e-5)
+    assert fine < 0.3 * rough

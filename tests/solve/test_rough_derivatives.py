@@ -61,17 +61,30 @@ def marched(theta: np.ndarray) -> dict[str, np.ndarray]:
     return table(path_slips(path, SPEED))
 
 
+def solved() -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Slips and their derivatives by the package."""
+    values, columns = slip_derivatives(build, np.zeros(4), END, tolerance=tighter(1000.0), refine=2)
+    return table(values), table(columns)
+
+
+def differences(step: float) -> dict[str, np.ndarray]:
+    """Central differences by brute force."""
+    moves = [(marched(step * e), marched(-step * e)) for e in np.eye(4)]
+    return {name: np.stack([(there[name] - back[name]) / (2.0 * step) for there, back in moves]) for name in SHOWN}
+
+
+def against_brute_force(step: float) -> dict[str, float]:
+    """Largest errors of the derivatives over the largest of their kind."""
+    return errors(solved()[1], differences(step))
+
+
 @pytest.mark.long
 def test_derivatives_in_the_roughness_agree_with_differences_by_brute_force():
-    values, columns = slip_derivatives(build, np.zeros(4), END, tolerance=tighter(1000.0), refine=2)
-    expected, seen = marched(np.zeros(4)), table(columns)
+    values, seen = solved()
+    expected = marched(np.zeros(4))
     for name in SHOWN:
-        assert table(values)[name] == pytest.approx(expected[name], rel=5e-4)
+        assert values[name] == pytest.approx(expected[name], rel=5e-4)
     for step in (6e-3, 2e-3):
-        moves = [(marched(step * e), marched(-step * e)) for e in np.eye(4)]
-        differences = {
-            name: np.stack([(there[name] - back[name]) / (2.0 * step) for there, back in moves]) for name in SHOWN
-        }
-        found = errors(seen, differences)
+        found = errors(seen, differences(step))
         print(step, found)
         assert all(error < 0.01 for error in found.values())
