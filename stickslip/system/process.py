@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 from typing import Any
 
 from . import cache, threads
 
 AMPLE = 3 * 2**29  # bytes that a process may hold between two pieces of its work
+RARELY = 50_000  # containers between two searches for cycles: imports and traces make a million, and keep them
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of mallopt(3)
 _KEPT, _LARGEST = 2**30, 2**25  # bytes: of freed memory that is kept, and of one piece of it
 
@@ -19,6 +21,7 @@ def begin() -> None:
     A fit makes and drops arrays of some megabytes thousands of times. The GNU library hands each back to the system,
     and the system clears each page before it is given again: a tenth of the time of a diagnosis.
     """
+    gc.set_threshold(RARELY)
     threads.one_for_linear_algebra()
     cache.keep_compiled()
     set_option = _of_c_library("mallopt")

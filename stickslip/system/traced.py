@@ -57,6 +57,7 @@ class Program:
     def __call__(self, *args: Any) -> Any:
         """The function's result."""
         leaves, structure = jax.tree.flatten(args)
+        leaves = [np.asarray(a) for a in leaves]  # arrays that JAX has committed to a device would compile anew
         kinds = structure, tuple((np.shape(a), getattr(a, "dtype", type(a))) for a in leaves)
         if kinds not in self._ready:
             with self._lock:  # of several threads one compiles, and the others wait for it

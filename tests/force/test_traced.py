@@ -52,6 +52,13 @@ def test_a_kept_trace_is_not_made_again_and_gives_the_same_numbers(folder):
     assert function.times == 2  # the second time for the comparison
 
 
+def test_a_result_that_is_given_back_is_no_reason_to_compile_again(folder):
+    program = Program(lambda a: a + 1.0, "one")
+    np.testing.assert_array_equal(program(program(jnp.zeros(3))), 2.0)
+    (ready,) = program._ready.values()
+    assert ready._cache_size() == 1
+
+
 @pytest.mark.parametrize(
     "name, parts", [("other", PARTS), ("one", {**PARTS, "a": np.zeros(6)}), ("one", {**PARTS, "a": np.arange(5)})]
 )

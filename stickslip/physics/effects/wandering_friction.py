@@ -5,7 +5,6 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from scipy.special import stdtr
 
 from ..contact import Bank
 from ..params import parameter, variant
@@ -20,8 +19,9 @@ _EDGES = 0.5 * np.sinh(np.linspace(0.0, np.arcsinh(2.0 * HIGHEST), WAVES + 1))
 # one wave in each, at places without a period
 _PLACES = np.mod(np.arange(1, WAVES + 1) * 0.5 * (np.sqrt(5.0) - 1.0), 1.0)
 FREQUENCY = _EDGES[:-1] + _PLACES * np.diff(_EDGES)
-# of the spectral density of the process, Student's t with three degrees of freedom
-AMPLITUDE = np.sqrt(4.0 * np.diff(stdtr(3, _EDGES)))
+# share of the variance below each wave number: the spectral density is Student's t with three degrees of freedom
+_BELOW = 2.0 / np.pi * (_EDGES / np.sqrt(3.0) / (1.0 + _EDGES**2 / 3.0) + np.arctan(_EDGES / np.sqrt(3.0)))
+AMPLITUDE = np.sqrt(2.0 * np.diff(_BELOW))
 # turned on by numbers without a common period, whatever the draw
 TURN = 2.0 * np.pi * np.mod(np.arange(1, WAVES + 1) ** 2 * np.sqrt(2.0), 1.0), np.sqrt(np.arange(2, WAVES + 2))
 
