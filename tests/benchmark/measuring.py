@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -66,6 +67,7 @@ def keep(part: str, only: str, **found: Any) -> None:
         print(line, flush=True)
     known[part] = {
         "version": __version__,
+        "commit": commit(),
         "date": date.today().isoformat(),
         "machine": f"{os.cpu_count()} processors",
         "command": f"python -m tests.benchmark --only {only}",
@@ -76,9 +78,20 @@ def keep(part: str, only: str, **found: Any) -> None:
     RESULTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
+def commit() -> str | None:
+    """The commit that is measured, with a plus where files were changed since; None without git."""
+    try:
+        found = subprocess.run(
+            ["git", "describe", "--always", "--dirty=+"], cwd=RESULTS.parent, capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return found.stdout.strip()
+
+
 def former(part: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The times of a part that is measured anew, with version and date; empty where there is none."""
-    kept = {key: part.get(key) for key in ("version", "date", "yardstick_s")}
+    kept = {key: part.get(key) for key in ("version", "commit", "date", "yardstick_s")}
     return [{**kept, "times": times(part)}] if part else []
 
 
