@@ -15,8 +15,8 @@ from pathlib import Path
 
 import stickslip as ss
 from stickslip.blind.answers import read_answer
+from stickslip.blind.case_scores import mark
 from stickslip.blind.figures import figures
-from stickslip.blind.marks import mark
 from stickslip.blind.score import score_challenge
 from stickslip.blind.seal import RUNS, read_truth
 

@@ -40,10 +40,10 @@ from stickslip.simulation.solve import Tolerance, integrate
 from tests.challenge import test_generator_dynamics as dynamics
 from tests.contact import test_indentation, test_tangential
 from tests.solve import (
-    books,
     comparison,
     convergence,
     derivatives,
+    energy_balance,
     ringing,
     slip_differences,
     slip_events,
@@ -458,7 +458,7 @@ def energy() -> plt.Figure:
         start = time.process_time()
         made = slip_events.run(rig(), 8.0, tighter(f))
         spent.append(time.process_time() - start)
-        worst.append(np.max(np.abs(books.imbalance(made.trajectory.steps))))
+        worst.append(np.max(np.abs(energy_balance.imbalance(made.trajectory.steps))))
         steps.append(made.trajectory.stats.steps)
     rows = [
         (name, short(worst[k]), f"{steps[k]:,}".replace(",", " "), f"{spent[k]:.2f} s")
@@ -473,7 +473,7 @@ def energy() -> plt.Figure:
     middle.loglog(steps, worst, "o-")
     middle.axhline(1e-6, color="k", lw=0.8)
     middle.set(xlabel="steps for 8 s with four events", ylabel="largest imbalance / work of the spring")
-    cycle = books.slow_cycle()
+    cycle = energy_balance.slow_cycle()
     s = cycle.steps
     print("hysteresis: largest departure over strength", np.max(np.abs(s.contact_force - cycle.force)) / STRENGTH)
     right.plot(s.x * 1e6, s.contact_force, lw=2.5, alpha=0.4, label="solver")

@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT))
 import stickslip as ss
 from stickslip.workbench.session import Session
 from tests.workbench.browser import DEEP, Browser, Served
-from tests.workbench.outline import OUTLINE, outline
+from tests.workbench.page_outline import OUTLINE, outline
 
 IMAGES = ROOT / "docs" / "images"
 SIZE = 1280, 1100

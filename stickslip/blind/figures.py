@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from .answers import KINDS as ANSWERS
-from .marks import CIRCUMSTANCES, Marked, rate
+from .case_scores import CIRCUMSTANCES, Marked, rate
 from .sizes import Size
 
 KINDS = ("nothing", "one", "two", "outside")

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from .answers import read_answer
+from .case_scores import mark
 from .figures import figures
-from .marks import mark
 from .one_case import failures
 from .run import PROTOCOL, codes_of, read_protocol
 from .seal import RUNS, SealError, case_hashes, case_names, check_seal, digest, read_truth

@@ -162,7 +162,7 @@ def score(folder: Path, *, seal: str | None = None, json: Flag = False, force: F
 
 def _write(out: Path, found: dict[str, Any]) -> str:
     from ..blind.pictures import amplitude_figure, confusion_by_amplitude_figure, confusion_figure
-    from ..blind.table import score_text
+    from ..blind.score_text import score_text
     from ..errors import RunFolderError
     from ..show.plots import save
     from ..system.runstore import json_text, write_aside

@@ -13,9 +13,9 @@ import numpy as np
 from ..data.checks import stopping
 from ..errors import ArgumentError, InputError, RunFolderError, nearest
 from ..inference.diagnose.checkpoints import Store
-from ..inference.diagnose.engine import Diagnosis as Found
-from ..inference.diagnose.engine import diagnose as search
 from ..inference.diagnose.model_ladder import Climbed
+from ..inference.diagnose.stepwise_selection import Diagnosis as Found
+from ..inference.diagnose.stepwise_selection import diagnose as search
 from ..inference.diagnose.summary import summary
 from ..physics.effects import catalogue
 from ..show.report.excerpts import trace_sections

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ArgumentError, InputError, nearest
-from ..inference.diagnose.confirm import Confirmation
-from ..inference.diagnose.fitted import fitted_model
+from ..inference.diagnose.free_simulation import Confirmation
 from ..inference.diagnose.model_ladder import Climbed, chosen, climb, extended, replaced, shortened
+from ..inference.diagnose.model_record import fitted_model
 from ..inference.fit.parameters import Free, effect_parameters
 from ..inference.fit.serialised import Fitted
 from ..inference.force.backbone import backbone, power_law

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..inference.diagnose.confirm import Confirmation
+from ..inference.diagnose.free_simulation import Confirmation
 from ..inference.diagnose.summary import fitted_sections
 from ..show.report.excerpts import trace_sections
 from ..show.report.identifiability import identifiability

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, nearest
-from ..inference.diagnose.confirm import Confirmation
 from ..inference.diagnose.free_errors import errors
 from ..inference.diagnose.free_measures import simulated
+from ..inference.diagnose.free_simulation import Confirmation
 from ..inference.diagnose.prepare import Prepared
 from ..inference.force.fit import Fit
 from ..system.object_repr import table

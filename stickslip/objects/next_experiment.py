@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..inference.diagnose.engine import Diagnosis as Found
 from ..inference.diagnose.model_ladder import Climbed
-from ..inference.diagnose.rounds import Round
 from ..inference.diagnose.search import Rung
+from ..inference.diagnose.search_round import Round
+from ..inference.diagnose.stepwise_selection import Diagnosis as Found
 from .campaign import Campaign
 from .experiments import Setting, SimulatedExperiment, practicable, scenario, simulate_rivals
 from .fit import Fit

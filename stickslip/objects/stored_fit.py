@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, RunFolderError, StickslipError
-from ..inference.diagnose.engine import static_residual
 from ..inference.diagnose.model_ladder import Climbed
 from ..inference.diagnose.search import Rung
+from ..inference.diagnose.stepwise_selection import static_residual
 from ..inference.force.candidates import with_start
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at
 from ..inference.force.fit_arrays import fit_arrays, fit_of
 from ..inference.force.heldout import apart
 from ..inference.force.problem import Problem
-from ..inference.force.rig import SPRING, with_free_spring
+from ..inference.force.stated_spring import SPRING, with_free_spring
 from ..physics.effects import catalogue
 from ..physics.params import specs, variants
 from ..system.runstore import Run, digests, read_result

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..errors import StickslipError
-from .steps import HAND, Step, complete
+from .history_steps import HAND, Step, complete
 
 if TYPE_CHECKING:
     from ..objects.fitted_run import FittedRun

@@ -19,10 +19,10 @@ from ..objects.campaign import Campaign, load_campaign
 from ..objects.example import to_work_in
 from . import restore
 from .catalogue_search import CatalogueSearch
+from .history_steps import Step, complete, fewer, first, moved
 from .history_writer import HistoryWriter
 from .session_callbacks import watch
 from .session_messages import Note, long
-from .steps import Step, complete, fewer, first, moved
 from .worker import AtOnce
 
 if TYPE_CHECKING:

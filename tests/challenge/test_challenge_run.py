@@ -19,8 +19,8 @@ from invented import effect, make
 from stickslip.blind.one_case import failures
 from stickslip.blind.run import PROTOCOL, UNRECORDED, Progress, code_digest, run_challenge, time_left
 from stickslip.blind.score import score_challenge
+from stickslip.blind.score_text import score_text
 from stickslip.blind.seal import RUNS
-from stickslip.blind.table import score_text
 from stickslip.cli import run
 from stickslip.errors import InputError
 from stickslip.system.cluster import cluster

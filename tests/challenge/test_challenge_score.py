@@ -11,13 +11,13 @@ import pytest
 from invented import answer, effect, make, result
 
 from stickslip.blind.answers import read_answer
+from stickslip.blind.case_scores import mark, rate
 from stickslip.blind.figures import VERDICTS, verdict_label
-from stickslip.blind.marks import mark, rate
 from stickslip.blind.one_case import record_failure
 from stickslip.blind.pictures import amplitude_figure, confusion_by_amplitude_figure, confusion_figure
 from stickslip.blind.score import score_challenge
+from stickslip.blind.score_text import score_text
 from stickslip.blind.seal import RUNS, SealError, read_truth
-from stickslip.blind.table import score_text
 from stickslip.cli import run
 from stickslip.errors import InputError
 

@@ -11,7 +11,7 @@ from invented import effect
 
 from stickslip.blind.answers import Answer
 from stickslip.blind.generator import EFFECTS, Drive, Rig, Setup, Surface, make_bank, simulate
-from stickslip.blind.generator import slots as S
+from stickslip.blind.generator import array_layout as S
 from stickslip.blind.generator.laws import body_force, load_point, spring_force, wave
 from stickslip.blind.sizes import Size, compared, factor
 from stickslip.physics.effects import catalogue

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.blind.generator import Bank, Drive, Result, Rig, Surface, make_bank, simulate
-from stickslip.blind.generator import slots as S
+from stickslip.blind.generator import array_layout as S
 from stickslip.blind.generator.bank import join
 from stickslip.blind.generator.contacts import fresh_lines
 from stickslip.errors import InputError, SolveError

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from stickslip.blind.generator import Rig
-from stickslip.blind.generator import slots as S
+from stickslip.blind.generator import array_layout as S
 from stickslip.blind.generator.implicit import kick
 from stickslip.blind.generator.laws import advance, decay, load_point, rate_factor, spring_force, wave
 from stickslip.blind.generator.springs import clip, creep_rate, plain

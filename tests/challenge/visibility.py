@@ -23,7 +23,7 @@ from stickslip.errors import StickslipError
 from stickslip.inference.features.curve import SampledCurve
 from stickslip.inference.features.evaluate import features
 from stickslip.inference.features.measurement import Measurement, measure
-from stickslip.inference.fit.start import ring_period
+from stickslip.inference.fit.stated_rig import ring_period
 from tests.fit.feature_floors import floors_alone
 
 SEEN = 5.0  # standard deviations from which an effect counts as seen

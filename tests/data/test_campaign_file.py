@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip.data.campaign import Unmeasured, campaign_template, load_campaign, load_traces
-from stickslip.data.campaign.place import key_lines
+from stickslip.data.campaign.located_errors import key_lines
 
 ROWS = np.column_stack([np.arange(100) * 0.01, np.arange(100) * 0.4])
 TRACE = """time = { column = "time", unit = "s" }

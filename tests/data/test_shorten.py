@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stickslip.data.first_cycles import first_cycles, shares
 from stickslip.data.segment import segment
-from stickslip.data.shorten import first_cycles, shares
 from stickslip.data.trace import Drive, Trace
 
 

@@ -25,10 +25,10 @@ import numpy as np
 from stickslip import __version__
 from stickslip.blind.answers import read_answer
 from stickslip.blind.case_plan import Case, Hidden, case_seed
+from stickslip.blind.case_scores import mark, rate
 from stickslip.blind.detection import amplitude, largest_multiple, visible_forms
 from stickslip.blind.generator import CATALOGUED, EFFECTS
 from stickslip.blind.make import make_challenge
-from stickslip.blind.marks import mark, rate
 from stickslip.blind.run import Progress, run_challenge
 from stickslip.blind.seal import RUNS, read_seal, read_truth
 from stickslip.inference.diagnose.decide import DISPERSION

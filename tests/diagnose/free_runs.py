@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from stickslip import __version__
-from stickslip.inference.diagnose.confirm import confirm
 from stickslip.inference.diagnose.final_comparison import settled
 from stickslip.inference.diagnose.free_errors import errors
+from stickslip.inference.diagnose.free_simulation import confirm
 from stickslip.inference.diagnose.prepare import Prepared
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import xarray
 
-from stickslip.inference.diagnose import confirm as confirming
-from stickslip.inference.diagnose.confirm import confirm
+from stickslip.inference.diagnose import free_simulation as confirming
 from stickslip.inference.diagnose.final_comparison import settled
 from stickslip.inference.diagnose.free_errors import contradiction, errors, predicted, summed
-from stickslip.inference.diagnose.free_words import cautions, free_variables
+from stickslip.inference.diagnose.free_report import cautions, free_variables
+from stickslip.inference.diagnose.free_simulation import confirm
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit_base
 from stickslip.inference.force.heldout import halves, points

@@ -20,7 +20,7 @@ from stickslip.inference.diagnose.decide import (
     odd,
     standard_error,
 )
-from stickslip.inference.diagnose.rounds import Round
+from stickslip.inference.diagnose.search_round import Round
 from stickslip.inference.diagnose.summary import FARTHER, failures, nearest_text
 from stickslip.inference.fit.parameters import effect_parameters
 from stickslip.inference.force.candidates import Candidate

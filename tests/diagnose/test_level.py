@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from stickslip.effects import make
-from stickslip.inference.diagnose import level as module
+from stickslip.inference.diagnose import wandering_level as module
 from stickslip.inference.diagnose.decide import DISPERSION
-from stickslip.inference.diagnose.engine import Verdict, with_level
-from stickslip.inference.diagnose.level import FORMS, TAG, Level, level_of
+from stickslip.inference.diagnose.stepwise_selection import Verdict, with_level
+from stickslip.inference.diagnose.wandering_level import FORMS, TAG, Level, level_of
 from stickslip.inference.force.problem import ALONG
 from stickslip.inference.force.scatter import WANDER, Follows
 

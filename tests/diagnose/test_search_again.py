@@ -13,7 +13,7 @@ import pytest
 
 from stickslip.inference.diagnose import search as module
 from stickslip.inference.diagnose.decide import Compared, Judged, named
-from stickslip.inference.diagnose.rounds import Round
+from stickslip.inference.diagnose.search_round import Round
 from stickslip.inference.force.candidates import Candidate
 from stickslip.inference.force.composition import Composition
 from stickslip.physics.effects import catalogue

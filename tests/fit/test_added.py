@@ -11,8 +11,8 @@ from stickslip.cli.fit import _gains_of_effects, _named
 from stickslip.data.campaign import Rig
 from stickslip.data.segment import segment
 from stickslip.errors import InputError
-from stickslip.inference.diagnose.fitted import fitted_model
 from stickslip.inference.diagnose.model_ladder import chosen, climb
+from stickslip.inference.diagnose.model_record import fitted_model
 from stickslip.inference.diagnose.prepare import prepare
 from stickslip.inference.fit.serialised import from_record, record
 from stickslip.inference.force.backbone import backbone, power_law

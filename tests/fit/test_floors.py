@@ -11,7 +11,7 @@ from stickslip.blind.generator import draw_setup, make_campaign
 from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.segment import segment
 from stickslip.inference.features.measurement import measure
-from stickslip.inference.fit.start import ring_period
+from stickslip.inference.fit.stated_rig import ring_period
 
 from .scatter_floors import floors, scatter_factor
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.data.trace import Drive, Trace
-from stickslip.inference.diagnose.fitted import _driven
+from stickslip.inference.diagnose.model_record import _driven
 from stickslip.inference.fit.serialised import Fitted, from_record, record
 from stickslip.system.runstore import json_text
 

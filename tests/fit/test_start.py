@@ -9,7 +9,7 @@ from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.segment import segment
 from stickslip.errors import InputError
 from stickslip.inference.diagnose.prepare import prepare
-from stickslip.inference.fit.start import FALLBACK_FREQUENCY, ring_period, ringing
+from stickslip.inference.fit.stated_rig import FALLBACK_FREQUENCY, ring_period, ringing
 
 RIG = 'schema = 1\n[rig]\nmass = "89.4 g"\ncontacts = 4\nnormal_force = "0.31 N"\nfriction_coefficient = 0.2\n'
 TRACE = """[[trace]]

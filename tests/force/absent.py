@@ -23,7 +23,7 @@ from stickslip.inference.force.candidates import every_form, try_effect
 from stickslip.inference.force.fit import fit_base
 from stickslip.inference.force.signatures import Explained
 from stickslip.system import process
-from tests.force.counted import COUNT, NOISE, Moved, moved, read
+from tests.force.counted_motions import COUNT, NOISE, Moved, moved, read
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results" / "absent.json"
 SPEEDS = ((5e-5, 14.0), (1e-4, 7.5), (2e-4, 4.0), (4e-4, 2.2))  # m/s, s

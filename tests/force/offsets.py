@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import stickslip as ss
-from tests.force.counted import COUNT, NOISE, Moved, moved, read
+from tests.force.counted_motions import COUNT, NOISE, Moved, moved, read
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results" / "offsets.json"
 SPEEDS = ((1e-4, 7.5), (2e-4, 4.0))  # m/s, s

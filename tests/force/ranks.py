@@ -28,7 +28,7 @@ import stickslip as ss
 from stickslip.blind.generator import Run, make_campaign
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, figure, styled
-from tests.finished import each
+from tests.kept_cases import each
 
 ROOT = Path(__file__).parents[2]
 RUNS = (Run("v100", 1e-4, 5), Run("v400", 4e-4, 5))

@@ -12,7 +12,7 @@ from stickslip.inference.force.noise import by_reading, reading_errors
 from stickslip.inference.force.signatures import Explained, signatures
 from stickslip.physics.effects.contact_damping import ContactDamping
 
-from .counted import moved, read
+from .counted_motions import moved, read
 
 pytestmark = pytest.mark.slow
 

@@ -17,7 +17,7 @@ from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Sensor
 from stickslip.simulation.solve import Tolerance
 
-from . import driven
+from . import solver_motion
 
 EXACT = 1e-10  # of the strength
 UNTOLD = 1e-3  # of the strength: bends not told, where the solver takes a dozen steps a period of the ringing
@@ -25,9 +25,9 @@ SHARES = {"direct-effect": 0.02, "rate-and-state": 0.02}  # more of them, and th
 
 
 @lru_cache(maxsize=64)
-def slips(name: str) -> driven.Slips:
-    law = next(law for law in driven.LAWS if driven.named(law) == name)
-    return driven.simulated(driven.effects_with(law, SHARES.get(law[0], 0.1)))
+def slips(name: str) -> solver_motion.Slips:
+    law = next(law for law in solver_motion.LAWS if solver_motion.named(law) == name)
+    return solver_motion.simulated(solver_motion.effects_with(law, SHARES.get(law[0], 0.1)))
 
 
 QUICK = {"viscous-drag"}
@@ -35,21 +35,21 @@ QUICK = {"viscous-drag"}
 
 def every_law(laws):
     """Parameters of a test, those that take long to compile marked as slow."""
-    names = [driven.named(law) for law in laws]
+    names = [solver_motion.named(law) for law in laws]
     return pytest.mark.parametrize(
         "name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in names]
     )
 
 
-def wrong(found: driven.Slips, until: int | None = None, bends: bool = True) -> float:
+def wrong(found: solver_motion.Slips, until: int | None = None, bends: bool = True) -> float:
     """Largest difference of the two forces, over the strength."""
-    apart = driven.held(found, bends).contact - found.steps.contact_force
-    return float(np.abs(apart[:until]).max() / driven.STRENGTH)
+    apart = solver_motion.held(found, bends).contact - found.steps.contact_force
+    return float(np.abs(apart[:until]).max() / solver_motion.STRENGTH)
 
 
 @pytest.fixture(scope="module")
-def base() -> driven.Slips:
-    return driven.simulated(())
+def base() -> solver_motion.Slips:
+    return solver_motion.simulated(())
 
 
 def test_the_base_model_holds_what_the_solver_found(base):
@@ -63,38 +63,38 @@ def test_the_base_model_holds_what_the_solver_found(base):
 def test_bends_within_a_step_are_all_that_is_missing(base):
     """They matter by less than one in a thousand, and less in shorter steps: by what caps grow back within one."""
     assert 1e-6 < wrong(base, bends=False) < UNTOLD
-    finer = driven.simulated((), Tolerance(5e-5, 5e-13, 5e-10), 3 * driven.KNOTS)
+    finer = solver_motion.simulated((), Tolerance(5e-5, 5e-13, 5e-10), 3 * solver_motion.KNOTS)
     assert wrong(finer, bends=False) < 0.3 * wrong(base, bends=False)
 
 
-@every_law(driven.LAWS)
+@every_law(solver_motion.LAWS)
 def test_every_law_holds_what_the_solver_found(name):
     found = slips(name)
     assert found.steps.x[-1] > 140e-6  # it slips
     assert found.turned < found.steps.t.size - 50  # and sticks again
     assert wrong(found) < EXACT  # told from the start: a drive that ripples slows what slides before the block turns
-    pull = driven.held(found).pull
+    pull = solver_motion.held(found).pull
     np.testing.assert_allclose(pull, found.steps.spring_force, rtol=1e-12, atol=1e-14)
 
 
-@every_law([law for law in driven.LAWS if not catalogue.get(law[0]).measured])
+@every_law([law for law in solver_motion.LAWS if not catalogue.get(law[0]).measured])
 def test_the_law_is_in_the_force(name, base):
     """Every law does something along the base's motion, but those of the sensor, which move nothing."""
     found = slips(name)
-    plain = driven.at_steps(driven.march(base.model, base.way), base)
-    law = driven.at_steps(driven.march(found.model, base.way), base)
+    plain = solver_motion.at_steps(solver_motion.march(base.model, base.way), base)
+    law = solver_motion.at_steps(solver_motion.march(found.model, base.way), base)
     changed = max(
         float(np.abs(getattr(law, part) - getattr(plain, part)).max()) for part in ("pull", "body", "contact")
     )
     sensor = issubclass(catalogue.get(name.split()[0]), Sensor) and name != "machine-compliance series"
     if sensor:
-        assert changed < 1e-12 * driven.STRENGTH
+        assert changed < 1e-12 * solver_motion.STRENGTH
     elif name.split()[0] != "inertia":  # which is in the mass
-        assert changed > 1e-6 * driven.STRENGTH
+        assert changed > 1e-6 * solver_motion.STRENGTH
 
 
 def test_elements_add_up_to_the_contact(base):
-    held = driven.held(base)
+    held = solver_motion.held(base)
     strength = np.asarray(base.model.bank.strength)
     np.testing.assert_allclose(held.elements @ strength, held.contact, rtol=0.0, atol=1e-14)
     assert np.abs(held.elements).max() <= 1.0 + 1e-9
@@ -103,8 +103,8 @@ def test_elements_add_up_to_the_contact(base):
 def test_the_tangent_is_that_of_what_sticks(base):
     """A virgin contact loaded one way is as stiff as its tangent before and after let expect."""
     x = np.linspace(0.0, 1.5e-6, 400)
-    way = driven.way_of(np.linspace(0.0, 10.0, x.size), x, np.full(x.size, 1.5e-7))
-    held = driven.march(base.model, way)
+    way = solver_motion.way_of(np.linspace(0.0, 10.0, x.size), x, np.full(x.size, 1.5e-7))
+    held = solver_motion.march(base.model, way)
     contact, tangent = (np.asarray(a)[: x.size] for a in (held.contact, held.tangent))
     slope = np.diff(contact) / np.diff(x)
     slack = 2e-3 * tangent[0]  # weakening sets in
@@ -119,10 +119,13 @@ def test_strength_and_stretch_of_an_event_are_those_of_its_elements(base):
     bank = base.model.bank
     scaled = eqx.tree_at(lambda m: m.bank, base.model, Bank(bank.stiffness * 1.1 / 1.3, bank.strength * 1.1))
     way = base.way._replace(strength=1.1 * base.way.strength, stretch=1.3 * base.way.stretch)
-    of_event, of_bank = driven.march(base.model, way), driven.march(scaled, base.way)
+    of_event, of_bank = solver_motion.march(base.model, way), solver_motion.march(scaled, base.way)
     np.testing.assert_allclose(of_event.contact, of_bank.contact, rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(of_event.tangent[1:], of_bank.tangent[1:], rtol=1e-12)
-    assert np.abs(of_event.contact - driven.march(base.model, base.way).contact).max() > 0.05 * driven.STRENGTH
+    assert (
+        np.abs(of_event.contact - solver_motion.march(base.model, base.way).contact).max()
+        > 0.05 * solver_motion.STRENGTH
+    )
 
 
 def test_the_shape_of_an_event_stretches_large_yield_displacements_more(base):
@@ -130,14 +133,17 @@ def test_the_shape_of_an_event_stretches_large_yield_displacements_more(base):
     reach = np.asarray(bank.strength / bank.stiffness)
     apart = np.log(reach) - np.log(reach).mean()
     shaped = eqx.tree_at(lambda m: m.bank.stiffness, base.model, bank.stiffness * np.exp(-0.2 * apart))
-    of_event = driven.march(base.model, base.way._replace(shape=0.2 * base.way.strength))
-    of_bank = driven.march(shaped, base.way)
+    of_event = solver_motion.march(base.model, base.way._replace(shape=0.2 * base.way.strength))
+    of_bank = solver_motion.march(shaped, base.way)
     np.testing.assert_allclose(of_event.contact, of_bank.contact, rtol=0.0, atol=1e-13)
-    assert np.abs(of_event.contact - driven.march(base.model, base.way).contact).max() > 0.01 * driven.STRENGTH
+    assert (
+        np.abs(of_event.contact - solver_motion.march(base.model, base.way).contact).max()
+        > 0.01 * solver_motion.STRENGTH
+    )
 
 
 def test_elements_slide_where_they_carry_their_cap(base):
-    held = driven.march(base.model, base.way)
+    held = solver_motion.march(base.model, base.way)
     carried = np.abs(np.asarray(held.elements))
     slides = np.asarray(held.slides)
     assert slides.all(axis=1).any() and not slides[0].any()
@@ -153,7 +159,7 @@ def test_caps_that_fall_as_the_block_turns_back_are_met_to_second_order():
     with twenty of them a period.
     """
     stribeck = catalogue.get("velocity-weakening")(drop=np.float64(0.12), velocity=np.float64(2e-4))
-    model = driven.with_effects(driven.base_model(()), (stribeck,))
+    model = solver_motion.with_effects(solver_motion.base_model(()), (stribeck,))
     fast, stop, period, decay, ringing = 1e-3, 2e-3, 2e-3, 3e-3, 8e-8  # m/s, s, s, s, m
 
     def force(steps: int) -> np.ndarray:
@@ -162,9 +168,9 @@ def test_caps_that_fall_as_the_block_turns_back_are_met_to_second_order():
         wave = ringing * np.exp(-after / decay + 1j * turn * after)
         x = np.where(t < stop, fast * (t - 0.5 * t**2 / stop), 0.5 * fast * stop + wave.real - ringing)
         v = np.where(t < stop, fast * (1.0 - t / stop), ((1j * turn - 1.0 / decay) * wave).real)
-        return np.asarray(driven.march(model, driven.way_of(t, x, v)).contact)[: steps + 1]
+        return np.asarray(solver_motion.march(model, solver_motion.way_of(t, x, v)).contact)[: steps + 1]
 
     exact = force(3840)
-    errors = [np.abs(force(n) - exact[:: 3840 // n]).max() / driven.STRENGTH for n in (60, 120, 240, 480)]
+    errors = [np.abs(force(n) - exact[:: 3840 // n]).max() / solver_motion.STRENGTH for n in (60, 120, 240, 480)]
     assert errors[0] < 2e-3
     assert np.log2(errors[0] / errors[-1]) / 3.0 > 1.85

@@ -16,7 +16,7 @@ from stickslip.data.campaign import Rig
 from stickslip.effects import make
 from stickslip.errors import InputError
 from stickslip.inference.diagnose.backbone_laws import Shape, judged, section, shape_of
-from stickslip.inference.diagnose.engine import Verdict, with_shape
+from stickslip.inference.diagnose.stepwise_selection import Verdict, with_shape
 from stickslip.inference.fit.static_table import StaticRig
 from stickslip.inference.force import geometry
 from stickslip.inference.force.backbone import Backbone, power_law

@@ -14,8 +14,8 @@ from stickslip.inference.force.heldout import folds, points, unseen
 from stickslip.inference.force.linearised import prior_rows, reach
 from stickslip.inference.force.scatter import NAMES, Scatter
 
+from .dense_covariance import dense
 from .test_derivatives import EFFECTS, with_effects
-from .whole import dense
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from stickslip.inference.force.later_ringing import Turns
 from stickslip.physics.effects import catalogue
 from stickslip.simulation.solve import Tolerance
 
-from . import driven
+from . import solver_motion
 
 pytestmark = pytest.mark.slow
 
@@ -29,13 +29,13 @@ def slips():
     law = eqx.tree_at(
         lambda e: (e.drop, e.velocity), catalogue.get("velocity-weakening")(), (jnp.asarray(0.12), jnp.asarray(2.2e-4))
     )
-    return driven.slipping(law, END, Tolerance(1e-4, 1e-12, 1e-9))
+    return solver_motion.slipping(law, END, Tolerance(1e-4, 1e-12, 1e-9))
 
 
 def after_arrests(slips) -> float:
     """By how much the law along the sampled motion holds too much in the first millisecond of rest (share of all)."""
     model, steps = slips
-    problem, events = driven.sampled(steps, RATE)
+    problem, events = solver_motion.sampled(steps, RATE)
     run, way = problem.runs[0], problem.ways[0]
     held = np.asarray(jax.jit(along)(model, way).contact)[: run.t.size]
     off = held - np.interp(run.t, steps.t, steps.contact_force)

@@ -17,7 +17,7 @@ from stickslip.inference.force.later_ringing import later_turns
 from stickslip.physics.effects import catalogue
 from stickslip.simulation.solve import Tolerance
 
-from . import driven
+from . import solver_motion
 
 RATE, PERIOD, DECAY = 1e4, 1.83e-3, 40.0  # Hz, s, 1/s
 END = 0.9  # s
@@ -75,13 +75,13 @@ def test_where_the_block_creeps_faster_than_it_rings_it_does_not_turn():
 def replaced():
     """A block whose junctions are replaced along its way, and its steps."""
     law = eqx.tree_at(lambda e: e.rate, catalogue.get("contact-renewal")(), jnp.asarray(2e4))
-    return driven.slipping(law, END, Tolerance(1e-6, 1e-14, 1e-11))
+    return solver_motion.slipping(law, END, Tolerance(1e-6, 1e-14, 1e-11))
 
 
 def before_onsets(replaced) -> float:
     """By how much the law along the sampled motion holds too much before an onset, in shares of what renewal takes."""
     model, steps = replaced
-    problem, events = driven.sampled(steps, RATE)
+    problem, events = solver_motion.sampled(steps, RATE)
     run, way = problem.runs[0], problem.ways[0]
     without = eqx.tree_at(lambda m: m.effects[0].rate, model, jnp.asarray(0.0))
     held, kept = (np.asarray(jax.jit(along)(m, way).contact)[: run.t.size] for m in (model, without))

@@ -24,8 +24,8 @@ from stickslip.inference.force.scatter import (
 )
 from stickslip.inference.force.whitening import Whitening
 
+from .dense_covariance import dense, states
 from .test_scatter import EVENTS, POINTS, RUN, events, true
-from .whole import dense, states
 
 LEVEL, LENGTH, BEND = 8e-3, 4.0, 0.5  # share of the strength, usual ways of an event, share of the process's own
 FOLLOWS = Follows("time", 1.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 import stickslip as ss
 from stickslip.blind.generator import Run, make_campaign
-from stickslip.data.shorten import first_cycles
+from stickslip.data.first_cycles import first_cycles
 from stickslip.inference.diagnose import prepare as preparing
 from stickslip.inference.force.knots import CREEP, knots
 

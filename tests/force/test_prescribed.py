@@ -13,10 +13,10 @@ from stickslip.data.prescribed import prescribed, with_motion
 from stickslip.data.segment import segment
 from stickslip.data.trace import Trace
 from stickslip.errors import InputError
-from stickslip.inference.diagnose.confirm import confirm
-from stickslip.inference.diagnose.engine import _end
+from stickslip.inference.diagnose.free_simulation import confirm
 from stickslip.inference.diagnose.prepare import Prepared
-from stickslip.inference.diagnose.rounds import Round
+from stickslip.inference.diagnose.search_round import Round
+from stickslip.inference.diagnose.stepwise_selection import _end
 from stickslip.inference.force.backbone import backbone
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip.inference.diagnose.decide import DISPERSION
-from stickslip.inference.diagnose.engine import STRUCTURED
+from stickslip.inference.diagnose.stepwise_selection import STRUCTURED
 from stickslip.inference.force.fit import fit, fit_base
 from stickslip.inference.force.residual import PULLED, coordinates, smooth_force, structures
 from stickslip.inference.force.signatures import Explained

@@ -7,11 +7,17 @@ from dataclasses import replace
 import pytest
 
 from stickslip.inference.diagnose.decide import Judge
-from stickslip.inference.diagnose.rounds import Round
 from stickslip.inference.diagnose.search import Rung, Search
+from stickslip.inference.diagnose.search_round import Round
 from stickslip.inference.force.candidates import with_start
 from stickslip.inference.force.fit import fit
-from stickslip.inference.force.rig import SPRING, slips_finding, spring_freed, with_free_spring, within_knowledge
+from stickslip.inference.force.stated_spring import (
+    SPRING,
+    slips_finding,
+    spring_freed,
+    with_free_spring,
+    within_knowledge,
+)
 from stickslip.physics.effects.viscous_drag import ViscousDrag
 from stickslip.system.units import shown
 

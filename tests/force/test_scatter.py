@@ -24,7 +24,7 @@ from stickslip.inference.force.scatter import (
 )
 from stickslip.inference.force.whitening import Whitening
 
-from .whole import dense
+from .dense_covariance import dense
 
 STRENGTH = 0.25  # N
 EVENTS, POINTS = 60, 48

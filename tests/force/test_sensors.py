@@ -15,7 +15,7 @@ from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Motion, Sensor
 from stickslip.physics.params import parameter
 
-from . import driven
+from . import solver_motion
 
 
 class Bent(Sensor):
@@ -48,16 +48,18 @@ LEFT = {"low-pass": 0.15}
 @pytest.fixture(scope="module")
 def moved():
     """The block as it moves, through slips and the ringing after them."""
-    return driven.simulated(())
+    return solver_motion.simulated(())
 
 
 def seen(slips, effects):
     """The model with sensors, the motion of its block and of what they show, and the force."""
-    model = driven.with_effects(slips.model, effects)
-    force = jnp.concatenate([jnp.asarray(slips.steps.contact_force), jnp.zeros(driven.KNOTS - slips.steps.t.size)])
+    model = solver_motion.with_effects(slips.model, effects)
+    force = jnp.concatenate(
+        [jnp.asarray(slips.steps.contact_force), jnp.zeros(solver_motion.KNOTS - slips.steps.t.size)]
+    )
     reading = jax.jit(read)(model, slips.way, force)
     n = slips.steps.t.size
-    rate = np.zeros(driven.KNOTS)
+    rate = np.zeros(solver_motion.KNOTS)
     rate[:n] = np.gradient(np.asarray(reading)[:n], np.asarray(slips.way.t)[:n])
     return model, force, slips.way._replace(x=reading, v=rate)
 
@@ -86,16 +88,16 @@ def test_a_low_pass_that_loses_most_of_the_ringing_is_undone(moved):
     """A ringing that decays, of which a filter of two radians of it shows less than half (Laplace transform)."""
     tau, turn, decay = 6.4e-4, 2.0 * np.pi * 513.0, 60.0
     pole = -decay + 1j * turn
-    t = np.arange(driven.KNOTS) * 1e-4
+    t = np.arange(solver_motion.KNOTS) * 1e-4
     sway, fade = 1e-7 * np.exp(pole * t), 1e-7 * np.exp(-t / tau)
     x = sway.real
     shown = 1.0 / (1.0 + pole * tau)
     reading = (shown * sway).real + (1.0 - shown.real) * fade  # which begins with the block
     rate = (shown * pole * sway).real - (1.0 - shown.real) / tau * fade
     assert np.abs(reading[50:250]).max() < 0.5 * np.abs(x[50:250]).max()
-    model = driven.with_effects(moved.model, (catalogue.make("sensor-low-pass", time_constant=tau),))
+    model = solver_motion.with_effects(moved.model, (catalogue.make("sensor-low-pass", time_constant=tau),))
     still = moved.way._replace(t=jnp.asarray(t), x=jnp.asarray(reading), v=jnp.asarray(rate))
-    found = jax.jit(undone)(model, still, jnp.zeros(driven.KNOTS))
+    found = jax.jit(undone)(model, still, jnp.zeros(solver_motion.KNOTS))
     assert np.abs(np.asarray(found.x) - x).max() < 1e-3 * np.abs(x).max()
 
 
@@ -113,9 +115,9 @@ def test_without_sensors_nothing_is_done(moved):
 @pytest.mark.parametrize("tag", ["sensor-gain", "sensor-drift", "sensor-low-pass", "sensor-high-pass"])
 def test_what_is_read_along_a_motion_is_what_the_solver_read(tag):
     """One chain of sensors in the simulation and along its motion."""
-    effects = driven.effects_with((tag, {}))
-    slips = driven.simulated(effects)
+    effects = solver_motion.effects_with((tag, {}))
+    slips = solver_motion.simulated(effects)
     n = slips.steps.t.size
-    shown = np.asarray(jax.jit(read)(slips.model, slips.way, jnp.zeros(driven.KNOTS)))[:n]
+    shown = np.asarray(jax.jit(read)(slips.model, slips.way, jnp.zeros(solver_motion.KNOTS)))[:n]
     assert np.abs(slips.steps.reading - slips.steps.x).max() > 1e-9
     np.testing.assert_allclose(shown, slips.steps.reading, rtol=0.0, atol=1e-13)

@@ -10,7 +10,7 @@ import pytest
 from stickslip.inference.force import smoothing
 from stickslip.inference.force.smoothing import crept
 
-from .counted import Moved, moved, read
+from .counted_motions import Moved, moved, read
 
 pytestmark = pytest.mark.slow
 

@@ -7,14 +7,14 @@ import pytest
 
 from stickslip.data.segment import segment
 from stickslip.effects import make
-from stickslip.inference.diagnose.level import level_of
 from stickslip.inference.diagnose.prepare import prepare
+from stickslip.inference.diagnose.wandering_level import level_of
 from stickslip.inference.force import fit as fitting
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit_arrays import fit_arrays, fit_of
 from stickslip.inference.force.signatures import Explained
 
-from .counted import moved, read
+from .counted_motions import moved, read
 
 SIZE, LENGTH = 0.01, 3e-4
 

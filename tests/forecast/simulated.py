@@ -26,7 +26,7 @@ from stickslip.inference.forecast.wander import Wander
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, RUNS, figure, styled
 from stickslip.simulation.scenario import load_scenario
-from tests.finished import each
+from tests.kept_cases import each
 
 from .synthetic import prepare
 

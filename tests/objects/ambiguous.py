@@ -29,7 +29,7 @@ from stickslip.objects.experiments import Setting
 from stickslip.objects.experiments.setting import settled
 from stickslip.physics.effects import catalogue
 from tests.diagnose.development import hidden, visible
-from tests.finished import each
+from tests.kept_cases import each
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results" / "ambiguous.json"
 RUNS = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4))

@@ -12,7 +12,7 @@ import stickslip as ss
 from stickslip.blind.detection import detection
 from stickslip.blind.generator import Run, make_campaign
 from stickslip.blind.generator.forms import EFFECTS
-from stickslip.inference.diagnose.rounds import Round
+from stickslip.inference.diagnose.search_round import Round
 from stickslip.objects import next_experiment as module
 from stickslip.objects.diagnosis import Diagnosis
 from stickslip.objects.experiments import Setting, rival_experiments

@@ -6,8 +6,8 @@ goes through a command of the program as well, which must end with 2, in words, 
 every fiftieth is inspected to the end.
 
 Inputs are read in child processes of many inputs each, with bounded memory: compiled libraries crash and hang too.
-The program's own precaution against that (`stickslip.data.readers.guard`) costs a process for each file and is switched
-off at first; an input that takes a child down is read again with it.
+The program's own precaution against that (`stickslip.data.readers.guarded_reading`) costs a process for each file and
+is switched off at first; an input that takes a child down is read again with it.
 """
 
 from __future__ import annotations
@@ -234,11 +234,11 @@ def child(seed: int, first: int, number: int, state: Path, guarded: bool, comman
     """Try inputs one after the other; every outcome is one line of JSON on stdout."""
     import resource
 
-    from stickslip.data.readers import guard
+    from stickslip.data.readers import guarded_reading
 
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    guard.ENABLED, guard.PATIENCE = guarded, 4.0
+    guarded_reading.ENABLED, guarded_reading.PATIENCE = guarded, 4.0
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))

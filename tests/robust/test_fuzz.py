@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import run
-from stickslip.data.readers import guard, read_columns
+from stickslip.data.readers import guarded_reading, read_columns
 from stickslip.errors import InputError
 
 from .fuzz import campaign, inputs, mutated, prepare, try_one
@@ -54,7 +54,7 @@ def test_damaged_files_are_read_or_refused():
 @pytest.mark.parametrize("name", ["5.mat", "4.nc"])
 def test_a_file_that_would_take_the_program_down_is_refused(tmp_path, monkeypatch, name):
     """Found by fuzzing: scipy crashes on the one, HDF5 loops for ever on the other (one bit was flipped)."""
-    monkeypatch.setattr(guard, "PATIENCE", 4.0)
+    monkeypatch.setattr(guarded_reading, "PATIENCE", 4.0)
     (tmp_path / name).write_bytes((Path(__file__).parent / "crashing" / name).read_bytes())
     with pytest.raises(InputError, match=r"damaged: the library .* (fails|does not end)"):
         read_columns(tmp_path / name)
@@ -62,8 +62,8 @@ def test_a_file_that_would_take_the_program_down_is_refused(tmp_path, monkeypatc
 
 def test_the_precaution_is_taken_once_for_a_file(tmp_path, monkeypatch):
     calls = []
-    real = guard.subprocess.run
-    monkeypatch.setattr(guard.subprocess, "run", lambda *a, **k: calls.append(a) or real(*a, **k))
+    real = guarded_reading.subprocess.run
+    monkeypatch.setattr(guarded_reading.subprocess, "run", lambda *a, **k: calls.append(a) or real(*a, **k))
     (tmp_path / "a.h5").write_bytes(dict(seeds())["a.h5"])
     for _ in range(3):
         read_columns(tmp_path / "a.h5")

@@ -61,15 +61,15 @@ def test_workers_of_a_killed_sweep_end(tmp_path):
 def test_a_trial_in_a_worker_ends_with_the_diagnosis(monkeypatch, tmp_path):
     from cloudpickle import dumps, loads
 
-    from stickslip.inference.diagnose import trials
+    from stickslip.inference.diagnose import parallel_refits
     from stickslip.system import cache
 
     ends = []
-    monkeypatch.setattr(trials, "end_with", ends.append)
+    monkeypatch.setattr(parallel_refits, "end_with", ends.append)
     monkeypatch.setattr(cache, "keep_compiled", lambda: None)
-    monkeypatch.setattr(trials, "Explained", lambda base: f"explained {base}")
-    monkeypatch.setattr(trials, "try_effect", lambda *arguments: arguments)
+    monkeypatch.setattr(parallel_refits, "Explained", lambda base: f"explained {base}")
+    monkeypatch.setattr(parallel_refits, "try_effect", lambda *arguments: arguments)
     (tmp_path / "base").write_bytes(dumps("base"))
-    made = loads(trials._in_worker(tmp_path / "base", "wear", [{"course": "linear"}], (), 4321))
+    made = loads(parallel_refits._in_worker(tmp_path / "base", "wear", [{"course": "linear"}], (), 4321))
     assert made == ["base", "explained base", "wear", [{"course": "linear"}]]
     assert ends == [4321]

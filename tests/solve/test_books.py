@@ -9,7 +9,7 @@ from stickslip.physics.contact import Hysteresis
 from stickslip.physics.effects.wear import Wear
 from stickslip.simulation.solve import integrate
 
-from .books import imbalance, slow_cycle
+from .energy_balance import imbalance, slow_cycle
 from .rig import STRENGTH, rig, tighter
 from .slip_events import run
 

@@ -20,7 +20,7 @@ from stickslip.physics.model import LoadPoint
 from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
 from stickslip.simulation.solve.integrate import observe, step_control
 from stickslip.simulation.solve.trajectory import Steps
-from stickslip.system.traced import Program
+from stickslip.system.trace_cache import Program
 
 from .rig import bank, rig
 

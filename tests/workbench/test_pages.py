@@ -40,7 +40,7 @@ from stickslip.workbench.parameter_sliders import rows as knob_rows
 from stickslip.workbench.session import Session
 from stickslip.workbench.session_callbacks import Place
 
-from .outline import OUTLINE, outline
+from .page_outline import OUTLINE, outline
 
 pytestmark = pytest.mark.slow
 
@@ -427,7 +427,7 @@ def test_a_notebook_of_a_hub_shows_them_through_its_proxy(campaign, base, monkey
 
 
 def test_of_many_steps_the_first_by_hand_are_forgotten(session, base, monkeypatch):
-    monkeypatch.setattr("stickslip.workbench.steps.MOST", 3)
+    monkeypatch.setattr("stickslip.workbench.history_steps.MOST", 3)
     for share in (1.01, 1.02, 1.03, 1.04, 1.05):
         session.by_hand({"weakening.drop": base.values["weakening.drop"] * share})
     assert len(session.steps) == 4 and session.steps[0].fit is base

@@ -13,9 +13,9 @@ import stickslip as ss
 from stickslip.system.progress import Cancelled
 from stickslip.workbench import search_process
 from stickslip.workbench.history_file import FOLDER, HistoryFile
+from stickslip.workbench.history_steps import Step, complete, fewer, moved
 from stickslip.workbench.selection import choose, cycles, follow, selected, worst
 from stickslip.workbench.session import Session
-from stickslip.workbench.steps import Step, complete, fewer, moved
 
 pytestmark = pytest.mark.slow  # of a fit that takes a quarter of a minute
 
@@ -174,7 +174,7 @@ def test_a_fit_of_a_campaign_that_is_not_open_any_more_is_no_step(base, session)
 
 
 def test_steps_that_are_dropped_leave_their_lines(base, session, monkeypatch):
-    monkeypatch.setattr("stickslip.workbench.steps.MOST", 3)
+    monkeypatch.setattr("stickslip.workbench.history_steps.MOST", 3)
     for share in (1.01, 1.02, 1.03, 1.04):
         session.by_hand({DROP: base.values[DROP] * share})
     assert len(session.steps) == 4

@@ -19,7 +19,7 @@ except ImportError:
     raise InputError("the challenge's simulator needs numba", hint="pip install 'stickslip[challenge]'") from None
 
 config: Any = numba.config
-_SOURCES = ("slots.py", "laws.py", "springs.py", "contacts.py", "implicit.py", "kernel.py")
+_SOURCES = ("array_layout.py", "laws.py", "springs.py", "contacts.py", "implicit.py", "kernel.py")
 
 
 @cache

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from . import slots as S
+from . import array_layout as S
 from .compiled import jit
 from .springs import plain, rich
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.errors import InputError, SolveError
 
-from . import slots as S
+from . import array_layout as S
 from .bank import Bank
 from .kernel import run
 from .lines import Array

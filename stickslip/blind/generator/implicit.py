@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import slots as S
+from . import array_layout as S
 from .compiled import jit
 from .contacts import contacts
 from .laws import advance, body_force, damping, friction, rate_factor, rated, spring_force

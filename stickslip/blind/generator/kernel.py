@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from . import slots as S
+from . import array_layout as S
 from .compiled import jit
 from .contacts import contacts, forget, fresh_lines, needs_rich, new_life, relax
 from .implicit import creep_step, kick

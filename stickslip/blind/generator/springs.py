@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from . import slots as S
+from . import array_layout as S
 from .compiled import jit
 
 

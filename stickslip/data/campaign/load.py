@@ -12,8 +12,8 @@ from pydantic import ValidationError
 
 from ...errors import InputError, nearest
 from ..readers import beside
+from .located_errors import readable
 from .models import CHANNELS, CampaignFile, Rig, RigKeys, TraceEntry
-from .place import readable
 from .toml_file import read_toml
 
 

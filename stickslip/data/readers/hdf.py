@@ -7,7 +7,7 @@ from typing import Any
 
 from ...errors import InputError
 from .base import Columns, add_array, need_columns
-from .guard import guard
+from .guarded_reading import guard
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 _UNIT_KEYS = ("units", "unit", "Units", "Unit", "UNITS")

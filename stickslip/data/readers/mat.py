@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from .base import Columns, add_array, need_columns, reading
-from .guard import guard
+from .guarded_reading import guard
 from .hdf import read_hdf
 
 _MOST_CELLS = 1000  # of a cell array

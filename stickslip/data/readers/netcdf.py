@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from .base import Columns, add_array, need_columns, reading
-from .guard import guard
+from .guarded_reading import guard
 
 _MOST_LINKS = 8  # one to the next
 

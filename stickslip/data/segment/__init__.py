@@ -10,14 +10,14 @@ import numpy as np
 from ...system.units import shown, to_si
 from ..resolution import noise_level
 from ..trace import Drive, Trace
-from .choose import choose_settings
+from .choose_settings import choose_settings
+from .downsampling import reduce_trace, thin
+from .event_shape import LEVELS, Shape, Shapes, crept, event_shapes
 from .find_slips import directions, half_of, pick
 from .kinematics import Array, block_motion, position_at, velocity
 from .phases import divide
 from .records import PHASES, Dropped, Event, Segmentation, Settings
-from .reduce import reduce_trace, thin
 from .ringing import LAWS
-from .shape import LEVELS, Shape, Shapes, crept, event_shapes
 
 __all__ = [
     "LAWS",

@@ -20,8 +20,8 @@
 6. *Unknown*: nothing more is seen, but an effect is held back; or the residual force is a function of a variable,
    and that would explain more than half of what the named effects do; or the misfit within events is larger than is
    expected of any law.
-7. *Wandering friction* is named where the last model still needs a level that goes on between events (:mod:`.level`),
-   and nothing is missing besides that has no name.
+7. *Wandering friction* is named where the last model still needs a level that goes on between events
+   (:mod:`.wandering_level`), and nothing is missing besides that has no name.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .confirm import Confirmation, Freely
 from .free_measures import Array, Measures, measures
+from .free_simulation import Confirmation, Freely
 
 ERRORS = 2.0  # standard errors by which a free prediction must be worse to contradict
 COUNTED = ("recurrence", "slip", "creep")  # the whole cycle says little beyond its recurrence

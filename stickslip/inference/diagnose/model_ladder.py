@@ -20,14 +20,14 @@ from ..force.profile_deviations import LEVEL, held, widened
 from ..force.signatures import Explained
 from ..uncertainty import Profile, profile
 from .backbone_laws import shape_of, unshaped
-from .confirm import Confirmation, confirm
 from .decide import DISPERSION
-from .engine import Diagnosis, Verdict, leading, static_residual
 from .final_comparison import settled
-from .level import level_of
+from .free_simulation import Confirmation, confirm
+from .parallel_refits import Tell
 from .prepare import Prepared
 from .search import Rung, without
-from .trials import Tell
+from .stepwise_selection import Diagnosis, Verdict, leading, static_residual
+from .wandering_level import level_of
 
 Form = tuple[str, Mapping[str, str]]  # tag and variants of an effect
 

@@ -9,24 +9,24 @@ from functools import cached_property
 import numpy as np
 
 from ...data.campaign import Campaign
+from ...data.first_cycles import first_cycles, shares
 from ...data.prescribed import prescribed, with_motion
 from ...data.segment import Segmentation
-from ...data.shorten import first_cycles, shares
 from ...data.trace import Trace
 from ...errors import ArgumentError, InputError, nearest
 from ...physics.effects.base import Effect
 from ...system.units import shown
 from ..features.measurement import Measurement, doubts, measure
-from ..fit.start import FALLBACK_PERIOD, ringing, shared_rig
+from ..fit.stated_rig import FALLBACK_PERIOD, ringing, shared_rig
 from ..force.composition import PULL
 from ..force.knots import Knots, knots
 from ..force.point import Point
 from ..force.prescribed import SAID, both_ways, thinned
 from ..force.prescribed import begin as begin_prescribed
 from ..force.problem import Problem
-from ..force.rig import SPRING
 from ..force.scales import Scales, of_run, scales, too_coarse
 from ..force.starting_values import begin
+from ..force.stated_spring import SPRING
 
 FEWEST = 2  # slips of a run that takes part
 MOST_EVENTS = 200  # that a fit sees: its memory and time grow with them

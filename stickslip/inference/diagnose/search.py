@@ -13,12 +13,12 @@ from ..force.heldout import apart
 from ..force.linearised import Array
 from ..force.point import Point
 from ..force.problem import Problem
-from ..force.rig import EXACT, SPRING
+from ..force.stated_spring import EXACT, SPRING
 from .checkpoints import Store, kept
 from .decide import Judge, Judged, best_forms, inside, named
 from .final_comparison import settled
-from .rounds import Round, one_round
-from .trials import Tell
+from .parallel_refits import Tell
+from .search_round import Round, one_round
 
 TAKEN_OUT = "detected, then removed: the resulting model predicts unseen runs no better"
 BEST = 10  # effects of a round that are tried again beside the one that was named

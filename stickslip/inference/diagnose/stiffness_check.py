@@ -11,7 +11,7 @@ from ...data.segment import Segmentation
 from ...data.trace import Trace
 from ...errors import StickslipError
 from ..force.fit import fit_base
-from ..force.rig import slips_finding, spring_freed, within_knowledge
+from ..force.stated_spring import slips_finding, spring_freed, within_knowledge
 from .decide import Judge
 from .prepare import prepare
 

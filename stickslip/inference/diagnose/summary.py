@@ -23,13 +23,13 @@ from ..force.prescribed import placeholders
 from ..force.residual import coordinates
 from .backbone_laws import Law, named_text, section
 from .decide import CHANCE, ERRORS, Judged, best_forms
-from .engine import Diagnosis
-from .fitted import fitted_model
 from .free_errors import errors
-from .free_words import cautions, free_variables, left_out
-from .level import TAG
-from .rounds import Round
+from .free_report import cautions, free_variables, left_out
+from .model_record import fitted_model
 from .search import Rung
+from .search_round import Round
+from .stepwise_selection import Diagnosis
+from .wandering_level import TAG
 
 Variables = dict[str, Any]
 FARTHER = "the prediction error on left-out runs rises when the random effects of events are set to zero"

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from ...physics.contact import Bank
 from ...physics.effects.base import Effect, Sensor
 from ...physics.model import Block, LoadPoint, Model, Weakening
-from ...system.traced import Program, of_this_package
+from ...system.trace_cache import Program, of_this_package
 from .composition import DAMPING, PULL
 from .force_along_motion import Way, along, lead, undone
 from .point import OWN

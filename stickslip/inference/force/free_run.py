@@ -20,7 +20,7 @@ from ...physics.contact import Bank
 from ...physics.model import LoadPoint, Model
 from ...simulation.shooting import MOST_STEPS, Cycles, Track, run_cycles
 from ...simulation.solve.stepper import Tolerance
-from ...system.traced import Program, of_this_package
+from ...system.trace_cache import Program, of_this_package
 from .compiled_force import EMPTY, model_of
 from .composition import PULL
 from .force_along_motion import departures

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...physics.contact import Bank
 from ...physics.effects.base import Effect, Sensor
 from ...physics.params import specs
-from ...system.traced import Program, of_this_package
+from ...system.trace_cache import Program, of_this_package
 from .compiled_force import EMPTY, PROGRAMS, Own, model_of, of_events
 from .composition import PULL
 from .fit import Fit

@@ -16,7 +16,7 @@ from ...inference.diagnose.prepare import Prepared
 from ...inference.force.knots import Knots, knots
 from ...inference.force.scales import of_run
 from ...simulation.conformance import blamed
-from ...simulation.conformance.trial import first_line
+from ...simulation.conformance.compile_check import first_line
 from ...simulation.scenario.recording import Recording
 from ...system.progress import Cancelled
 from ..fit import Fit

@@ -9,8 +9,8 @@ from ...errors import StickslipError
 from ...physics.effects.base import Effect
 from ...physics.effects.catalogue import accept, forms
 from . import dynamics, gradients, statics
+from .compile_check import first_line
 from .rig import Rig
-from .trial import first_line
 
 
 @dataclass(frozen=True)

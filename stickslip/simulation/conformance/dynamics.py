@@ -11,10 +11,10 @@ import numpy as np
 from ...physics.effects.base import Effect, Motion
 from ...physics.effects.catalogue import forms
 from ...physics.params import specs
+from .compile_check import first_line
 from .gradients import present
 from .rig import AT_ONCE, STOPPED, TIGHT, Rig, base_model, directions, march_step, prescribed
 from .statics import corners
-from .trial import first_line
 
 ACTIVE = ("sensor", "drive")  # families that are not a passive contact
 GAIN = 1e-5  # energy that may appear by quadrature and in the model's books, as a share of all that is lost

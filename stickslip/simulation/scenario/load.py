@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ...data.campaign.place import Place, key_lines, readable, shown_place
+from ...data.campaign.located_errors import Place, key_lines, readable, shown_place
 from ...data.campaign.toml_file import read_toml
 from ...errors import InputError
 from ...system.object_repr import Shown, facts

@@ -18,7 +18,7 @@ from ...physics.contact import Bank
 from ...physics.effects.base import Motion
 from ...physics.model import Model, State
 from ...physics.params import check
-from ...system.traced import Program, of_this_package
+from ...system.trace_cache import Program, of_this_package
 from .stepper import ContactStepper, Increments, Step, Tolerance
 from .trajectory import Stats, Steps, Trajectory, energy_error
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip.errors import InputError, nearest
 
-from .. import slots as S
+from .. import array_layout as S
 from ..dynamics import Rig
 from ..lines import Array, Surface
 from ..sensor import Sensor

@@ -7,7 +7,7 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.physics.effects import catalogue
-from stickslip.simulation.conformance import blamed, load_effects, trial, try_laws
+from stickslip.simulation.conformance import blamed, compile_check, load_effects, try_laws
 
 LAW = """from jax import numpy as jnp
 from stickslip.effects import Memory, Threshold
@@ -84,8 +84,8 @@ def test_the_programs_own_are_not_tried(load, monkeypatch):
         tried.extend(effect.tag for effect in effects)
         return made(effects)
 
-    made = trial.base_model
-    monkeypatch.setattr(trial, "base_model", base_model)
+    made = compile_check.base_model
+    monkeypatch.setattr(compile_check, "base_model", base_model)
     _, (mine,) = load()
     assert tried == ["mine", "mine"]  # in both forms of its law
     try_laws([catalogue.get("wear"), mine])

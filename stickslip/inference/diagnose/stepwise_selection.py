@@ -20,17 +20,17 @@ from ..force.linearised import Array
 from ..force.prescribed import applies
 from ..force.profile_deviations import LEVEL, widened
 from ..force.residual import Structure, structures
-from ..force.rig import slips_finding, within_knowledge
 from ..force.signatures import Explained
+from ..force.stated_spring import slips_finding, within_knowledge
 from .backbone_laws import Shape, shape_of, unshaped
 from .checkpoints import Store, kept
-from .confirm import Confirmation, Parts, confirm
 from .decide import DISPERSION, Judged, as_well
-from .level import TAG, Level, level_of
+from .free_simulation import Confirmation, Parts, confirm
+from .parallel_refits import Tell
 from .prepare import FEWEST, Prepared, prepare
-from .rounds import Round
 from .search import Rung, Search
-from .trials import Tell
+from .search_round import Round
+from .wandering_level import TAG, Level, level_of
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
 LEFT = 0.5  # of what named effects explain, from which what is left is no matter of a law's form any more

@@ -18,13 +18,13 @@ import pytest
 from stickslip.inference.force.problem import compiled
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.base import Effect
-from stickslip.system import threads, traced
-from stickslip.system.traced import Program
+from stickslip.system import threads, trace_cache
+from stickslip.system.trace_cache import Program
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(traced, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(trace_cache, "_folder", lambda: tmp_path)
     return tmp_path
 
 
@@ -93,7 +93,7 @@ def test_nothing_is_kept_without_a_name_or_of_what_calls_back_into_python(folder
 @pytest.mark.parametrize("how", ["gone", "read-only"])
 def test_a_folder_that_cannot_be_written_does_no_harm(folder, monkeypatch, how):
     if how == "gone":
-        monkeypatch.setattr(traced, "_folder", lambda: folder / "gone")
+        monkeypatch.setattr(trace_cache, "_folder", lambda: folder / "gone")
     else:
 
         def refuse(*args, **kwargs):
@@ -108,7 +108,7 @@ def test_a_folder_that_cannot_be_written_does_no_harm(folder, monkeypatch, how):
 
 def test_no_trace_is_kept_of_code_that_was_changed_since_it_was_loaded(folder, tmp_path_factory, monkeypatch):
     package = tmp_path_factory.mktemp("package")
-    monkeypatch.setattr(traced, "PACKAGE", package)
+    monkeypatch.setattr(trace_cache, "PACKAGE", package)
     (package / "law.py").write_text("x = 1")
     os.utime(package / "law.py", (0.0, 0.0))
     Program(Counted(), "one")(PARTS, 3.0)
@@ -128,7 +128,7 @@ def test_an_output_that_is_no_known_container_is_traced_every_time(folder):
 ADDS = """
 from stickslip.system import cache
 cache.keep_compiled()
-from stickslip.system.traced import Program
+from stickslip.system.trace_cache import Program
 print(Program(lambda x: x + 1.0, "adds")(1.0))
 """
 
@@ -146,9 +146,9 @@ def test_traces_belong_to_the_code_and_old_ones_of_other_code_go(tmp_path, monke
     package, cache = tmp_path / "package", tmp_path / "cache"
     package.mkdir(), cache.mkdir()
     (package / "law.py").write_text("x = 1")
-    monkeypatch.setattr(traced, "PACKAGE", package)
-    monkeypatch.setattr(traced, "folder_for", lambda name: cache)
-    of = traced._of_this_version.__wrapped__
+    monkeypatch.setattr(trace_cache, "PACKAGE", package)
+    monkeypatch.setattr(trace_cache, "folder_for", lambda name: cache)
+    of = trace_cache._of_this_version.__wrapped__
     assert of() is None  # changed since it was loaded: neither are traces of the new code those of this process
     os.utime(package / "law.py", (0.0, 0.0))
     first = of()
@@ -162,7 +162,7 @@ def test_traces_belong_to_the_code_and_old_ones_of_other_code_go(tmp_path, monke
     assert of() == second
     assert set(cache.iterdir()) == {second}
     for change in (
-        lambda: monkeypatch.setattr(traced, "version", lambda name: f"{name} 9.9"),
+        lambda: monkeypatch.setattr(trace_cache, "version", lambda name: f"{name} 9.9"),
         lambda: monkeypatch.setenv("EQX_ON_ERROR", "breakpoint"),
         lambda: monkeypatch.setattr(jax, "default_backend", lambda: "another"),
     ):

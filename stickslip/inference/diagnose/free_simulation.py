@@ -22,8 +22,8 @@ from ..force.fit import Fit
 from ..force.heldout import folds, halves, points
 from .checkpoints import Store
 from .free_measures import Array, Measures, measured, scatter, simulated
+from .parallel_refits import Tell
 from .prepare import Prepared
-from .trials import Tell
 
 Parts = tuple[str, ...]  # tags of what is in a model
 FOLLOWED = (

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from ..force.candidates import Candidate, every_form, from_end
 from ..force.fit import Fit
-from ..force.rig import spring_freed
+from ..force.stated_spring import spring_freed
 from .checkpoints import Store
 from .decide import Compared, Judge, Judged, as_well, held_back, named
 from .final_comparison import Finals, finalists
-from .trials import Tell, trials
+from .parallel_refits import Tell, trials
 
 
 @dataclass(frozen=True)

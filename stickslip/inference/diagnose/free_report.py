@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ...data.segment import thin
-from .confirm import Confirmation, Freely, Parts
 from .free_errors import contradiction, predicted, summed
 from .free_measures import Array
+from .free_simulation import Confirmation, Freely, Parts
 from .prepare import Prepared
 
 POINTS = 4000  # of a picture's line
