@@ -261,7 +261,7 @@ def test_inertial_fit_of_a_generated_campaign(capsys):
     assert profile["interval"][0] < p["weakening.drop"]["value"] < profile["interval"][1]
     assert 0.02 <= found["backbone"]["rough_line"]["H"] <= 0.98
     assert {law["tag"] for law in found["backbone"]["laws"]} >= {"curvature", "plasticity", "roll-off"}
-    assert not any(law["told"] for law in found["backbone"]["laws"])  # nobody measured the roughness
+    assert not any(law["unique"] for law in found["backbone"]["laws"])  # nobody measured the roughness
     assert all(word in found["identifiability"][-1] for word in ("h_rms", "line_length", "only together"))
     shown = capsys.readouterr().out
     assert "on unseen runs" in shown and "weakening.drop is determined on both sides" in shown

@@ -39,21 +39,22 @@ class Campaign(Shown, Mapping[str, Trace]):
         description: what the campaign file says, or what
             :func:`stickslip.data.campaign.described` makes without a file.
         traces: the runs, in its order.
-        effects: Python files with effects of one's own that were loaded with it.
+        effect_files: Python files with effects of one's own that were loaded with it.
 
     Attributes:
-        description, traces, effects: as given.
+        description, traces, effect_files: as given.
     """
 
     def __init__(
-        self, description: files.Campaign, traces: Sequence[Trace], effects: str | Path | Sequence[str | Path] = ()
+        self, description: files.Campaign, traces: Sequence[Trace], effect_files: str | Path | Sequence[str | Path] = ()
     ) -> None:
-        self.description, self.traces, self.effects = description, tuple(traces), tuple(map(Path, several(effects)))
+        self.description, self.traces = description, tuple(traces)
+        self.effect_files = tuple(map(Path, several(effect_files)))
 
     @classmethod
     def from_traces(
         cls, traces: Sequence[Trace], rig: Mapping[str, Any] | None = None, title: str = "",
-        effects: str | Path | Sequence[str | Path] = (),
+        effect_files: str | Path | Sequence[str | Path] = (),
     ) -> Campaign:  # fmt: skip
         """A campaign without a file.
 
@@ -61,17 +62,17 @@ class Campaign(Shown, Mapping[str, Trace]):
             traces: the runs, such as of :meth:`stickslip.Trace.from_arrays`.
             rig: keys and values as under ``[rig]`` of a campaign file: ``{"mass": "89 g", "contacts": 4}``.
             title: free text.
-            effects: Python files with effects of one's own; their code is run.
+            effect_files: Python files with effects of one's own; their code is run.
 
         Raises:
             InputError: no trace, two of one name, a key or value of the rig that cannot be used.
         """
         if not traces:
             raise InputError("a campaign needs at least one trace")
-        _load_effects(effects)
+        _load_effects(effect_files)
         described = files.described([t.name for t in traces], rig or {}, title)
         own = [_with_spring(t, described) for t in traces]
-        return cls(described, [from_load_point(t) for t in own], effects)
+        return cls(described, [from_load_point(t) for t in own], effect_files)
 
     @property
     def title(self) -> str:
@@ -336,23 +337,23 @@ def _load_effects(paths: str | Path | Sequence[str | Path]) -> None:
 
 
 def load_campaign(
-    path: str | Path, effects: str | Path | Sequence[str | Path] = (), progress: Tell | None = None
+    path: str | Path, effect_files: str | Path | Sequence[str | Path] = (), progress: Tell | None = None
 ) -> Campaign:
     """Read a campaign file and the runs it names.
 
     Args:
         path: of the TOML file (``stickslip new campaign`` writes one with every key explained).
-        effects: Python files with effects of one's own; their code is run.
+        effect_files: Python files with effects of one's own; their code is run.
         progress: told what is read and the share of it done; default a bar where a terminal or a notebook shows one.
 
     Raises:
         InputError: the file, a trace, a unit or an effect's file cannot be used.
     """
-    _load_effects(effects)
+    _load_effects(effect_files)
     description = files.load_campaign(path)
     traces = []
     with reporting("reading", progress) as tell:
         for i, entry in enumerate(description.entries):
             tell(f"reading {entry.label}", i / len(description.entries))
             traces.append(files.load_trace(description, entry))
-    return Campaign(description, traces, effects)
+    return Campaign(description, traces, effect_files)

@@ -220,7 +220,7 @@ def diagnose(
                 "inputs": campaign.inputs(),
                 "holdout": list(holdout),
                 "versions": versions(),
-                "code": code_digest(campaign.effects),
+                "code": code_digest(campaign.effect_files),
             }
         )
         pieces = Pieces(run, key)

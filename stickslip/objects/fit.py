@@ -34,7 +34,7 @@ from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rou
 from .fit_plots import FitPlots
 from .fit_result import fit_result
 from .fit_tables import STRENGTH, correlation_table, error_table, ladder_table, parameter_table
-from .free_cycles import free_run_errors, freely
+from .free_cycles import free_run_errors, simulated_cycles
 from .parameters_by_hand import moved, profile, refitted
 from .result_base import Savable, Tell, dataset, finish, several
 
@@ -300,7 +300,7 @@ class Fit(Savable):
         """
         return free_run_errors(self.confirm(progress), self.parts)
 
-    def freely(self, run: str) -> xarray.Dataset:
+    def simulate_cycles(self, run: str) -> xarray.Dataset:
         """Free simulation of every cycle of a measured run, each begun at the measured arrest before it.
 
         Returns:
@@ -312,7 +312,7 @@ class Fit(Savable):
         Raises:
             InputError: no run of that name whose cycles can be run.
         """
-        return freely(self._climbed.prepared, self.force_fit, run)
+        return simulated_cycles(self._climbed.prepared, self.force_fit, run)
 
     @cached_property
     def fitted(self) -> Fitted:

@@ -189,12 +189,12 @@ def _drive_table(drive: Moves, events: int) -> dict[str, Any]:
     return {"piece": [{"velocity": float(v), "duration": float(t)} for v, t in pieces]}
 
 
-def load_run(folder: str | Path, effects: str | Path | Sequence[str | Path] = ()) -> FittedRun:
+def load_run(folder: str | Path, effect_files: str | Path | Sequence[str | Path] = ()) -> FittedRun:
     """Read the model that a fit or a diagnosis left in its run folder.
 
     Args:
         folder: of ``stickslip fit --model inertial --out`` or ``stickslip diagnose --out``.
-        effects: Python files with effects of one's own that are in the model; their code is run.
+        effect_files: Python files with effects of one's own that are in the model; their code is run.
 
     Raises:
         RunFolderError: no run folder, a damaged one, or one that holds no fitted model.
@@ -202,7 +202,7 @@ def load_run(folder: str | Path, effects: str | Path | Sequence[str | Path] = ()
     """
     folder = Path(folder)
     result = read_result(folder)
-    load_effects(several(effects))
+    load_effects(several(effect_files))
     section = result.get(KEY)
     if section is None:
         raise RunFolderError(

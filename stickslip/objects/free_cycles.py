@@ -41,8 +41,8 @@ def free_run_errors(confirmation: Confirmation, parts: Sequence[str]) -> pandas.
     )
 
 
-def freely(prepared: Prepared, fit: Fit, run: str) -> xarray.Dataset:
-    """See :meth:`stickslip.Fit.freely`."""
+def simulated_cycles(prepared: Prepared, fit: Fit, run: str) -> xarray.Dataset:
+    """See :meth:`stickslip.Fit.simulate_cycles`."""
     import xarray
 
     m, names = prepared.measurement, [k.name for k in prepared.runs]

@@ -52,7 +52,7 @@ def _with(
         return known
     rows = [
         {
-            "experiment": t.words, "information": t.information, "margin": t.margin, "tells": t.tells, "note": t.note,
+            "experiment": t.words, "information": t.information, "margin": t.margin, "odds": t.odds, "note": t.note,
         }
         for t in options
     ]  # fmt: skip
@@ -79,4 +79,4 @@ def _text(known: str, options: list[SimulatedExperiment]) -> str:
     best = options[0]
     if best.note or best.margin < np.log(2.0):
         return f"{known} (no experiment of the usual kind is expected to separate them)"
-    return f"{best.words}, after which the true one is expected to be {best.tells} as any other; or {known}"
+    return f"{best.words}, after which the true one is expected to be {best.odds} as any other; or {known}"

@@ -27,7 +27,7 @@ def study(
     campaigns: Mapping[str, str | Path | Campaign] | str | Path | Sequence[str | Path],
     effects: str | Sequence[str] = (),
     *,
-    files: str | Path | Sequence[str | Path] = (),
+    effect_files: str | Path | Sequence[str | Path] = (),
     scheduler: str | None = None,
     workers: int | None = None,
     progress: Tell | None = None,
@@ -37,7 +37,7 @@ def study(
     Args:
         campaigns: campaign files by a name of each or by their folders, or campaigns by name.
         effects: added to the base in each, as of :meth:`Campaign.fit`.
-        files: Python files with effects of one's own; they must be there on every worker.
+        effect_files: Python files with effects of one's own; they must be there on every worker.
         scheduler: address of a running dask scheduler, ``tcp://host:8786``; default a cluster on this machine.
         workers: of the local cluster; default one a core.
         progress: told which campaign is done and the share of all; default a bar in a terminal or a notebook.
@@ -62,7 +62,7 @@ def study(
         from distributed import as_completed
 
         local = None if scheduler else os.getpid()
-        own = (several(effects), tuple(map(str, several(files))), local)
+        own = (several(effects), tuple(map(str, several(effect_files))), local)
         given = {n: c if isinstance(c, Campaign) else str(Path(c).resolve()) for n, c in named.items()}
         work = {client.submit(_fitted, one, *own, pure=False): name for name, one in given.items()}
         for done in as_completed(work):
@@ -96,10 +96,10 @@ def _fitted(
 def _loaded(given: str | Campaign, files: tuple[str, ...]) -> Campaign:
     if not isinstance(given, Campaign):
         return load_campaign(given, files)
-    if files or given.effects:  # its own are known in the process that sent it
+    if files or given.effect_files:  # its own are known in the process that sent it
         from ..simulation.conformance import load_effects
 
-        load_effects([*given.effects, *map(Path, files)])
+        load_effects([*given.effect_files, *map(Path, files)])
     return given
 
 

@@ -48,7 +48,7 @@ class CallableModule(ModuleType):
         if proxy is None:
             hub = os.environ.get("JUPYTERHUB_SERVICE_PREFIX", "")
             proxy = f"{hub.rstrip('/')}/proxy" if hub else ""
-        return Window(Session(campaign=campaign, effects=campaign.effects), tall, proxy)
+        return Window(Session(campaign=campaign, effect_files=campaign.effect_files), tall, proxy)
 
 
 sys.modules[__name__].__class__ = CallableModule

@@ -57,7 +57,7 @@ class CatalogueSearch:
             if begun and self._listing is begun[0]:
                 session.listed, session.said = 1.0, f"the effects could not be evaluated: {text}"
 
-        self._listing = search_process.promises(fit, session.effects, found, failed)
+        self._listing = search_process.promises(fit, session.effect_files, found, failed)
         begun.append(self._listing)
 
     def diagnose(self, out: Path | None) -> None:
@@ -80,7 +80,7 @@ class CatalogueSearch:
             self._search = None
             session.param.update(searching="", said=f"the diagnosis ended: {text}")
 
-        self._search = search_process.diagnosis(session.data, session.effects, out, tell, done, failed)
+        self._search = search_process.diagnosis(session.data, session.effect_files, out, tell, done, failed)
 
     def stop(self) -> None:
         """End the diagnosis; what it has finished is used when it is begun again."""

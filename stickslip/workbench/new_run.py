@@ -305,4 +305,4 @@ def add(campaign: Campaign, name: str, content: bytes, text: str) -> Campaign:
             raise
         finally:
             trial.unlink(missing_ok=True)
-    return load_campaign(toml, campaign.effects)
+    return load_campaign(toml, campaign.effect_files)

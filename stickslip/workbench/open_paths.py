@@ -27,14 +27,14 @@ def opened(path: Path, effects: Sequence[Path] = ()) -> Session:
     own = tuple(p.resolve() for p in effects)
     file = path / CAMPAIGN if path.is_dir() else path
     if file.is_file() or not path.is_dir():
-        return Session(campaign=load_campaign(file, own), effects=own)
+        return Session(campaign=load_campaign(file, own), effect_files=own)
     from ..inference.fit.serialised import KEY
     from ..objects.diagnosis import Diagnosis
     from ..objects.fitted_run import load_run
 
     result = read_result(path)
     campaign = load_campaign(campaign_of(path, result), own)
-    session = Session(campaign=campaign, effects=own)
+    session = Session(campaign=campaign, effect_files=own)
     if result.get("kind") == "diagnose":
         session.diagnosis = Diagnosis(campaign, None, result, {}, path)
     if KEY in result:

@@ -127,8 +127,8 @@ class Rivals:
         columns = ["experiment: a click draws it", "the true one becomes", "they differ most in", "by"]
         rows = [
             [t.words, t.note] if t.note else
-            [t.words, t.tells, experiments.where(t.measure, t.slip), f"{100 * t.share:.2g} %"] if t.measure else
-            [t.words, t.tells, "nothing", ""]
+            [t.words, t.odds, experiments.where(t.measure, t.slip), f"{100 * t.share:.2g} %"] if t.measure else
+            [t.words, t.odds, "nothing", ""]
             for t in found
         ]  # fmt: skip
         self._table.param.update(columns=columns, rows=rows)
@@ -163,7 +163,7 @@ class Rivals:
 
 def _difference(experiment: SimulatedExperiment) -> str:
     """How clearly an experiment separates the models, in words."""
-    words = f"After {experiment.words} the true one is expected to be {experiment.tells} as any other."
+    words = f"After {experiment.words} the true one is expected to be {experiment.odds} as any other."
     if experiment.measure:
         place = experiments.where(experiment.measure, experiment.slip)
         words += f" They differ most in the {place}: by {100 * experiment.share:.2g} % of its mean."

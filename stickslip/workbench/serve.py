@@ -117,7 +117,7 @@ def serve(
         signal.signal(signal.SIGTERM, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
     url = f"http://{f'[{address}]' if ':' in address else address}:{port}/{token}/"
     tell(url)
-    watcher = own_effects.watch(session, session.effects) if session.effects else None
+    watcher = own_effects.watch(session, session.effect_files) if session.effect_files else None
     if waiting:  # a fit would keep the first window waiting
         session.busy = LOOKING
         server.io_loop.call_later(PATIENCE, begin)

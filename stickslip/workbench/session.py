@@ -49,7 +49,7 @@ class Session(param.Parameterized):
         said: what the user must read: an error in words or a :class:`Note` ("" for nothing).
         locked: names of parameters that a fit leaves as they are.
         promises: what every effect promises on top of the model as it stands; ``listed`` is how many were looked at.
-        effects: Python files with effects of one's own; ``loaded`` counts how often they were.
+        effect_files: Python files with effects of one's own; ``loaded`` counts how often they were.
         worker: does what takes longer than a hand would wait; the same thread unless a server gives another.
         aside: does what no hand waits for, likewise.
         view: what windows show besides the model, as plain data by page; ``restored`` counts how often it came back.
@@ -74,7 +74,7 @@ class Session(param.Parameterized):
     locked = param.Parameter(frozenset())
     promises = param.Parameter(())
     listed = param.Number(1.0)
-    effects = param.Parameter(())
+    effect_files = param.Parameter(())
     loaded = param.Integer(0)
     worker = param.Parameter(AtOnce())
     aside = param.Parameter(AtOnce())
@@ -123,7 +123,7 @@ class Session(param.Parameterized):
                     path = to_work_in(self.offers[number], self.home)
                 except OSError as error:
                     raise RunFolderError(f"the example cannot be copied here ({error.strerror or error})") from None
-                self.show_first(load_campaign(path, self.effects))
+                self.show_first(load_campaign(path, self.effect_files))
 
         if self.campaign is None and 0 <= number < len(self.offers):
             self.worker("", job)
@@ -309,7 +309,7 @@ class Session(param.Parameterized):
             if fit is None or (self.free[0] is fit and self.free[1] == run):
                 return
             try:
-                self.free = fit, run, fit.freely(run)
+                self.free = fit, run, fit.simulate_cycles(run)
             except StickslipError:
                 self.free = fit, run, None
 
@@ -327,12 +327,12 @@ class Session(param.Parameterized):
 
     def options(self) -> str:
         """Options of a command that name the files with effects of one's own."""
-        return "".join(f" --effect {quote(self.shown(path))}" for path in self.effects)
+        return "".join(f" --effect {quote(self.shown(path))}" for path in self.effect_files)
 
     def code(self) -> str:
         """The lines of Python that lead to the model as it stands."""
         path = self.data.description.path.name
-        own = f", effects={[self.shown(p) for p in self.effects]!r}" if self.effects else ""
+        own = f", effect_files={[self.shown(p) for p in self.effect_files]!r}" if self.effect_files else ""
         first: Sequence[str] = ("import stickslip as ss", f"campaign = ss.load_campaign({path!r}{own})")
         return "\n".join([*first, *(s.code for s in self.taken)])
 

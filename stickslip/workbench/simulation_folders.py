@@ -110,7 +110,7 @@ def _experiments(
     lines = commands(found, model, f"{run.target.name}-{AGAIN}", effects)
     failed = [{"experiment": t.words, "note": t.note} for t in found if not t.recordings]
     best = done[0]
-    verdict = f"{' or '.join(best.fits)}: after {best.words} the true one is expected to be {best.tells} as any other"
+    verdict = f"{' or '.join(best.fits)}: after {best.words} the true one is expected to be {best.odds} as any other"
     run.json({
         "schema": 1, "kind": KIND, "title": campaign.title, "verdict": verdict, "inputs": campaign.inputs(),
         "versions": versions(), "experiments": [*rows, *failed], "history": {**told, "commands": lines},

@@ -219,20 +219,20 @@ def test_an_effect_of_ten_deviations_is_told_where_the_roughness_is_known_and_on
     # the same gain over lines of a roughness that nobody measured names nothing
     unsure = replace(known.line, stated=("H",))
     nothing = judged(curve, known.power, Laws(unsure, None, tuple(law.shaped for law in known.laws)))
-    assert nothing.close == () and not any(row["told"] for row in section(nothing)["laws"])
+    assert nothing.close == () and not any(row["unique"] for row in section(nothing)["laws"])
     assert "h_rms is not stated" in section(nothing)["laws"][0]["text"]
     assert named.tag == "machine-compliance"
     assert abs(named.shaped.amplitude - compliance) < 3.0 * named.shaped.std < compliance
     assert named.shaped.gain > 50.0
     row = next(r for r in section(known)["laws"] if r["tag"] == named.tag)
-    assert row["told"] and row["amplitude"]["unit"] == "m/N"
+    assert row["unique"] and row["amplitude"]["unit"] == "m/N"
     assert "machine-compliance" in section(known)["text"]
     # some other roughness has the same curve
     assert known.unstated.cost < known.line.cost - 50.0
     unknown = laws(curve, tags)
     assert unknown.close == ()
     assert max(law.shaped.gain for law in unknown.laws) < 25.0
-    assert not any(row["told"] for row in section(unknown)["laws"])
+    assert not any(row["unique"] for row in section(unknown)["laws"])
     assert "not stated" in section(unknown)["laws"][0]["text"]
 
 
@@ -241,7 +241,7 @@ def test_effects_alike_are_a_set():
     lines = rough_bank(HURST, HEIGHT, LOAD, FRICTION, contacts=CONTACTS, seed=200, n=400)
     known = laws(measured(of_bank(make("curvature", share=1.0).reshape(lines)), 1), **STATED)
     assert {law.tag for law in known.close} == {"curvature", "plasticity"}
-    assert not any(row["told"] for row in section(known)["laws"])
+    assert not any(row["unique"] for row in section(known)["laws"])
     assert "cannot distinguish it from" in section(known)["text"]
 
 

@@ -76,5 +76,5 @@ def test_a_way_back_tells_that_the_level_follows_the_place():
     given = prepare(campaign.description, campaign.traces, [segment(t) for t in campaign.traces])
     assert given.problem.along == ("time", "slip path", "place")
     base = fitting.fit_base(given.problem, given.start)
-    assert base.scatter.follows.coordinate == "place" and base.scatter.follows.alike == ()
+    assert base.scatter.follows.coordinate == "place" and base.scatter.follows.equally_likely == ()
     assert level_of(base).form == {"along": "place"}

@@ -82,7 +82,7 @@ def test_a_fit_takes_a_single_name(campaign):
 
 def test_a_run_is_asked_for_by_one_word_everywhere():
     asked = (
-        *(ss.Campaign.levels, ss.Campaign.forecast, ss.Campaign.to_xarray, ss.Fit.freely, ss.Fit.scenario),
+        *(ss.Campaign.levels, ss.Campaign.forecast, ss.Campaign.to_xarray, ss.Fit.simulate_cycles, ss.Fit.scenario),
         *(ss.Fit.simulate, FitPlots.trace, FitPlots.force, FitPlots.creep, FittedRun.scenario, FittedRun.model_of),
     )
     for method in asked:

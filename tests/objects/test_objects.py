@@ -373,7 +373,7 @@ def test_with_the_hidden_effect_slips_come_when_they_were_measured(base, aged):
     way: dict[str, list[np.ndarray]] = {"base": [], "aged": []}
     for run in ("v050", "v100", "v200", "v400"):
         for name, fit in (("base", base), ("aged", aged)):
-            found = fit.freely(run)
+            found = fit.simulate_cycles(run)
             late = (found.half - found.measured_half).values[1:]  # the first is that of a virgin contact
             way[name].append(1e-6 * float(run[1:]) * late)
             np.testing.assert_allclose(found.slip[1:], found.measured_slip[1:], rtol=0.02)
@@ -385,11 +385,11 @@ def test_with_the_hidden_effect_slips_come_when_they_were_measured(base, aged):
 
 
 def test_every_cycle_begins_at_the_measured_arrest(base):
-    found = base.freely("v200")
+    found = base.simulate_cycles("v200")
     np.testing.assert_allclose(found.time[1:, 0], found.measured_arrest[:-1], atol=1e-3)  # the top of the ringing
     assert (np.diff(found.time, axis=1) >= 0.0).all()
 
 
 def test_a_run_that_is_none_is_refused(base):
     with pytest.raises(InputError, match="v050"):
-        base.freely("v51")
+        base.simulate_cycles("v51")

@@ -305,7 +305,7 @@ def _until(true, seconds=20.0):
 def test_an_effect_that_is_saved_is_loaded_anew(tmp_path, campaign):
     path = Path(tmp_path / "own_effect.py")
     path.write_text(EFFECT)
-    session = Session(campaign=campaign, effects=(path,))
+    session = Session(campaign=campaign, effect_files=(path,))
     ended = own_effects.watch(session, (path,))
     try:
         time.sleep(0.5)

@@ -197,7 +197,7 @@ def _law(law: Law, shape: Shape) -> dict[str, Any]:
             "name": law.name, "value": s.amplitude, "std": s.std if np.isfinite(s.std) else None, "unit": s.free.unit,
         },
         "visible": s.visible, "H": s.hurst, "h_rms": s.h_rms,
-        "told": bool(shape.close) and law is shape.close[0] and len(shape.close) == 1,
+        "unique": bool(shape.close) and law is shape.close[0] and len(shape.close) == 1,
         "text": _reason(law, shape),
     }  # fmt: skip
 

@@ -32,7 +32,8 @@ class Level:
     """How the strength of the contact wanders.
 
     Attributes:
-        coordinate, alike: along what, and along what it might as well.
+        coordinate: along what.
+        equally_likely: along what it might as well.
         size: standard deviation, as a share of the strength.
         length: correlation length (m or s).
         own: what events differ by besides, as a share of the strength.
@@ -40,7 +41,7 @@ class Level:
     """
 
     coordinate: str
-    alike: tuple[str, ...]
+    equally_likely: tuple[str, ...]
     size: float
     length: float
     own: float
@@ -60,7 +61,11 @@ class Level:
     def text(self) -> str:
         """The same in a few sentences."""
         unit = "s" if self.coordinate == "time" else "m"
-        like = f" (or {' or '.join(self.alike)}: these data cannot distinguish them)" if self.alike else ""
+        like = (
+            f" (or {' or '.join(self.equally_likely)}: these data cannot distinguish them)"
+            if self.equally_likely
+            else ""
+        )
         return (
             f"From event to event the strength wanders by {100 * self.size:.2g} % along {self.coordinate}{like}, with "
             f"a length of {shown(self.length, unit, 2)}; {100 * self.own:.2g} % is independent from event to event. "
@@ -70,14 +75,14 @@ class Level:
     @property
     def experiment(self) -> dict[str, Any] | None:
         """What would separate the coordinates."""
-        if not self.alike:
+        if not self.equally_likely:
             return None
-        names = [f"{TAG} along {name}" for name in (self.coordinate, *self.alike)]
-        return {"text": SEPARATED[frozenset({self.coordinate, self.alike[0]})], "separates": names}
+        names = [f"{TAG} along {name}" for name in (self.coordinate, *self.equally_likely)]
+        return {"text": SEPARATED[frozenset({self.coordinate, self.equally_likely[0]})], "separates": names}
 
     def plain(self) -> dict[str, Any]:
         """Entries of the result beside the sizes of what is random."""
-        return {"coordinate": self.coordinate, "alike": list(self.alike), "text": self.text}
+        return {"coordinate": self.coordinate, "equally_likely": list(self.equally_likely), "text": self.text}
 
 
 def level_of(fit: Fit) -> Level | None:
@@ -88,4 +93,4 @@ def level_of(fit: Fit) -> Level | None:
     gain = independent(fit).cost - fit.cost
     if gain / DISPERSION < len(WANDER) * np.log(fit.problem.events):  # Schwarz's criterion
         return None
-    return Level(follows.coordinate, follows.alike, size["level"], size["length"], size["strength"], gain)
+    return Level(follows.coordinate, follows.equally_likely, size["level"], size["length"], size["strength"], gain)

@@ -348,8 +348,8 @@ def wandering(found: Fit) -> Fit:
     assert best.scatter.follows is not None
     if found.cost - best.cost < len(WANDER) * np.log(problem.events):  # Schwarz's criterion
         return found
-    alike = tuple(name for name, f in tried.items() if f is not best and f.cost - best.cost < DISTINCT)
-    own = replace(best.scatter, follows=replace(best.scatter.follows, alike=alike))
+    others = tuple(name for name, f in tried.items() if f is not best and f.cost - best.cost < DISTINCT)
+    own = replace(best.scatter, follows=replace(best.scatter.follows, equally_likely=others))
     best = replace(best, scatter=own)
     best = _arrived(adapted(refit(problem, best.point, best)))
     return replace(best, evaluations=found.evaluations + best.evaluations)

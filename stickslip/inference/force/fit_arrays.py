@@ -32,7 +32,7 @@ def scatter_arrays(scatter: Scatter) -> dict[str, np.ndarray]:
     own = {"sizes": scatter.sizes, "most": np.asarray(scatter.most, float)}
     if (f := scatter.follows) is None:
         return own
-    return {**own, "follows": np.array([f.coordinate, *f.alike]), "unit": np.array(f.unit)}
+    return {**own, "follows": np.array([f.coordinate, *f.equally_likely]), "unit": np.array(f.unit)}
 
 
 def scatter_of(kept: Mapping[str, np.ndarray]) -> Scatter:
@@ -43,8 +43,8 @@ def scatter_of(kept: Mapping[str, np.ndarray]) -> Scatter:
         most[: kept["most"].size] = kept["most"]
         scatter = replace(scatter, most=most)
     if "follows" in kept:
-        coordinate, *alike = (str(name) for name in kept["follows"])
-        scatter = replace(scatter, follows=Follows(coordinate, float(kept["unit"]), tuple(alike)))
+        coordinate, *others = (str(name) for name in kept["follows"])
+        scatter = replace(scatter, follows=Follows(coordinate, float(kept["unit"]), tuple(others)))
     return scatter
 
 

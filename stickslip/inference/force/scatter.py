@@ -54,12 +54,12 @@ class Follows:
     Attributes:
         coordinate: one of :data:`.problem.ALONG`.
         unit: usual distance of events along it (s or m).
-        alike: coordinates that these data cannot tell from it.
+        equally_likely: coordinates that these data cannot distinguish from it.
     """
 
     coordinate: str
     unit: float
-    alike: tuple[str, ...] = ()
+    equally_likely: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

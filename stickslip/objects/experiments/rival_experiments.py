@@ -59,7 +59,7 @@ class SimulatedExperiment:
     code: str = ""
 
     @property
-    def tells(self) -> str:
+    def odds(self) -> str:
         """How likely the true model is expected to become beside any other one, in words."""
         if self.margin < np.log(2.0):
             return "about as likely"

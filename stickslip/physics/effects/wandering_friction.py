@@ -46,7 +46,7 @@ class WanderingFriction(Memory, Threshold):
     )
     symbols = {
         "w": "logarithm of the level of friction (1)",
-        "s": "what the level goes with: place (m), slip path (m) or time (s)",
+        "s": "coordinate along which the level varies: place (m), slip path (m) or time (s)",
         "a_j": "amplitudes of 128 waves: half of the square is the variance of a band of the spectral density (1)",
         "q_j": "wave numbers in correlation lengths, one in each band, up to 200 (1)",
         r"\varphi_j": "phases of the first draw (rad)",
@@ -100,9 +100,9 @@ class WanderingFriction(Memory, Threshold):
         upper=30.0,
         grid=(0.0,),
         symbol="n",
-        doc="number of the draw: another one, half apart or more, is another course",
+        doc="number of the draw: numbers that differ by a half or more give different courses",
     )
-    along: str = variant("place", ("place", "slip", "time"), "what the level goes with")
+    along: str = variant("place", ("place", "slip", "time"), "coordinate along which the level varies")
     of: str = variant("both", ("both", "static", "sliding"), "which friction wanders")
 
     def formula(self) -> str:
