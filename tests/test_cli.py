@@ -24,6 +24,7 @@ from stickslip import cli
 from stickslip.cli import COMMANDS, run
 from stickslip.system.cache import heal
 
+SHIPPED = Path(__file__).parents[1] / "scenarios" / "hidden-effect"
 SCENARIO = """
 schema = 1
 title = "small"
@@ -435,29 +436,28 @@ def test_the_exit_does_not_wait_for_a_timer_that_an_interrupted_library_left():
 
 
 @pytest.mark.slow
-def test_a_signal_ends_the_program_cleanly(scenario, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "stickslip.cli",
-        "simulate",
-        scenario,
-        "--out",
-        "out",
-        "--set",
-        "drive.events=90000",
-    ]
+@pytest.mark.parametrize("command", ["simulate", "fit"])
+def test_a_signal_ends_the_program_cleanly(command, scenario, tmp_path):
+    """In the middle of its work."""
+    long = {
+        "simulate": [scenario, "--out", "out", "--set", "drive.events=90000"],
+        "fit": [str(SHIPPED / "campaign.toml"), "--add", "rate-and-state", "--out", "out"],
+    }
     # a shell's background job ignores the signal and hands that on; a person's terminal does not
     process = subprocess.Popen(
-        command,
+        [sys.executable, "-m", "stickslip.cli", command, *long[command]],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
+    before = sorted(SHIPPED.iterdir())
     try:
         deadline = time.monotonic() + 60
-        while not Path("out.partial").exists() and time.monotonic() < deadline:
+        if command == "fit":  # its folder is begun when all is fitted
+            time.sleep(6.0)
+            assert process.poll() is None
+        while command != "fit" and not Path("out.partial").exists() and time.monotonic() < deadline:
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=60)
@@ -467,6 +467,7 @@ def test_a_signal_ends_the_program_cleanly(scenario, tmp_path):
     assert "interrupted" in err
     assert "Traceback" not in err
     assert os.listdir() == ["rig.toml"]  # noqa: PTH208
+    assert sorted(SHIPPED.iterdir()) == before
 
 
 def test_a_series_of_runs(scenario, capsys):
