@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import FitError
+from stickslip.inference.diagnose.decide import Judge
 from stickslip.inference.force import candidates
 from stickslip.inference.force.candidates import Candidate, Start, _at, _columns, from_end, try_effect, with_start
 from stickslip.inference.force.descent import SETTLED, descend
@@ -62,6 +63,16 @@ def test_making_room_takes_no_more_of_the_strength_than_a_step_may(small):
     nothing = replace(found.point, weights=0.0 * found.point.weights)
     with pytest.raises(FitError, match="no finite force"):
         refit(found.problem, nothing, found)
+
+
+def test_what_was_tried_takes_little_memory(small):
+    """A diagnosis keeps all candidates: what is large and can be found again is not kept with them."""
+    found = fit(small.problem, small.point)
+    (tried,) = try_effect(found, Explained(found), "viscous-drag", [{}])
+    assert "_system" in vars(found) and "_system" not in vars(tried.fit)
+    judged = Judge(found, 1)(tried)
+    assert judged.candidate.fit is tried.fit and "_system" not in vars(tried.fit)
+    assert judged.std == pytest.approx(tried.fit.std()[tried.name])
 
 
 @pytest.mark.slow

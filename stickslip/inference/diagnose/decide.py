@@ -27,6 +27,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -180,9 +181,9 @@ class Judge:
 
     def __call__(self, candidate: Candidate) -> Judged | None:
         """The candidate beside it; None where it was not fitted."""
-        fit = candidate.fit
-        if fit is None:
+        if candidate.fit is None:
             return None
+        fit = copy(candidate.fit)  # what is large and found for it goes with the copy
         own = [f for f in fit.problem.composition.phases if f.name.startswith(f"{candidate.tag}.")]
         free = [f for f in fit.free if f.name.startswith(f"{candidate.tag}.")]
         number = len(free) + len(own) * len(fit.problem.runs)
@@ -191,7 +192,7 @@ class Judge:
         name = candidate.name
         std = fit.std().get(name, np.inf)
         return Judged(
-            found.fit, found.gain, found.chance, found.unseen, found.nearer, candidate, fit.values[name], std,
+            candidate.fit, found.gain, found.chance, found.unseen, found.nearer, candidate, fit.values[name], std,
             far,
         )  # fmt: skip
 

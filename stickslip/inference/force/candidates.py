@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -122,11 +123,9 @@ def try_effect(base: Fit, explained: Explained, tag: str, forms: Sequence[dict[s
     """An effect in some of its forms, each refitted in full, then once more from where the best of them ended."""
     made = [_tried(base, explained, tag, form) for form in forms]
     best = min(made, key=_cost)
-    if best.fit is None:
-        return made
-    if catalogue.get(tag).periodic is None:
+    if best.fit is not None and catalogue.get(tag).periodic is None:
         made = [c if c.fit is None or c.fit.cost < best.fit.cost + EVEN else from_end(base, c, best.fit) for c in made]
-    return made
+    return [c if c.fit is None else replace(c, fit=copy(c.fit)) for c in made]  # without what is large and soon found
 
 
 def _tried(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> Candidate:
