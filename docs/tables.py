@@ -17,7 +17,6 @@ RESULTS = Path(__file__).resolve().parent / "results"
 MISSING = "*Not measured yet.*"
 PARTS = {
     "one": "one effect, at ten times its detection limit",
-    "fresh": "the same, another seed, the first in random order",
     "strong": "one effect, at the largest plausible amplitude",
     "two": "two effects",
     "left-out": "one effect, which is left out of the catalogue",
@@ -91,10 +90,7 @@ def rates(found: dict[str, Any]) -> str:
         return MISSING
     parts = {key: found[key] for key in PARTS if found.get(key)}
     rows: list[list[object]] = [["campaigns", *(len(part["cases"]) for part in parts.values())]]
-    counted = [
-        [name.replace("tellable", "identifiable"), *(rate(part["rates"].get(name)) for part in parts.values())]
-        for name in names
-    ]
+    counted = [[name, *(rate(part["rates"].get(name)) for part in parts.values())] for name in names]
     rows += [row for row in counted if any(row[1:])]
     lacking = [words for key, words in PARTS.items() if key not in parts]
     sources = [f"`{k}` version {p['version']}, {p['date']}, seed {p['seed']}" for k, p in parts.items()]

@@ -17,6 +17,7 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 import stickslip
@@ -443,6 +444,7 @@ def test_a_signal_ends_the_program_cleanly(command, scenario, tmp_path):
         "simulate": [scenario, "--out", "out", "--set", "drive.events=90000"],
         "fit": [str(SHIPPED / "campaign.toml"), "--add", "rate-and-state", "--out", "out"],
     }
+    before = sorted(SHIPPED.iterdir())
     # a shell's background job ignores the signal and hands that on; a person's terminal does not
     process = subprocess.Popen(
         [sys.executable, "-m", "stickslip.cli", command, *long[command]],
@@ -451,14 +453,15 @@ def test_a_signal_ends_the_program_cleanly(command, scenario, tmp_path):
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    before = sorted(SHIPPED.iterdir())
     try:
         deadline = time.monotonic() + 60
-        if command == "fit":  # its folder is begun when all is fitted
-            time.sleep(6.0)
-            assert process.poll() is None
-        while command != "fit" and not Path("out.partial").exists() and time.monotonic() < deadline:
+        # the folder of a fit is begun when all is fitted; it has spent as much long after its imports, before its end
+        spent = psutil.Process(process.pid).cpu_times
+        while time.monotonic() < deadline:
+            if spent().user > 4.0 if command == "fit" else Path("out.partial").exists():
+                break
             time.sleep(0.05)
+        assert process.poll() is None
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=60)
     finally:

@@ -43,3 +43,17 @@ def test_only_processors_that_were_given_to_the_process_count(monkeypatch):
         assert processors() == 1
     finally:
         os.sched_setaffinity(0, given)
+
+
+@pytest.mark.parametrize("first", ["", "import jax"])
+@pytest.mark.parametrize("asked", [None, "cuda"])
+def test_no_graphics_processor_is_taken_unless_asked_for(first, asked):
+    """Also where JAX was imported before: as in a worker, whose modules need it."""
+    code = (
+        f"{first}\nfrom stickslip.system import process\nprocess.begin()\nimport jax\nprint(jax.config.jax_platforms)"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "JAX_PLATFORMS"} | (
+        {"JAX_PLATFORMS": asked} if asked else {}
+    )
+    made = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert made.stdout.strip() == (asked or "cpu")

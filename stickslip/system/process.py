@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
+import sys
 from typing import Any
 
 from . import cache, threads
@@ -18,13 +19,15 @@ _KEPT, _LARGEST = 2**30, 2**25  # bytes: of freed memory that is kept, and of on
 def begin() -> None:
     """One thread for linear algebra, compiled code kept on disk, freed memory kept by the process, no accelerator.
 
-    JAX would take a graphics processor where it finds one, and most of its memory; a single run is faster without.
-    ``JAX_PLATFORMS=cuda`` in the environment uses it all the same.
+    JAX would take a graphics processor where it finds one, and most of its memory. ``JAX_PLATFORMS=cuda`` in the
+    environment uses it all the same.
 
     A fit makes and drops arrays of some megabytes thousands of times. The GNU library hands each back to the system,
     and the system clears each page before it is given again: a tenth of the time of a diagnosis.
     """
-    os.environ.setdefault("JAX_PLATFORMS", "cpu")
+    platforms = os.environ.setdefault("JAX_PLATFORMS", "cpu")
+    if "jax" in sys.modules:
+        sys.modules["jax"].config.update("jax_platforms", platforms)
     gc.set_threshold(RARELY)
     threads.one_for_linear_algebra()
     cache.keep_compiled()

@@ -57,7 +57,7 @@ class Program:
     def __call__(self, *args: Any) -> Any:
         """The function's result."""
         leaves, structure = jax.tree.flatten(args)
-        leaves = [np.asarray(a) for a in leaves]  # arrays that JAX has committed to a device would compile anew
+        leaves = [_here(a) for a in leaves]  # arrays that JAX has committed to a device would compile anew
         kinds = structure, tuple((np.shape(a), getattr(a, "dtype", type(a))) for a in leaves)
         if kinds not in self._ready:
             with self._lock:  # of several threads one compiles, and the others wait for it
@@ -86,6 +86,10 @@ class Program:
                 return _compiled(flat)
             _write(path, kept)
         return _compiled(export.deserialize(bytearray(kept)).call)
+
+
+def _here(leaf: Any) -> Any:
+    return np.asarray(leaf) if isinstance(leaf, jax.Array) and isinstance(leaf.dtype, np.dtype) else leaf
 
 
 def _compiled(function: Callable[..., Any]) -> Any:

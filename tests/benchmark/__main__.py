@@ -78,6 +78,7 @@ def main() -> None:
     parser.add_argument("--springs", type=int, nargs="+", help="numbers of springs of the solvers")
     parser.add_argument("--sets", type=int, default=1000, help="parameter sets of the batches")
     parser.add_argument("--chunk", type=int, default=10, help="runs of one vmap among the batches")
+    parser.add_argument("--vmap", action="store_true", help="of the batches one chunk alone, as for a GPU; not kept")
     parser.add_argument("--small", action="store_true", help="small sizes, to see that it runs; writes no files")
     parser.add_argument("--only", choices=PARTS, help="sizes: springs, drive, holds and events")
     arguments = parser.parse_args()
@@ -107,7 +108,10 @@ def main() -> None:
     if only in (None, "batches"):
         from . import batches
 
-        batches.report(FACTOR, 8 if small else arguments.sets, arguments.chunk, kept=not small)
+        if arguments.vmap:
+            batches.vmap_alone(FACTOR, arguments.chunk)
+        else:
+            batches.report(FACTOR, 8 if small else arguments.sets, arguments.chunk, kept=not small)
     if only in (None, "many"):
         from . import many
 

@@ -64,13 +64,20 @@ def by_processes(theta: np.ndarray, factor: float, workers: int) -> tuple[np.nda
     return np.concatenate([f[0] for f in found]), sum(f[1] for f in found), sum(f[2] for f in found)
 
 
+def vmap_alone(factor: float, chunk: int) -> None:
+    """One chunk, timed after it was compiled; for a graphics processor, in whose place the others have no business."""
+    theta = parameters(chunk)
+    by_vmap(theta, factor, chunk)
+    _, _, wall = timed(lambda: by_vmap(theta, factor, chunk), 2)
+    print(f"vmap, {chunk} runs on {jax.devices()[0].device_kind}: {1e3 * wall / chunk:.3g} ms of wall time a run")
+
+
 def report(factor: float, sets: int = 1000, chunk: int = CHUNK, kept: bool = True) -> dict[str, float]:
     """The table; vmap on ten chunks (its cost is the same for every chunk). ``kept``: among the results."""
     theta, workers = parameters(sets), os.cpu_count() or 1
     one_by_one(theta[:1], factor)
     _, single, _ = timed(lambda: one_by_one(theta[:1], factor), 7)
-    print(f"\nOn {jax.devices()[0].device_kind}; wall time tells where that is no processor.")
-    print(f"Batches: {sets} parameter sets, 256 elements, 5 s of drive, default tolerance/{factor:g}.")
+    print(f"\nBatches: {sets} parameter sets, 256 elements, 5 s of drive, default tolerance/{factor:g}.")
     head("way", "sets", "processor ms a run", "in single runs", "wall s in all", "of it started")
     row("one run", 1, f"{1e3 * single:.1f}", "1", "", "")
     exact, cpu, wall = timed(lambda: one_by_one(theta, factor), 1)

@@ -14,7 +14,7 @@ from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic,
 from . import own
 from .case import REFERENCE, Answer, Case, events_of, leapfrog, measure
 from .measuring import head, keep, row, timed
-from .solvers import Found, coarsest_leapfrog, coarsest_own
+from .solvers import FACTORS, Found, coarsest_leapfrog, coarsest_own
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "performance"
 SPRINGS, BINS = (64, 250, 1000, 4000), (32, 64, 128, 256)
@@ -23,6 +23,7 @@ HOLDS = (1.0, 10.0, 100.0)  # s
 EVENTS, FAST = (1, 3, 10, 30, 100, 300, 1000), 2e-4  # 1, m/s
 OWN_ALL, OWN_BINS, LEAPFROG = "own, every spring an element", "own, springs in bins", "numba leapfrog, every spring"
 OWN, OWN_TIMES = "own", "own, every onset to 0.001 of the period"
+OWN_LONGEST = "own, at the tolerance of the longest run"
 TIMED = 100  # events up to which a setting is looked for that has every onset right
 Series = dict[str, list[dict]]
 
@@ -85,9 +86,9 @@ def events(numbers: Sequence[int] = EVENTS, chosen_at: int = 10) -> Series:
     """Longer and longer drives; settings are those that are accurate enough for some ten events, and are kept.
 
     With a setting kept what an onset is off adds up from event to event: these are measured by recurrence and creep.
-    Beside them the own solver with the setting that has every onset right.
+    Beside them the own solver with the setting that has every onset right, for each number and for the largest.
     """
-    series: Series = {OWN: [], LEAPFROG: [], OWN_TIMES: []}
+    series: Series = {OWN: [], LEAPFROG: [], OWN_TIMES: [], OWN_LONGEST: []}
     print(
         f"\nNumber of events: 256 springs, drive {FAST * 1e6:g} um/s, settings chosen for {chosen_at} events, and kept"
         " (accurate enough by recurrence), or chosen for each number (by onset)."
@@ -99,6 +100,11 @@ def events(numbers: Sequence[int] = EVENTS, chosen_at: int = 10) -> Series:
     short = Case(velocity=FAST).lasting(chosen_at)
     part = leapfrog(short, REFERENCE)
     factor, dt = coarsest_own(short, part).setting, coarsest_leapfrog(short, part).setting
+    fine = next(
+        f
+        for f in FACTORS
+        if f >= factor and measure(longest, own.answer(longest, own.own_run(longest, f)), reference).onset < 1e-3
+    )
     for n in numbers:
         end = 0.5 * (seen.arrest[n - 1] + seen.onset[n]) if n < len(seen.onset) else longest.duration
         case = replace(longest, duration=float(np.round(end / 1e-3) * 1e-3))
@@ -111,6 +117,9 @@ def events(numbers: Sequence[int] = EVENTS, chosen_at: int = 10) -> Series:
             _found(case, own.answer(case, made), exact, factor, cpu, made.stats.steps),
             f"tolerance/{factor:g}",
         )
+        made, cpu, _ = timed(lambda c=case: own.own_run(c, fine))
+        found = _found(case, own.answer(case, made), exact, fine, cpu, made.stats.steps)
+        _note(series, OWN_LONGEST, n, found, f"tolerance/{fine:g}")
         answer, cpu, _ = timed(lambda c=case: leapfrog(c, dt))
         found = _found(case, answer, exact, dt, cpu, round(case.duration / dt))
         _note(series, LEAPFROG, n, found, f"{dt * 1e6:g} us")
@@ -151,14 +160,19 @@ def draw(name: str, series: Series) -> Figure:
     made, axes = figure(width=6.0, height=3.8)
     ax = axes[0, 0]
     for way, points in series.items():
-        color, mark = {OWN_ALL: (LIGHT, "s"), OWN_TIMES: (LIGHT, "s"), LEAPFROG: (DARK, "^")}.get(way, (MIDDLE, "o"))
+        color, mark = {
+            OWN_ALL: (LIGHT, "s-"),
+            OWN_TIMES: (LIGHT, "s-"),
+            OWN_LONGEST: (MIDDLE, "D--"),
+            LEAPFROG: (DARK, "^-"),
+        }.get(way, (MIDDLE, "o-"))
         good = [p for p in points if p["enough"]]
         x, y = (np.array([p[k] for p in good]) for k in ("size", "processor_s"))
         # + 0.0: no slope of minus zero
         text = f"{way} (slope {round(points[0]['slope'], 2) + 0.0:.2f})" if "slope" in points[0] else way
-        ax.plot(factor * x, y, mark + "-", color=color, label=text)
+        ax.plot(factor * x, y, mark, color=color, label=text)
         bad = [p for p in points if not p["enough"]]
-        ax.plot([factor * p["size"] for p in bad], [p["processor_s"] for p in bad], mark, mfc="none", color=color)
+        ax.plot([factor * p["size"] for p in bad], [p["processor_s"] for p in bad], mark[0], mfc="none", color=color)
     logarithmic(ax, "x")
     logarithmic(ax, "y")
     ax.set_xlabel(label)

@@ -154,9 +154,8 @@ def main() -> None:
                 ("generator, long steps in creep", both.quiet),
             ):
                 sizes = g.onset * 1e6, g.recurrence * 1e6, g.duration * 1e6, g.size * 1e9, g.creep * 1e9
-                rows.append(
-                    [f"{seed}, {velocity * 1e6:g} µm/s", text, *(f"{float(f'{size:.2g}'):g}" for size in sizes)]
-                )
+                cells = ("< 0.001" if size < 1e-3 else f"{float(f'{size:.2g}'):g}" for size in sizes)
+                rows.append([f"{seed}, {velocity * 1e6:g} µm/s", text, *cells])
                 print(" | ".join(rows[-1]), flush=True)
     known = json.loads(FIGURES.read_text(encoding="utf-8"))
     known["same springs"] = {

@@ -35,7 +35,7 @@ from stickslip.inference.diagnose.decide import DISPERSION
 from stickslip.objects.diagnosis import diagnose_campaign
 from stickslip.physics.effects import catalogue
 
-TELLABLE = float(np.log(20.0))  # likelihood ratio of twenty
+IDENTIFIABLE = float(np.log(20.0))  # likelihood ratio of twenty
 MULTIPLE = 10.0  # of detection, or the largest at which the block slips
 VELOCITIES, HOLDS = (5e-5, 1e-4, 2e-4, 4e-4), (1.0, 5.0)  # m/s, s
 RESULTS = Path(__file__).parents[2] / "docs" / "results" / "development.json"
@@ -121,7 +121,7 @@ def tally(folder: Path, part: str, seed: int) -> dict[str, Any]:
     marked = [mark(truth, read_answer(folder / RUNS, truth["name"])) for truth in read_truth(folder)["cases"]]
     marked = [m for m in marked if m.answer.kind != "not run"]
     margins = {m.name: _margin(folder, m) for m in marked}
-    tellable = [m for m in marked if (margins[m.name] or 0.0) > TELLABLE]
+    identifiable = [m for m in marked if (margins[m.name] or 0.0) > IDENTIFIABLE]
     hidden = [m for m in marked if m.tags]
     sizes = [s for m in hidden for s in m.sizes]
     return {
@@ -133,9 +133,9 @@ def tally(folder: Path, part: str, seed: int) -> dict[str, Any]:
             "exact": rate(m.exact for m in marked),
             "right": rate(m.right for m in marked),
             "something wrong named": rate(not set(m.answer.named) <= set(m.tags) for m in marked),
-            "tellable": rate((margins[m.name] or 0.0) > TELLABLE for m in marked if len(m.tags) == 1),
-            "exact where tellable": rate(m.exact for m in tellable),
-            "right where tellable": rate(m.right for m in tellable),
+            "identifiable": rate((margins[m.name] or 0.0) > IDENTIFIABLE for m in marked if len(m.tags) == 1),
+            "exact where identifiable": rate(m.exact for m in identifiable),
+            "right where identifiable": rate(m.right for m in identifiable),
             "complete": rate(m.answer.kind == "complete" for m in marked),
             "amplitude within two deviations": rate(bool(s.within(2.0)) for s in sizes if s.std is not None),
         },

@@ -17,6 +17,7 @@ from stickslip.objects import next_experiment as module
 from stickslip.objects.diagnosis import Diagnosis
 from stickslip.objects.experiments import Setting, rival_experiments
 from stickslip.objects.next_experiment import next_experiment
+from stickslip.show.report.html import render
 from stickslip.system.progress import Cancelled
 
 pytestmark = pytest.mark.slow
@@ -60,6 +61,8 @@ def test_every_experiment_is_simulated_and_the_best_is_proposed(undecided, monke
     assert margins["a hold of 100 s"] > margins["a hold of 1 s"] > 0.0  # ageing grows with the time in contact
     assert made["text"].startswith(rows[0]["experiment"]) and made["text"].endswith(KNOWN["text"])
     assert made["separates"] == list(SET) and json.loads(json.dumps(made)) == made
+    page = render({"kind": "diagnose", "next_experiment": made}, [])
+    assert all(f'<td class="text">{row["odds"]}</td>' in page for row in done)
     assert said and all(0.0 <= share <= 1.0 for _, share in said)
     table = Diagnosis(campaign, None, {"next_experiment": made}, {}).experiments
     assert list(table.index) == [row["experiment"] for row in rows] and table["margin"].iloc[0] == rows[0]["margin"]

@@ -181,11 +181,19 @@ def test_everything_a_diagnosis_holds_is_shown(tmp_path):
 
 
 def test_with_several_sets_every_experiment_is_shown(tmp_path):
-    other = {"text": "hold the drive", "separates": ["wear", "thermal-creep"]}
+    tried = {
+        "experiment": "a hold of 10 s",
+        "information": 0.6,
+        "margin": 3.0,
+        "odds": "20 times as likely",
+        "note": "",
+    }
+    other = {"text": "hold the drive", "separates": ["wear", "thermal-creep"], "experiments": [tried]}
     result = {**DIAGNOSIS, "next_experiment": {**DIAGNOSIS["next_experiment"], "others": [other]}}
     words = " ".join(Reader(write_report(folder(tmp_path, result)).read_text()).text.split())
     assert "start in reverse (separates tilt, nonlinear-spring)" in words
     assert "hold the drive (separates wear, thermal-creep)" in words
+    assert "a hold of 10 s" in words and "20 times as likely" in words
 
 
 def test_results_with_little_in_them(tmp_path):

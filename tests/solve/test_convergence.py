@@ -74,11 +74,14 @@ def test_undamped_ringing_decides_the_onset():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("damping", [1.0, 10.0])
-def test_onsets_of_a_damped_block_converge_whatever_the_kick(damping):
-    """Kicks shift the steps, and with them the errors: both fall with the tolerance, towards the leapfrog's onsets."""
+@pytest.mark.parametrize("damping, fall", [(1.0, 4.0), (10.0, 21.0)])
+def test_onsets_of_a_damped_block_converge_whatever_the_kick(damping, fall):
+    """Kicks shift the steps, and with them the errors: both fall with the tolerance, towards the leapfrog's onsets.
+
+    At the second order by 21 times for a hundredth of the tolerance; the longer the block rings, the finer that begins.
+    """
     kicks = np.linspace(0.0, 2e-6, 6)
     exact = brute_onsets(damping, kicks, dt=2.5e-6)
-    rough, fine = (np.abs(onset_scatter(damping, kicks, tighter(f)) - exact).max() for f in (10.0, 1000.0))
-    assert rough < (2e-3 if damping == 1.0 else 5e-5)
-    assert fine < 0.3 * rough
+    rough, fine = (onset_scatter(damping, kicks, tighter(f)) for f in (10.0, 1000.0))
+    assert np.abs(fine - exact).max() < np.abs(rough - exact).max() / fall
+    assert np.ptp(fine, axis=0).max() < np.ptp(rough, axis=0).max() / fall

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -168,8 +169,8 @@ def _ranking(done: Round, rung: Rung, d: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _ranked(j: Judged, done: Round, rung: Rung, d: Diagnosis) -> dict[str, Any]:
-    fit = j.candidate.fit
-    assert fit is not None
+    assert j.candidate.fit is not None
+    fit = copy(j.candidate.fit)  # what is large and found for it goes with the copy
     spec = catalogue.amplitude(catalogue.get(j.tag))
     total = float(j.unseen.sum())
     return {
