@@ -1,5 +1,7 @@
 """Make the figures of docs/verification.md and write its tables: ``python docs/make_verification.py [name ...]``.
 
+One table is of docs/challenge.md: the energy balance of the generator.
+
 Tables go to docs/results/verification.json, each with version, date and command; other numbers are printed.
 """
 

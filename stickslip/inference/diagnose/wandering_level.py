@@ -61,11 +61,8 @@ class Level:
     def text(self) -> str:
         """The same in a few sentences."""
         unit = "s" if self.coordinate == "time" else "m"
-        like = (
-            f" (or {' or '.join(self.equally_likely)}: these data cannot distinguish them)"
-            if self.equally_likely
-            else ""
-        )
+        others = " or ".join(self.equally_likely)
+        like = f" (or {others}: these data cannot distinguish them)" if others else ""
         return (
             f"From event to event the strength wanders by {100 * self.size:.2g} % along {self.coordinate}{like}, with "
             f"a length of {shown(self.length, unit, 2)}; {100 * self.own:.2g} % is independent from event to event. "
