@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip.data.checks.spring_force import force_findings, gain_is_wrong, stick_gain
+from stickslip.data.checks.spring_force import common_gain, force_findings, gain_is_wrong, stick_gain
 from stickslip.data.displacements import true_gains
 from stickslip.data.segment import segment
 from stickslip.data.segment.stick_ripple import stick_ripple, stick_spectrum
@@ -68,9 +68,16 @@ def test_a_force_that_rises_too_slowly_may_be_creep_and_is_left_as_it_is():
     (mended,), (note,) = true_gains([fast], [segment(fast)])
     assert "sensor-gain of +9.8 %" in note
     assert mended.events[3].slip < 0.95 * segment(fast).events[3].slip
-    # said once of all runs
-    _, (note,) = true_gains([fast, trace, fast.replace(name="again")], [segment(fast), found, segment(fast)])
-    assert f"{fast.name}), +9.8 %" in note and "again): while" in note
+    # one sensor, so all runs have its scale, a run with too few sticks for one of its own too, and it is said once
+    again, few = fast.replace(name="again"), fast.between(stop=fast.time[0] + 3.5).replace(name="few")
+    assert stick_gain(few, segment(few)) is None
+    mended, (note,) = true_gains([fast, again, few], [segment(t) for t in (fast, again, few)])
+    assert "+9.8 %" in note and f"; {fast.name}, again, few): while" in note
+    assert [m.settings.gain for m in mended] == [pytest.approx(1.098 * fast.spring_stiffness, rel=1e-3)] * 3
+    # the mean of runs that differ is known as well as they differ
+    apart = [{"value": v, "std": 1e-3, "sticks": 9.0} for v in (1.05, 1.15)]
+    assert common_gain(apart)["value"] == pytest.approx(1.1)
+    assert common_gain(apart)["std"] == pytest.approx(0.05)
 
 
 def test_ripple_of_the_drive_is_found_below_the_noise():

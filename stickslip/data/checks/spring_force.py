@@ -11,6 +11,7 @@ from ..trace import Trace
 from .finding import Finding
 
 _FEWEST = 5  # sticks
+_EXACT = 1e-4  # to which a gain is known at best
 _SAID = 0.02  # smaller errors of the scale are not spoken of
 
 
@@ -39,6 +40,16 @@ def stick_gain(trace: Trace, found: Segmentation) -> dict[str, float] | None:
     spread = 1.4826 * float(np.median(np.abs(slopes - np.median(slopes))))
     std = 1.2533 * spread / float(np.sqrt(len(slopes)))
     return {"value": float(np.median(slopes)), "std": std, "sticks": float(len(slopes))}
+
+
+def common_gain(gains: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Mean of gains of :func:`stick_gain`, one or more, by their errors, which are larger where runs differ by more."""
+    values, std = (np.array([gain[name] for gain in gains]) for name in ("value", "std"))
+    weights = 1.0 / np.maximum(std, _EXACT) ** 2
+    mean = float(weights @ values / weights.sum())
+    off = float(weights @ (values - mean) ** 2) / max(len(gains) - 1, 1)
+    sticks = float(sum(gain["sticks"] for gain in gains))
+    return {"value": mean, "std": float(np.sqrt(max(off, 1.0) / weights.sum())), "sticks": sticks}
 
 
 def gain_is_wrong(gain: Mapping[str, float]) -> bool:

@@ -14,8 +14,8 @@ from ...physics.contact import Bank
 from ...physics.effects.base import Effect, Sensor
 from ...physics.model import Block, LoadPoint, Model, Weakening
 from ...system.trace_cache import Program, of_this_package
-from .composition import DAMPING, PULL
-from .force_along_motion import Way, along, lead, undone
+from .composition import DAMPING, PULL, SCALE
+from .force_along_motion import Way, along, lead, of_block
 from .point import OWN
 
 PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
@@ -57,21 +57,22 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
             way = way._replace(drive=way.drive + values[PULL] / stiffness)
         model = model_of(values, effects, Bank(weights / reach, weights), spring)
         seen, delay = way, jnp.zeros(())
-        if any(isinstance(e, Sensor) for e in effects):
-            # the measured force, near enough for a sensor that sees it
-            force = model.block.spring_stiffness * (way.drive - way.x) + way.force
+        if any(isinstance(e, Sensor) for e in effects) or way.divisor is not None:
 
             def before(rate: Any) -> Way:
-                return undone(model, way._replace(v=rate), force, knots)
+                return of_block(model, way._replace(v=rate), values.get(SCALE, 1.0), knots)
 
             seen, ahead = jax.jvp(before, (way.v,), (jnp.ones_like(way.v),))
             delay = jnp.sum(ahead.x) / way.x.size  # a reading that is late is taken ahead by its rate
         shift = seen.x - way.x
         held = along(model, of_events(seen, event, of), knots)
-        steep = jax.vmap(jax.grad(model.pull))(lead(model, way.t, way.drive) - seen.x)
+        led = lead(model, way.t, way.drive)
+        steep = jax.vmap(jax.grad(model.pull))(led - seen.x)
         # how much the displacement changes where the reading does
-        steps = jnp.diff(way.x)
-        gain = 1.0 + jnp.sum(steps * jnp.diff(shift)) / jnp.sum(steps**2)
+        steps, further = jnp.diff(way.x), jnp.diff(shift)
+        if way.divisor is not None:  # of the elongation of the spring
+            steps, further = steps - jnp.diff(way.drive), further - jnp.diff(led - way.drive)
+        gain = 1.0 + jnp.sum(steps * further) / jnp.sum(steps**2)
         return (
             (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, gain, delay),
             (held.elements, held.tangent, held.slides, held.sliding, held.psi),

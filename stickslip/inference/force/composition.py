@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 PHASE = "phase"
 DAMPING = "rig.damping"
 BESIDE = "rig.parallel_stiffness"  # of a spring beside the contact, which never slides (N/m)
+SCALE = "sensor.force_scale"  # measured over true force of the spring, where nothing else was measured (1)
 PULL = "start.pull"  # of the spring at the start of a record, where the contact is not virgin (N)
 
 

@@ -20,6 +20,7 @@ from ...physics.effects.lag import slope
 from ...physics.model import Model, State
 
 PASSES = 4  # of undoing a sensor by what it shows
+NEWTON = 3  # steps to the elongation of a spring under a force; a linear one is there at once
 
 
 class Way(NamedTuple):
@@ -36,6 +37,7 @@ class Way(NamedTuple):
         force: that was measured to pull the block where no spring does (N).
         bend: of the path from the knot before (m), see :class:`~stickslip.physics.effects.base.Motion`; None where
             knots lie so close to each arrest that straight paths do.
+        divisor: N/m, by which the spring's force was divided for ``x``; None where the displacement was measured.
     """
 
     t: Any
@@ -49,6 +51,7 @@ class Way(NamedTuple):
     load: Any
     force: Any
     bend: Any = None
+    divisor: Any = None
 
 
 class Held(NamedTuple):
@@ -149,6 +152,17 @@ def departures(bank: Bank) -> Array:
     return reach - jnp.mean(reach)
 
 
+def of_block(model: Model, way: Way, scale: Array, knots: Array | int | None = None) -> Way:
+    """The motion of the block from what was read: sensors undone, and the spring where its force was read alone.
+
+    Arguments as of :func:`undone` and :func:`of_spring_force`.
+    """
+    if chain(model):
+        # the measured force, near enough for a sensor that sees it
+        way = undone(model, way, model.block.spring_stiffness * (way.drive - way.x) + way.force, knots)
+    return way if way.divisor is None else of_spring_force(model, way, scale)
+
+
 def undone(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Way:
     """The motion of the block from that of the reading: the chain of sensor effects undone.
 
@@ -171,6 +185,25 @@ def undone(model: Model, way: Way, force: Array, knots: Array | int | None = Non
         for _ in range(PASSES):
             way = _moved(way, shown.x - read(model, way, force, knots, (sensor,)))
     return way
+
+
+def of_spring_force(model: Model, way: Way, scale: Array) -> Way:
+    """The motion of the block where not the displacement was measured but the force of the spring.
+
+    The block is where the spring of the model has the measured force, behind the load point of the model.
+
+    Args:
+        model: with its spring.
+        way: its displacement made of the force as it was measured.
+        scale: measured over true force (1).
+    """
+    force = way.divisor / scale * (way.drive - way.x)
+    pull = jax.vmap(jax.value_and_grad(model.pull))
+    stretch = force / model.block.spring_stiffness
+    for _ in range(NEWTON):
+        found, slopes = pull(stretch)
+        stretch = stretch - (found - force) / slopes
+    return _moved(way, lead(model, way.t, way.drive) - stretch - way.x)
 
 
 def _moved(way: Way, further: Array) -> Way:

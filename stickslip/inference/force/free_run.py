@@ -17,12 +17,13 @@ import numpy as np
 from jax import export
 
 from ...physics.contact import Bank
+from ...physics.effects.base import Motion, Sensor
 from ...physics.model import LoadPoint, Model
 from ...simulation.shooting import MOST_STEPS, Cycles, Track, run_cycles
 from ...simulation.solve.stepper import Tolerance
 from ...system.trace_cache import Program, of_this_package
 from .compiled_force import EMPTY, model_of
-from .composition import PULL
+from .composition import PULL, SCALE
 from .force_along_motion import departures
 from .point import Point
 from .problem import Problem
@@ -50,21 +51,33 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
     c = problem.composition
     turns = {f.name: np.float64(float(f.scale) * point.phases[j, run]) for j, f in enumerate(c.phases)}
     values = {**{n: np.float64(v) for n, v in problem.values(point).items()}, **turns}
-    own = problem.runs[run].stiffness
+    own, divisor = problem.runs[run].stiffness, problem.runs[run].divisor
     program = _program(tuple(values), jax.tree.structure(c.effects))
     found: Track = program(
         values, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), np.asarray(c.reach),
-        np.float64(np.nan if own is None else own), np.zeros((np.size(cycles.start), 3)) if events is None else events,
+        np.float64(np.nan if own is None else own), None if divisor is None else np.float64(divisor),
+        np.zeros((np.size(cycles.start), 3)) if events is None else events,
         cycles, FINE,
     )  # fmt: skip
     return found
 
 
+class _SpringReading(Sensor):
+    """The displacement that is made of the spring's force, where that was measured alone."""
+
+    model: Model
+    divisor: Any  # N/m, of the true force
+
+    def read(self, state: Any, reading: Any, motion: Motion, contact_force: Any) -> Any:
+        told = self.model.load_point(motion.t) + self.model.load_point.stretch
+        return told - self.model.pull(motion.load_point - reading) / self.divisor
+
+
 @lru_cache(maxsize=64)
 def _program(names: tuple[str, ...], structure: Any) -> Program:
     def one_run(
-        values: dict[str, Any], leaves: Any, weights: Any, reach: Any, own: Any, events: Any, cycles: Cycles,
-        tolerance: Tolerance,
+        values: dict[str, Any], leaves: Any, weights: Any, reach: Any, own: Any, divisor: Any, events: Any,
+        cycles: Cycles, tolerance: Tolerance,
     ) -> Track:  # fmt: skip
         effects = jax.tree.unflatten(structure, leaves)
 
@@ -77,7 +90,12 @@ def _program(names: tuple[str, ...], structure: Any) -> Program:
             begun = jnp.zeros(())
             if PULL in values:
                 begun = jnp.where(cycles.virgin, 0.0, values[PULL] / model.block.spring_stiffness)
-            return eqx.tree_at(lambda m: m.load_point, model, LoadPoint(nodes[0], nodes[1], begun))
+            model = eqx.tree_at(lambda m: m.load_point, model, LoadPoint(nodes[0], nodes[1], begun))
+            if divisor is None:
+                return model
+            return eqx.tree_at(
+                lambda m: m.effects, model, (_SpringReading(model, divisor / values[SCALE]), *model.effects)
+            )
 
         return run_cycles(build, events, cycles, tolerance, MOST_STEPS)
 

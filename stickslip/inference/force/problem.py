@@ -296,7 +296,7 @@ class Problem:
         share = np.ones(size)
         errors = self.usual.size
         slopes, local = np.zeros((size, a + b * runs + k + errors)), np.zeros((size, OWN))
-        sensed = any(isinstance(e, Sensor) for e in c.effects)
+        shown = any(isinstance(e, Sensor) for e in c.effects)
         common = scales, phase_scale, fixed, leaves, weights, c.reach
 
         def of_run(numbered: tuple[int, tuple[Any, ...]]) -> list[Any]:
@@ -314,6 +314,7 @@ class Problem:
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             way = mean @ (run.x - run.x[0])
+            sensed = shown or run.divisor is not None
             if sensed:
                 rate, acceleration = rate + first @ shift[:n], acceleration + second @ shift[:n]
                 way = way + mean @ shift[:n]
@@ -417,7 +418,7 @@ def _padded(k: Knots, n: int, load: float | None) -> Way:
     return Way(
         grown(k.t, 1e-3), grown(k.x), np.concatenate([k.v, np.zeros(n - k.v.size)]), grown(k.drive),
         np.ones(n), np.ones(n), np.zeros(1), np.zeros(n, int), np.ones(n) if load is None else grown(k.load / load),
-        grown(k.force),
+        grown(k.force), divisor=None if k.divisor is None else np.float64(k.divisor),
     )  # fmt: skip
 
 

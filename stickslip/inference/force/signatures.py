@@ -16,9 +16,9 @@ from ...physics.effects.base import Effect, Sensor
 from ...physics.params import specs
 from ...system.trace_cache import Program, of_this_package
 from .compiled_force import EMPTY, PROGRAMS, Own, model_of, of_events
-from .composition import PULL
+from .composition import PULL, SCALE
 from .fit import Fit
-from .force_along_motion import Way, along, undone
+from .force_along_motion import Way, along, of_block
 from .linearised import Array, prior_rows, reach
 from .problem import Problem
 
@@ -70,7 +70,7 @@ def _at_points(problem: Problem, fit: Fit, found: Sequence[Sequence[Array]], sen
     for run, (q, shift, mass) in zip(problem.runs, found, strict=True):
         n, s = run.t.size, slice(p, p + run.at.size)
         moved = (run.mean @ q[:, :n].T).T - mass[:, None] * run.acceleration
-        if sensed:
+        if sensed or run.divisor is not None:
             first, second = run.smooth
             moved = moved - values["rig.mass"] * (second @ shift[:, :n].T).T
             moved = moved - values["rig.damping"] * (first @ shift[:, :n].T).T
@@ -100,10 +100,7 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
             moving = way
             if PULL in everything:
                 moving = moving._replace(drive=moving.drive + everything[PULL] / model.block.spring_stiffness)
-            seen = moving
-            if any(isinstance(e, Sensor) for e in model.effects):
-                force = model.block.spring_stiffness * (moving.drive - moving.x) + moving.force
-                seen = undone(model, moving, force, knots)
+            seen = of_block(model, moving, everything.get(SCALE, 1.0), knots)
             held = along(model, of_events(seen, own.value, own.of), knots)
             return held.pull + held.body - held.contact, seen.x - way.x, model.mass()
 

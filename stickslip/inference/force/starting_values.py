@@ -15,7 +15,7 @@ from ...data.segment import Segmentation
 from ...data.trace import Trace
 from ...errors import InputError
 from ..fit.parameters import Free, vector
-from .composition import BESIDE, PULL, Composition
+from .composition import BESIDE, PULL, SCALE, Composition
 from .knots import Knots
 from .point import OWN, Point
 from .problem import Problem
@@ -24,6 +24,7 @@ from .scales import Scales
 ELEMENTS = 64
 REACH = (1 / 60.0, 30.0)  # yield displacements, over strength/stiffness of the whole contact
 FALLBACK_STIFFNESS = 1000.0  # N/m
+CALIBRATED, MISTAKEN = 0.02, 0.1  # of a force, to which its scale is known; where sticks contradict it
 
 
 def known(value: Any, default: float, width: float) -> tuple[float, float, float | None, float | None, bool]:
@@ -102,6 +103,11 @@ def begin(
         free.append(
             log("rig.mass", "kg", mass, mass_width, lightest or mass / 10, heaviest or mass * 10, "mass of the block")
         )
+    made = np.array([k.divisor / c for k, c in zip(runs, each, strict=True) if k.divisor is not None])
+    if made.size:
+        scale = float(np.exp(np.mean(np.log(made))))
+        width = MISTAKEN if np.any(made != 1.0) else CALIBRATED
+        free.append(log(SCALE, "1", scale, width, 0.5 * scale, 2.0 * scale, "measured over true force of the spring"))
     begun = np.zeros((0, len(runs)))
     if not virgin.all():
         unit = strength

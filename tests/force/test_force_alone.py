@@ -1,0 +1,92 @@
+"""Records of nothing but the spring's force: its scale and the drive's ripple are found with the rest of the model."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+import stickslip as ss
+from stickslip.blind.generator import Run, make_campaign
+from stickslip.inference.force.composition import SCALE
+from stickslip.inference.force.force_along_motion import of_block
+from stickslip.physics.effects import catalogue
+from stickslip.simulation.solve import Tolerance
+
+from . import solver_motion
+
+RUNS = (Run("v100", 1e-4, 8), Run("v200", 2e-4, 8), Run("v400", 4e-4, 4))
+NOISE = 2e-8  # m; of the force over the spring's stiffness
+QUIET = 5e-9
+GAIN = 1.1
+RIPPLE = {"ripple": 4e-7, "pitch": 5e-5}
+EFFECTS = {
+    "linear": (),
+    "ripple": (catalogue.make("drive-ripple", **RIPPLE),),
+    "nonlinear spring": (catalogue.make("nonlinear-spring", curvature=400.0),),
+}
+
+
+def force_alone(trace, stiffness, gain=GAIN, seed=3):
+    """A run of which only the force is left, read by a sensor whose scale is wrong."""
+    stretch = trace.drive.position(trace.time) - np.asarray(trace.displacement)
+    noisy = stretch + NOISE * np.random.default_rng(seed).standard_normal(stretch.size)
+    return trace.replace(
+        displacement=None, resolution=None, walk=0.0, hum=0.0, spring_force=gain * stiffness * noisy,
+        noise=gain * stiffness * NOISE,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["linear", "ripple", "nonlinear spring"])
+def test_the_block_is_where_the_model_s_spring_has_the_measured_force(name):
+    slips = solver_motion.simulated(EFFECTS[name])
+    n, divisor = slips.steps.t.size, 1040.0
+    drive = np.asarray(slips.way.drive)
+    shown = drive.copy()
+    shown[:n] -= GAIN * slips.steps.spring_force / divisor
+    way = slips.way._replace(x=shown, divisor=divisor)
+    assert np.abs(shown[:n] - slips.steps.x).max() > 1e-6
+    found = jax.jit(of_block)(slips.model, way, GAIN)
+    np.testing.assert_allclose(found.x[:n], slips.steps.x, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_the_scale_of_a_force_is_found_with_the_rest(tmp_path):
+    truth = make_campaign(tmp_path / "c", 21, (), runs=RUNS, spring_known=True, rate=1e4)["rig"]
+    made = ss.load_campaign(tmp_path / "c" / "campaign.toml")
+    traces = [force_alone(t, truth["spring_stiffness"]) for t in made.values()]
+    campaign = ss.Campaign(made.description, traces)
+    (note,) = campaign.scaled[1]
+    assert all(name in note for name in campaign.names)  # one sensor: the run with few sticks has the scale of the others
+    fit = campaign.fit()
+    table = fit.parameters
+    true = {
+        SCALE: GAIN, "weakening.drop": 1.0 - truth["mu_k"] / truth["mu_s"],
+        "weakening.slip_distance": truth["slip_length"], "rig.damping": truth["damping"],
+    }  # fmt: skip
+    for name, value in true.items():
+        assert abs(table.value[name] - value) < 4.0 * table["std"][name] + 0.005 * value, name
+        assert table["std"][name] < 0.02 * value, name
+    # better than the sticks tell it: they creep
+    assert abs(table.value[SCALE] - GAIN) < 0.7 * abs(1.099 - GAIN)
+    predicted = fit.predict()
+    assert predicted.slip["all"] < 0.01 and predicted.missed["all"] == 0
+
+
+@pytest.mark.slow
+def test_the_drive_s_ripple_is_found_in_a_force():
+    model, steps = solver_motion.slipping(EFFECTS["ripple"][0], 1.9, Tolerance(5e-4, 5e-12, 5e-9))
+    t = np.arange(0.0, steps.t[-1], 1e-4)
+    x = CubicHermiteSpline(steps.t, steps.x, steps.v)(t) - QUIET * np.random.default_rng(0).standard_normal(t.size)
+    force = float(model.block.spring_stiffness) * (np.asarray(jax.vmap(model.lead)(jnp.asarray(t))) - x)
+    run = ss.Trace.from_arrays(
+        "run", time=t, spring_force=force, drive_velocity=solver_motion.SPEED,
+        noise=float(model.block.spring_stiffness) * QUIET,
+    )  # fmt: skip
+    found = ss.Campaign.from_traces([run], solver_motion.SAMPLED).fit("drive-ripple").parameters
+    for name, value in (("ripple", RIPPLE["ripple"]), ("pitch", RIPPLE["pitch"])):
+        assert found.value[f"drive-ripple.{name}"] == pytest.approx(value, rel=0.01)
+        assert found["std"][f"drive-ripple.{name}"] < 0.01 * value
+    assert found.value[SCALE] == pytest.approx(1.0, abs=1e-3)
