@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -39,6 +40,10 @@ def test_every_coordinate_is_a_form_of_the_effect():
     for coordinate in ALONG:
         found = Level(coordinate, (), 0.07, 6.3e-4, 0.01, 1600.0)
         assert make(TAG, **found.form).along == found.form["along"]
+        assert make(TAG, **found.form).of == "both" and "the strength wanders" in found.text
+        for of in ("static", "sliding"):
+            alone = replace(found, of=of)
+            assert make(TAG, **alone.form).of == of and f"{of} friction wanders" in alone.text
 
 
 def test_what_cannot_be_told_has_an_experiment():

@@ -40,8 +40,7 @@ def dense(sizes: np.ndarray, known: Known) -> np.ndarray:
         of_states[1::2] *= chain.unit  # slopes are over the usual way of an event
         of_states[:, 1::2] *= chain.unit
         cubic = CubicHermiteSpline([0.0, 1.0], np.eye(4).reshape(2, 2, 4)[:, 0], np.eye(4).reshape(2, 2, 4)[:, 1])
-        slides = chain.slides[..., None]
-        load = slides * cubic(chain.share) + (1.0 - slides) * cubic(chain.held)[:, None]
+        load = chain.slides[..., None] * cubic(chain.share) + chain.rests[..., None] * cubic(chain.held)[:, None]
         load *= np.stack([np.ones(events), chain.way, np.ones(events), chain.way], axis=1)[:, None]
         load *= known.local[..., :2].sum(axis=2, keepdims=True)  # the caps alone: yield displacements go with them
         whole = of_states.reshape(events, 4, events, 4)

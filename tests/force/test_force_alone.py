@@ -59,7 +59,7 @@ def test_the_scale_of_a_force_is_found_with_the_rest(tmp_path):
     traces = [force_alone(t, truth["spring_stiffness"]) for t in made.values()]
     campaign = ss.Campaign(made.description, traces)
     (note,) = campaign.scaled[1]
-    assert all(name in note for name in campaign.names)  # one sensor: the run with few sticks has the scale of the others
+    assert all(name in note for name in campaign.names)  # one sensor: of the run with few sticks, too
     fit = campaign.fit()
     table = fit.parameters
     true = {

@@ -42,7 +42,9 @@ def levelled(way: str, short: bool = True, groups: int = EVENTS // RUN, every: b
     end = np.cumsum(steps)
     share = np.sort(rng.uniform(0.0, 1.0, known.there.shape), axis=1)
     slides = np.ones_like(share) if every else np.sort(rng.uniform(0.0, 1.0, share.shape), axis=1)
-    return known.following(Chain(end - steps, end, group, 1.0, share, slides, rng.uniform(0.0, 0.5, EVENTS)))
+    held = rng.uniform(0.0, 0.5, EVENTS)
+    rests = (1.0 - slides) * rng.uniform(0.0, 1.0, share.shape)  # of one friction alone it is less than the rest
+    return known.following(Chain(end - steps, end, group, 1.0, share, slides, held, rests))
 
 
 def sizes(level: float = LEVEL, length: float = LENGTH, bend: float = BEND) -> np.ndarray:
@@ -193,7 +195,8 @@ def test_the_cost_is_linear_in_the_events():
             np.tile(np.arange(6) % 4, (n, 1)), np.ones((n, 6)), np.ones((n, 6)), np.tile(np.arange(6.0), (n, 1)),
             share, np.ones(n), np.arange(n) == 0, np.ones((n, 6), bool), 1.0,
             chain=Chain(
-                np.arange(n) * 1.0, np.arange(n) + 1.0, np.zeros(n, int), 1.0, share, np.ones_like(share), np.zeros(n)
+                np.arange(n) * 1.0, np.arange(n) + 1.0, np.zeros(n, int), 1.0, share, np.ones_like(share), np.zeros(n),
+                np.zeros_like(share),
             ),
         )  # fmt: skip
         residual = 1e-2 * rng.standard_normal((n, 6))

@@ -12,16 +12,23 @@ from stickslip.inference.diagnose.wandering_level import level_of
 from stickslip.inference.force import fit as fitting
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit_arrays import fit_arrays, fit_of
+from stickslip.inference.force.level_within_events import _states
 from stickslip.inference.force.signatures import Explained
 
 from .counted_motions import moved, read
+from .solver_motion import STRENGTH
 
 SIZE, LENGTH = 0.01, 3e-4
 
 
-def wanders(size):
+def courses(size, of="both"):
+    """Two draws of a level along the slip path."""
+    return [make("wandering-friction", size=size, length=LENGTH, draw=i, along="slip", of=of) for i in range(2)]
+
+
+def wanders(size, of="both"):
     """Two runs whose friction wanders along the slip path."""
-    effects = [make("wandering-friction", size=size, length=LENGTH, draw=i, along="slip") for i in range(2)]
+    effects = courses(size, of)
     return read([moved(1e-4, 8.0, 1e-4, effects[:1]), moved(2e-4, 4.0, 1e-4, effects[1:])], 5)
 
 
@@ -66,6 +73,26 @@ def test_a_diagnosis_names_the_wander_and_nothing_else(size):
     )
     assert found.verdict["kind"] == "missing" and found.verdict["effects"] == ["wandering-friction"]
     assert found.verdict["forms"] == {"wandering-friction": {"along": "slip"}}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("of", ["static", "sliding"])
+def test_static_or_sliding_friction_alone_is_told_and_its_course_is_found(of):
+    campaign = wanders(SIZE, of)
+    given = prepare(campaign.description, campaign.traces, [segment(t) for t in campaign.traces])
+    base = fitting.fit_base(given.problem, given.start)
+    assert (base.scatter.follows.coordinate, base.scatter.follows.of) == ("slip path", of)
+    assert level_of(base).form == {"along": "slip", "of": of}
+    again = fit_of(given.problem.with_composition(base.problem.composition), fit_arrays(base))
+    assert again.cost == base.cost and again.scatter.follows == base.scatter.follows
+    after = _states(base.problem, base.point, base.forces, base.scatter, base.known, base.blocks)[:, 2]
+    for run, effect in enumerate(courses(SIZE, of)):
+        own = base.problem.event_run == run
+        true = SIZE * np.asarray(effect.course(base.known.chain.end[own] / LENGTH))
+        assert np.corrcoef(true, after[own])[0, 1] > 0.995
+        # a share of the strength, which a record that begins with the contact loaded tells badly
+        scale = np.polyfit(true, after[own], 1)[0] * base.strength / STRENGTH
+        assert scale == pytest.approx(1.0, abs=0.05)
 
 
 @pytest.mark.slow

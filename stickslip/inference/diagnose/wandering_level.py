@@ -19,6 +19,7 @@ from .decide import DISPERSION
 
 TAG = "wandering-friction"
 FORMS = {"place": "place", "slip path": "slip", "time": "time"}
+WHAT = {"both": "the strength", "static": "static friction", "sliding": "sliding friction"}
 SEPARATED = {
     frozenset({"slip path", "time"}): "hold the drive for as long as several slips take: a level that wanders in time "
     "changes meanwhile, one that wanders along the slip path does not",
@@ -38,6 +39,7 @@ class Level:
         length: correlation length (m or s).
         own: what events differ by besides, as a share of the strength.
         gain: fall of the cost against independent strengths.
+        of: which friction wanders: both, static or sliding.
     """
 
     coordinate: str
@@ -46,11 +48,13 @@ class Level:
     length: float
     own: float
     gain: float
+    of: str = "both"
 
     @property
     def form(self) -> dict[str, str]:
         """Of the catalogue's effect."""
-        return {"along": FORMS[self.coordinate]}
+        form = {"along": FORMS[self.coordinate]}
+        return form if self.of == "both" else {**form, "of": self.of}
 
     @property
     def reason(self) -> str:
@@ -64,9 +68,9 @@ class Level:
         others = " or ".join(self.equally_likely)
         like = f" (or {others}: these data cannot distinguish them)" if others else ""
         return (
-            f"From event to event the strength wanders by {100 * self.size:.2g} % along {self.coordinate}{like}, with "
-            f"a length of {shown(self.length, unit, 2)}; {100 * self.own:.2g} % is independent from event to event. "
-            "All effects are tried on top of this."
+            f"From event to event {WHAT[self.of]} wanders by {100 * self.size:.2g} % along {self.coordinate}{like}, "
+            f"with a length of {shown(self.length, unit, 2)}; {100 * self.own:.2g} % of the strength is independent "
+            "from event to event. All effects are tried on top of this."
         )
 
     @property
@@ -79,7 +83,12 @@ class Level:
 
     def plain(self) -> dict[str, Any]:
         """Entries of the result beside the sizes of what is random."""
-        return {"coordinate": self.coordinate, "equally_likely": list(self.equally_likely), "text": self.text}
+        return {
+            "coordinate": self.coordinate,
+            "of": self.of,
+            "equally_likely": list(self.equally_likely),
+            "text": self.text,
+        }
 
 
 def level_of(fit: Fit) -> Level | None:
@@ -90,4 +99,6 @@ def level_of(fit: Fit) -> Level | None:
     gain = independent(fit).cost - fit.cost
     if gain / DISPERSION < len(WANDER) * np.log(fit.problem.events):  # Schwarz's criterion
         return None
-    return Level(follows.coordinate, follows.equally_likely, size["level"], size["length"], size["strength"], gain)
+    return Level(
+        follows.coordinate, follows.equally_likely, size["level"], size["length"], size["strength"], gain, follows.of
+    )  # fmt: skip

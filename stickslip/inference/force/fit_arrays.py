@@ -32,7 +32,12 @@ def scatter_arrays(scatter: Scatter) -> dict[str, np.ndarray]:
     own = {"sizes": scatter.sizes, "most": np.asarray(scatter.most, float)}
     if (f := scatter.follows) is None:
         return own
-    return {**own, "follows": np.array([f.coordinate, *f.equally_likely]), "unit": np.array(f.unit)}
+    return {
+        **own,
+        "follows": np.array([f.coordinate, *f.equally_likely]),
+        "unit": np.array(f.unit),
+        "of": np.array(f.of),
+    }
 
 
 def scatter_of(kept: Mapping[str, np.ndarray]) -> Scatter:
@@ -44,7 +49,8 @@ def scatter_of(kept: Mapping[str, np.ndarray]) -> Scatter:
         scatter = replace(scatter, most=most)
     if "follows" in kept:
         coordinate, *others = (str(name) for name in kept["follows"])
-        scatter = replace(scatter, follows=Follows(coordinate, float(kept["unit"]), tuple(others)))
+        of = str(kept["of"]) if "of" in kept else "both"  # not in files of before
+        scatter = replace(scatter, follows=Follows(coordinate, float(kept["unit"]), tuple(others), of))
     return scatter
 
 

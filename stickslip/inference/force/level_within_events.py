@@ -15,7 +15,7 @@ import numpy as np
 from .linearised import Array
 from .linked_events import WALK
 from .point import Forces, Point, Slopes
-from .problem import Problem, coordinate
+from .problem import Problem, coordinate, part_of
 from .scatter import Blocks, Follows, Known, Scatter
 from .whitening import Whitening
 
@@ -53,14 +53,15 @@ def _beyond(
     assert chain is not None
     mean = (chain.mean * states).sum(axis=1)
     courses = []
-    for first, run, error in zip(problem.first, problem.runs, problem.errors, strict=True):
+    for first, run, error, rested in zip(problem.first, problem.runs, problem.errors, slopes.rested, strict=True):
         there = (run.event >= 0) & (run.event < run.events)
         e = first + np.where(there, run.event, 0)
         whole = chain.end[e] - chain.begin[e]
         way = coordinate(replace(run, x=run.x + error), follows.coordinate)  # the chain is of the motion as it was read
         share = (way - chain.begin[e]) / np.where(whole == 0.0, 1.0, whole)
         course = chain.course(np.clip(share, 0.0, 1.0), e, states)
-        courses.append(np.where(there, course - mean[e], 0.0))
+        caps = np.log1p(part_of(follows.of, rested) * np.expm1(course))
+        courses.append(np.where(there, caps - mean[e], 0.0))
     first_order = np.einsum("eik,ek->ei", chain.loads(known.caps), states) - known.caps * mean[:, None]
     along = problem.with_courses(courses).evaluate(point).residual
     out = along - (slopes.residual - problem.beyond)

@@ -5,12 +5,13 @@ from it, and what sticks (k) remembers where it was at the arrest t0. With w_0 a
 a time T apart, w(t) = (1 - s) w_0 + s w_1 and a Brownian bridge, s = (t - t0) / T. The bridge is an event's own. The
 nodes hang together from event to event of a run, w_1 - w_0 ~ N(0, size^2 T), and begin at zero.
 
-*Level.* The caps of an event are partly its own and partly a level, which leaves the stiffnesses as they are. It is a
-Matern process of order 3/2 along time, slip path or place: cov = size^2 (1 + q) exp(-q) with q = sqrt(3) |s_i - s_j| /
-length in a run, nothing between runs. It has a slope, and value and slope together are Markov (Hartikainen & Sarkka
-2010); its nodes are where events end, in the middle of slips. Between two nodes it goes as a cubic but for the bridge
-of an integrated Brownian motion, which is an event's own: so does the process where events are short beside its length,
-and a smoother one with less of the bridge.
+*Level.* The caps of an event are partly its own and partly a level, which leaves the stiffnesses as they are. It is
+that of friction as a whole, or of static or sliding friction alone, whose share of the caps changes as they heal. It is
+a Matern process of order 3/2 along time, slip path or place: cov = size^2 (1 + q) exp(-q) with
+q = sqrt(3) |s_i - s_j| / length in a run, nothing between runs. It has a slope, and value and slope together are Markov
+(Hartikainen & Sarkka 2010); its nodes are where events end, in the middle of slips. Between two nodes it goes as a
+cubic but for the bridge of an integrated Brownian motion, which is an event's own: so does the process where events are
+short beside its length, and a smoother one with less of the bridge.
 
 Given the nodes events are independent, so that these are eliminated with a banded matrix (Rue & Held 2005, Gaussian
 Markov Random Fields, ch. 2).
@@ -59,6 +60,7 @@ class Chain:
         share: of the way of an event that is over, shape (E, n).
         slides: share of the strength that slides, and goes with the level where it is, shape (E, n).
         held: share of the way that was over when the rest came to rest, with the level of then, shape (E,).
+        rests: share of the strength that goes with the level of then, shape (E, n).
     """
 
     begin: Array
@@ -68,6 +70,7 @@ class Chain:
     share: Array
     slides: Array
     held: Array
+    rests: Array
 
     @cached_property
     def nodes(self) -> Index:
@@ -139,8 +142,7 @@ class Chain:
     def loads(self, caps: Array) -> Array:
         """What the four states of an event do, given what an e-fold of its caps does: (E, n) to (E, n, 4)."""
         own, held = _cubic(self.share, self.way[:, None]), _cubic(self.held, self.way)[:, None]
-        slides = self.slides[..., None]
-        return np.asarray(caps[..., None] * (slides * own + (1.0 - slides) * held))
+        return np.asarray(caps[..., None] * (self.slides[..., None] * own + self.rests[..., None] * held))
 
     def course(self, share: Array, event: Index, states: Array) -> Array:
         """Level at shares of the ways of events (n,), from the states of all events (E, 4), shape (n,)."""
@@ -152,8 +154,7 @@ class Chain:
         That of an integrated Brownian motion with both ends given: the influence function of a clamped beam.
         """
         one, other = self.share[:, :, None], self.share[:, None, :]
-        held, slides = self.held[:, None, None], self.slides
-        rests = 1.0 - slides
+        held, slides, rests = self.held[:, None, None], self.slides, self.rests
         both = slides[:, :, None] * slides[:, None, :] * _clamped(one, other)
         both += slides[:, :, None] * rests[:, None, :] * _clamped(one, held)
         both += rests[:, :, None] * slides[:, None, :] * _clamped(held, other)

@@ -52,6 +52,7 @@ class Forces:
         slides: whether an element slides there, shape (n, k) each.
         sliding: force of those that slide (N), shape (n,) each.
         psi: state of the weakening, shape (n,) each.
+        rested: share of static friction in the caps, shape (n,) each.
         held: force that the model holds (N), shape (p,).
         share: what a reading counts for as the rig is stated, over what it counts for in the model, shape (p,).
     """
@@ -64,6 +65,7 @@ class Forces:
     slides: tuple[NDArray[np.bool_], ...]
     sliding: tuple[Array, ...]
     psi: tuple[Array, ...]
+    rested: tuple[Array, ...]
     held: Array
     share: Array
 

@@ -138,7 +138,15 @@ class Problem:
         slide = np.concatenate([_mean(k, s) for k, s in zip(self.runs, forces.sliding, strict=True)])
         whole = -caps(forces.local)
         slides = np.clip(slide / np.where(whole == 0.0, np.inf, whole), 0.0, 1.0)
-        return Chain(begin, end, self.event_run, follows.unit, blocks(share), blocks(slides), held)
+        now, then = np.ones(slides.size), np.ones(held.size)
+        if follows.of != "both":
+            shares = [part_of(follows.of, rested) for rested in forces.rested]
+            now = np.concatenate([_mean(k, part) for k, part in zip(self.runs, shares, strict=True)])
+            then = np.concatenate(
+                [np.interp(_arrests(k), k.t, part) for k, part in zip(self.runs, shares, strict=True)]
+            )
+        rests = (1.0 - slides) * then[self.of]
+        return Chain(begin, end, self.event_run, follows.unit, blocks(share), blocks(slides * now), held, blocks(rests))
 
     def _by_run(self, both: Array) -> Array:
         """Sine and cosine, shape (p, 2), apart for every run with hum, shape (p, 2 h)."""
@@ -354,7 +362,16 @@ class Problem:
         slopes[:, a + b * runs + k :] = self._carried(tangents, local)
         residual += self.offset + self.beyond + slopes[:, a + b * runs + k :] @ point.common
         sticking, sliding, forces, states = zip(*kept, strict=True)
-        return Forces(residual, local, springs, tangents, sticking, sliding, forces, states, held, share), slopes
+        ratio = 1.0 - values["weakening.drop"]
+        rested = tuple(psi / (ratio + (1.0 - ratio) * psi) for psi in states)
+        return Forces(
+            residual, local, springs, tangents, sticking, sliding, forces, states, rested, held, share
+        ), slopes
+
+
+def part_of(of: str, rested: Array) -> Array:
+    """Share of the caps that is static or sliding friction's, or both, where that of static friction is ``rested``."""
+    return np.ones_like(rested) if of == "both" else rested if of == "static" else 1.0 - rested
 
 
 def coordinate(k: Knots, name: str) -> Array:

@@ -44,6 +44,7 @@ FARTHEST = 1.5  # step of a size, in e-folds
 DAMPINGS = 6  # of a step that does not lower the cost
 SETTLED = 0.05  # fall of the cost at which the search ends
 EXACT = 0.02  # of a level, to which any process describes it
+PARTS = ("both", "static", "sliding")  # of friction, that wander
 SHORTEST = 2.0  # length of a wander, in usual distances of events: it goes on from one to the next
 
 
@@ -55,11 +56,13 @@ class Follows:
         coordinate: one of :data:`.problem.ALONG`.
         unit: usual distance of events along it (s or m).
         equally_likely: coordinates that these data cannot distinguish from it.
+        of: which friction wanders, one of :data:`PARTS`.
     """
 
     coordinate: str
     unit: float
     equally_likely: tuple[str, ...] = ()
+    of: str = "both"
 
 
 @dataclass(frozen=True)
