@@ -71,6 +71,7 @@ def paper(data: Path, work: Path) -> dict[str, Any]:
         "says": [*seen["can"], *seen["cannot"]],
         "gain": {name: trace["stick_gain"][name] for name in ("sticks", "value", "std")},
         "part_s": dynamic["traces"][0]["duration"],
+        "scale": [dynamic["parameters"]["sensor.force_scale"][name] for name in ("value", "std")],
         "fit_says": [note for note in dynamic["notes"] if "sensor-gain" in note],
         "ripple": ripple["text"],
         "lines_near": sum(0.1 < line["period"] < 0.2 for line in ripple["lines"]),

@@ -60,7 +60,9 @@ def _beyond(
         way = coordinate(replace(run, x=run.x + error), follows.coordinate)  # the chain is of the motion as it was read
         share = (way - chain.begin[e]) / np.where(whole == 0.0, 1.0, whole)
         course = chain.course(np.clip(share, 0.0, 1.0), e, states)
-        caps = np.log1p(part_of(follows.of, rested) * np.expm1(course))
+        part = part_of(follows.of, rested)
+        with np.errstate(divide="ignore"):  # the logarithm of 1 - part + part exp(course)
+            caps = np.logaddexp(np.log1p(-part), np.log(part) + course)
         courses.append(np.where(there, caps - mean[e], 0.0))
     first_order = np.einsum("eik,ek->ei", chain.loads(known.caps), states) - known.caps * mean[:, None]
     along = problem.with_courses(courses).evaluate(point).residual
