@@ -30,15 +30,9 @@ class Adhesion(Geometry):
     family = "geometry"
 
     attraction: Array = parameter(
-        0.0,
-        unit="1",
-        lower=0.0,
-        upper=0.3,
-        usual=(0.0, 0.01),
-        null=0.0,
-        symbol=r"\varepsilon",
-        doc="adhesive over applied load (steel in air: below 0.01)",
-    )
+        0.0, unit="1", lower=0.0, upper=0.3, usual=(0.0, 0.01), null=0.0, symbol=r"\varepsilon",
+        doc="adhesive over applied load (steel in air: below 0.01)"
+    )  # fmt: skip
 
     def reshape(self, bank: Bank) -> Bank:
         extra = self.attraction * bank.total_strength / bank.total_stiffness

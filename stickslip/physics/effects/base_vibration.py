@@ -33,26 +33,13 @@ class BaseVibration(BodyForce):
     family = "drive"
 
     acceleration: Array = parameter(
-        0.0,
-        unit="m/s^2",
-        lower=-0.1,
-        upper=0.1,
-        usual=(-0.01, 0.01),
-        null=0.0,
-        symbol="a_b",
-        doc="amplitude of the base's acceleration",
-    )
+        0.0, unit="m/s^2", lower=-0.1, upper=0.1, usual=(-0.01, 0.01), null=0.0, symbol="a_b",
+        doc="amplitude of the base's acceleration"
+    )  # fmt: skip
     frequency: Array = parameter(
-        20.0,
-        unit="Hz",
-        lower=1.0,
-        upper=500.0,
-        usual=(5.0, 50.0),
-        log=True,
-        grid=(7.0, 20.0, 50.0),
-        symbol="f",
-        doc="frequency",
-    )
+        20.0, unit="Hz", lower=1.0, upper=500.0, usual=(5.0, 50.0), log=True, grid=(7.0, 20.0, 50.0), symbol="f",
+        doc="frequency"
+    )  # fmt: skip
     phase: Array = phase("phase at t = 0")
 
     def force(self, state: Any, motion: Motion, contact: Contact) -> Array:

@@ -34,36 +34,17 @@ class ContactAgeing(Memory, Threshold):
     family = "friction"
 
     rate: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-0.02,
-        upper=0.05,
-        usual=(0.0, 0.02),
-        null=0.0,
-        symbol=r"\beta",
-        doc="relative growth of strength per e-fold of age",
-    )
+        0.0, unit="1", lower=-0.02, upper=0.05, usual=(0.0, 0.02), null=0.0, symbol=r"\beta",
+        doc="relative growth of strength per e-fold of age"
+    )  # fmt: skip
     onset_time: Array = parameter(
-        0.03,
-        unit="s",
-        lower=1e-4,
-        upper=10.0,
-        usual=(1e-3, 1.0),
-        log=True,
-        grid=(3e-3, 0.03, 0.3),
-        symbol="t_0",
-        doc="age from which strength grows",
-    )
+        0.03, unit="s", lower=1e-4, upper=10.0, usual=(1e-3, 1.0), log=True, grid=(3e-3, 0.03, 0.3), symbol="t_0",
+        doc="age from which strength grows"
+    )  # fmt: skip
     slip_distance: Array = parameter(
-        1e-6,
-        unit="m",
-        lower=1e-8,
-        upper=1e-4,
-        log=True,
-        grid=(3e-7, 3e-6),
-        symbol="D",
-        doc="slip over which the age is lost",
-    )
+        1e-6, unit="m", lower=1e-8, upper=1e-4, log=True, grid=(3e-7, 3e-6), symbol="D",
+        doc="slip over which the age is lost"
+    )  # fmt: skip
     first_age: Array = first_age(10.0)
 
     def start(self, bank: Bank) -> Array:

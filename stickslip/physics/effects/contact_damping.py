@@ -33,15 +33,9 @@ class ContactDamping(BodyForce):
     family = "contact"
 
     time: Array = parameter(
-        0.0,
-        unit="s",
-        lower=0.0,
-        upper=1e-3,
-        usual=(0.0, 3e-5),
-        null=0.0,
-        symbol=r"\eta",
-        doc="damping of a stuck element over its stiffness",
-    )
+        0.0, unit="s", lower=0.0, upper=1e-3, usual=(0.0, 3e-5), null=0.0, symbol=r"\eta",
+        doc="damping of a stuck element over its stiffness"
+    )  # fmt: skip
 
     def force(self, state: Any, motion: Motion, contact: Contact) -> Array:
         cap = filled(contact.cap)

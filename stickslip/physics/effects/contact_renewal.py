@@ -81,15 +81,9 @@ class ContactRenewal(Memory, Threshold, Flow):
     family = "contact"
 
     rate: Array = parameter(
-        0.0,
-        unit="1/m",
-        lower=0.0,
-        upper=2e6,
-        usual=(0.0, 1e6),
-        null=0.0,
-        symbol=r"1/\ell",
-        doc="share of the junctions that break per metre of slip",
-    )
+        0.0, unit="1/m", lower=0.0, upper=2e6, usual=(0.0, 1e6), null=0.0, symbol=r"1/\ell",
+        doc="share of the junctions that break per metre of slip"
+    )  # fmt: skip
 
     def start(self, bank: Bank) -> Junctions:
         zero = jnp.zeros_like(bank.stiffness)

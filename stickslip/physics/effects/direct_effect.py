@@ -38,25 +38,13 @@ class DirectEffect(Threshold):
     family = "friction"
 
     strengthening: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-0.01,
-        upper=0.1,
-        null=0.0,
-        symbol="a",
-        doc="relative growth of friction per e-fold of velocity",
-    )
+        0.0, unit="1", lower=-0.01, upper=0.1, null=0.0, symbol="a",
+        doc="relative growth of friction per e-fold of velocity"
+    )  # fmt: skip
     cutoff_velocity: Array = parameter(
-        1e-8,
-        unit="m/s",
-        lower=1e-10,
-        upper=1e-4,
-        usual=(1e-9, 1e-7),
-        log=True,
-        grid=(1e-9, 1e-8, 1e-7),
-        symbol="v^*",
-        doc="velocity below which friction is static",
-    )
+        1e-8, unit="m/s", lower=1e-10, upper=1e-4, usual=(1e-9, 1e-7), log=True, grid=(1e-9, 1e-8, 1e-7), symbol="v^*",
+        doc="velocity below which friction is static"
+    )  # fmt: skip
     form: str = variant("shifted", ("shifted", "asinh"), "ln(1 + v/v*), or asinh(v/(2 v*)) of forward and back jumps")
 
     def formula(self) -> str:

@@ -35,15 +35,9 @@ class DriveRipple(Drive):
         0.0, unit="m", lower=-5e-6, upper=5e-6, null=0.0, symbol=r"\varepsilon", doc="amplitude of the position error"
     )
     pitch: Array = parameter(
-        1e-3,
-        unit="m",
-        lower=1e-6,
-        upper=1e-2,
-        log=True,
-        grid=(0.5e-3, 1e-3, 2e-3),
-        symbol=r"\ell",
-        doc="travel of one period",
-    )
+        1e-3, unit="m", lower=1e-6, upper=1e-2, log=True, grid=(0.5e-3, 1e-3, 2e-3), symbol=r"\ell",
+        doc="travel of one period"
+    )  # fmt: skip
     phase: Array = phase("phase at travel 0")
 
     def lead(self, t: Array, load_point: Array) -> Array:

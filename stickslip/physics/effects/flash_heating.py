@@ -33,24 +33,13 @@ class FlashHeating(Memory, Threshold):
     family = "friction"
 
     softening: Array = parameter(
-        0.0,
-        unit="1/W",
-        lower=-1.0,
-        upper=1.0,
-        null=0.0,
-        symbol=r"\chi",
-        doc="relative loss of strength per watt: softening per kelvin times thermal resistance",
-    )
+        0.0, unit="1/W", lower=-1.0, upper=1.0, null=0.0, symbol=r"\chi",
+        doc="relative loss of strength per watt: softening per kelvin times thermal resistance"
+    )  # fmt: skip
     time: Array = parameter(
-        1e-3,
-        unit="s",
-        lower=1e-6,
-        upper=10.0,
-        log=True,
-        grid=(1e-5, 1e-3, 0.1),
-        symbol=r"\tau",
-        doc="thermal time of the contacts",
-    )
+        1e-3, unit="s", lower=1e-6, upper=10.0, log=True, grid=(1e-5, 1e-3, 0.1), symbol=r"\tau",
+        doc="thermal time of the contacts"
+    )  # fmt: skip
 
     def start(self, bank: Bank) -> Array:
         return jnp.zeros(())

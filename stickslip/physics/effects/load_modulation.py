@@ -32,15 +32,9 @@ class LoadModulation(Threshold):
     family = "contact"
 
     depth: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-0.05,
-        upper=0.05,
-        usual=(-0.01, 0.01),
-        null=0.0,
-        symbol=r"\varepsilon",
-        doc="amplitude of the load as a share of the load",
-    )
+        0.0, unit="1", lower=-0.05, upper=0.05, usual=(-0.01, 0.01), null=0.0, symbol=r"\varepsilon",
+        doc="amplitude of the load as a share of the load"
+    )  # fmt: skip
     frequency: Array = parameter(
         10.0, unit="Hz", lower=0.1, upper=500.0, log=True, grid=(5.0, 10.0, 25.0, 50.0), symbol="f", doc="frequency"
     )

@@ -34,13 +34,7 @@ class MeasuredLoad(Threshold):
     measured = "normal_load"
 
     share: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-1.0,
-        upper=5.0,
-        null=0.0,
-        symbol="s",
-        doc="share of the load's changes in friction",
+        0.0, unit="1", lower=-1.0, upper=5.0, null=0.0, symbol="s", doc="share of the load's changes in friction"
     )
 
     def strength(self, state: Any, motion: Motion, contact: Contact) -> Array:

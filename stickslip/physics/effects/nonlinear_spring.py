@@ -32,14 +32,9 @@ class NonlinearSpring(Spring):
     family = "block"
 
     curvature: Array = parameter(
-        0.0,
-        unit="1/m",
-        lower=-800.0,
-        upper=800.0,
-        null=0.0,
-        symbol=r"\beta",
-        doc="relative change of the secant stiffness per metre of elongation (at 0.1 mm in the cubic form)",
-    )
+        0.0, unit="1/m", lower=-800.0, upper=800.0, null=0.0, symbol=r"\beta",
+        doc="relative change of the secant stiffness per metre of elongation (at 0.1 mm in the cubic form)"
+    )  # fmt: skip
     form: str = variant("quadratic", ("quadratic", "cubic"), "one-sided (beam) or symmetric (wire)")
 
     def formula(self) -> str:

@@ -36,24 +36,13 @@ class Plasticity(Geometry):
     family = "geometry"
 
     hardness_ratio: Array = parameter(
-        0.0,
-        unit="1",
-        lower=0.0,
-        upper=10.0,
-        null=0.0,
-        symbol="h",
-        doc="elastic over plastic load of the deepest asperity",
-    )
+        0.0, unit="1", lower=0.0, upper=10.0, null=0.0, symbol="h",
+        doc="elastic over plastic load of the deepest asperity"
+    )  # fmt: skip
     sharpness: Array = parameter(
-        1.0,
-        unit="1",
-        lower=1.0,
-        upper=8.0,
-        grid=(1.0, 4.0),
-        symbol="n",
-        doc="how abruptly asperities yield",
-        ends=(1.0, 8.0),
-    )
+        1.0, unit="1", lower=1.0, upper=8.0, grid=(1.0, 4.0), symbol="n", doc="how abruptly asperities yield",
+        ends=(1.0, 8.0)
+    )  # fmt: skip
 
     def reshape(self, bank: Bank) -> Bank:
         load = self.hardness_ratio * bank.threshold / bank.threshold.max()

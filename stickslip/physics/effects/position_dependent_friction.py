@@ -34,24 +34,13 @@ class PositionDependentFriction(Threshold):
     family = "friction"
 
     depth: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-0.3,
-        upper=0.3,
-        null=0.0,
-        symbol=r"\varepsilon",
-        doc="relative change of friction: amplitude of the wave, or change over one wavelength",
-    )
+        0.0, unit="1", lower=-0.3, upper=0.3, null=0.0, symbol=r"\varepsilon",
+        doc="relative change of friction: amplitude of the wave, or change over one wavelength"
+    )  # fmt: skip
     wavelength: Array = parameter(
-        3e-4,
-        unit="m",
-        lower=1e-5,
-        upper=1e-2,
-        log=True,
-        grid=(1e-4, 3e-4, 1e-3),
-        symbol=r"\lambda",
-        doc="wavelength, or length of the trend",
-    )
+        3e-4, unit="m", lower=1e-5, upper=1e-2, log=True, grid=(1e-4, 3e-4, 1e-3), symbol=r"\lambda",
+        doc="wavelength, or length of the trend"
+    )  # fmt: skip
     phase: Array = phase("phase at x = 0")
     form: str = variant("wave", ("wave", "trend"), "periodic, or growing along the track")
 

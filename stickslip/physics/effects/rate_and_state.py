@@ -43,46 +43,21 @@ class RateAndState(Memory, Threshold):
     family = "friction"
 
     evolution: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-0.02,
-        upper=0.1,
-        null=0.0,
-        symbol="b",
-        doc="relative growth of strength per e-fold of the state",
-    )
+        0.0, unit="1", lower=-0.02, upper=0.1, null=0.0, symbol="b",
+        doc="relative growth of strength per e-fold of the state"
+    )  # fmt: skip
     ratio: Array = parameter(
-        0.6,
-        unit="1",
-        lower=0.0,
-        upper=2.0,
-        grid=(0.3, 0.7),
-        symbol="a/b",
-        doc="direct effect over evolution effect; below 1 friction weakens with velocity",
-        ends=(0.0,),
-    )
+        0.6, unit="1", lower=0.0, upper=2.0, grid=(0.3, 0.7), symbol="a/b",
+        doc="direct effect over evolution effect; below 1 friction weakens with velocity", ends=(0.0,)
+    )  # fmt: skip
     slip_distance: Array = parameter(
-        2e-6,
-        unit="m",
-        lower=1e-8,
-        upper=1e-4,
-        usual=(1e-7, 1e-5),
-        log=True,
-        grid=(5e-7, 5e-6),
-        symbol="L",
-        doc="slip over which the state is renewed",
-    )
+        2e-6, unit="m", lower=1e-8, upper=1e-4, usual=(1e-7, 1e-5), log=True, grid=(5e-7, 5e-6), symbol="L",
+        doc="slip over which the state is renewed"
+    )  # fmt: skip
     cutoff_velocity: Array = parameter(
-        1e-7,
-        unit="m/s",
-        lower=1e-10,
-        upper=1e-4,
-        usual=(1e-9, 1e-6),
-        log=True,
-        grid=(1e-8, 1e-6),
-        symbol="v^*",
-        doc="velocity below which friction is static",
-    )
+        1e-7, unit="m/s", lower=1e-10, upper=1e-4, usual=(1e-9, 1e-6), log=True, grid=(1e-8, 1e-6), symbol="v^*",
+        doc="velocity below which friction is static"
+    )  # fmt: skip
     first_age: Array = first_age(100.0)
     law: str = variant("ageing", ("ageing", "slip"), "the state grows in stationary contact too, or by slip only")
 

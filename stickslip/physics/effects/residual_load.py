@@ -46,29 +46,16 @@ class ResidualLoad(Memory, Flow):
     family = "contact"
 
     lost: Array = parameter(
-        0.0,
-        unit="1",
-        lower=0.0,
-        upper=0.98,
-        null=0.0,
-        symbol=r"\varepsilon",
-        doc="share of every force that is lost as a slip comes to rest (1: virgin again)",
-        ends=(0.98,),
-    )
+        0.0, unit="1", lower=0.0, upper=0.98, null=0.0, symbol=r"\varepsilon",
+        doc="share of every force that is lost as a slip comes to rest (1: virgin again)", ends=(0.98,)
+    )  # fmt: skip
     slip_length: Array = parameter(
         1e-6, unit="m", lower=1e-8, upper=1e-4, log=True, symbol=r"\ell", doc="slip that sets the contacts in motion"
     )
     settling_time: Array = parameter(
-        1e-3,
-        unit="s",
-        lower=1e-5,
-        upper=0.1,
-        log=True,
-        grid=(2e-5, 2e-4, 2e-3),
-        symbol=r"\tau_a",
-        doc="time in which they come to rest",
-        ends=(1e-5,),
-    )
+        1e-3, unit="s", lower=1e-5, upper=0.1, log=True, grid=(2e-5, 2e-4, 2e-3), symbol=r"\tau_a",
+        doc="time in which they come to rest", ends=(1e-5,)
+    )  # fmt: skip
 
     def start(self, bank: Bank) -> Mobility:
         return Mobility(jnp.zeros(()), jnp.zeros(()))

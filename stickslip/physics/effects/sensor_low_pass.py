@@ -32,15 +32,9 @@ class SensorLowPass(Memory, Sensor):
     place = Sensor.LOW_PASS
 
     time_constant: Array = parameter(
-        0.0,
-        unit="s",
-        lower=0.0,
-        upper=2e-3,
-        usual=(0.0, 1e-3),
-        null=0.0,
-        symbol=r"\tau",
-        doc="time constant of the sensor",
-    )
+        0.0, unit="s", lower=0.0, upper=2e-3, usual=(0.0, 1e-3), null=0.0, symbol=r"\tau",
+        doc="time constant of the sensor"
+    )  # fmt: skip
 
     def start(self, bank: Bank) -> Array:
         return jnp.zeros(())

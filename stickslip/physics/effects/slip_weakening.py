@@ -40,35 +40,17 @@ class SlipWeakening(Memory, Threshold):
     family = "friction"
 
     drop: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-0.2,
-        upper=0.5,
-        usual=(0.0, 0.4),
-        null=0.0,
-        symbol=r"\varepsilon",
-        doc="share of the strength that sliding takes",
-    )
+        0.0, unit="1", lower=-0.2, upper=0.5, usual=(0.0, 0.4), null=0.0, symbol=r"\varepsilon",
+        doc="share of the strength that sliding takes"
+    )  # fmt: skip
     distance: Array = parameter(
-        5e-7,
-        unit="m",
-        lower=2e-8,
-        upper=2e-5,
-        usual=(5e-8, 5e-6),
-        log=True,
-        grid=(1e-7, 5e-7, 2e-6),
-        symbol="D_s",
-        doc="slip over which strength is lost",
-    )
+        5e-7, unit="m", lower=2e-8, upper=2e-5, usual=(5e-8, 5e-6), log=True, grid=(1e-7, 5e-7, 2e-6), symbol="D_s",
+        doc="slip over which strength is lost"
+    )  # fmt: skip
     recovery_distance: Array = parameter(
-        2e-8,
-        unit="m",
-        lower=1e-9,
-        upper=1e-6,
-        log=True,
-        symbol=r"\ell_h",
-        doc="way made stuck over which strength returns",
-    )
+        2e-8, unit="m", lower=1e-9, upper=1e-6, log=True, symbol=r"\ell_h",
+        doc="way made stuck over which strength returns"
+    )  # fmt: skip
 
     def start(self, bank: Bank) -> Array:
         return jnp.zeros_like(bank.stiffness)

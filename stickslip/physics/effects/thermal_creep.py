@@ -37,25 +37,13 @@ class ThermalCreep(Flow):
     family = "contact"
 
     velocity: Array = parameter(
-        0.0,
-        unit="m/s",
-        lower=0.0,
-        upper=1e-6,
-        usual=(0.0, 1e-7),
-        null=0.0,
-        symbol="v_1",
-        doc="slip velocity of an element that is just below its cap",
-    )
+        0.0, unit="m/s", lower=0.0, upper=1e-6, usual=(0.0, 1e-7), null=0.0, symbol="v_1",
+        doc="slip velocity of an element that is just below its cap"
+    )  # fmt: skip
     activation: Array = parameter(
-        0.03,
-        unit="1",
-        lower=0.01,
-        upper=0.1,
-        log=True,
-        grid=(0.02, 0.05),
-        symbol=r"\alpha",
-        doc="thermal energy over the work of the cap in one jump",
-    )
+        0.03, unit="1", lower=0.01, upper=0.1, log=True, grid=(0.02, 0.05), symbol=r"\alpha",
+        doc="thermal energy over the work of the cap in one jump"
+    )  # fmt: skip
 
     def flow(self, state: Any, motion: Motion, force: Array, contact: Contact) -> Array:
         scale = self.activation * filled(contact.cap)

@@ -35,15 +35,9 @@ class Tilt(Threshold):
     family = "contact"
 
     coupling: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-0.3,
-        upper=0.3,
-        usual=(-0.1, 0.1),
-        null=0.0,
-        symbol=r"\kappa",
-        doc="relative change of the normal load at the full friction force",
-    )
+        0.0, unit="1", lower=-0.3, upper=0.3, usual=(-0.1, 0.1), null=0.0, symbol=r"\kappa",
+        doc="relative change of the normal load at the full friction force"
+    )  # fmt: skip
     by: str = variant("spring", ("spring", "contact"), "the force that tilts: of the driving spring, or of the contact")
 
     def formula(self) -> str:

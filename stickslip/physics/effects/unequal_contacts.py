@@ -37,14 +37,9 @@ class UnequalContacts(Geometry):
     family = "geometry"
 
     spread: Array = parameter(
-        0.0,
-        unit="1",
-        lower=0.0,
-        upper=0.6,
-        null=0.0,
-        symbol=r"\sigma",
-        doc="rms over the contacts of the logarithm of their largest threshold",
-    )
+        0.0, unit="1", lower=0.0, upper=0.6, null=0.0, symbol=r"\sigma",
+        doc="rms over the contacts of the logarithm of their largest threshold"
+    )  # fmt: skip
 
     def reshape(self, bank: Bank) -> Bank:
         score = np.resize(normal_scores(CONTACTS), bank.stiffness.size)

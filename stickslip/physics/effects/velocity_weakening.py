@@ -39,26 +39,13 @@ class VelocityWeakening(Threshold):
     family = "friction"
 
     drop: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-0.3,
-        upper=0.5,
-        usual=(0.0, 0.4),
-        null=0.0,
-        symbol=r"\varepsilon",
-        doc="share of the strength that velocity takes",
-    )
+        0.0, unit="1", lower=-0.3, upper=0.5, usual=(0.0, 0.4), null=0.0, symbol=r"\varepsilon",
+        doc="share of the strength that velocity takes"
+    )  # fmt: skip
     velocity: Array = parameter(
-        1e-3,
-        unit="m/s",
-        lower=1e-6,
-        upper=1e-1,
-        usual=(1e-6, 1e-2),
-        log=True,
-        grid=(1e-4, 1e-3, 1e-2),
-        symbol="v_s",
-        doc="velocity over which strength falls",
-    )
+        1e-3, unit="m/s", lower=1e-6, upper=1e-1, usual=(1e-6, 1e-2), log=True, grid=(1e-4, 1e-3, 1e-2), symbol="v_s",
+        doc="velocity over which strength falls"
+    )  # fmt: skip
     exponent: Array = parameter(
         1.0, unit="1", lower=0.3, upper=3.0, grid=(0.5, 1.0, 2.0), symbol="q", doc="power of the velocity"
     )

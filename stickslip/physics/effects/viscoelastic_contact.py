@@ -66,15 +66,9 @@ class ViscoelasticContact(Memory, Flow):
     family = "contact"
 
     share: Array = parameter(
-        0.0,
-        unit="1",
-        lower=0.0,
-        upper=0.5,
-        usual=(0.0, 0.1),
-        null=0.0,
-        symbol="g",
-        doc="share of the stiffness that relaxes",
-    )
+        0.0, unit="1", lower=0.0, upper=0.5, usual=(0.0, 0.1), null=0.0, symbol="g",
+        doc="share of the stiffness that relaxes"
+    )  # fmt: skip
     time: Array = parameter(
         0.1, unit="s", lower=2e-3, upper=100.0, log=True, grid=(0.01, 0.1, 1.0), symbol=r"\tau", doc="relaxation time"
     )

@@ -65,43 +65,20 @@ class WanderingFriction(Memory, Threshold):
     drawn = True
 
     size: Array = parameter(
-        0.0,
-        unit="1",
-        lower=0.0,
-        upper=0.5,
-        null=0.0,
-        symbol=r"\varepsilon",
-        doc="standard deviation of the logarithm of friction",
-    )
+        0.0, unit="1", lower=0.0, upper=0.5, null=0.0, symbol=r"\varepsilon",
+        doc="standard deviation of the logarithm of friction"
+    )  # fmt: skip
     length: Array = parameter(
-        1e-4,
-        unit="m",
-        lower=1e-6,
-        upper=1.0,
-        log=True,
-        grid=(1e-4,),
-        symbol=r"\ell",
-        doc="correlation length along place or slip path",
-    )
+        1e-4, unit="m", lower=1e-6, upper=1.0, log=True, grid=(1e-4,), symbol=r"\ell",
+        doc="correlation length along place or slip path"
+    )  # fmt: skip
     time: Array = parameter(
-        10.0,
-        unit="s",
-        lower=1e-3,
-        upper=1e6,
-        log=True,
-        grid=(10.0,),
-        symbol=r"\tau",
-        doc="correlation time",
+        10.0, unit="s", lower=1e-3, upper=1e6, log=True, grid=(10.0,), symbol=r"\tau", doc="correlation time"
     )
     draw: Array = parameter(
-        0.0,
-        unit="1",
-        lower=0.0,
-        upper=30.0,
-        grid=(0.0,),
-        symbol="n",
-        doc="number of the draw: numbers that differ by a half or more give different courses",
-    )
+        0.0, unit="1", lower=0.0, upper=30.0, grid=(0.0,), symbol="n",
+        doc="number of the draw: numbers that differ by a half or more give different courses"
+    )  # fmt: skip
     along: str = variant("place", ("place", "slip", "time"), "coordinate along which the level varies")
     of: str = variant("both", ("both", "static", "sliding"), "which friction wanders")
 

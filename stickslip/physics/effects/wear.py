@@ -44,24 +44,13 @@ class Wear(Memory, Threshold, Stiffness):
     family = "friction"
 
     drift: Array = parameter(
-        0.0,
-        unit="1",
-        lower=-0.5,
-        upper=0.5,
-        null=0.0,
-        symbol=r"\varepsilon",
-        doc="relative change over the path s_1 (logarithmic: per e-fold beyond it)",
-    )
+        0.0, unit="1", lower=-0.5, upper=0.5, null=0.0, symbol=r"\varepsilon",
+        doc="relative change over the path s_1 (logarithmic: per e-fold beyond it)"
+    )  # fmt: skip
     path: Array = parameter(
-        1e-3,
-        unit="m",
-        lower=1e-5,
-        upper=1.0,
-        log=True,
-        grid=(1e-4, 1e-3, 1e-2),
-        symbol="s_1",
-        doc="path over which it changes",
-    )
+        1e-3, unit="m", lower=1e-5, upper=1.0, log=True, grid=(1e-4, 1e-3, 1e-2), symbol="s_1",
+        doc="path over which it changes"
+    )  # fmt: skip
     changes: str = variant("friction", ("friction", "thresholds"), "what drifts: the caps, or u_max at constant caps")
     course: str = variant("linear", ("linear", "logarithmic", "saturating"), "how it goes on with the path")
 
