@@ -27,7 +27,7 @@ from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .data_abilities import abilities
 from .fit import Fit
-from .next_experiment import next_experiment
+from .next_experiment import next_experiment, rows, sampled_experiments
 from .result_base import Savable, Tell, dataset, finish, head, several
 from .stored_fit import load_fit
 from .wander import wander, wander_sentence
@@ -73,9 +73,31 @@ class Diagnosis(Savable):
         number); ``margin`` is the expected logarithm of the likelihood ratio of the true one over another one, the
         least of all.
         """
-        rows = (self.next_experiment or {}).get("experiments", ())
-        return table({row["experiment"]: {k: v for k, v in row.items() if k != "experiment"} for row in rows},
-                     "experiment")  # fmt: skip
+        return _experiments((self.next_experiment or {}).get("experiments", ()))
+
+    def sampled_experiments(
+        self, draws: int = 50, tune: int = 50, seed: int = 0, progress: Tell | None = None
+    ) -> pandas.DataFrame:
+        """:attr:`experiments` with the parameters of every model drawn from its posterior (:meth:`Fit.sample`).
+
+        Those of :attr:`experiments` are the Gaussian of the fit. Takes as long as the sampling does, some minutes.
+
+        Args:
+            draws, tune: of each model, kept and for adaptation.
+            seed: of the draws.
+            progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
+
+        Raises:
+            InputError: nutpie is not installed, fewer than two draws, or no set that an experiment could separate.
+            RunFolderError: only the result of the diagnosis was kept.
+        """
+        if self.found is None:
+            hint = "diagnose the campaign again in this session"
+            raise RunFolderError("of this diagnosis only the result was kept, not its models", hint=hint)
+        if draws < 2:
+            raise InputError("out of range", key="draws", value=draws, allowed="2 or more")
+        with reporting("experiments", progress) as tell:
+            return _experiments(rows(sampled_experiments(self.campaign, self.found, draws, tune, seed, tell)))
 
     @property
     def best(self) -> Fit:
@@ -139,6 +161,10 @@ class Diagnosis(Savable):
         if proposed is not None:
             parts.append(facts({"next experiment": proposed["text"]}))
         return parts
+
+
+def _experiments(made: Sequence[dict[str, Any]]) -> pandas.DataFrame:
+    return table({row["experiment"]: {k: v for k, v in row.items() if k != "experiment"} for row in made}, "experiment")
 
 
 def diagnose(

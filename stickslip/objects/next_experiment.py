@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..inference.diagnose.model_ladder import Climbed
 from ..inference.diagnose.search import Rung
 from ..inference.diagnose.search_round import Round
 from ..inference.diagnose.stepwise_selection import Diagnosis as Found
 from .campaign import Campaign
-from .experiments import Setting, SimulatedExperiment, practicable, scenario, simulate_rivals
+from .experiments import Setting, SimulatedExperiment, part, practicable, scenario, simulate_rivals
 from .fit import Fit
+from .posterior import drawn_points, sample
 from .result_base import Tell
 
 
@@ -39,6 +41,30 @@ def next_experiment(
     return {**made[0], "others": made[1:]} if len(made) > 1 else made[0]
 
 
+def sampled_experiments(
+    campaign: Campaign, found: Found, draws: int, tune: int, seed: int, tell: Tell
+) -> list[SimulatedExperiment]:
+    """The experiments for the first set, the parameters of every model drawn from its posterior.
+
+    Args:
+        campaign, found: the diagnosis.
+        draws, tune, seed: of :meth:`stickslip.Fit.sample`, one chain.
+        tell: told the progress.
+
+    Raises:
+        InputError: no set of effects along the motion that the data cannot distinguish.
+    """
+    done = next((done for done in found.named.values() if len(done.close) > 1), None)
+    if done is None or found.prepared.prescribed:
+        raise InputError("there is no set of effects that an experiment along the motion could separate")
+    fits = {j.tag: _fit(campaign, found, done, j.tag, j.candidate.fit) for j in done.close}
+    first, drawn = next(iter(fits.values())), {}
+    for i, (tag, fit) in enumerate(fits.items()):
+        share = part(tell, i, len(fits) + 1, f"posterior with {tag}, ")
+        drawn[tag] = drawn_points(fit, sample(fit, draws, tune, 1, seed, share))
+    return simulate_rivals(first, fits, _options(first), part(tell, len(fits), len(fits) + 1), drawn=drawn)
+
+
 def _with(
     campaign: Campaign, found: Found, known: dict[str, Any], done: Round | None, tell: Tell,
     in_time: Callable[[], bool],
@@ -50,13 +76,15 @@ def _with(
     options = simulate_rivals(first, fits, _options(first), tell, until=in_time)
     if not options:
         return known
-    rows = [
-        {
-            "experiment": t.words, "information": t.information, "margin": t.margin, "odds": t.odds, "note": t.note,
-        }
+    return {**known, "text": _text(known["text"], options), "experiments": rows(options)}
+
+
+def rows(options: Sequence[SimulatedExperiment]) -> list[dict[str, Any]]:
+    """What is kept of experiments."""
+    return [
+        {"experiment": t.words, "information": t.information, "margin": t.margin, "odds": t.odds, "note": t.note}
         for t in options
-    ]  # fmt: skip
-    return {**known, "text": _text(known["text"], options), "experiments": rows}
+    ]
 
 
 def _fit(campaign: Campaign, found: Found, done: Round, tag: str, model: Any) -> Fit:

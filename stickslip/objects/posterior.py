@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inference.fit.parameters import to_si
+from ..inference.force.point import Point
 from ..inference.force.posterior import Walked, walked
 from ..system.extras import need
 from .fit_tables import STRENGTH
@@ -74,6 +75,13 @@ def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int, tell: Tell) 
         found.posterior[name].attrs["units"] = unit
     found.posterior.attrs.update(title=fit.campaign.title, model=" + ".join(fit.parts), trust=" ".join(trust(found)))
     return found
+
+
+def drawn_points(fit: Fit, found: Any) -> list[Point]:
+    """The draws of :func:`sample` as points of the fit's model, what was not drawn at its best."""
+    way, posterior = walked(fit.force_fit), found.posterior
+    values = np.stack([posterior[f.name].values.ravel() for f in fit.free], axis=1)
+    return [way.best(np.array([f.inward(v) for f, v in zip(fit.free, row, strict=True)])) for row in values]
 
 
 def _expanded(way: Walked, names: list[str], x: np.ndarray) -> dict[str, Any]:

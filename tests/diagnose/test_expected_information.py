@@ -13,6 +13,7 @@ from stickslip.inference.diagnose.decide import DISPERSION
 from stickslip.inference.diagnose.expected_information import KNOWN, Changed, information, margins
 from stickslip.inference.force import problem as problem_module
 from stickslip.inference.force.noise import by_reading, known_of
+from stickslip.inference.force.posterior import walked
 from stickslip.inference.force.problem import Problem
 from stickslip.inference.force.scatter import Blocks
 from stickslip.inference.force.whitening import Whitening
@@ -23,13 +24,17 @@ RUNS = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4))
 
 
 @pytest.fixture(scope="module")
-def pair(tmp_path_factory):
-    """A base and the same with a larger drop of friction, of two runs from a virgin contact."""
+def base(tmp_path_factory):
+    """Of two runs from a virgin contact."""
     folder = tmp_path_factory.mktemp("telling") / "case"
     make_campaign(folder, 11, (), runs=RUNS, spring_known=True)
-    campaign = ss.load_campaign(folder / "campaign.toml")
-    fit = campaign.fit()
-    return fit.force_fit, fit.with_values({"weakening.drop": 1.02 * fit.values["weakening.drop"]}).force_fit
+    return ss.load_campaign(folder / "campaign.toml").fit()
+
+
+@pytest.fixture(scope="module")
+def pair(base):
+    """The base and the same with a larger drop of friction."""
+    return base.force_fit, base.with_values({"weakening.drop": 1.02 * base.values["weakening.drop"]}).force_fit
 
 
 def _dense(one, other, run):
@@ -83,6 +88,27 @@ def test_what_the_campaign_leaves_unknown_of_the_parameters_tells_nothing(pair):
     assert as_found == pytest.approx(margins(pair, [run, run])[0, 1], rel=1e-9)
     assert vague < as_found < sure
     assert sure > 2.0 * vague
+
+
+def test_draws_of_the_gaussian_say_what_the_gaussian_says(base):
+    other = base.with_values({"weakening.drop": 1.02 * base.values["weakening.drop"]}).refit(locked="weakening.drop")
+    pair = base.force_fit, other.force_fit
+    run, rng = pair[0].problem.runs[1], np.random.default_rng(0)
+
+    def told(draws, spread):
+        ways = [walked(fit) for fit in pair]
+        drawn = [[way.at(spread * x)[0] for x in rng.standard_normal((draws, way.size))] for way in ways]
+        return margins(pair, [run, run], drawn=drawn)[0, 1]
+
+    assert told(100, 1.0) == pytest.approx(margins(pair, [run, run])[0, 1], rel=0.3)
+    # draws that agree leave unknown what is not drawn, given what is
+    known = [replace(fit, valleys=()) for fit in pair]
+    for fit, one in zip(pair, known, strict=True):
+        a, left = fit.point.z.size, fit.covariance.copy()
+        left -= left[:, :a] @ np.linalg.solve(left[:a, :a], left[:a])
+        left[:a], left[:, :a] = 0.0, 0.0
+        one.__dict__["_judged"] = (*fit._judged[:2], left)
+    assert told(3, 1e-7) == pytest.approx(margins(known, [run, run])[0, 1], rel=1e-3)
 
 
 def test_a_load_that_is_put_in_is_known_to_one_per_cent(pair, monkeypatch):

@@ -12,6 +12,7 @@ import stickslip as ss
 from stickslip.blind.detection import detection
 from stickslip.blind.generator import Run, make_campaign
 from stickslip.blind.generator.forms import EFFECTS
+from stickslip.errors import InputError, RunFolderError
 from stickslip.inference.diagnose.search_round import Round
 from stickslip.objects import next_experiment as module
 from stickslip.objects.diagnosis import Diagnosis
@@ -66,6 +67,34 @@ def test_every_experiment_is_simulated_and_the_best_is_proposed(undecided, monke
     assert said and all(0.0 <= share <= 1.0 for _, share in said)
     table = Diagnosis(campaign, None, {"next_experiment": made}, {}).experiments
     assert list(table.index) == [row["experiment"] for row in rows] and table["margin"].iloc[0] == rows[0]["margin"]
+
+
+def test_experiments_over_draws_of_the_posterior(undecided, monkeypatch):
+    campaign, found = undecided
+    few = {"a hold of 1 s", "a hold of 100 s"}
+    usual = module.practicable
+    monkeypatch.setattr(module, "practicable", lambda *args: {k: v for k, v in usual(*args).items() if k in few})
+    said = []
+    made = Diagnosis(campaign, found, {}, {})
+    table = made.sampled_experiments(20, 20, progress=lambda text, share: said.append((text, share)))
+    gaussian = next_experiment(campaign, found, KNOWN, lambda text, share: None)["experiments"]
+    assert set(table.index) == few and not table["note"].any()
+    for row in gaussian:
+        assert table["margin"][row["experiment"]] == pytest.approx(row["margin"], rel=0.5)
+    assert table["margin"]["a hold of 100 s"] > table["margin"]["a hold of 1 s"] > 0.0
+    assert any(text.startswith("posterior with contact-ageing") for text, _ in said)
+    assert all(0.0 <= share <= 1.0 for _, share in said)
+
+
+def test_sampled_experiments_need_models_and_a_set(undecided):
+    campaign, found = undecided
+    with pytest.raises(RunFolderError, match="only the result was kept"):
+        Diagnosis(campaign, None, {}, {}).sampled_experiments()
+    with pytest.raises(InputError, match="draws"):
+        Diagnosis(campaign, found, {}, {}).sampled_experiments(1)
+    alone = SimpleNamespace(**{**vars(found), "named": {}})
+    with pytest.raises(InputError, match="no set of effects"):
+        Diagnosis(campaign, alone, {}, {}).sampled_experiments(2)
 
 
 def test_without_models_or_time_the_words_of_the_catalogue_stand(undecided):

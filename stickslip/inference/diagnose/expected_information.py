@@ -4,6 +4,9 @@ Along the motion of an experiment two models hold forces that differ by ``d``. W
 residual force there (noise, scatter of events, and what the campaign leaves unknown of the parameters of both),
 ``d' S^-1 d / 2`` is the logarithm of the likelihood ratio that the experiment is expected to give for the one that is
 true. From that follows the expected information about which model it is (Lindley, Ann. Math. Stat. 27 (1956) 986).
+
+What is left unknown of the parameters is the Gaussian of the fit, or draws of the posterior: the forces of each draw,
+and around them the Gaussian of what is not drawn, given what is.
 """
 
 from __future__ import annotations
@@ -62,7 +65,10 @@ class _Held:
     blocks: Blocks
 
 
-def margins(fits: Sequence[Fit], runs: Sequence[Knots], changed: Changed | None = None) -> Array:
+def margins(
+    fits: Sequence[Fit], runs: Sequence[Knots], changed: Changed | None = None,
+    drawn: Sequence[Sequence[Point]] | None = None,
+) -> Array:  # fmt: skip
     """Expected logarithm of the likelihood ratio of each model, were it true, over each other one, shape (m, m).
 
     In units in which chance spreads as it should (the cost over its dispersion).
@@ -71,10 +77,12 @@ def margins(fits: Sequence[Fit], runs: Sequence[Knots], changed: Changed | None 
         fits: models of one campaign.
         runs: the motion of the experiment by each of them.
         changed: what the experiment changes of the rig.
+        drawn: of each model draws of the posterior, with what is linear at its best; default its Gaussian.
     """
+    sampled = [()] * len(fits) if drawn is None else drawn
     out = np.zeros((len(fits), len(fits)))
     for i, run in enumerate(runs):
-        held = [_held(fit, run, changed or Changed()) for fit in fits]
+        held = [_held(fit, run, changed or Changed(), own) for fit, own in zip(fits, sampled, strict=True)]
         for j in range(len(fits)):
             if i != j:
                 out[i, j] = min(_margin(one, other) for one in held[i] for other in held[j])
@@ -99,17 +107,16 @@ def _margin(one: _Held, other: _Held) -> float:
     return 0.5 * float(difference @ difference - told @ told) / DISPERSION
 
 
-def _held(fit: Fit, run: Knots, changed: Changed) -> list[_Held]:
+def _held(fit: Fit, run: Knots, changed: Changed, drawn: Sequence[Point]) -> list[_Held]:
     """The model along the run, at each phase that the run may have of its own."""
     periodic = [f.name for f in fit.problem.composition.phases if f.name != PULL]
-    return [_along(fit, run, changed, 2.0 * np.pi * i / TURNS) for i in range(TURNS if periodic else 1)]
+    return [_along(fit, run, changed, 2.0 * np.pi * i / TURNS, drawn) for i in range(TURNS if periodic else 1)]
 
 
-def _along(fit: Fit, run: Knots, changed: Changed, turn: float) -> _Held:
-    known, z = fit.problem.composition, fit.point.z
+def _along(fit: Fit, run: Knots, changed: Changed, turn: float, drawn: Sequence[Point]) -> _Held:
+    known = fit.problem.composition
     (level, width), names = known.nominal, [f.name for f in known.shared]
-    if MASS in names:
-        z = z + np.log(changed.mass) * (np.array(names) == MASS)
+    heavier = np.log(changed.mass) * (np.array(names) == MASS)
     problem = Problem(
         replace(
             known, mass=changed.mass * known.mass, reach=changed.stretch * known.reach,
@@ -120,15 +127,23 @@ def _along(fit: Fit, run: Knots, changed: Changed, turn: float) -> _Held:
     phases = known.phases
     own = np.array([[0.0 if f.name == PULL else turn / float(f.scale)] for f in phases]).reshape(len(phases), 1)
     alike = problem.alike
-    common = np.concatenate([fit.point.common[:alike], np.zeros(problem.usual.size - alike)])
     events = np.zeros((problem.events, fit.point.events.shape[1]))
-    point = Point(z, own, changed.load * fit.point.weights, events, common)
+
+    def here(there: Point) -> Point:
+        common = np.concatenate([there.common[:alike], np.zeros(problem.usual.size - alike)])
+        return Point(there.z + heavier, own, changed.load * there.weights, events, common)
+
+    point = here(fit.point)
     blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
     rows, none = by_reading(problem, point, slopes), np.zeros(problem.of.size, bool)
     noise = known_of(problem, slopes, rows, blocks, none, fit.scatter.follows)
     white = Whitening(fit.scatter.sizes, noise)
-    unsure = [slopes.shared @ _deviations(fit, problem, changed.load)]
-    first = z.size + own.size
+    unsure, expected = [slopes.shared @ _deviations(fit, problem, changed.load, bool(drawn))], slopes.residual
+    if drawn:
+        forces = np.stack([problem.forces(here(draw)).residual for draw in drawn], axis=1)
+        expected = forces.mean(axis=1)
+        unsure.append((forces - expected[:, None]) / np.sqrt(len(drawn) - 1.0))
+    first = point.z.size + own.size
     if changed.load != 1.0:
         unsure.append(slopes.shared[:, first : first + point.weights.size] @ point.weights[:, None] * KNOWN)
         unsure.append(slopes.local[:, [STRETCH]] * KNOWN)
@@ -136,16 +151,25 @@ def _along(fit: Fit, run: Knots, changed: Changed, turn: float) -> _Held:
         unsure.append((slopes.share * problem.composition.mass * run.acceleration)[:, None] * KNOWN)
     if changed.spring != 1.0 and run.stiffness is not None:
         unsure.append((slopes.share * (run.mean @ (run.stiffness * (run.drive - run.x))))[:, None] * KNOWN)
-    return _Held(slopes.residual, np.hstack(unsure), white.with_events(blocks(slopes.local)), blocks)
+    return _Held(expected, np.hstack(unsure), white.with_events(blocks(slopes.local)), blocks)
 
 
-def _deviations(fit: Fit, problem: Problem, load: float) -> Array:
-    """Of parameters of a problem of one run, by independent combinations: those of the campaign, and the run's own."""
+def _deviations(fit: Fit, problem: Problem, load: float, drawn: bool) -> Array:
+    """Of parameters of a problem of one run, by independent combinations: those of the campaign, and the run's own.
+
+    Where the shared ones are ``drawn``, of all others given these.
+    """
     a, k = fit.point.z.size, fit.point.weights.size
     there, here = fit.point.phases.size, len(problem.composition.phases)
     alike = problem.alike
     known = np.concatenate([np.arange(a), a + there + np.arange(k + alike)])
     part = fit.covariance[np.ix_(known, known)]
+    if drawn:
+        sd = np.sqrt(np.maximum(np.diag(part), 1e-300))
+        even = part / sd[:, None] / sd
+        left = even - even[:, :a] @ np.linalg.pinv(even[:a, :a], rcond=1e-10, hermitian=True) @ even[:a]
+        left[:a], left[:, :a] = 0.0, 0.0
+        part = left * sd[:, None] * sd
     scale = np.sqrt(np.maximum(np.diag(part), 1e-300))  # metres beside newtons
     values, vectors = np.linalg.eigh(part / scale[:, None] / scale)
     told = np.concatenate([np.arange(a), a + here + np.arange(k + alike)])

@@ -34,7 +34,10 @@ def with_level(
         return problem, slopes
     own = known.with_local(blocks(slopes.local))
     states = _states(problem, point, slopes, scatter, own, blocks)
-    beyond = _beyond(problem, point, slopes, scatter.follows, own, states, blocks)
+    with np.errstate(over="ignore", invalid="ignore"):
+        beyond = _beyond(problem, point, slopes, scatter.follows, own, states, blocks)
+    if not np.isfinite(beyond).all():  # of a model so far off that its level would be none
+        return problem, slopes
     return problem.with_beyond(beyond), replace(slopes, residual=slopes.residual - problem.beyond + beyond)
 
 

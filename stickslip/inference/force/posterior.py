@@ -68,6 +68,10 @@ class Walked:
         point = moved(start, np.concatenate([np.zeros(a), change]), start.events)
         return point, value, gradient
 
+    def best(self, z: Array) -> Point:
+        """The point with given shared parameters (search scale), all else at its best."""
+        return self.at(np.asarray(np.linalg.solve(self.root, z - self.fit.point.z), float))[0]
+
     @property
     def _linear(self) -> int:
         return self.fit.covariance.shape[0] - self.size

@@ -280,6 +280,7 @@ class Problem:
         """Residuals and derivatives in what is an event's own, in less time than all derivatives."""
         return self._evaluated(point, False)[0]
 
+    @np.errstate(invalid="ignore", over="ignore")  # where the force is not finite a search turns back
     def _evaluated(self, point: Point, whole: bool) -> tuple[Forces, Array]:
         c = self.composition
         shared, phases = c.shared, c.phases

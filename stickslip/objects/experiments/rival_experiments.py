@@ -14,6 +14,7 @@ from ...errors import InputError, StickslipError
 from ...inference.diagnose.expected_information import information, margins
 from ...inference.diagnose.prepare import Prepared
 from ...inference.force.knots import Knots, knots
+from ...inference.force.point import Point
 from ...inference.force.scales import of_run
 from ...simulation.conformance import blamed
 from ...simulation.conformance.compile_check import first_line
@@ -93,7 +94,7 @@ def rivals(
 def simulate_rivals(
     model: Fit, fits: Mapping[str, Fit], options: Mapping[str, Setting], tell: Tell,
     show: Callable[[Sequence[SimulatedExperiment]], None] = lambda found: None, code: str = "",
-    until: Callable[[], bool] = lambda: True,
+    until: Callable[[], bool] = lambda: True, drawn: Mapping[str, Sequence[Point]] | None = None,
 ) -> list[SimulatedExperiment]:  # fmt: skip
     """Every experiment simulated for every model; the one first of which most information is expected.
 
@@ -104,13 +105,14 @@ def simulate_rivals(
         tell, show: told the progress, and what there is so far.
         code: the lines of Python that lead to the model.
         until: whether there is time for more; what is not simulated then is missing.
+        drawn: draws of the posterior of every model; default the Gaussian of its fit.
     """
     out: list[SimulatedExperiment] = []
     for i, (words, setting) in enumerate(options.items()):
         if not until():
             break
         try:
-            out.append(_told(words, setting, model, fits, part(tell, i, len(options), f"{words}, "), code))
+            out.append(_told(words, setting, model, fits, part(tell, i, len(options), f"{words}, "), code, drawn))
         except Cancelled:
             raise
         except Exception as error:  # an effect of one's own may fail in any way
@@ -123,8 +125,9 @@ def simulate_rivals(
 
 
 def _told(
-    words: str, setting: Setting, model: Fit, fits: Mapping[str, Fit], tell: Tell, code: str
-) -> SimulatedExperiment:
+    words: str, setting: Setting, model: Fit, fits: Mapping[str, Fit], tell: Tell, code: str,
+    drawn: Mapping[str, Sequence[Point]] | None = None,
+) -> SimulatedExperiment:  # fmt: skip
     setting = settled(model, setting)
     found, seen = {}, []
     for i, (tag, fit) in enumerate(fits.items()):
@@ -132,7 +135,8 @@ def _told(
         found[tag] = run(made, part(tell, i, len(fits)), f"with {tag}")
         spring = made.file.block.spring_stiffness if setting.spring.strip() else None
         seen.append(seen_as(found[tag], fit.climbed.prepared, setting.run, spring))
-    apart = margins([fit.force_fit for fit in fits.values()], seen, changed(model, setting))
+    draws = None if drawn is None else [drawn[tag] for tag in fits]
+    apart = margins([fit.force_fit for fit in fits.values()], seen, changed(model, setting), draws)
     least = float(apart[~np.eye(len(apart), dtype=bool)].min())
     measure, slip, share = farthest(found) or ("", -1, 0.0)
     return SimulatedExperiment(
