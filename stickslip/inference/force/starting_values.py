@@ -24,7 +24,8 @@ from .scales import Scales
 ELEMENTS = 64
 REACH = (1 / 60.0, 30.0)  # yield displacements, over strength/stiffness of the whole contact
 FALLBACK_STIFFNESS = 1000.0  # N/m
-CALIBRATED, MISTAKEN = 0.02, 0.1  # of a force, to which its scale is known; where sticks contradict it
+CALIBRATED = 0.02  # to which the scale of a force is known: as stated, or as the sticks set it right
+LESS, MORE = 0.97, 1.1  # of that scale: creep in the sticks hides some of it, and nothing adds to it but noise
 
 
 def known(value: Any, default: float, width: float) -> tuple[float, float, float | None, float | None, bool]:
@@ -106,8 +107,9 @@ def begin(
     made = np.array([k.divisor / c for k, c in zip(runs, each, strict=True) if k.divisor is not None])
     if made.size:
         scale = float(np.exp(np.mean(np.log(made))))
-        width = MISTAKEN if np.any(made != 1.0) else CALIBRATED
-        free.append(log(SCALE, "1", scale, width, 0.5 * scale, 2.0 * scale, "measured over true force of the spring"))
+        free.append(
+            log(SCALE, "1", scale, CALIBRATED, LESS * scale, MORE * scale, "measured over true force of the spring")
+        )
     begun = np.zeros((0, len(runs)))
     if not virgin.all():
         unit = strength
