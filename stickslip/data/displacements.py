@@ -60,8 +60,9 @@ def with_displacements(traces: Sequence[Trace], found: Sequence[Segmentation]) -
         notes.append(f"{trace.name}: the displacement is {'drive - F/c_s' if gain else 'the integral of the velocity'}")
         count = None if trace.resolution is None or gain is None else trace.resolution / gain
         noise = events.settings.noise
+        scale = None if gain is None else gain / (trace.spring_stiffness or gain)
         given = trace.replace(
-            displacement=np.array(position), noise=noise, resolution=count, drive=drive, force_divisor=gain
+            displacement=np.array(position), noise=noise, resolution=count, drive=drive, force_scale=scale
         )
         out.append(from_load_point(given))
     return out, notes

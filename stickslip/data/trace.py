@@ -259,7 +259,7 @@ class Trace(Shown, _Rebuilt):
         walk: random walk of the displacement, m/sqrt(s), where somebody stated it.
         hum: amplitude of the displacement's error at the mains frequency, m, where somebody stated it.
         spring_stiffness: N/m, where this run's spring is known.
-        force_divisor: N/m, by which the spring's force was divided for a displacement that was not measured.
+        force_scale: measured over true force of the spring (1), with which a displacement was made that was not measured.
         virgin: whether the run starts from a freshly set down, never loaded contact.
         role: ``"train"``, ``"held-out"`` or ``""`` (undecided).
         minimum_slip: m, the smallest slip that counts as an event, where somebody stated it.
@@ -284,7 +284,7 @@ class Trace(Shown, _Rebuilt):
     walk: float = 0.0
     hum: float = 0.0
     spring_stiffness: float | None = None
-    force_divisor: float | None = None
+    force_scale: float | None = None
     virgin: bool = False
     role: str = ""
     minimum_slip: float | None = None

@@ -42,11 +42,11 @@ def force_alone(trace, stiffness, gain=GAIN, seed=3):
 @pytest.mark.parametrize("name", ["linear", "ripple", "nonlinear spring"])
 def test_the_block_is_where_the_model_s_spring_has_the_measured_force(name):
     slips = solver_motion.simulated(EFFECTS[name])
-    n, divisor = slips.steps.t.size, 1040.0
+    n, stiffness = slips.steps.t.size, float(slips.model.block.spring_stiffness)
     drive = np.asarray(slips.way.drive)
     shown = drive.copy()
-    shown[:n] -= GAIN * slips.steps.spring_force / divisor
-    way = slips.way._replace(x=shown, divisor=divisor)
+    shown[:n] -= GAIN * slips.steps.spring_force / (1.04 * stiffness)
+    way = slips.way._replace(x=shown, made_with=1.04)
     assert np.abs(shown[:n] - slips.steps.x).max() > 1e-6
     found = jax.jit(of_block)(slips.model, way, GAIN)
     np.testing.assert_allclose(found.x[:n], slips.steps.x, atol=1e-12)

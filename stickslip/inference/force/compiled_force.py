@@ -57,7 +57,7 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
             way = way._replace(drive=way.drive + values[PULL] / stiffness)
         model = model_of(values, effects, Bank(weights / reach, weights), spring)
         seen, delay = way, jnp.zeros(())
-        if any(isinstance(e, Sensor) for e in effects) or way.divisor is not None:
+        if any(isinstance(e, Sensor) for e in effects) or way.made_with is not None:
 
             def before(rate: Any) -> Way:
                 return of_block(model, way._replace(v=rate), values.get(SCALE, 1.0), knots)
@@ -70,7 +70,7 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
         steep = jax.vmap(jax.grad(model.pull))(led - seen.x)
         # how much the displacement changes where the reading does
         steps, further = jnp.diff(way.x), jnp.diff(shift)
-        if way.divisor is not None:  # of the elongation of the spring
+        if way.made_with is not None:  # of the elongation of the spring
             steps, further = steps - jnp.diff(way.drive), further - jnp.diff(led - way.drive)
         gain = 1.0 + jnp.sum(steps * further) / jnp.sum(steps**2)
         return (

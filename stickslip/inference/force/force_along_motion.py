@@ -37,7 +37,8 @@ class Way(NamedTuple):
         force: that was measured to pull the block where no spring does (N).
         bend: of the path from the knot before (m), see :class:`~stickslip.physics.effects.base.Motion`; None where
             knots lie so close to each arrest that straight paths do.
-        divisor: N/m, by which the spring's force was divided for ``x``; None where the displacement was measured.
+        made_with: measured over true force of the spring with which ``x`` was made of it (1); None where it was
+            measured.
     """
 
     t: Any
@@ -51,7 +52,7 @@ class Way(NamedTuple):
     load: Any
     force: Any
     bend: Any = None
-    divisor: Any = None
+    made_with: Any = None
 
 
 class Held(NamedTuple):
@@ -160,7 +161,7 @@ def of_block(model: Model, way: Way, scale: Array, knots: Array | int | None = N
     if chain(model):
         # the measured force, near enough for a sensor that sees it
         way = undone(model, way, model.block.spring_stiffness * (way.drive - way.x) + way.force, knots)
-    return way if way.divisor is None else of_spring_force(model, way, scale)
+    return way if way.made_with is None else of_spring_force(model, way, scale)
 
 
 def undone(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Way:
@@ -197,9 +198,9 @@ def of_spring_force(model: Model, way: Way, scale: Array) -> Way:
         way: its displacement made of the force as it was measured.
         scale: measured over true force (1).
     """
-    force = way.divisor / scale * (way.drive - way.x)
+    stretch = way.made_with / scale * (way.drive - way.x)  # of a linear spring
+    force = model.block.spring_stiffness * stretch
     pull = jax.vmap(jax.value_and_grad(model.pull))
-    stretch = force / model.block.spring_stiffness
     for _ in range(NEWTON):
         found, slopes = pull(stretch)
         stretch = stretch - (found - force) / slopes

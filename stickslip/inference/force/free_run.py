@@ -51,11 +51,11 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
     c = problem.composition
     turns = {f.name: np.float64(float(f.scale) * point.phases[j, run]) for j, f in enumerate(c.phases)}
     values = {**{n: np.float64(v) for n, v in problem.values(point).items()}, **turns}
-    own, divisor = problem.runs[run].stiffness, problem.runs[run].divisor
+    own, made_with = problem.runs[run].stiffness, problem.runs[run].made_with
     program = _program(tuple(values), jax.tree.structure(c.effects))
     found: Track = program(
         values, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), np.asarray(c.reach),
-        np.float64(np.nan if own is None else own), None if divisor is None else np.float64(divisor),
+        np.float64(np.nan if own is None else own), None if made_with is None else np.float64(made_with),
         np.zeros((np.size(cycles.start), 3)) if events is None else events,
         cycles, FINE,
     )  # fmt: skip
@@ -66,17 +66,17 @@ class _SpringReading(Sensor):
     """The displacement that is made of the spring's force, where that was measured alone."""
 
     model: Model
-    divisor: Any  # N/m, of the true force
+    made_with: Any  # force over elongation in the displacement that is shown (N/m)
 
     def read(self, state: Any, reading: Any, motion: Motion, contact_force: Any) -> Any:
         told = self.model.load_point(motion.t) + self.model.load_point.stretch
-        return told - self.model.pull(motion.load_point - reading) / self.divisor
+        return told - self.model.pull(motion.load_point - reading) / self.made_with
 
 
 @lru_cache(maxsize=64)
 def _program(names: tuple[str, ...], structure: Any) -> Program:
     def one_run(
-        values: dict[str, Any], leaves: Any, weights: Any, reach: Any, own: Any, divisor: Any, events: Any,
+        values: dict[str, Any], leaves: Any, weights: Any, reach: Any, own: Any, made_with: Any, events: Any,
         cycles: Cycles, tolerance: Tolerance,
     ) -> Track:  # fmt: skip
         effects = jax.tree.unflatten(structure, leaves)
@@ -91,11 +91,10 @@ def _program(names: tuple[str, ...], structure: Any) -> Program:
             if PULL in values:
                 begun = jnp.where(cycles.virgin, 0.0, values[PULL] / model.block.spring_stiffness)
             model = eqx.tree_at(lambda m: m.load_point, model, LoadPoint(nodes[0], nodes[1], begun))
-            if divisor is None:
+            if made_with is None:
                 return model
-            return eqx.tree_at(
-                lambda m: m.effects, model, (_SpringReading(model, divisor / values[SCALE]), *model.effects)
-            )
+            shown = model.block.spring_stiffness * made_with / values[SCALE]
+            return eqx.tree_at(lambda m: m.effects, model, (_SpringReading(model, shown), *model.effects))
 
         return run_cycles(build, events, cycles, tolerance, MOST_STEPS)
 

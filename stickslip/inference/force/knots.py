@@ -72,7 +72,8 @@ class Knots:
             (m), shape (g, 2).
         walk: random walk of the reading where it is stated (m/s^0.5), else zero.
         step: between samples (s).
-        divisor: N/m, by which the spring's force was divided for a displacement that was not measured.
+        made_with: measured over true force of the spring with which a displacement was made that was
+            not measured (1).
     """
 
     name: str
@@ -103,7 +104,7 @@ class Knots:
     hum: Array
     walk: float = 0.0
     step: float = 0.0
-    divisor: float | None = None
+    made_with: float | None = None
 
     @property
     def prescribed(self) -> bool:
@@ -356,7 +357,7 @@ class _Pieces:
             _places(made["at"], phase, of, events, times), _elapsed(made["at"], of, begun), np.diff(begun),
             noise, trace.spring_stiffness, trace.virgin, np.zeros(knot_t.size), load_at(trace, knot_t),
             np.zeros(of.size), band(second, rate), told.sums(times.hum.at(t)), trace.walk, 1.0 / rate,
-            trace.force_divisor,
+            trace.force_scale,
         )  # fmt: skip
         return selected(knots_made, keep)
 

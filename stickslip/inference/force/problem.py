@@ -323,7 +323,7 @@ class Problem:
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             way = mean @ (run.x - run.x[0])
-            sensed = shown or run.divisor is not None
+            sensed = shown or run.made_with is not None
             if sensed:
                 rate, acceleration = rate + first @ shift[:n], acceleration + second @ shift[:n]
                 way = way + mean @ shift[:n]
@@ -436,7 +436,7 @@ def _padded(k: Knots, n: int, load: float | None) -> Way:
     return Way(
         grown(k.t, 1e-3), grown(k.x), np.concatenate([k.v, np.zeros(n - k.v.size)]), grown(k.drive),
         np.ones(n), np.ones(n), np.zeros(1), np.zeros(n, int), np.ones(n) if load is None else grown(k.load / load),
-        grown(k.force), divisor=None if k.divisor is None else np.float64(k.divisor),
+        grown(k.force), made_with=None if k.made_with is None else np.float64(k.made_with),
     )  # fmt: skip
 
 

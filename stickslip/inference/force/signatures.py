@@ -70,7 +70,7 @@ def _at_points(problem: Problem, fit: Fit, found: Sequence[Sequence[Array]], sen
     for run, (q, shift, mass) in zip(problem.runs, found, strict=True):
         n, s = run.t.size, slice(p, p + run.at.size)
         moved = (run.mean @ q[:, :n].T).T - mass[:, None] * run.acceleration
-        if sensed or run.divisor is not None:
+        if sensed or run.made_with is not None:
             first, second = run.smooth
             moved = moved - values["rig.mass"] * (second @ shift[:, :n].T).T
             moved = moved - values["rig.damping"] * (first @ shift[:, :n].T).T

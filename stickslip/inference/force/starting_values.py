@@ -104,7 +104,7 @@ def begin(
         free.append(
             log("rig.mass", "kg", mass, mass_width, lightest or mass / 10, heaviest or mass * 10, "mass of the block")
         )
-    made = np.array([k.divisor / c for k, c in zip(runs, each, strict=True) if k.divisor is not None])
+    made = np.array([k.made_with for k in runs if k.made_with is not None])
     if made.size:
         scale = float(np.exp(np.mean(np.log(made))))
         free.append(
