@@ -259,7 +259,7 @@ class Trace(Shown, _Rebuilt):
         walk: random walk of the displacement, m/sqrt(s), where somebody stated it.
         hum: amplitude of the displacement's error at the mains frequency, m, where somebody stated it.
         spring_stiffness: N/m, where this run's spring is known.
-        force_scale: measured over true force of the spring (1), with which a displacement was made that was not measured.
+        force_scale: measured over true force of the spring (1), with which a displacement not measured was made.
         virgin: whether the run starts from a freshly set down, never loaded contact.
         role: ``"train"``, ``"held-out"`` or ``""`` (undecided).
         minimum_slip: m, the smallest slip that counts as an event, where somebody stated it.
