@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .checks.spring_force import common_gain, gain_is_wrong, stick_gain
+from .checks.spring_force import alike, common_gain, gain_is_wrong, stick_gain
 from .prescribed import prescribed
 from .readers.repair import from_load_point
 from .segment import Segmentation, block_motion, segment
@@ -16,8 +16,9 @@ from .trace import Trace
 def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Segmentation], list[str]]:
     """Events of traces of spring force, with the force's scale set right where the sticks show that it is wrong.
 
-    All runs were read by one sensor, so its scale is that of all sticks together. A force that rises too slowly is left
-    as it is: a block that creeps along makes the same.
+    All runs were read by one sensor, so its scale is that of all sticks together. Where runs differ by more than their
+    errors, each that is wrong is set right by its own. A force that rises too slowly is left as it is: a block that
+    creeps along makes the same.
 
     Returns:
         The events of every trace, and a sentence that says by how much the scale was set right.
@@ -26,20 +27,30 @@ def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[
     told = [gain for gain in gains.values() if gain is not None]
     if not told:
         return list(found), []
-    gain = common_gain(told)
-    if not gain_is_wrong(gain):
-        return list(found), []
-    out, names = list(found), []
+    common = common_gain(told) if alike(told) else None
+    out, wrong = list(found), {}
     for i, trace in enumerate(traces):
-        if trace.leading == "spring_force" and trace.spring_stiffness is not None and trace.drive is not None:
-            out[i] = segment(trace, spring_stiffness=trace.spring_stiffness * gain["value"])
-            names.append(trace.name)
+        gain, stated = gains[i] if common is None else common, trace.spring_stiffness
+        if trace.leading != "spring_force" or stated is None or trace.drive is None:
+            continue
+        if gain is not None and gain_is_wrong(gain):
+            out[i] = segment(trace, spring_stiffness=stated * gain["value"])
+            wrong[trace.name] = gain
+    if not wrong:
+        return out, []
+    if common is not None:
+        sizes = f"{_size(common)}; {', '.join(wrong)})"
+    else:
+        sizes = ", ".join(f"{_size(gain)}; {name})" for name, gain in wrong.items())
     return out, [
-        f"sensor-gain of {100 * (gain['value'] - 1):+.1f} % (+-{100 * gain['std']:.1f} %; {', '.join(names)}): while "
-        "the block sticks, the force rises faster than stiffness times drive by this much. The force was divided by "
-        "the gain; stiffness or drive velocity may be what is wrong instead. A fit of the dynamic model finds the "
-        "scale together with all other parameters (sensor.force_scale)."
+        f"sensor-gain of {sizes}: while the block sticks, the force rises faster than stiffness times drive by this "
+        "much. The force was divided by the gain; stiffness or drive velocity may be what is wrong instead. A fit of "
+        "the dynamic model finds the scale together with all other parameters (sensor.force_scale)."
     ]
+
+
+def _size(gain: Mapping[str, float]) -> str:
+    return f"{100 * (gain['value'] - 1):+.1f} % (+-{100 * gain['std']:.1f} %"
 
 
 def with_displacements(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[list[Trace], list[str]]:
@@ -60,7 +71,8 @@ def with_displacements(traces: Sequence[Trace], found: Sequence[Segmentation]) -
         notes.append(f"{trace.name}: the displacement is {'drive - F/c_s' if gain else 'the integral of the velocity'}")
         count = None if trace.resolution is None or gain is None else trace.resolution / gain
         noise = events.settings.noise
-        scale = None if gain is None else gain / (trace.spring_stiffness or gain)
+        stated = trace.spring_stiffness
+        scale = None if gain is None or stated is None else gain / stated
         given = trace.replace(
             displacement=np.array(position), noise=noise, resolution=count, drive=drive, force_scale=scale
         )

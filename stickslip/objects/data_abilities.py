@@ -142,7 +142,8 @@ def _signals(pairs: Pairs, slipping: Pairs) -> Verdict:
         return [], []
     bad = [
         f"Spring force only in {_some(force)}: the block's position is drive - F/c_s, so every error of the force's "
-        "scale, of the stiffness or of the drive appears as motion."
+        "scale, of the stiffness or of the drive appears as motion. A fit finds the scale with the rest, and a ripple "
+        "of the drive as an effect."
     ]
     good: list[str] = []
     for t, s in pairs:

@@ -34,6 +34,7 @@ FRICTION = 0.2  # where neither load nor friction of a contact is known; only th
 _OTHERWISE = {  # parameters of a fit that a scenario has in another way -> what to set
     "weakening.drop": "set weakening.ratio, which is 1 - drop",
     "contact.strength": "set contact.friction_coefficient: strength = contacts x normal_force x friction_coefficient",
+    "sensor.force_scale": "a scenario gives the motion of the block and the true force",
 }
 
 

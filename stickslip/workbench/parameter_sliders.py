@@ -16,7 +16,7 @@ from ..system.units import shown, shown_with
 
 DEVIATIONS = 12.0  # of a parameter that a slider reaches to either side
 LEAST, MOST = 0.3, 3.5  # e-folds to either side on a logarithmic scale
-BASE = ("contact", "weakening", "rig", "start")
+BASE = ("contact", "weakening", "rig", "sensor", "start")
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import stickslip as ss
 from stickslip.blind.generator import Run, make_campaign
 from stickslip.inference.force.composition import SCALE
 from stickslip.inference.force.force_along_motion import of_block
+from stickslip.inference.force.problem import CREEPING
 from stickslip.physics.effects import catalogue
 from stickslip.simulation.solve import Tolerance
 
@@ -25,6 +26,7 @@ RIPPLE = {"ripple": 4e-7, "pitch": 5e-5}
 EFFECTS = {
     "linear": (),
     "ripple": (catalogue.make("drive-ripple", **RIPPLE),),
+    "sensor": (catalogue.make("sensor-gain", gain=0.03), catalogue.make("sensor-low-pass", time_constant=5e-4)),
     "nonlinear spring": (catalogue.make("nonlinear-spring", curvature=400.0),),
 }
 
@@ -52,6 +54,49 @@ def test_the_block_is_where_the_model_s_spring_has_the_measured_force(name):
     np.testing.assert_allclose(found.x[:n], slips.steps.x, atol=1e-12)
 
 
+def test_a_sensor_of_the_force_sees_the_elongation():
+    """Too large a reading, and a late one, of the elongation: not of the displacement, which goes with the drive."""
+    slips = solver_motion.simulated(())
+    n, stiffness = slips.steps.t.size, float(slips.model.block.spring_stiffness)
+    t, drive, stretch = slips.way.t, np.asarray(slips.way.drive), slips.steps.spring_force / stiffness
+    shown = drive.copy()
+    shown[:n] -= 1.03 * stretch
+    way = slips.way._replace(x=shown, v=np.gradient(shown, t), made_with=1.0)
+    gain = solver_motion.with_effects(slips.model, EFFECTS["sensor"][:1])
+    np.testing.assert_allclose(jax.jit(of_block)(gain, way, 1.0).x[:n], slips.steps.x, atol=1e-10)
+    # of an elongation that grows evenly a low-pass shows what it was a time constant before
+    v, tau = 1e-4, float(EFFECTS["sensor"][1].time_constant)
+    even = np.linspace(0.0, 0.1, solver_motion.KNOTS)
+    late = solver_motion.with_effects(slips.model, EFFECTS["sensor"][1:])
+    way = slips.way._replace(
+        t=even, drive=v * even, x=v * even - v * (even - tau), v=np.zeros_like(even), made_with=1.0
+    )
+    np.testing.assert_allclose(jax.jit(of_block)(late, way, 1.0).x[1:-1], 0.0, atol=1e-12)
+
+
+def solved(effect, end):
+    """A run of the solver of which the force alone is read."""
+    model, steps = solver_motion.slipping(effect, end, Tolerance(5e-4, 5e-12, 5e-9))
+    t, stiffness = np.arange(0.0, steps.t[-1], 1e-4), float(model.block.spring_stiffness)
+    x = CubicHermiteSpline(steps.t, steps.x, steps.v)(t) - QUIET * np.random.default_rng(0).standard_normal(t.size)
+    force = stiffness * (np.asarray(jax.vmap(model.lead)(jnp.asarray(t))) - x)
+    run = ss.Trace.from_arrays(
+        "run", time=t, spring_force=force, drive_velocity=solver_motion.SPEED, noise=stiffness * QUIET
+    )
+    return ss.Campaign.from_traces([run], solver_motion.SAMPLED)
+
+
+@pytest.mark.slow
+def test_what_a_force_counts_for_in_creep_does_not_depend_on_the_spring():
+    """It is the force that was read: a spring that stiffens makes nothing of it larger."""
+    prepared = solved(catalogue.make("drive-ripple"), 1.0).prepare()
+    bent = catalogue.make("nonlinear-spring", curvature=400.0)
+    problem = prepared.problem.with_composition(prepared.problem.composition.with_effect(bent, ()))
+    share, slow = problem.forces(prepared.start).share, problem.phase == CREEPING
+    np.testing.assert_allclose(share[slow], 1.0, rtol=1e-12)
+    assert np.ptp(share[~slow]) > 1e-3
+
+
 @pytest.mark.slow
 def test_the_scale_of_a_force_is_found_with_the_rest(tmp_path):
     truth = make_campaign(tmp_path / "c", 21, (), runs=RUNS, spring_known=True, rate=1e4)["rig"]
@@ -77,15 +122,7 @@ def test_the_scale_of_a_force_is_found_with_the_rest(tmp_path):
 
 @pytest.mark.slow
 def test_the_drive_s_ripple_is_found_in_a_force():
-    model, steps = solver_motion.slipping(EFFECTS["ripple"][0], 1.9, Tolerance(5e-4, 5e-12, 5e-9))
-    t = np.arange(0.0, steps.t[-1], 1e-4)
-    x = CubicHermiteSpline(steps.t, steps.x, steps.v)(t) - QUIET * np.random.default_rng(0).standard_normal(t.size)
-    force = float(model.block.spring_stiffness) * (np.asarray(jax.vmap(model.lead)(jnp.asarray(t))) - x)
-    run = ss.Trace.from_arrays(
-        "run", time=t, spring_force=force, drive_velocity=solver_motion.SPEED,
-        noise=float(model.block.spring_stiffness) * QUIET,
-    )  # fmt: skip
-    found = ss.Campaign.from_traces([run], solver_motion.SAMPLED).fit("drive-ripple").parameters
+    found = solved(EFFECTS["ripple"][0], 1.9).fit("drive-ripple").parameters
     for name, value in (("ripple", RIPPLE["ripple"]), ("pitch", RIPPLE["pitch"])):
         assert found.value[f"drive-ripple.{name}"] == pytest.approx(value, rel=0.01)
         assert found["std"][f"drive-ripple.{name}"] < 0.01 * value

@@ -11,6 +11,7 @@ from ..trace import Trace
 from .finding import Finding
 
 _FEWEST = 5  # sticks
+_CHANCE = 1e-3  # below which runs are not of one scale
 _EXACT = 1e-4  # to which a gain is known at best
 _SAID = 0.02  # smaller errors of the scale are not spoken of
 
@@ -52,6 +53,15 @@ def common_gain(gains: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {"value": mean, "std": float(np.sqrt(max(off, 1.0) / weights.sum())), "sticks": sticks}
 
 
+def alike(gains: Sequence[Mapping[str, float]]) -> bool:
+    """Whether gains of runs differ by no more than their errors let expect of one sensor."""
+    from scipy.stats import chi2
+
+    values, std = (np.array([gain[name] for gain in gains]) for name in ("value", "std"))
+    off = (values - common_gain(gains)["value"]) / np.maximum(std, 0.5 * _SAID)
+    return len(gains) < 2 or bool(chi2.sf((off**2).sum(), len(gains) - 1) > _CHANCE)
+
+
 def gain_is_wrong(gain: Mapping[str, float]) -> bool:
     """Whether the scale of the force must be wrong (see `stick_gain`): it rises faster than the drive can stretch."""
     return gain["value"] - 1.0 > max(_SAID, 3 * gain["std"])
@@ -60,8 +70,8 @@ def gain_is_wrong(gain: Mapping[str, float]) -> bool:
 def force_findings(traces: Sequence[Trace], found: Sequence[Segmentation]) -> list[Finding]:
     """A finding for each record of force alone that does not rise as stiffness and drive want it.
 
-    None of them stops a name: a scale that is too large is set right before anything is fitted, and a block that creeps
-    along makes one that is too small.
+    None of them stops a name: a scale that is too large is set right before anything is fitted, and found with the fit;
+    a block that creeps along makes one that is too small.
     """
     out = []
     for trace, events in zip(traces, found, strict=True):

@@ -15,7 +15,7 @@ from ...physics.effects.base import Effect, Sensor
 from ...physics.model import Block, LoadPoint, Model, Weakening
 from ...system.trace_cache import Program, of_this_package
 from .composition import DAMPING, PULL, SCALE
-from .force_along_motion import Way, along, lead, of_block
+from .force_along_motion import Way, along, as_sensed, lead, of_spring_force
 from .point import OWN
 
 PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
@@ -57,24 +57,29 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
             way = way._replace(drive=way.drive + values[PULL] / stiffness)
         model = model_of(values, effects, Bank(weights / reach, weights), spring)
         seen, delay = way, jnp.zeros(())
-        if any(isinstance(e, Sensor) for e in effects) or way.made_with is not None:
+        if any(isinstance(e, Sensor) for e in effects):
 
             def before(rate: Any) -> Way:
-                return of_block(model, way._replace(v=rate), values.get(SCALE, 1.0), knots)
+                return as_sensed(model, way._replace(v=rate), knots)
 
             seen, ahead = jax.jvp(before, (way.v,), (jnp.ones_like(way.v),))
             delay = jnp.sum(ahead.x) / way.x.size  # a reading that is late is taken ahead by its rate
+        # how much what is sensed changes where the reading does
+        steps = jnp.diff(way.x if way.made_with is None else way.x - way.drive)
+        gain = 1.0 + jnp.sum(steps * jnp.diff(seen.x - way.x)) / jnp.sum(steps**2)
+        if way.made_with is not None:
+            seen = of_spring_force(model, seen, values[SCALE])
         shift = seen.x - way.x
         held = along(model, of_events(seen, event, of), knots)
         led = lead(model, way.t, way.drive)
         steep = jax.vmap(jax.grad(model.pull))(led - seen.x)
-        # how much the displacement changes where the reading does
-        steps, further = jnp.diff(way.x), jnp.diff(shift)
-        if way.made_with is not None:  # of the elongation of the spring
-            steps, further = steps - jnp.diff(way.drive), further - jnp.diff(led - way.drive)
-        gain = 1.0 + jnp.sum(steps * further) / jnp.sum(steps**2)
+        # what a reading counts for: by the force of the spring, and by the displacement
+        creeps, moves = gain * steep, gain * jnp.ones_like(steep)
+        if way.made_with is not None:
+            told = gain * way.made_with / values[SCALE] * model.block.spring_stiffness  # the force itself is read
+            creeps, moves = told * jnp.ones_like(steep), told / steep
         return (
-            (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, gain, delay),
+            (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, creeps, moves, delay),
             (held.elements, held.tangent, held.slides, held.sliding, held.psi),
         )
 

@@ -158,10 +158,21 @@ def of_block(model: Model, way: Way, scale: Array, knots: Array | int | None = N
 
     Arguments as of :func:`undone` and :func:`of_spring_force`.
     """
-    if chain(model):
-        # the measured force, near enough for a sensor that sees it
-        way = undone(model, way, model.block.spring_stiffness * (way.drive - way.x) + way.force, knots)
+    way = as_sensed(model, way, knots)
     return way if way.made_with is None else of_spring_force(model, way, scale)
+
+
+def as_sensed(model: Model, way: Way, knots: Array | int | None = None) -> Way:
+    """The motion with the sensors undone: a sensor of the spring's force sees its elongation, not the displacement."""
+    if not chain(model):
+        return way
+    # the measured force, near enough for a sensor that sees it
+    force = model.block.spring_stiffness * (way.drive - way.x) + way.force
+    if way.made_with is None:
+        return undone(model, way, force, knots)
+    speed = slope(way.drive, way.t)
+    way = undone(model, way._replace(x=way.x - way.drive, v=way.v - speed), force, knots)
+    return way._replace(x=way.x + way.drive, v=way.v + speed)
 
 
 def undone(model: Model, way: Way, force: Array, knots: Array | int | None = None) -> Way:

@@ -8,7 +8,7 @@ fit, the contact is the measured bank itself, and each cycle runs from a measure
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -62,15 +62,24 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
     return found
 
 
-class _SpringReading(Sensor):
-    """The displacement that is made of the spring's force, where that was measured alone."""
+class _Elongation(Sensor):
+    """What a sensor of the spring's force sees: its elongation, with the sign of the block's displacement."""
 
     model: Model
-    made_with: Any  # force over elongation in the displacement that is shown (N/m)
+    shown: Any  # force over elongation in the displacement that is made of it (N/m)
 
     def read(self, state: Any, reading: Any, motion: Motion, contact_force: Any) -> Any:
-        told = self.model.load_point(motion.t) + self.model.load_point.stretch
-        return told - self.model.pull(motion.load_point - reading) / self.made_with
+        return -self.model.pull(motion.load_point - reading) / self.shown
+
+
+class _FromLoadPoint(Sensor):
+    """The displacement that is made of that, after all other sensors."""
+
+    model: Model
+    place: ClassVar[int] = Sensor.OFFSET + 1
+
+    def read(self, state: Any, reading: Any, motion: Motion, contact_force: Any) -> Any:
+        return self.model.load_point(motion.t) + self.model.load_point.stretch + reading
 
 
 @lru_cache(maxsize=64)
@@ -94,7 +103,8 @@ def _program(names: tuple[str, ...], structure: Any) -> Program:
             if made_with is None:
                 return model
             shown = model.block.spring_stiffness * made_with / values[SCALE]
-            return eqx.tree_at(lambda m: m.effects, model, (_SpringReading(model, shown), *model.effects))
+            chain = (_Elongation(model, shown), *model.effects, _FromLoadPoint(model))
+            return eqx.tree_at(lambda m: m.effects, model, chain)
 
         return run_cycles(build, events, cycles, tolerance, MOST_STEPS)
 

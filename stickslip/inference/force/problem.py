@@ -318,8 +318,8 @@ class Problem:
         p, kept = 0, []
         for r, (run, parts) in enumerate(zip(self.runs, found, strict=True)):
             n, s = run.t.size, slice(p, p + run.at.size)
-            q, shift, mass, slope, gain, delay, *parts = parts
-            dq, dshift, dmass, dslope, dgain, ddelay, elements, tangent, *state = parts
+            q, shift, mass, slope, creeps, moves, delay, *parts = parts
+            dq, dshift, dmass, _, dcreeps, dmoves, ddelay, elements, tangent, *state = parts
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             way = mean @ (run.x - run.x[0])
@@ -328,12 +328,14 @@ class Problem:
                 rate, acceleration = rate + first @ shift[:n], acceleration + second @ shift[:n]
                 way = way + mean @ shift[:n]
             spring = starts["rig.spring_stiffness"] if run.stiffness is None else run.stiffness
-            steep = mean @ slope[:n] / (mean @ np.ones(n))
+            weight = mean @ np.ones(n)
             # the noise of a reading that is late is taken ahead as well, the faster it is the larger it becomes
             band = self.bands[run.phase]
             late, later = np.sqrt(1.0 + (band * delay) ** 2), band**2 * delay * ddelay[:, None]
             read = not run.prescribed  # else a reading is told by itself, and the likelihood is that of the force
-            counts = gain * np.where(slow[s], steep / spring, late * mass / c.mass) if read else np.ones(run.at.size)
+            by_spring, by_mass = mean @ creeps[:n], mean @ moves[:n]
+            counts = np.where(slow[s], by_spring / spring, late * mass / c.mass * by_mass) / weight
+            counts = counts if read else np.ones(run.at.size)
             share[s] = 1.0 / counts
             force = mean @ q[:n] - mass * acceleration - damping * rate - beside * way
             residual[s] = share[s] * force
@@ -341,9 +343,9 @@ class Problem:
             if sensed:
                 moved = moved - mass * (second @ dshift[:, :n].T) - damping * (first @ dshift[:, :n].T)
                 moved = moved - beside * (mean @ dshift[:, :n].T)
-            faster = dmass / mass + later.T / late[:, None] ** 2
-            grown = np.where(slow[s, None], (mean @ dslope[:, :n].T) / (mean @ slope[:n])[:, None], faster)
-            moved = share[s, None] * moved - read * residual[s, None] * (grown + dgain / gain)
+            slower, faster = (mean @ d[:, :n].T / v[:, None] for d, v in ((dcreeps, by_spring), (dmoves, by_mass)))
+            faster = faster + dmass / mass + later.T / late[:, None] ** 2
+            moved = share[s, None] * moved - read * residual[s, None] * np.where(slow[s, None], slower, faster)
             local[s] = moved[:, -OWN:]
             if whole:
                 slopes[s, bent] = moved[:, : len(bent)]

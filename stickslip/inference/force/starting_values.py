@@ -121,6 +121,8 @@ def begin(
                            for k, f in zip(runs, onsets, strict=True)]])  # fmt: skip
     yields = reach * np.geomspace(*REACH, elements)
     runs = [replace(k, stiffness=None) if k.stiffness == stiffness else k for k in runs]  # one spring for all of them
+    if made.size:  # what one run was set right by more than another stays
+        runs = [k if k.made_with is None else replace(k, made_with=scale) for k in runs]
     composition = Composition(mass, yields, tuple(free), fixed, (), (nominal, width_nominal))
     problem = Problem(composition, runs)
     flat = np.full(elements, strength / elements)
