@@ -12,6 +12,7 @@ import xarray
 from stickslip.inference.diagnose import free_simulation as confirming
 from stickslip.inference.diagnose.final_comparison import settled
 from stickslip.inference.diagnose.free_errors import contradiction, errors, predicted, summed
+from stickslip.inference.diagnose.free_measures import CHANGES, simulated
 from stickslip.inference.diagnose.free_report import cautions, free_variables
 from stickslip.inference.diagnose.free_simulation import confirm
 from stickslip.inference.force.candidates import try_effect
@@ -103,6 +104,21 @@ def stronger(plain, monkeypatch):
         return confirm({BASE: base}, BASE, data)
 
     return run
+
+
+def test_sliding_friction_that_differs_in_every_event_is_another_drop(plain):
+    data, base = plain
+    m, names = data.measurement, [f.name for f in base.free]
+    at, ratio = names.index("weakening.drop"), 1.0 - base.values["weakening.drop"]
+    z = base.point.z.copy()
+    z[at] = base.free[at].inward(1.0 - ratio * np.exp(0.01))
+    changes = np.zeros((np.shape(m.cycles.start)[1], len(CHANGES) - 1))
+    changes[:, CHANGES.index("ratio")] = 0.01
+    _, found, _ = simulated(m, base.problem, base.point, 0, 0, changes)
+    _, other, _ = simulated(m, base.problem, replace(base.point, z=z), 0, 0)
+    _, as_fitted, _ = simulated(m, base.problem, base.point, 0, 0)
+    np.testing.assert_allclose(found, other, rtol=1e-9, atol=1e-15)
+    assert np.abs(found - as_fitted).max() > 1e-3 * np.abs(as_fitted).max()
 
 
 def test_wrong_parameters_show(stronger, confirmed):

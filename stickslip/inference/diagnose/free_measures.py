@@ -38,6 +38,7 @@ from ..force.scatter import EVENTS
 Array = NDArray[np.float64]
 NAMES = ("recurrence", "cycle", "slip", "creep")
 STEPS = (0.01, 0.05, 0.05, 2e-3)  # by which events are changed: ln strength, ln stretch, shape, offset over the slip
+CHANGES = (*EVENTS[:-1], "ratio", EVENTS[-1])  # of single events; the ratio is that of kinetic to static friction
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,8 @@ def simulated(
     Args:
         m: the measurement. problem, point: the model.
         r: number of the run in the measurement. run: the same in the problem.
-        events, offset: changes of single events (n, 2), and of the positions at the arrests (m), shape (n,).
+        events, offset: changes of single events as of :func:`run_freely`, shape (n, 4), and of the positions at the
+            arrests (m), shape (n,).
     """
     cycles, anchors = (jax.tree.map(lambda a: np.asarray(a)[r], part) for part in (m.cycles, m.anchors))
     if offset is not None:
@@ -123,12 +125,14 @@ def scatter(m: Measurement, fit: Fit, runs: list[int]) -> Measures:
     even = (np.arange(n) % 2 == 0).astype(float)
     usual = float(np.median(m.values[..., m.layout.slices()["size"].start][np.asarray(m.cycles.used)]))
     steps = (*STEPS[:-1], STEPS[-1] * usual)
-    plain = _all(m, fit, runs, np.zeros((n, len(EVENTS))))
+    plain = _all(m, fit, runs, np.zeros((n, len(CHANGES))))
     total = {k: a + b for (k, a), b in zip(_sensor(m).items(), _misfit(m, fit, runs), strict=True)}
-    alone = np.eye(len(EVENTS))
-    changes = [(row, step, size[name]) for row, step, name in zip(alone, steps, EVENTS, strict=True)]
-    if "level" in size:  # moves the caps: strength and yield displacements together
-        changes.append((alone[0] + alone[1], steps[0], size["level"]))
+    alone = dict(zip(CHANGES, np.eye(len(CHANGES)), strict=True))
+    changes = [(alone[name], step, size[name]) for step, name in zip(steps, EVENTS, strict=True)]
+    if fit.scatter.follows is not None:
+        caps, ratio = alone["strength"] + alone["stretch"], alone["ratio"]  # stiffnesses stay
+        level = {"both": caps, "static": caps - ratio, "sliding": ratio}[fit.scatter.follows.of]
+        changes.append((level, steps[0], size["level"]))
     for j, (row, step, deviation) in enumerate(changes):
         every: Any = dict.fromkeys(NAMES, 0.0)
         for own in (even, 1.0 - even):

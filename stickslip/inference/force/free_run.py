@@ -42,8 +42,9 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
         point: its parameters; what differs from event to event is not used.
         run: number of the run in the problem, whose phases and pull at the start are taken.
         cycles: of that run, arrays (n,).
-        events: logarithms of factors on strength and on yield displacements, and the power by which these are
-            stretched besides, in every cycle, shape (n, 3); default all events equal.
+        events: logarithms of factors on strength and on yield displacements, the power by which these are stretched
+            besides, and the logarithm of a factor on kinetic over static friction, in every cycle, shape (n, 4);
+            default all events equal.
 
     Returns:
         The tracks, with a leading axis of cycles.
@@ -56,7 +57,7 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
     found: Track = program(
         values, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), np.asarray(c.reach),
         np.float64(np.nan if own is None else own), None if made_with is None else np.float64(made_with),
-        np.zeros((np.size(cycles.start), 3)) if events is None else events,
+        np.zeros((np.size(cycles.start), 4)) if events is None else events,
         cycles, FINE,
     )  # fmt: skip
     return found
@@ -96,6 +97,8 @@ def _program(names: tuple[str, ...], structure: Any) -> Program:
             own_reach = jnp.exp(-event[2] * departures(plain))
             bank = Bank(plain.stiffness * (strength / stretch) * own_reach, weights * strength)
             model = model_of(values, effects, bank, own)
+            ratio = model.weakening.ratio * jnp.exp(event[3])
+            model = eqx.tree_at(lambda m: m.weakening.ratio, model, ratio)
             begun = jnp.zeros(())
             if PULL in values:
                 begun = jnp.where(cycles.virgin, 0.0, values[PULL] / model.block.spring_stiffness)
