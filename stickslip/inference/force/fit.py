@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -332,25 +331,27 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
 def wandering(found: Fit) -> Fit:
     """The fit with strengths of events that follow each other, if that pays; else the same.
 
-    Of the coordinates along which a level may wander, and of static friction, sliding friction or both that may, what
-    makes the events most likely with the parameters as they are; both where one alone is not clearly likelier.
+    Of the coordinates along which a level may wander the one under which the events, with the parameters as they are,
+    are most likely. Where a level pays that may be that of static or of sliding friction alone, of which both are
+    asked along every coordinate; it is that of both where neither is clearly likelier.
     """
     problem, tried = found.problem, {}
     along = problem.along if problem.events >= FEWEST else ()
     forces = problem.evaluate(found.around) if along else found.forces  # as of a fit that is read back
-    for coordinate, of in product(along, PARTS):
-        follows = Follows(coordinate, problem.distance(coordinate), of=of)
-        chain = problem.chain(follows, found.blocks, forces)
-        assert chain is not None
-        start = replace(found, scatter=found.scatter.following(follows), known=found.known.following(chain))
-        tried[coordinate, of] = adapted(start, rounds=0)
-    if not tried:
-        return found
+    for of in PARTS:
+        for coordinate in along:
+            follows = Follows(coordinate, problem.distance(coordinate), of=of)
+            chain = problem.chain(follows, found.blocks, forces)
+            assert chain is not None
+            start = replace(found, scatter=found.scatter.following(follows), known=found.known.following(chain))
+            tried[coordinate, of] = adapted(start, rounds=0)
+        # the first is that of both: Schwarz's criterion
+        least = min((f.cost for f in tried.values()), default=np.inf)
+        if found.cost - least < len(WANDER) * np.log(problem.events):
+            return found
     coordinate, of = min(tried, key=lambda key: tried[key].cost - DISTINCT * (key[1] == "both"))
     best = tried[coordinate, of]
     assert best.scatter.follows is not None
-    if found.cost - best.cost < len(WANDER) * np.log(problem.events):  # Schwarz's criterion
-        return found
     others = tuple(name for name in along if name != coordinate and tried[name, of].cost - best.cost < DISTINCT)
     own = replace(best.scatter, follows=replace(best.scatter.follows, equally_likely=others))
     best = replace(best, scatter=own)
