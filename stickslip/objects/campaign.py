@@ -15,6 +15,7 @@ from ..data.segment import Segmentation, segment
 from ..data.segment.left_out import left_out as not_used
 from ..data.trace import Trace
 from ..errors import InputError, nearest
+from ..system.lazy_method import LazyMethod
 from ..system.object_repr import Shown, facts, table
 from ..system.progress import reporting
 from .result_base import several
@@ -24,10 +25,10 @@ if TYPE_CHECKING:
     import xarray
 
     from ..inference.diagnose.prepare import Prepared
-    from .diagnosis import Diagnosis
+    from .diagnosis import diagnose as _diagnose
     from .fit import Fit
-    from .forecast import Forecast
-    from .inspection import Inspection
+    from .forecast import forecast as _forecast
+    from .inspection import inspect as _inspect
     from .result_base import Tell
     from .static_fit import Align, Sampling, StaticFit, Time
 
@@ -165,15 +166,12 @@ class Campaign(Shown, Mapping[str, Trace]):
         except InputError as error:
             raise error.at(file=self._file) from None
 
-    def inspect(self, progress: Tell | None = None) -> Inspection:
-        """Events of every run, what was mended or left out, and what these data can tell.
-
-        Args:
-            progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
-        """
-        from .inspection import inspect
-
-        return inspect(self, progress)
+    if TYPE_CHECKING:
+        inspect, diagnose, forecast = _inspect, _diagnose, _forecast
+    else:
+        inspect = LazyMethod("stickslip.objects.inspection")
+        diagnose = LazyMethod("stickslip.objects.diagnosis")
+        forecast = LazyMethod("stickslip.objects.forecast")
 
     @overload
     def fit(
@@ -226,19 +224,6 @@ class Campaign(Shown, Mapping[str, Trace]):
             return fit_static(self, **static, progress=progress)
         return fit(self, effects, holdout=holdout, progress=progress)
 
-    def diagnose(
-        self, *, candidates: str | Sequence[str] | None = None, max_effects: int = 4,
-        holdout: str | Sequence[str] = (), jobs: int | None = None, time_limit: float | None = None,
-        out: str | Path | None = None, force: bool = False, progress: Tell | None = None,
-    ) -> Diagnosis:  # fmt: skip
-        """Find the physical effect that the base model lacks; see :func:`stickslip.objects.diagnosis.diagnose`."""
-        from .diagnosis import diagnose
-
-        return diagnose(
-            self, candidates=candidates, max_effects=max_effects, holdout=holdout, jobs=jobs, time_limit=time_limit,
-            out=out, force=force, progress=progress,
-        )  # fmt: skip
-
     def levels(self, run: str | None = None) -> xarray.Dataset:
         """Force of the spring at onset and arrest of every slip of a run, and when and where; no fit is needed.
 
@@ -258,31 +243,6 @@ class Campaign(Shown, Mapping[str, Trace]):
             return levels(trace, self.scaled[0][self.names.index(trace.name)])
         except InputError as error:
             raise error.at(file=self._file) from None
-
-    def forecast(
-        self, run: str | None = None, train: float = 0.5, at: float | None = None, *,
-        out: str | Path | None = None, force: bool = False, progress: Tell | None = None,
-    ) -> Forecast:  # fmt: skip
-        """Forecast the slips of the later part of a run, each from what was measured before it, and score it:
-        ``campaign.forecast("v050", at=0.5)``.
-
-        Args:
-            run: its name; default the run with the most slips.
-            train: share of its length from which everything is learned.
-            at: mean recurrences after an arrest at which a forecast is made, once in each stick; default moments all
-                along, ten in a mean recurrence.
-            out: run folder for ``result.json``, ``arrays.nc``, ``report.html``, and until it is finished for the parts
-                from which an interrupted forecast goes on; default none.
-            force: replace an existing run folder.
-            progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
-
-        Raises:
-            InputError: no run of that name, too few slips, no load point or force, shares out of range.
-            RunFolderError: the folder cannot be written.
-        """
-        from .forecast import forecast
-
-        return forecast(self, run, train, at, out=out, force=force, progress=progress)
 
     def to_xarray(self, run: str) -> xarray.Dataset:
         """Signals of a run; see :meth:`stickslip.Trace.to_xarray`."""

@@ -153,7 +153,24 @@ def forecast(
     campaign: Campaign, run: str | None = None, train: float = 0.5, at: float | None = None, *,
     out: str | Path | None = None, force: bool = False, progress: Tell | None = None,
 ) -> Forecast:  # fmt: skip
-    """See :meth:`Campaign.forecast`."""
+    """Forecast the slips of the later part of a run, each from what was measured before it, and score it:
+    ``campaign.forecast("v050", at=0.5)``.
+
+    Args:
+        campaign: the runs.
+        run: name of the run; default the one with the most slips.
+        train: share of its length from which everything is learned.
+        at: mean recurrences after an arrest at which a forecast is made, once in each stick; default moments all
+            along, ten in a mean recurrence.
+        out: run folder for ``result.json``, ``arrays.nc``, ``report.html``, and until it is finished for the parts
+            from which an interrupted forecast goes on; default none.
+        force: replace an existing run folder.
+        progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
+
+    Raises:
+        InputError: no run of that name, too few slips, no load point or force, shares out of range.
+        RunFolderError: the folder cannot be written.
+    """
     number = _chosen(campaign, run)
     if at is not None and not at >= 0.0:
         raise InputError("a moment before the stick begins", key="at", value=at, allowed="0 or more")

@@ -83,7 +83,12 @@ class Inspection(Savable):
 
 
 def inspect(campaign: Campaign, progress: Tell | None = None) -> Inspection:
-    """See :meth:`Campaign.inspect`."""
+    """Events of every run, what was mended or left out, and what these data can tell.
+
+    Args:
+        campaign: the runs.
+        progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
+    """
     from ..data.checks import rig_against_motion, stopping
     from ..data.segment.stick_ripple import stick_ripple
     from ..inference.diagnose.stiffness_check import spring_finding

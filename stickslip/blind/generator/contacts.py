@@ -12,24 +12,25 @@ from .springs import plain, rich
 
 
 @jit
-def contacts(old, new, k, normal, fade, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff):
+def contacts(old, new, springs, du, dq, h, plus, minus, soft, tilt):
     """All contacts moved by ``du`` (and the yaw ``dq``): (force, force of the yaw moment, sticking stiffness)."""
     total = 0.0
     moment = 0.0
     stiff = 0.0
+    start = springs.start
     n = start.size - 1
     for j in range(n):
         side = 1.0 if 2 * j < n else -1.0
         step = (du + side * dq) * soft
         a = tilt
-        if eff[S.TILT_FORM] == 1.0:  # the front contacts lose three times what the rear ones gain
+        if springs.eff[S.TILT_FORM] == 1.0:  # the front contacts lose three times what the rear ones gain
             a = 3.0 * tilt if side > 0.0 else -tilt
         p = plus * (1.0 - a)
         m = minus * (1.0 - a)
-        if is_rich:
-            f, s = rich(old, new, k, normal, fade, start[j], start[j + 1], step, h, p, m, eff)
+        if springs.is_rich:
+            f, s = rich(old, new, springs, start[j], start[j + 1], step, h, p, m)
         else:
-            f, s = plain(old[0], new[0], k, normal, start[j], start[j + 1], step, p, m)
+            f, s = plain(old[0], new[0], springs, start[j], start[j + 1], step, p, m)
         total += f
         moment += side * f
         stiff += s * soft

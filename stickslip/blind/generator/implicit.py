@@ -21,7 +21,7 @@ def narrow(lo, r_lo, hi, r_hi, side, at, miss):
 
 @jit
 def creep_step(
-    f, g, k, normal, fade, start, soft, is_rich, state, trial, rig, eff,
+    f, g, springs, soft, state, trial, rig,
     t1, h, z1, x0, u0, v0, y0, fs0, branch, power, capacity, k_m, fastest,
 ):  # fmt: skip
     """Backward Euler over ``h``: find the contact's motion ``du`` at which the forces balance.
@@ -29,7 +29,7 @@ def creep_step(
     Returns whether it was found slower than ``fastest``, and du, x, v, extension, spring force, its branch, contact
     force, moment, sticking stiffness, damping, body force.
     """
-    mass = rig[S.MASS]
+    mass, eff = rig[S.MASS], springs.eff
     is_rated = rated(eff)
     tilt = eff[S.TILT_K] * fs0 / capacity if eff[S.TILT_K] != 0.0 else 0.0
     du = lo = hi = r_lo = r_hi = 0.0
@@ -44,7 +44,7 @@ def creep_step(
         if is_rated:
             plus = mu * rate_factor(max(du / h, 0.0), trial, eff)
             minus = mu * rate_factor(max(-du / h, 0.0), trial, eff)
-        fc, moment, stiff = contacts(f, g, k, normal, fade, start, du, 0.0, h, plus, minus, soft, tilt, is_rich, eff)
+        fc, moment, stiff = contacts(f, g, springs, du, 0.0, h, plus, minus, soft, tilt)
         x = u0 + du + (fc / k_m if k_m != 0.0 else 0.0)
         v = (x - x0) / h
         y = z1 - x
@@ -81,14 +81,14 @@ def creep_step(
 
 @jit
 def kick(
-    f, g, k, normal, fade, start, soft, is_rich, trial, rig, eff,
+    f, g, springs, soft, trial, rig,
     du, dq, h, mu, tilt, fs, fb, c_now, v0, vh,
 ):  # fmt: skip
     """Velocity of this node where the caps depend on it, given the motion ``du`` up to it.
 
     Returns the velocity, the contact force, its moment and the sticking stiffness.
     """
-    inertia = 2.0 * rig[S.MASS] / h
+    inertia, eff = 2.0 * rig[S.MASS] / h, springs.eff
     lo = hi = r_lo = r_hi = 0.0
     fc = moment = stiff = 0.0
     side = 0
@@ -97,7 +97,7 @@ def kick(
     for it in range(200):
         plus = mu * rate_factor(max(v, 0.0), trial, eff)
         minus = mu * rate_factor(max(-v, 0.0), trial, eff)
-        fc, moment, stiff = contacts(f, g, k, normal, fade, start, du, dq, h, plus, minus, soft, tilt, is_rich, eff)
+        fc, moment, stiff = contacts(f, g, springs, du, dq, h, plus, minus, soft, tilt)
         miss = fs - fc + fb - c_now * v - inertia * (v - vh)
         if abs(miss) < KICK_MISS:
             break

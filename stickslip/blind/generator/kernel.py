@@ -11,7 +11,7 @@ from .compiled import jit
 from .contacts import contacts, forget, fresh_lines, needs_rich, new_life, relax
 from .implicit import creep_step, kick
 from .laws import advance, body_force, damping, friction, load_point, rated, spring_force
-from .springs import stored
+from .springs import Springs, stored
 
 QUIET_BELOW = 0.7e-6  # m/s: creep slower than this ...
 QUIET_AFTER = 8e-3  # s: ... for this long is followed with implicit steps
@@ -39,6 +39,7 @@ def run(
     fade = np.ones(size)
     fade_step = 0.0
     is_rich = needs_rich(eff)
+    springs = Springs(k, normal, fade, start, is_rich, eff)
     is_rated = rated(eff)
     if eff[S.RENEW_RATE] != 0.0:
         for i in range(size):
@@ -119,7 +120,7 @@ def run(
             if is_rich and h != fade_step:
                 fade_step = relax(fade, tau, h, eff)
             done, du, x, v, y, fs, br, fc, moment, stiff, c_now, fb = creep_step(
-                f, g, k, normal, fade, start, soft, is_rich, state, trial, rig, eff,
+                f, g, springs, soft, state, trial, rig,
                 t1, h, z1, x0, u0, v0, y0, fs0, branch, power, capacity, k_m, QUIET_UNTIL,
             )  # fmt: skip
             done = done and stiff >= quiet_stiffness
@@ -160,13 +161,13 @@ def run(
             c_now = damping(vh, stiff, fc0 / capacity, rig, eff)
             fb = body_force(t, x, vh, rig, eff)
             if not is_rated:
-                fc, moment, stiff = contacts(f, g, k, normal, fade, start, du, dq, h, mu, mu, soft, tilt, is_rich, eff)
+                fc, moment, stiff = contacts(f, g, springs, du, dq, h, mu, mu, soft, tilt)
                 before = vh
                 vh = ((mass / h - 0.5 * c_now) * vh + fs - fc + fb) / (mass / h + 0.5 * c_now)
                 v = 0.5 * (before + vh)
             else:
                 v, fc, moment, stiff = kick(
-                    f, g, k, normal, fade, start, soft, is_rich, trial, rig, eff,
+                    f, g, springs, soft, trial, rig,
                     du, dq, h, mu, tilt, fs, fb, c_now, v0, vh,
                 )  # fmt: skip
                 vh = 2.0 * v - vh
@@ -260,6 +261,7 @@ def run(
                     row = nxt
                     normal = normal_pool[row]
                     k = k_pool[row]
+                    springs = Springs(k, normal, fade, start, is_rich, eff)
                     changed = True
                 for i in range(size):
                     f[2, i] = 0.0

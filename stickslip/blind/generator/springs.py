@@ -3,9 +3,31 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from . import array_layout as S
 from .compiled import jit
+
+
+class Springs(NamedTuple):
+    """The springs of all contacts on their present lines.
+
+    Attributes:
+        k, normal: stiffness and normal force of each, shape (n,).
+        fade: factor by which the branch of each relaxes in a step, shape (n,).
+        start: first spring of every contact, and the end of the last.
+        is_rich: whether they have a memory (:func:`rich`).
+        eff: amplitudes and inner parameters of the effects.
+    """
+
+    k: np.ndarray
+    normal: np.ndarray
+    fade: np.ndarray
+    start: np.ndarray
+    is_rich: bool
+    eff: np.ndarray
 
 
 @jit
@@ -16,12 +38,13 @@ def clip(trial, normal, plus, minus):
 
 
 @jit
-def plain(old, new, k, normal, lo, hi, du, plus, minus):
+def plain(old, new, springs, lo, hi, du, plus, minus):
     """Springs lo..hi moved by ``du`` between caps +plus f_n and -minus f_n: (force, stiffness still sticking).
 
     Four sums side by side let the processor overlap them in an order that is always the same; leaving the order to
     the compiler made results depend, in the last digit, on where the arrays lay in memory.
     """
+    k, normal = springs.k, springs.normal
     f0 = f1 = f2 = f3 = 0.0
     s0 = s1 = s2 = s3 = 0.0
     whole = lo + (hi - lo) // 4 * 4
@@ -70,12 +93,12 @@ def creep_rate(ratio, eff):
 
 
 @jit
-def rich(old, new, k, normal, fade, lo, hi, du, h, plus, minus, eff):
+def rich(old, new, springs, lo, hi, du, h, plus, minus):
     """As ``plain`` for springs with a relaxing branch, slip weakening, thermal creep and a finite life.
 
     Rows of ``old`` and ``new``: elastic force, force of the branch, slip since arrest, life left.
-    ``fade`` is the factor by which each branch relaxes in ``h``.
     """
+    k, normal, fade, eff = springs.k, springs.normal, springs.fade, springs.eff
     force = 0.0
     stuck = 0.0
     g = eff[S.VISCO_G]
