@@ -10,7 +10,7 @@ from stickslip.blind.generator import Rig
 from stickslip.blind.generator import array_layout as S
 from stickslip.blind.generator.implicit import kick
 from stickslip.blind.generator.laws import advance, decay, load_point, rate_factor, spring_force, wave
-from stickslip.blind.generator.springs import clip, creep_rate, plain
+from stickslip.blind.generator.springs import Springs, clip, creep_rate, plain
 
 V_STAR, LENGTH, RIG = 1e-6, 2e-6, Rig().vector()
 
@@ -20,6 +20,10 @@ def effect(**slots: float) -> np.ndarray:
     for name, value in slots.items():
         out[S.EFFECT_SLOTS[name]] = value
     return out
+
+
+def springs(k: np.ndarray, normal: np.ndarray, start: list[int], eff: np.ndarray | None = None) -> Springs:
+    return Springs(k, normal, np.ones(k.size), np.array(start), False, effect() if eff is None else eff)
 
 
 @pytest.mark.parametrize("speed", [0.0, 1e-9, 1e-6, 1e-3])
@@ -90,7 +94,7 @@ def test_return_map_of_a_bank_with_odd_length() -> None:
     n = 23
     old, k, normal = rng.normal(0, 0.05, n), rng.uniform(0.5, 2, n), rng.uniform(0.1, 1, n)
     new = np.zeros(n)
-    force, stuck = plain(old, new, k, normal, 2, n, 0.1, 0.2, 0.15)
+    force, stuck = plain(old, new, springs(k, normal, [0, n]), 2, n, 0.1, 0.2, 0.15)
     trial = old + k * 0.1
     expected = np.clip(trial, -0.15 * normal, 0.2 * normal)
     assert np.array_equal(new[2:], expected[2:])
@@ -109,7 +113,7 @@ def test_kick_takes_the_rate_of_the_cap_it_slides_at(sign: float) -> None:
     f[0] = sign * 0.2 * normal
     h, v_in = 1e-5, sign * 1e-3
     v, force, _, stuck = kick(
-        f, g, k, normal, np.ones(2), np.array([0, 1, 2]), 1.0, False, state, RIG, eff,
+        f, g, springs(k, normal, [0, 1, 2], eff), 1.0, state, RIG,
         v_in * h * 100, 0.0, h, 0.2, 0.0, 0.0, 0.0, 0.0, v_in, v_in,
     )  # fmt: skip
     assert stuck == 0.0

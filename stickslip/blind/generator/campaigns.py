@@ -90,10 +90,12 @@ def make_campaign(
         setup = replace(setup, groups=None)
     noise = np.random.default_rng(seeds[1])
     faults = np.random.default_rng([seed, 1])  # so that counts do not change with what the recorder makes of them
+    simulated = partial(simulate, setup.rig, effects=setup.effects, dt=dt, quiet=quiet, relaxation=setup.relaxation)
     traces, listed = [], []
     for number, run in enumerate(runs):
         lines = [int(seeds[0]), number] if new_lines else int(seeds[0])
-        result, start, drive = _run(setup, lines, run, new_lines, virgin, dt, rate, quiet, int(seeds[2]) + number)
+        with_seed = partial(simulated, seed=int(seeds[2]) + number)
+        result, start, drive = _run(with_seed, setup, lines, run, virgin, rate)
         read, events = _read(setup, result, start, rate, noise)
         if events["onset"].size < 3:
             raise InputError(f"run '{run.name}' shows {events['onset'].size} slips", key="effects", hint=OTHER_CASE)
@@ -122,21 +124,20 @@ def make_campaign(
 
 
 def _run(
-    setup: Setup, lines: int | list[int], run: Run, new_lines: bool, virgin: bool, dt: float, rate: float, quiet: bool,
-    seed: int,
-) -> tuple[Result, float, list[tuple[float, float]]]:  # fmt: skip
-    """The run, the time at which its record starts, and its drive as the file gives it."""
+    simulated: Callable[..., Result], setup: Setup, lines: int | list[int], run: Run, virgin: bool, rate: float
+) -> tuple[Result, float, list[tuple[float, float]]]:
+    """The run, the time at which its record starts, and its drive as the file gives it.
+
+    Lines with two seeds are replaced after every slip.
+    """
+    new_lines = not isinstance(lines, int)
     pool = (MOST_SLIPS if run.pieces else run.events) + 3 if new_lines else 1
     while True:
         bank = make_bank(
             setup.surface, np.asarray(setup.rig.loads), lines,
             pool=pool, groups=setup.groups, roughness_spread=setup.roughness_spread,
         )  # fmt: skip
-        simulated = partial(
-            simulate, setup.rig, bank=bank, effects=setup.effects, dt=dt, quiet=quiet, new_lines=new_lines,
-            relaxation=setup.relaxation, seed=seed,
-        )  # fmt: skip
-        made = _with(simulated, run, virgin, rate)
+        made = _with(partial(simulated, bank=bank, new_lines=new_lines), run, virgin, rate)
         if not new_lines or made[0].event_columns["onset"].size < pool:
             return made
         pool *= 2  # no line comes twice

@@ -36,6 +36,40 @@ class Own(NamedTuple):
     of: Any
 
 
+class CommonInput(NamedTuple):
+    """What the forces of all runs are computed from.
+
+    Attributes:
+        effects: their leaves; those that are free have other values.
+        weights, reach: of the bank, shapes (k,): strengths (N) and yield displacements (m).
+    """
+
+    effects: Any
+    weights: Any
+    reach: Any
+
+    @property
+    def bank(self) -> Bank:
+        """The contact."""
+        return Bank(self.weights / self.reach, self.weights)
+
+
+class RunInput(NamedTuple):
+    """What the forces of one run are computed from besides.
+
+    Attributes:
+        spring: of the run (N/m), nan where it has none of its own.
+        way: the measured motion.
+        knots: how many points of it count.
+        own: of its events.
+    """
+
+    spring: Any
+    way: Way
+    knots: Any
+    own: Own
+
+
 @lru_cache(maxsize=PROGRAMS)
 def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, whole: bool) -> Program:
     """The compiled forces at the knots of one run, shape (n,), with derivatives in shared, phases and locals.
@@ -46,16 +80,14 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
     """
     a, b = len(names), len(phases)
 
-    def forces(
-        z: Any, turn: Any, event: Any, scales: Any, fixed: Any, effects: Any, weights: Any, reach: Any, spring: Any,
-        way: Way, knots: Any, of: Any,
-    ) -> Any:  # fmt: skip
+    def forces(z: Any, turn: Any, event: Any, scales: Any, fixed: Any, common: CommonInput, run: RunInput) -> Any:
+        effects, way, knots = jax.tree.unflatten(structure, common.effects), run.way, run.knots
         si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
         values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
         if PULL in values:
-            stiffness = jnp.where(jnp.isnan(spring), values["rig.spring_stiffness"], spring)
+            stiffness = jnp.where(jnp.isnan(run.spring), values["rig.spring_stiffness"], run.spring)
             way = way._replace(drive=way.drive + values[PULL] / stiffness)
-        model = model_of(values, effects, Bank(weights / reach, weights), spring)
+        model = model_of(values, effects, common.bank, run.spring)
         seen, delay = way, jnp.zeros(())
         if any(isinstance(e, Sensor) for e in effects):
 
@@ -70,7 +102,7 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
         if way.made_with is not None:
             seen = of_spring_force(model, seen, values[SCALE])
         shift = seen.x - way.x
-        held = along(model, of_events(seen, event, of), knots)
+        held = along(model, of_events(seen, event, run.own.of), knots)
         led = lead(model, way.t, way.drive)
         steep = jax.vmap(jax.grad(model.pull))(led - seen.x)
         # what a reading counts for: by the force of the spring, and by the displacement
@@ -83,15 +115,12 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
             (held.elements, held.tangent, held.slides, held.sliding, held.psi),
         )
 
-    def derived(
-        z: Any, turn: Any, scales: Any, turn_scale: Any, fixed: Any, leaves: Any, weights: Any, reach: Any, spring: Any,
-        way: Way, knots: Any, own: Own,
-    ) -> Any:  # fmt: skip
-        effects = jax.tree.unflatten(structure, leaves)
+    def derived(z: Any, turn: Any, scales: Any, turn_scale: Any, fixed: Any, common: CommonInput, run: RunInput) -> Any:
+        own = run.own
 
         def moved(row: Any) -> Any:
             def f(z: Any, turn: Any, event: Any) -> Any:
-                return forces(z, turn, event, scales, fixed, effects, weights, reach, spring, way, knots, own.of)
+                return forces(z, turn, event, scales, fixed, common, run)
 
             # all events are moved at once: each acts on its own points only
             step = own.moves[:, None] * row[a + b :]

@@ -22,7 +22,7 @@ from ...physics.model import LoadPoint, Model
 from ...simulation.shooting import MOST_STEPS, Cycles, Track, run_cycles
 from ...simulation.solve.stepper import Tolerance
 from ...system.trace_cache import Program, of_this_package
-from .compiled_force import EMPTY, model_of
+from .compiled_force import CommonInput, model_of
 from .composition import PULL, SCALE
 from .force_along_motion import departures
 from .point import Point
@@ -55,8 +55,8 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
     own, made_with = problem.runs[run].stiffness, problem.runs[run].made_with
     program = _program(tuple(values), jax.tree.structure(c.effects))
     found: Track = program(
-        values, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), np.asarray(c.reach),
-        np.float64(np.nan if own is None else own), None if made_with is None else np.float64(made_with),
+        values, problem.common_input(point), np.float64(np.nan if own is None else own),
+        None if made_with is None else np.float64(made_with),
         np.zeros((np.size(cycles.start), 4)) if events is None else events,
         cycles, FINE,
     )  # fmt: skip
@@ -86,16 +86,16 @@ class _FromLoadPoint(Sensor):
 @lru_cache(maxsize=64)
 def _program(names: tuple[str, ...], structure: Any) -> Program:
     def one_run(
-        values: dict[str, Any], leaves: Any, weights: Any, reach: Any, own: Any, made_with: Any, events: Any,
-        cycles: Cycles, tolerance: Tolerance,
+        values: dict[str, Any], common: CommonInput, own: Any, made_with: Any, events: Any, cycles: Cycles,
+        tolerance: Tolerance,
     ) -> Track:  # fmt: skip
-        effects = jax.tree.unflatten(structure, leaves)
+        effects = jax.tree.unflatten(structure, common.effects)
 
         def build(event: Any, nodes: Any) -> Model:
             strength, stretch = jnp.exp(event[0]), jnp.exp(event[1])
-            plain = Bank(weights / reach, weights)
+            plain = common.bank
             own_reach = jnp.exp(-event[2] * departures(plain))
-            bank = Bank(plain.stiffness * (strength / stretch) * own_reach, weights * strength)
+            bank = Bank(plain.stiffness * (strength / stretch) * own_reach, plain.strength * strength)
             model = model_of(values, effects, bank, own)
             ratio = model.weakening.ratio * jnp.exp(event[3])
             model = eqx.tree_at(lambda m: m.weakening.ratio, model, ratio)

@@ -25,7 +25,7 @@ from .point import OWN, Point
 from .problem import Problem
 from .reading import Reading
 from .smoothing import onward
-from .starting_values import ELEMENTS, REACH, known, with_weights
+from .starting_values import ELEMENTS, REACH, known, log, with_weights
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -233,9 +233,6 @@ def begin(rig: Rig, runs: Sequence[Knots], elements: int = ELEMENTS) -> tuple[Pr
     speed = float(np.median(moving[moving > STILL * moving.max()]))
     mass = known(rig.mass, 1e-9 * strength, 0.0)[0]
     critical = strength / speed
-
-    def log(name: str, unit: str, start: float, width: float, lower: float, upper: float, doc: str) -> Free:
-        return Free(name, unit, "log", start, start, width, lower, upper, doc)
 
     free = [
         log("weakening.drop", "1", 0.03, 1.5, 1e-4, 0.95, "1 - kinetic over static friction"),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...physics.effects.base import Sensor
 from ...system.threads import side_by_side
 from ..fit.parameters import to_si
-from .compiled_force import EMPTY, Own, compiled
+from .compiled_force import EMPTY, CommonInput, Own, RunInput, compiled
 from .composition import BESIDE, DAMPING, Composition
 from .force_along_motion import Way
 from .knots import PHASES, Knots
@@ -265,11 +265,16 @@ class Problem:
             out.append(own._replace(value=value))
         return out
 
-    def run_arguments(self, point: Point) -> list[tuple[Any, ...]]:
-        """Of every run: its own spring (N/m), way, number of knots, and what differs from event to event."""
+    def common_input(self, point: Point) -> CommonInput:
+        """What the forces of all runs are computed from."""
+        c = self.composition
+        return CommonInput(tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), c.reach)
+
+    def run_inputs(self, point: Point) -> list[RunInput]:
+        """What the forces of each run are computed from besides."""
         springs = [np.float64(np.nan if k.stiffness is None else k.stiffness) for k in self.runs]
         knots = [np.int64(k.t.size) for k in self.runs]
-        return list(zip(springs, self.ways, knots, self.own(point), strict=True))
+        return list(map(RunInput, springs, self.ways, knots, self.own(point)))
 
     def evaluate(self, point: Point) -> Slopes:
         """Residuals and derivatives."""
@@ -292,11 +297,9 @@ class Problem:
             tuple(shared[i].name for i in bent), tuple(f.name for f in phases), jax.tree.structure(c.effects), whole
         )
         phase_scale = np.array([float(f.scale) for f in phases])
-        leaves = tuple(jax.tree.leaves(c.effects))
         values = self.values(point)
         damping, beside = values[DAMPING], values.get(BESIDE, 0.0)
         fixed = {n: np.float64(v) for n, v in {**c.fixed, "rig.mass": c.mass, DAMPING: damping}.items()}
-        weights = np.maximum(point.weights, EMPTY)
         a, b, k, runs = len(shared), len(phases), point.weights.size, len(self.runs)
         size = self.at.size
         residual, springs, tangents, held = (np.zeros(size) for _ in range(4))
@@ -306,15 +309,18 @@ class Problem:
         errors = self.usual.size
         slopes, local = np.zeros((size, a + b * runs + k + errors)), np.zeros((size, OWN))
         shown = any(isinstance(e, Sensor) for e in c.effects)
-        common = scales, phase_scale, fixed, leaves, weights, c.reach
+        common = self.common_input(point)
 
-        def of_run(numbered: tuple[int, tuple[Any, ...]]) -> list[Any]:
-            r, arguments = numbered
+        def of_run(numbered: tuple[int, RunInput]) -> list[Any]:
+            r, own = numbered
             return [
-                np.asarray(a) for a in program(point.z[bent], point.phases[:, r] * phase_scale, *common, *arguments)
+                np.asarray(a)
+                for a in program(
+                    point.z[bent], point.phases[:, r] * phase_scale, scales, phase_scale, fixed, common, own
+                )
             ]
 
-        found = side_by_side(of_run, enumerate(self.run_arguments(point)), [k.t.size for k in self.runs])
+        found = side_by_side(of_run, enumerate(self.run_inputs(point)), [k.t.size for k in self.runs])
         p, kept = 0, []
         for r, (run, parts) in enumerate(zip(self.runs, found, strict=True)):
             n, s = run.t.size, slice(p, p + run.at.size)
@@ -355,7 +361,7 @@ class Problem:
                     slopes[s, a + j * runs + r] = moved[:, len(bent) + j]
             held_by = mean @ elements[:n]
             slopes[s, a + b * runs : a + b * runs + k] = -share[s, None] * held_by
-            held[s] = held_by @ weights + beside * way
+            held[s] = held_by @ common.weights + beside * way
             springs[s] = share[s] * (mean @ slope[:n])
             tangents[s] = share[s] * (mean @ tangent[:n] + beside)
             shares = np.interp(run.t, run.at, share[s])

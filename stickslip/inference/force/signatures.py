@@ -11,14 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from ...physics.contact import Bank
 from ...physics.effects.base import Effect, Sensor
 from ...physics.params import specs
 from ...system.trace_cache import Program, of_this_package
-from .compiled_force import EMPTY, PROGRAMS, Own, model_of, of_events
+from .compiled_force import PROGRAMS, CommonInput, RunInput, model_of, of_events
 from .composition import PULL, SCALE
 from .fit import Fit
-from .force_along_motion import Way, along, of_block
+from .force_along_motion import along, of_block
 from .linearised import Array, prior_rows, reach
 from .problem import Problem
 
@@ -55,12 +54,11 @@ def _arguments(fit: Fit) -> tuple[tuple[Any, ...], list[tuple[Any, ...]]]:
     problem, point = fit.problem, fit.point
     c = problem.composition
     values = {n: np.float64(v) for n, v in problem.values(point).items()}
-    shared = values, tuple(jax.tree.leaves(c.effects)), np.maximum(point.weights, EMPTY), c.reach
     turned = [
         {f.name: np.float64(float(f.scale) * point.phases[j, r]) for j, f in enumerate(c.phases)}
         for r in range(len(problem.runs))
     ]
-    return shared, [(turn, *own) for turn, own in zip(turned, problem.run_arguments(point), strict=True)]
+    return (values, problem.common_input(point)), list(zip(turned, problem.run_inputs(point), strict=True))
 
 
 def _at_points(problem: Problem, fit: Fit, found: Sequence[Sequence[Array]], sensed: bool) -> Array:
@@ -84,29 +82,26 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
     names = tuple(specs(cls))
     place = names.index(cls.amplitude)
 
-    def one(
-        values: Any, known: Any, leaves: Any, weights: Any, reach: Any, turned: Any, spring: Any, way: Way, knots: Any,
-        own: Own,
-    ) -> Any:  # fmt: skip
-        effects = jax.tree.unflatten(base, leaves)
+    def one(values: Any, known: Any, common: CommonInput, turned: Any, run: RunInput) -> Any:
+        effects, way, knots = jax.tree.unflatten(base, common.effects), run.way, run.knots
         everything = {**known, **turned}
 
         def forces(amplitude: Any) -> Any:
             numbers = [values[n] for n in names]
             numbers[place] = amplitude
             effect = jax.tree.unflatten(structure, numbers)
-            model = model_of(everything, effects, Bank(weights / reach, weights), spring)
+            model = model_of(everything, effects, common.bank, run.spring)
             model = type(model)(model.block, model.bank, model.weakening, model.load_point, (*model.effects, effect))
             moving = way
             if PULL in everything:
                 moving = moving._replace(drive=moving.drive + everything[PULL] / model.block.spring_stiffness)
             seen = of_block(model, moving, everything.get(SCALE, 1.0), knots)
-            held = along(model, of_events(seen, own.value, own.of), knots)
+            held = along(model, of_events(seen, run.own.value, run.own.of), knots)
             return held.pull + held.body - held.contact, seen.x - way.x, model.mass()
 
         return jax.jvp(forces, (values[names[place]],), (jnp.ones(()),))[1]
 
-    every = jax.vmap(one, in_axes=(0, *[None] * 9))
+    every = jax.vmap(one, in_axes=(0, *[None] * 4))
     own = of_this_package(base) and cls.__module__.split(".")[0] == __name__.split(".")[0]
     return Program(every, f"signature {base} {structure}" if own else None)
 

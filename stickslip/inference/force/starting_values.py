@@ -38,6 +38,12 @@ def known(value: Any, default: float, width: float) -> tuple[float, float, float
     return float(value), 0.0, None, None, True
 
 
+def log(name: str, unit: str, start: float, width: float, lower: float, upper: float, doc: str) -> Free:
+    """A free parameter that is sought on a logarithmic scale, and begins within its bounds."""
+    start = float(np.clip(start, lower * 1.001, upper * 0.999))
+    return Free(name, unit, "log", start, start, width, lower, upper, doc)
+
+
 def begin(
     rig: Rig, traces: Sequence[Trace], found: Sequence[Segmentation], runs: Sequence[Knots], times: Scales,
     elements: int = ELEMENTS,
@@ -80,10 +86,6 @@ def begin(
     whole = mass * (2 * np.pi / times.ring) ** 2 if times.ring else 0.0
     reach = strength / max(whole - stiffness, 0.1 * whole) if whole else 0.3 * _creep(runs, found)
     critical = 2.0 * np.sqrt(stiffness * mass)
-
-    def log(name: str, unit: str, start: float, width: float, lower: float, upper: float, doc: str) -> Free:
-        start = float(np.clip(start, lower * 1.001, upper * 0.999))
-        return Free(name, unit, "log", start, start, width, lower, upper, doc)
 
     free = [
         log("weakening.drop", "1", drop, 1.0, 0.003, 0.95, "1 - kinetic over static friction"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import equinox as eqx
 import jax
@@ -32,6 +32,16 @@ if TYPE_CHECKING:
 
 _MOST_SAMPLES = 200_000_000
 PACKAGES = ("stickslip", "numpy", "jax", "diffrax", "equinox")
+
+
+class _Simulated(NamedTuple):
+    """A scenario, what was built of it, and its motion."""
+
+    scenario: Scenario
+    setup: Setup
+    trajectory: Trajectory
+    events: Events
+    sliding: Sliding
 
 
 def simulate(scenario: Scenario, progress: Tell | None = None) -> xarray.Dataset:
@@ -72,7 +82,7 @@ def record(scenario: Scenario, progress: Tell | None = None) -> Recording:
         key, value, allowed = "output.sampling_rate", f"{samples} samples", f"at most {_MOST_SAMPLES}"
         raise InputError("the output would be too long", file=scenario.path, key=key, value=value, allowed=allowed)
     t = np.arange(samples) / file.output.sampling_rate
-    return _recording(scenario, setup, trajectory, events, sliding, t)
+    return _recording(_Simulated(scenario, setup, trajectory, events, sliding), t)
 
 
 def _run(scenario: Scenario, setup: Setup, sliding: Sliding, tell: Tell) -> tuple[Trajectory, Events, float]:
@@ -135,9 +145,8 @@ def _joined(parts: list[Trajectory]) -> Trajectory:
     return Trajectory(whole, Stats(steps_made, rejected, energy_error(whole), seconds))
 
 
-def _recording(
-    scenario: Scenario, setup: Setup, trajectory: Trajectory, events: Events, sliding: Sliding, t: np.ndarray
-) -> Recording:
+def _recording(made: _Simulated, t: np.ndarray) -> Recording:
+    scenario, setup, trajectory, events, _ = made
     at = trajectory.at(t)
     sampled = {
         "time": (t, "s", "time"),
@@ -159,7 +168,7 @@ def _recording(
     u, moment = first_stick(setup)
     data["static_displacement"] = Variable("static", u, {"units": "m", "long_name": "static curve of the first stick"})
     data["static_time"] = Variable("static", moment, {"units": "s", "long_name": "its virtual time"})
-    return Recording(data, _attributes(scenario, setup, trajectory, events, sliding))
+    return Recording(data, _attributes(made))
 
 
 def _spring_force(setup: Setup, t: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -184,9 +193,8 @@ def _reading(scenario: Scenario, trajectory: Trajectory, events: Events, t: np.n
     return measure(Vibrometer(**settings, clears=clears), lambda times: trajectory.at(times).reading, t)
 
 
-def _attributes(
-    scenario: Scenario, setup: Setup, trajectory: Trajectory, events: Events, sliding: Sliding
-) -> dict[str, object]:
+def _attributes(made: _Simulated) -> dict[str, object]:
+    scenario, setup, trajectory, _, sliding = made
     file, built = scenario.file, setup.contact
     table = file.contact
     rough = table if isinstance(table, RoughLineTable) else None
@@ -210,13 +218,14 @@ def _attributes(
         "contact_resonance": math.sqrt((built.stiffness + k) / file.block.mass) / (2 * math.pi),
         "critical_velocity": sliding.critical_velocity,
         "critical_stiffness": sliding.critical_stiffness,
-        "verdict": _verdict(scenario, setup, trajectory, events, sliding),
+        "verdict": _verdict(made),
         "warnings": "\n".join(built.warnings),
     }
 
 
-def _verdict(scenario: Scenario, setup: Setup, trajectory: Trajectory, events: Events, sliding: Sliding) -> str:
+def _verdict(made: _Simulated) -> str:
     """What the rig does and, where it slides, why."""
+    scenario, setup, trajectory, events, sliding = made
     n, end = events.number, float(trajectory.steps.t[-1])
     beyond = " (effects left out of this estimate)" if scenario.file.effect else ""
     if n:
