@@ -15,7 +15,6 @@ from stickslip.inference.force import problem as problem_module
 from stickslip.inference.force.noise import by_reading, known_of
 from stickslip.inference.force.posterior import walked
 from stickslip.inference.force.problem import Problem
-from stickslip.inference.force.scatter import Blocks
 from stickslip.inference.force.whitening import Whitening
 
 pytestmark = pytest.mark.slow
@@ -54,12 +53,11 @@ def _dense(one, other, run):
         covariance[shared:, shared:] = np.diag(own**2)
         parts.append(slopes.shared @ covariance @ slopes.shared.T)
         if fit is one:
-            blocks = Blocks.of(problem.of, problem.events)
             rows = by_reading(problem, point, slopes)
-            known = known_of(problem, slopes, rows, blocks, np.zeros(problem.of.size, bool))
-            white = Whitening(fit.scatter.sizes, known).with_events(blocks(slopes.local))
+            known = known_of(problem, slopes, rows, np.zeros(problem.of.size, bool))
+            white = Whitening(fit.scatter.sizes, known).with_events(problem.blocks(slopes.local))
     difference = forces[1].residual - forces[0].residual
-    eye = white(blocks(np.eye(difference.size))).reshape(-1, difference.size)
+    eye = white(problem.blocks(np.eye(difference.size))).reshape(-1, difference.size)
     inverse = eye.T @ eye  # of what is random; times the whole covariance it is better conditioned
     told = np.linalg.solve(np.eye(difference.size) + sum(parts) @ inverse, difference)
     return 0.5 * difference @ inverse @ told / DISPERSION

@@ -13,7 +13,6 @@ from stickslip.inference.force.fit import fit
 from stickslip.inference.force.knots import CREEP, NUCLEATION, PHASES, RING, SLIP, knots
 from stickslip.inference.force.noise import by_reading, noise, periodic, remembered, weakened
 from stickslip.inference.force.problem import Problem
-from stickslip.inference.force.scatter import Blocks
 from stickslip.physics.effects.base import Motion
 from stickslip.physics.model import Weakening
 from stickslip.physics.sensor.chain import FRINGE
@@ -42,7 +41,7 @@ def test_noise_of_the_samples_reaches_the_force_as_stated(still):
     """Draws, whitened with what is stated, event by event: near the contact's resonance spring and inertia undo each
     other, creep counts from the start, windows that go back share a mean, and slip takes friction away."""
     problem, point = still.problem, still.point
-    blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
+    blocks, slopes = problem.blocks, problem.evaluate(point)
     rng, drawn = np.random.default_rng(4), []
     for _ in range(TRIALS):
         shaken = [
@@ -51,7 +50,7 @@ def test_noise_of_the_samples_reaches_the_force_as_stated(still):
         ]
         drawn.append(Problem(problem.composition, shaken).evaluate(point).residual)
     seen = blocks((np.array(drawn) - np.mean(drawn, axis=0)).T)
-    stated, phases = noise(problem, by_reading(problem, point, slopes), blocks), blocks(problem.phase)
+    stated, phases = noise(problem, by_reading(problem, point, slopes)), blocks(problem.phase)
     for phase in (CREEP, NUCLEATION, SLIP, RING):
         squares, variances, apart = [], [], []
         for e in range(problem.events):
@@ -73,11 +72,10 @@ def test_noise_of_the_samples_reaches_the_force_as_stated(still):
 
 def test_a_spring_of_the_run_counts_as_that_of_the_rig_does(small):
     problem, point = small.problem, small.point
-    blocks = Blocks.of(problem.of, problem.events)
     stiffness = problem.composition.fixed["rig.spring_stiffness"]
     fixed = {**problem.composition.fixed, "rig.spring_stiffness": 0.1 * stiffness}
     own = Problem(replace(problem.composition, fixed=fixed), [replace(k, stiffness=stiffness) for k in problem.runs])
-    found = [noise(p, by_reading(p, point, p.evaluate(point)), blocks) for p in (problem, own)]
+    found = [noise(p, by_reading(p, point, p.evaluate(point))) for p in (problem, own)]
     np.testing.assert_allclose(*found, rtol=1e-12, atol=0.0)
 
 
@@ -85,14 +83,14 @@ def test_a_spring_of_the_run_counts_as_that_of_the_rig_does(small):
 def test_an_error_periodic_within_a_fringe_reaches_the_force_as_stated(small, turn):
     """A small one is added to the reading: what it does to the residuals lies in the span of what is stated."""
     problem, point = small.problem, small.point
-    blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
+    blocks, slopes = problem.blocks, problem.evaluate(point)
     shaken = []
     for trace, found, k in zip(small.traces, small.found, problem.runs, strict=True):
         phase = 2.0 * np.pi * k.reading.samples / FRINGE
         error = SMALL * (np.sin(phase + turn) + 0.25 * np.cos(2.0 * phase - turn))
         shaken.append(knots(trace, found, small.times, error))
     seen = blocks(Problem(problem.composition, shaken).evaluate(point).residual - slopes.residual)
-    stated = periodic(problem, by_reading(problem, point, slopes), blocks)
+    stated = periodic(problem, by_reading(problem, point, slopes))
     fast = blocks(np.isin(problem.phase, [NUCLEATION, SLIP]))  # where hardly an element sticks, whose kinks answer
     explained, checked = [], 0
     for e, own in enumerate(fast & blocks.there):

@@ -30,7 +30,7 @@ def base(begun):
 def objective(base, problem, point) -> float:
     white = Whitening(base.scatter.sizes, base.known)
     slopes = problem.evaluate(point)
-    return Linearised(problem, point, slopes, base.scatter, base.blocks, white).objective(point, slopes)
+    return Linearised(problem, point, slopes, base.scatter, white).objective(point, slopes)
 
 
 @pytest.mark.slow
@@ -116,7 +116,7 @@ def test_a_search_comes_back_from_the_side_of_the_valley(base):
     z[names.index("weakening.drop")] += 0.1
     point = replace(base.point, z=z)
     slopes = base.problem.evaluate(point)
-    _, _, fallen, count, _ = descend(base.problem, point, slopes, base.scatter, base.known, base.blocks, 30)
+    _, _, fallen, count, _ = descend(base.problem, point, slopes, base.scatter, base.known, 30)
     start = objective(base, base.problem, point) - objective(base, base.problem, base.point)
     assert start > 1e4
     assert fallen > start - 3.0
@@ -128,7 +128,7 @@ def test_derivatives_that_no_covariance_holds_end_a_search_in_words(base):
     """Of a candidate, which is then left out: one of a record with counts of a micrometre once ended the diagnosis."""
     bad = replace(base.slopes, local=1e200 * base.slopes.local)
     with pytest.raises(FitError, match="too large"), np.errstate(all="ignore"):
-        descend(base.problem, base.point, bad, base.scatter, base.known, base.blocks, 4)
+        descend(base.problem, base.point, bad, base.scatter, base.known, 4)
 
 
 @pytest.mark.slow

@@ -85,7 +85,7 @@ def test_static_or_sliding_friction_alone_is_told_and_its_course_is_found(of):
     assert level_of(base).form == {"along": "slip", "of": of}
     again = fit_of(given.problem.with_composition(base.problem.composition), fit_arrays(base))
     assert again.cost == base.cost and again.scatter.follows == base.scatter.follows
-    after = _states(base.problem, base.point, base.forces, base.scatter, base.known, base.blocks)[:, 2]
+    after = _states(base.problem, base.point, base.forces, base.scatter, base.known)[:, 2]
     for run, effect in enumerate(courses(SIZE, of)):
         own = base.problem.event_run == run
         true = SIZE * np.asarray(effect.course(base.known.chain.end[own] / LENGTH))

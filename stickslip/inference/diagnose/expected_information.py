@@ -134,9 +134,9 @@ def _along(fit: Fit, run: Knots, changed: Changed, turn: float, drawn: Sequence[
         return Point(there.z + heavier, own, changed.load * there.weights, events, common)
 
     point = here(fit.point)
-    blocks, slopes = Blocks.of(problem.of, problem.events), problem.evaluate(point)
+    blocks, slopes = problem.blocks, problem.evaluate(point)
     rows, none = by_reading(problem, point, slopes), np.zeros(problem.of.size, bool)
-    noise = known_of(problem, slopes, rows, blocks, none, fit.scatter.follows)
+    noise = known_of(problem, slopes, rows, none, fit.scatter.follows)
     white = Whitening(fit.scatter.sizes, noise)
     unsure, expected = [slopes.shared @ _deviations(fit, problem, changed.load, bool(drawn))], slopes.residual
     if drawn:

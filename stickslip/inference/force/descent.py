@@ -9,7 +9,7 @@ from ...system.progress import breathe
 from .linearised import Linearised, moved
 from .point import Point, Slopes
 from .problem import Problem
-from .scatter import Blocks, Known, Scatter
+from .scatter import Known, Scatter
 from .whitening import Whitening
 
 FAILED = 4  # steps in turn that do not lower the cost, after which the search ends
@@ -21,7 +21,7 @@ SETTLED = 0.3  # fall of the cost (in units of chi-square) at which a search end
 
 
 def descend(
-    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks, most: int,
+    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, most: int,
     damping: float = DAMPING,
 ) -> tuple[Point, Slopes, float, int, float]:  # fmt: skip
     """Damped Gauss-Newton steps, with the covariance as it is, until the cost falls no more (Levenberg 1944).
@@ -44,7 +44,7 @@ def descend(
         breathe()
         if not failed:
             try:
-                system = Linearised(problem, point, slopes, scatter, blocks, white)
+                system = Linearised(problem, point, slopes, scatter, white)
             except np.linalg.LinAlgError:
                 raise FitError(
                     "derivatives with respect to the random effects of an event are too large for a likelihood"

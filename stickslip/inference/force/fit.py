@@ -58,7 +58,6 @@ class Fit:
         dropped: points left out, for they lie beyond what else is random (a jump of the sensor), shape (p,).
         known: what the covariance is made of.
         around: where the noise of the readings was carried to a force.
-        blocks: points by event.
         strength: force of the contact at full strength (N).
         evaluations: of the model.
         valleys: changes of all that is shared, one standard deviation each, that the derivatives do not show (see
@@ -72,10 +71,14 @@ class Fit:
     dropped: NDArray[np.bool_]
     known: Known
     around: Point
-    blocks: Blocks
     strength: float
     evaluations: int
     valleys: tuple[Array, ...] = ()
+
+    @property
+    def blocks(self) -> Blocks:
+        """Points by event."""
+        return self.problem.blocks
 
     def __getstate__(self) -> dict[str, object]:
         return {name: value for name, value in vars(self).items() if name != "_system"}  # large, and soon found again
@@ -89,7 +92,7 @@ class Fit:
     def _system(self) -> Linearised:
         """Found when asked for: a model that a hand moves is drawn, and judged when it stands still."""
         white = Whitening(self.scatter.sizes, self.known)
-        return Linearised(self.problem, self.point, self.slopes, self.scatter, self.blocks, white)
+        return Linearised(self.problem, self.point, self.slopes, self.scatter, white)
 
     @property
     def white(self) -> WithEvents:
@@ -189,7 +192,7 @@ def fit(
             "along this motion the contact would hold no force: check mass and spring, and the signs and units of "
             "drive and displacement"
         )
-    blocks = Blocks.of(problem.of, problem.events)
+    blocks = problem.blocks
     sizes = Scatter.wide() if scatter is None else scatter
     out = np.zeros(problem.of.size, bool) if dropped is None else dropped
     slopes = problem.evaluate(point)
@@ -204,23 +207,23 @@ def fit(
         rows = by_reading(problem, point, slopes)
         problem = problem.carried_by(carrier(problem, slopes, rows))
         slopes = problem.recarried(slopes, point)
-        made = known_of(problem, slopes, rows, blocks, out, sizes.follows)
+        made = known_of(problem, slopes, rows, out, sizes.follows)
         if turn or first:
             marginal = blocks(slopes.residual) - np.einsum("eia,ea->ei", made.local, point.events)
             sizes = estimate(sizes, marginal, made, NEWTON)
-            more = beyond(made, sizes, marginal, blocks, out.size) & ~out
+            more = beyond(problem, made, sizes, marginal) & ~out
             if dropped is None and more.any():
                 out = out | more
                 made = made.without(blocks(left_out(problem, out)))
                 sizes = estimate(sizes, marginal, made, NEWTON)
-        problem, slopes = with_level(problem, point, slopes, sizes, made, blocks)
-        point, slopes, total, count, damping = descend(problem, point, slopes, sizes, made, blocks, steps, damping)
+        problem, slopes = with_level(problem, point, slopes, sizes, made)
+        point, slopes, total, count, damping = descend(problem, point, slopes, sizes, made, steps, damping)
         evaluations += count
         if turn > PLACED + 2 and total < 1.0:
             break
-    made = known_of(problem, slopes, by_reading(problem, point, slopes), blocks, out, sizes.follows)
+    made = known_of(problem, slopes, by_reading(problem, point, slopes), out, sizes.follows)
     around, carried = point, slopes
-    point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, blocks, LAST)
+    point, slopes, _, count, _ = descend(problem, point, slopes, sizes, made, LAST)
     if slopes is carried:  # which is rounded otherwise than what is evaluated where a stored fit is read
         slopes = problem.evaluate(point)
     with portion(FIRST, 1.0):
@@ -269,7 +272,7 @@ def fit_base(problem: Problem, point: Point) -> Fit:
         other = wandering(other)
     if not any(run.prescribed for run in problem.runs):
         rows = by_reading(other.problem, other.around, other.problem.evaluate(other.around))
-        frequencies = bands(other.problem, rows, other.blocks, other.scatter, other.known)
+        frequencies = bands(other.problem, rows, other.scatter, other.known)
         other = replace(other, problem=other.problem.in_bands(frequencies))
     return replace(other, evaluations=found.evaluations + other.evaluations)
 
@@ -290,10 +293,10 @@ def refit(problem: Problem, point: Point, base: Fit, last: int = LAST) -> Fit:
     Raises:
         FitError: the model gives no finite force at the start.
     """
-    blocks, slopes = base.blocks, problem.evaluate(point)
+    slopes = problem.evaluate(point)
     if not slopes.finite or not point.weights.sum() > 0.0:
         raise FitError("the model gives no finite force along the motion")
-    point, slopes, _, count, _ = descend(problem, point, slopes, base.scatter, base.known, blocks, last)
+    point, slopes, _, count, _ = descend(problem, point, slopes, base.scatter, base.known, last)
     return _like(base, problem, point, slopes, base.scatter, count + 1)
 
 
@@ -320,8 +323,8 @@ def adapted(found: Fit, rounds: int = ROUNDS, steps: int = STEPS) -> Fit:
         fallen = before - misfit(sizes.sizes, marginal, known)
         if turn == rounds:
             break
-        problem, slopes = with_level(problem, point, slopes, sizes, known, blocks)
-        point, slopes, total, count, damping = descend(problem, point, slopes, sizes, known, blocks, steps, damping)
+        problem, slopes = with_level(problem, point, slopes, sizes, known)
+        point, slopes, total, count, damping = descend(problem, point, slopes, sizes, known, steps, damping)
         evaluations += count
         if fallen + total < 1.0:
             break
@@ -341,7 +344,7 @@ def wandering(found: Fit) -> Fit:
     for of in PARTS:
         for coordinate in along:
             follows = Follows(coordinate, problem.distance(coordinate), of=of)
-            chain = problem.chain(follows, found.blocks, forces)
+            chain = problem.chain(follows, forces)
             assert chain is not None
             start = replace(found, scatter=found.scatter.following(follows), known=found.known.following(chain))
             tried[coordinate, of] = adapted(start, rounds=0)
@@ -374,9 +377,8 @@ def again(
     problem: Problem, point: Point, scatter: Scatter, dropped: NDArray[np.bool_], around: Point, evaluations: int
 ) -> Fit:
     """A fit that was made before, from where it ended; arguments as the attributes of :class:`Fit`."""
-    blocks = Blocks.of(problem.of, problem.events)
     slopes = problem.evaluate(around)
-    known = known_of(problem, slopes, by_reading(problem, around, slopes), blocks, dropped, scatter.follows)
+    known = known_of(problem, slopes, by_reading(problem, around, slopes), dropped, scatter.follows)
     return _found(problem, point, problem.evaluate(point), scatter, dropped, known, around, evaluations)
 
 
@@ -388,9 +390,8 @@ def _found(
     problem: Problem, point: Point, forces: Forces, scatter: Scatter, dropped: NDArray[np.bool_], known: Known,
     around: Point, evaluations: int,
 ) -> Fit:  # fmt: skip
-    blocks = Blocks.of(problem.of, problem.events)
     return Fit(
-        problem, point, forces, scatter, dropped, known.with_local(blocks(forces.local)), around, blocks,
+        problem, point, forces, scatter, dropped, known.with_local(problem.blocks(forces.local)), around,
         float(point.weights.sum()), evaluations,
     )  # fmt: skip
 

@@ -167,9 +167,7 @@ def points(fit: Fit, left_out: list[NDArray[np.intp]]) -> list[Point]:
     for part in left_out:
         hidden = np.where(np.isin(fit.problem.of, part), fit.known.strength**2, 0.0)  # which takes their weight
         apart = replace(fit, known=replace(fit.known, dropped=np.maximum(fit.known.dropped, fit.blocks(hidden))))
-        system = Linearised(
-            fit.problem, fit.point, fit.slopes, fit.scatter, fit.blocks, Whitening(fit.scatter.sizes, apart.known)
-        )
+        system = Linearised(fit.problem, fit.point, fit.slopes, fit.scatter, Whitening(fit.scatter.sizes, apart.known))
         change, _, _ = system.step()
         ways = [moved(fit.point, share * change, system.events_after(share * change)) for share in SHARES]
         start = min(ways, key=lambda point: system.objective(point, fit.problem.forces(point)))

@@ -28,7 +28,7 @@ def jumping(system: Linearised) -> int | None:
     Args:
         system: at the optimum, without that jump.
     """
-    problem, blocks = system.problem, system.blocks
+    problem, blocks = system.problem, system.problem.blocks
     tried = np.setdiff1d(np.flatnonzero(~problem.begins), problem.jumps)
     if tried.size == 0 or any(run.prescribed for run in problem.runs):
         return None

@@ -16,43 +16,42 @@ from .linearised import Array
 from .linked_events import WALK
 from .point import Forces, Point, Slopes
 from .problem import Problem, coordinate, part_of
-from .scatter import Blocks, Follows, Known, Scatter
+from .scatter import Follows, Known, Scatter
 from .whitening import Whitening
 
 
 def with_level(
-    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known, blocks: Blocks
+    problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, known: Known
 ) -> tuple[Problem, Slopes]:
     """The problem with the most likely course of the level at a point, and what :meth:`Problem.evaluate` says there.
 
     Args:
         problem, point, slopes: where.
         scatter, known: sizes of what is random, and what the covariance is made of.
-        blocks: points by event.
     """
     if scatter.follows is None or known.chain is None:
         return problem, slopes
-    own = known.with_local(blocks(slopes.local))
-    states = _states(problem, point, slopes, scatter, own, blocks)
+    own = known.with_local(problem.blocks(slopes.local))
+    states = _states(problem, point, slopes, scatter, own)
     with np.errstate(over="ignore", invalid="ignore"):
-        beyond = _beyond(problem, point, slopes, scatter.follows, own, states, blocks)
+        beyond = _beyond(problem, point, slopes, scatter.follows, own, states)
     if not np.isfinite(beyond).all():  # of a model so far off that its level would be none
         return problem, slopes
     return problem.with_beyond(beyond), replace(slopes, residual=slopes.residual - problem.beyond + beyond)
 
 
-def _states(problem: Problem, point: Point, forces: Forces, scatter: Scatter, known: Known, blocks: Blocks) -> Array:
+def _states(problem: Problem, point: Point, forces: Forces, scatter: Scatter, known: Known) -> Array:
     """Values and slopes of the level (e-folds) at both ends of every event, shape (E, 4)."""
     white = Whitening(scatter.sizes, known).with_events(known.local)
-    marginal = blocks(forces.residual) - np.einsum("eia,ea->ei", known.local, point.events)
+    marginal = problem.blocks(forces.residual) - np.einsum("eia,ea->ei", known.local, point.events)
     return np.asarray(-white.stands(marginal)[:, WALK:])
 
 
 def _beyond(
-    problem: Problem, point: Point, slopes: Slopes, follows: Follows, known: Known, states: Array, blocks: Blocks
+    problem: Problem, point: Point, slopes: Slopes, follows: Follows, known: Known, states: Array
 ) -> Array:  # fmt: skip
     """Residual along the course of the level less that of first order (N), shape (p,)."""
-    chain = known.chain
+    chain, blocks = known.chain, problem.blocks
     assert chain is not None
     mean = (chain.mean * states).sum(axis=1)
     courses = []

@@ -12,7 +12,7 @@ from .bank import spacing
 from .composition import PULL
 from .point import Forces, Point, Slopes
 from .problem import Problem
-from .scatter import EVENTS, Blocks, Scatter
+from .scatter import EVENTS, Scatter
 from .whitening import LEVELLED, Whitening
 
 Array = NDArray[np.float64]
@@ -26,13 +26,12 @@ class Linearised:
 
     Args:
         problem, point, slopes: where, and the residuals and derivatives there.
-        scatter, blocks, white: sizes of what is random, points by event, and the covariance.
+        scatter, white: sizes of what is random, and the covariance.
     """
 
-    def __init__(
-        self, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, blocks: Blocks, white: Whitening
-    ):
-        self.problem, self.point, self.slopes, self.blocks = problem, point, slopes, blocks
+    def __init__(self, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, white: Whitening):
+        self.problem, self.point, self.slopes = problem, point, slopes
+        self.blocks = blocks = problem.blocks
         self.random = np.exp(2.0 * scatter.sizes[: len(EVENTS)])
         self.prior, self.target = prior_rows(problem, point)
         self.local = local = blocks(slopes.local)

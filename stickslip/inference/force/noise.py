@@ -11,33 +11,34 @@ from scipy.sparse import coo_array, csr_array, dia_array, diags_array
 from .knots import PHASES
 from .point import Point, Slopes
 from .problem import Problem
-from .scatter import Blocks, Follows, Known, Scatter, covariance, weigh
+from .scatter import Follows, Known, Scatter, covariance, weigh
 
 Array = NDArray[np.float64]
 FORGOTTEN = 4.0  # e-folds after which the weakening remembers nothing of the path
 FAR = 5.0  # standard deviations from what the rest of an event lets expect, from which a point is left out
 
 
-def beyond(known: Known, scatter: Scatter, marginal: Array, blocks: Blocks, size: int) -> NDArray[np.bool_]:
+def beyond(problem: Problem, known: Known, scatter: Scatter, marginal: Array) -> NDArray[np.bool_]:
     """Points that what else is known of their event would not let expect, shape (p,)."""
     found = weigh(scatter.sizes, marginal, known)
     z = found.weighted / np.sqrt(np.diagonal(found.inverted, axis1=1, axis2=2))
-    out = np.zeros(size, bool)
+    out, blocks = np.zeros(problem.of.size, bool), problem.blocks
     out[blocks.index[blocks.there]] = np.abs(z[blocks.there]) > FAR
     return out
 
 
 def known_of(
-    problem: Problem, slopes: Slopes, rows: Sequence[csr_array], blocks: Blocks, dropped: NDArray[np.bool_],
+    problem: Problem, slopes: Slopes, rows: Sequence[csr_array], dropped: NDArray[np.bool_],
     follows: Follows | None = None,
 ) -> Known:  # fmt: skip
     """What the covariance is made of, at a point; ``rows`` of :func:`by_reading`."""
+    blocks = problem.blocks
     strength = problem.composition.nominal[0]  # not the model's: a weaker contact would have a smaller misfit allowed
     return Known(
-        noise(problem, rows, blocks), periodic(problem, rows, blocks),
+        noise(problem, rows), periodic(problem, rows),
         blocks(left_out(problem, dropped)), blocks(slopes.local), blocks(problem.phase),
         blocks(slopes.spring), blocks(slopes.tangent), blocks(problem.place), blocks(problem.elapsed),
-        problem.lasting, problem.begins, blocks.there, strength, problem.walk, problem.chain(follows, blocks, slopes),
+        problem.lasting, problem.begins, blocks.there, strength, problem.walk, problem.chain(follows, slopes),
     )  # fmt: skip
 
 
@@ -76,9 +77,10 @@ def carrier(problem: Problem, slopes: Slopes, rows: Sequence[csr_array]) -> Arra
     return np.column_stack([slopes.tangent, hum, slopes.local[:, 0]])
 
 
-def noise(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Array:
+def noise(problem: Problem, carried: Sequence[csr_array]) -> Array:
     """Covariance of the residual force (N^2) by the noise of single samples, event by event, shape (E, n, n)."""
     event, place = np.zeros(problem.of.size, int), np.zeros(problem.of.size, int)
+    blocks = problem.blocks
     e, i = np.nonzero(blocks.there)
     event[blocks.index[e, i]], place[blocks.index[e, i]] = e, i
     out = np.zeros((*blocks.there.shape, blocks.there.shape[1]))
@@ -113,13 +115,13 @@ def reading_errors(problem: Problem, rows: Sequence[csr_array], weighted: Array,
     return out
 
 
-def periodic(problem: Problem, carried: Sequence[csr_array], blocks: Blocks) -> Array:
+def periodic(problem: Problem, carried: Sequence[csr_array]) -> Array:
     """Covariance (N^2) by errors of the reading of 1 m that are periodic within a fringe, shape (E, n, n).
 
     Their phase is an event's own: a slow walk of the reading turns it.
     """
     columns = [rows @ run.reading.fringe for run, rows in zip(problem.runs, carried, strict=True)]
-    side = blocks(np.concatenate(columns))
+    side = problem.blocks(np.concatenate(columns))
     return np.asarray(side @ np.swapaxes(side, 1, 2))
 
 
@@ -171,7 +173,7 @@ def weakened(t: Array, x: Array, sliding: Array, psi: Array, ratio: float, reach
     return csr_array((value, j, np.cumsum(stored)), shape=(t.size,) * 2)
 
 
-def bands(problem: Problem, carried: Sequence[csr_array], blocks: Blocks, scatter: Scatter, known: Known) -> Array:
+def bands(problem: Problem, carried: Sequence[csr_array], scatter: Scatter, known: Known) -> Array:
     """Angular frequency of the noise by phase (rad/s), shape (4,).
 
     Where a model takes a reading ahead by a time tau, its noise e becomes e + tau e', and the covariance S of the
@@ -185,8 +187,8 @@ def bands(problem: Problem, carried: Sequence[csr_array], blocks: Blocks, scatte
         both = (single[1:] & single[:-1]).astype(float)
         ends = diags_array([np.append(-both, 0.0), both], offsets=[0, 1], shape=(single.size, single.size))
         rates.append(csr_array(row @ ends.T) / run.step)
-    grown = scatter.named()["white"] ** 2 * noise(problem, rates, blocks)
+    grown = scatter.named()["white"] ** 2 * noise(problem, rates)
     _, whole = covariance(scatter.sizes, known)
     share = np.einsum("eij,eji->ei", np.linalg.inv(whole), grown)
-    phases = [share[blocks.there & (known.phase == i)] for i in range(len(PHASES))]
+    phases = [share[problem.blocks.there & (known.phase == i)] for i in range(len(PHASES))]
     return np.sqrt(np.maximum([own.mean() if own.size else 0.0 for own in phases], 0.0))

@@ -74,6 +74,7 @@ class Problem:
         self.loaded = median is not None and float(np.std(loads)) > LOADED * abs(median)
         self.ways = tuple(_padded(k, room, median) for k in runs)
         self.of = np.concatenate([k.of + f for k, f in zip(runs, first[:-1], strict=True)])
+        self.blocks = Blocks.of(self.of, self.events)
         self.run = np.concatenate([np.full(k.at.size, r) for r, k in enumerate(runs)])
         self.event_run = np.concatenate([np.full(k.events, r) for r, k in enumerate(runs)])
         self.phase, self.place, self.at = (
@@ -130,7 +131,7 @@ class Problem:
         begin, end, *_ = self.coordinates[ALONG.index(coordinate)]
         return float(np.median(np.abs(end - begin)))
 
-    def chain(self, follows: Follows | None, blocks: Blocks, forces: Forces) -> Chain | None:
+    def chain(self, follows: Follows | None, forces: Forces) -> Chain | None:
         """How levels go on from event to event; runs by themselves."""
         if follows is None:
             return None
@@ -145,7 +146,7 @@ class Problem:
             then = np.concatenate(
                 [np.interp(_arrests(k), k.t, part) for k, part in zip(self.runs, shares, strict=True)]
             )
-        rests = (1.0 - slides) * then[self.of]
+        rests, blocks = (1.0 - slides) * then[self.of], self.blocks
         return Chain(begin, end, self.event_run, follows.unit, blocks(share), blocks(slides * now), held, blocks(rests))
 
     def _by_run(self, both: Array) -> Array:
@@ -313,12 +314,8 @@ class Problem:
 
         def of_run(numbered: tuple[int, RunInput]) -> list[Any]:
             r, own = numbered
-            return [
-                np.asarray(a)
-                for a in program(
-                    point.z[bent], point.phases[:, r] * phase_scale, scales, phase_scale, fixed, common, own
-                )
-            ]
+            phase = point.phases[:, r] * phase_scale
+            return [np.asarray(a) for a in program(point.z[bent], phase, scales, phase_scale, fixed, common, own)]
 
         found = side_by_side(of_run, enumerate(self.run_inputs(point)), [k.t.size for k in self.runs])
         p, kept = 0, []
