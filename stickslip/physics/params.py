@@ -89,7 +89,7 @@ def _as_float(value: Any) -> Any:
 
 
 def parameter(
-    default: float,
+    default: float | None = None,
     *,
     unit: str,
     lower: float,
@@ -104,7 +104,16 @@ def parameter(
     width: float | None = None,
     usual: tuple[float, float] | None = None,
 ) -> Any:
-    """A field of a physical class: a 64-bit float with its :class:`Spec`. Arguments as there."""
+    """A field of a physical class: a 64-bit float with its :class:`Spec`.
+
+    Arguments as there; without a default it is the null value.
+
+    Raises:
+        InputError: neither a default nor a null value.
+    """
+    default = null if default is None else default
+    if default is None:
+        raise InputError("a parameter needs a default, or a null value that is its default", key=doc)
     spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, symbol, ends, prior, width, usual)
     return eqx.field(default=float(default), converter=_as_float, metadata={"spec": spec})
 

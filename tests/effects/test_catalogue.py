@@ -110,7 +110,7 @@ def test_a_cell_that_is_run_again_replaces_its_effect(monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("amplitude = ", "amplitud = "), "needs an amplitude"),
+        (('amplitude = "size"', 'amplitude = "length"'), "needs an amplitude"),
         (('tag = "humming"', 'tag = "sensor-drift"'), "taken"),
         (('tag = "humming"', 'tag = "Humming"'), "needs a tag"),
         (("(Threshold)", "(Treshold)"), "line 7.*Treshold"),
@@ -215,3 +215,16 @@ def test_equations_of_the_static_model_have_no_inertia() -> None:
 
 def test_inertia_alone_is_not_the_static_model() -> None:
     assert "m x''" in of_tags(["static", "inertia"]).text()
+
+
+def test_the_amplitude_is_the_parameter_that_can_vanish(tmp_path: Path, no_user_effects: None) -> None:
+    """Its name and its default are said once; two such parameters leave it open which one it is."""
+    short = MY_EFFECT.replace('    amplitude = "size"\n', "").replace("parameter(0.0,", "parameter(")
+    catalogue.load_file(write(tmp_path / "my_effect.py", short))
+    made = catalogue.make("humming")
+    assert made.amplitude == "size" and float(made.size) == 0.0
+    both = short.replace("humming", "buzzing").replace("20e-6, unit", "20e-6, null=20e-6, unit")
+    with pytest.raises(InputError, match="needs an amplitude"):
+        catalogue.load_file(write(tmp_path / "other_effect.py", both))
+    with pytest.raises(InputError, match="needs a default"):
+        catalogue.load_file(write(tmp_path / "third_effect.py", short.replace("null=0.0, ", "")))

@@ -98,7 +98,7 @@ def test_it_keeps_the_rules_and_is_simulated(installed):
         ("humming = humming_friction:Huming", MODULE, "'humming' of humming-friction cannot be loaded.*Huming"),
         ("humming = humming_friction:Humming", "import os\nos.no_such_thing", "'humming' of humming-friction cannot"),
         ("humming = nowhere_at_all:Humming", MODULE, "'humming' of humming-friction cannot be loaded.*nowhere_at_all"),
-        ("humming = humming_friction:Humming", MODULE.replace("amplitude", "amplitud"), "needs an amplitude"),
+        ("humming = humming_friction:Humming", MODULE.replace("null=0.0, ", ""), "needs an amplitude"),
         ("humming = humming_friction:Humming", MODULE.replace('"humming"', '"wear"'), "'wear' of humming-.*is taken"),
     ],
 )

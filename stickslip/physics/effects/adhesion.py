@@ -26,11 +26,10 @@ class Adhesion(Geometry):
         "plasticity": "load series including light loads; humidity",
     }
     source = "Derjaguin, Muller & Toporov, J. Colloid Interface Sci. 53 (1975) 314"
-    amplitude = "attraction"
     family = "geometry"
 
     attraction: Array = parameter(
-        0.0, unit="1", lower=0.0, upper=0.3, usual=(0.0, 0.01), null=0.0, symbol=r"\varepsilon",
+        null=0.0, unit="1", lower=0.0, upper=0.3, usual=(0.0, 0.01), symbol=r"\varepsilon",
         doc="adhesive over applied load (steel in air: below 0.01)"
     )  # fmt: skip
 

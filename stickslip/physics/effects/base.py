@@ -8,6 +8,7 @@ continuous, and has no switch that resets a state. Concrete effects are final; r
 from __future__ import annotations
 
 import abc
+import dataclasses
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import jax.numpy as jnp
@@ -132,7 +133,7 @@ class Effect(Parametrised):
         signature: what it does to a measured trace.
         confused_with: tags with a similar signature, each with the experiment that separates the two.
         source: paper or book.
-        amplitude: name of the parameter whose null value makes the effect vanish.
+        amplitude: name of the parameter whose null value makes the effect vanish: the only one with such a value.
         generalises: tags of effects that this law contains as special cases; where both describe the data, the special
             case is named.
         exponents: names of inner parameters that make of one formula what the literature has as several forms (linear
@@ -163,9 +164,20 @@ class Effect(Parametrised):
     drawn: ClassVar[bool] = False
     symbols: ClassVar[dict[str, str]] = {}
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        vanishing = [name for name, field in vars(cls).items() if _has_null(field)]
+        if "amplitude" not in vars(cls) and len(vanishing) == 1:
+            cls.amplitude = vanishing[0]
+
     def formula(self) -> str:
         """LaTeX of the law in the form chosen, equations of its state included; to be overridden where forms differ."""
         return self.equation
+
+
+def _has_null(field: object) -> bool:
+    spec = field.metadata.get("spec") if isinstance(field, dataclasses.Field) else None
+    return spec is not None and spec.null is not None
 
 
 class Memory(Effect):

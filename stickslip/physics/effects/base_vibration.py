@@ -28,12 +28,11 @@ class BaseVibration(BodyForce):
         "drive-ripple": "change the drive velocity: a vibration keeps its frequency",
     }
     source = "Newton's law in the frame of an accelerated base; levels: Gordon, Proc. SPIE 1619 (1992) 71"
-    amplitude = "acceleration"
     periodic = ("frequency", "time")
     family = "drive"
 
     acceleration: Array = parameter(
-        0.0, unit="m/s^2", lower=-0.1, upper=0.1, usual=(-0.01, 0.01), null=0.0, symbol="a_b",
+        null=0.0, unit="m/s^2", lower=-0.1, upper=0.1, usual=(-0.01, 0.01), symbol="a_b",
         doc="amplitude of the base's acceleration"
     )  # fmt: skip
     frequency: Array = parameter(

@@ -58,7 +58,7 @@ def accept(cls: object) -> type[Effect]:
             key=f"{here}.amplitude",
             value=cls.amplitude,
             allowed=", ".join(known) or None,
-            hint="eps: Array = parameter(0.0, null=0.0, unit='1', lower=-0.1, upper=0.1, doc='...')",
+            hint="eps: Array = parameter(null=0.0, unit='1', lower=-0.1, upper=0.1, doc='...')",
         )
     for name, spec in known.items():
         if not spec.lower < spec.upper:

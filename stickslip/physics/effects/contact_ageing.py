@@ -30,11 +30,10 @@ class ContactAgeing(Memory, Threshold):
         "wear": "go back over the same track after a hold",
     }
     source = "Dieterich, J. Geophys. Res. 77 (1972) 3690; Baumberger & Caroli, Adv. Phys. 55 (2006) 279"
-    amplitude = "rate"
     family = "friction"
 
     rate: Array = parameter(
-        0.0, unit="1", lower=-0.02, upper=0.05, usual=(0.0, 0.02), null=0.0, symbol=r"\beta",
+        null=0.0, unit="1", lower=-0.02, upper=0.05, usual=(0.0, 0.02), symbol=r"\beta",
         doc="relative growth of strength per e-fold of age"
     )  # fmt: skip
     onset_time: Array = parameter(

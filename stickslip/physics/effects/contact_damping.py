@@ -29,11 +29,10 @@ class ContactDamping(BodyForce):
         "curvature": "decay of the ringing at several amplitudes",
     }
     source = "Kelvin-Voigt contact: Johnson, Contact Mechanics (1985), sec. 6.5"
-    amplitude = "time"
     family = "contact"
 
     time: Array = parameter(
-        0.0, unit="s", lower=0.0, upper=1e-3, usual=(0.0, 3e-5), null=0.0, symbol=r"\eta",
+        null=0.0, unit="s", lower=0.0, upper=1e-3, usual=(0.0, 3e-5), symbol=r"\eta",
         doc="damping of a stuck element over its stiffness"
     )  # fmt: skip
 

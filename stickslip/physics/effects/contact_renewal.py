@@ -77,11 +77,10 @@ class ContactRenewal(Memory, Threshold, Flow):
         "slip-weakening": "load series: the slip over which strength is lost scales with u_max",
     }
     source = "Farkas, Dahmen & Wolf, J. Stat. Mech. (2005) P06015; Braun & Peyrard, Phys. Rev. Lett. 100 (2008) 125501"
-    amplitude = "rate"
     family = "contact"
 
     rate: Array = parameter(
-        0.0, unit="1/m", lower=0.0, upper=2e6, usual=(0.0, 1e6), null=0.0, symbol=r"1/\ell",
+        null=0.0, unit="1/m", lower=0.0, upper=2e6, usual=(0.0, 1e6), symbol=r"1/\ell",
         doc="share of the junctions that break per metre of slip"
     )  # fmt: skip
 

@@ -35,7 +35,6 @@ class Curvature(Geometry):
         "contact-damping": "decay of the ringing at several amplitudes",
     }
     source = "Cattaneo (1938); Mindlin, J. Appl. Mech. 16 (1949) 259"
-    amplitude = "share"
     family = "geometry"
 
     share: Array = share("how far the distribution of thresholds is that of a smooth sphere")

@@ -34,11 +34,10 @@ class DirectEffect(Threshold):
         "viscoelastic-contact": "a hold at half load: only the viscoelastic contact relaxes",
     }
     source = "Dieterich, J. Geophys. Res. 84 (1979) 2161; Baumberger, Berthoud & Caroli, Phys. Rev. B 60 (1999) 3928"
-    amplitude = "strengthening"
     family = "friction"
 
     strengthening: Array = parameter(
-        0.0, unit="1", lower=-0.01, upper=0.1, null=0.0, symbol="a",
+        null=0.0, unit="1", lower=-0.01, upper=0.1, symbol="a",
         doc="relative growth of friction per e-fold of velocity"
     )  # fmt: skip
     cutoff_velocity: Array = parameter(

@@ -27,12 +27,11 @@ class DriveRipple(Drive):
         "nonlinear-spring": "go on for several pitches: a ripple repeats",
     }
     source = "ISO 3408-3: travel deviation of ball screws"
-    amplitude = "ripple"
     periodic = ("pitch", "load point")
     family = "drive"
 
     ripple: Array = parameter(
-        0.0, unit="m", lower=-5e-6, upper=5e-6, null=0.0, symbol=r"\varepsilon", doc="amplitude of the position error"
+        null=0.0, unit="m", lower=-5e-6, upper=5e-6, symbol=r"\varepsilon", doc="amplitude of the position error"
     )
     pitch: Array = parameter(
         1e-3, unit="m", lower=1e-6, upper=1e-2, log=True, grid=(0.5e-3, 1e-3, 2e-3), symbol=r"\ell",

@@ -29,11 +29,10 @@ class FlashHeating(Memory, Threshold):
         "viscous-drag": "another ambient temperature",
     }
     source = "Archard, Wear 2 (1959) 438; Rice, J. Geophys. Res. 111 (2006) B05311"
-    amplitude = "softening"
     family = "friction"
 
     softening: Array = parameter(
-        0.0, unit="1/W", lower=-1.0, upper=1.0, null=0.0, symbol=r"\chi",
+        null=0.0, unit="1/W", lower=-1.0, upper=1.0, symbol=r"\chi",
         doc="relative loss of strength per watt: softening per kelvin times thermal resistance"
     )  # fmt: skip
     time: Array = parameter(

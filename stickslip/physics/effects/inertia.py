@@ -25,11 +25,10 @@ class AddedMass(Inertia):
         "viscous-drag": "compare slip duration and overshoot: drag lowers the overshoot, mass does not",
     }
     source = "Rayleigh, The Theory of Sound 1 (1877): a uniform spring adds a third of its mass"
-    amplitude = "share"
     family = "block"
 
     share: Array = parameter(
-        0.0, unit="1", lower=0.0, upper=0.2, null=0.0, symbol=r"\alpha", doc="added mass as a share of the block's"
+        null=0.0, unit="1", lower=0.0, upper=0.2, symbol=r"\alpha", doc="added mass as a share of the block's"
     )
 
     def mass(self, mass: Array) -> Array:

@@ -27,12 +27,11 @@ class LoadModulation(Threshold):
         "drive-ripple": "change the drive velocity: the line of a ripple moves with it, that of the load stays",
     }
     source = "Tolstoi, Wear 10 (1967) 199: normal degree of freedom in friction"
-    amplitude = "depth"
     periodic = ("frequency", "time")
     family = "contact"
 
     depth: Array = parameter(
-        0.0, unit="1", lower=-0.05, upper=0.05, usual=(-0.01, 0.01), null=0.0, symbol=r"\varepsilon",
+        null=0.0, unit="1", lower=-0.05, upper=0.05, usual=(-0.01, 0.01), symbol=r"\varepsilon",
         doc="amplitude of the load as a share of the load"
     )  # fmt: skip
     frequency: Array = parameter(

@@ -42,11 +42,10 @@ class MachineCompliance(Geometry, Sensor):
         "tilt": "a second laser on the base",
     }
     source = "Masing (1926); inverse of a Prandtl-Ishlinskii operator: Krejci & Kuhnen, IEE Proc. 148 (2001) 185"
-    amplitude = "compliance"
     family = "geometry"
 
     compliance: Array = parameter(
-        0.0, unit="m/N", lower=0.0, upper=1e-6, null=0.0, symbol="1/k_m", doc="compliance of the fixture"
+        null=0.0, unit="m/N", lower=0.0, upper=1e-6, symbol="1/k_m", doc="compliance of the fixture"
     )
     where: str = variant("read-out", ("read-out", "series"), "seen by the sensor only, or between contact and mass")
 

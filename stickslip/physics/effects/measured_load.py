@@ -29,12 +29,11 @@ class MeasuredLoad(Threshold):
         "position-dependent-friction": "go back over the same place at another load",
     }
     source = "Amontons (1699); Linker & Dieterich, J. Geophys. Res. 97 (1992) 4923, where the share is less than 1"
-    amplitude = "share"
     family = "contact"
     measured = "normal_load"
 
     share: Array = parameter(
-        0.0, unit="1", lower=-1.0, upper=5.0, null=0.0, symbol="s", doc="share of the load's changes in friction"
+        null=0.0, unit="1", lower=-1.0, upper=5.0, symbol="s", doc="share of the load's changes in friction"
     )
 
     def strength(self, state: Any, motion: Motion, contact: Contact) -> Array:

@@ -28,11 +28,10 @@ class NonlinearSpring(Spring):
         "contact-ageing": "change the drive velocity at the same stroke",
     }
     source = "Nayfeh & Mook, Nonlinear Oscillations (1979), ch. 4"
-    amplitude = "curvature"
     family = "block"
 
     curvature: Array = parameter(
-        0.0, unit="1/m", lower=-800.0, upper=800.0, null=0.0, symbol=r"\beta",
+        null=0.0, unit="1/m", lower=-800.0, upper=800.0, symbol=r"\beta",
         doc="relative change of the secant stiffness per metre of elongation (at 0.1 mm in the cubic form)"
     )  # fmt: skip
     form: str = variant("quadratic", ("quadratic", "cubic"), "one-sided (beam) or symmetric (wire)")

@@ -32,11 +32,10 @@ class Plasticity(Geometry):
         "contact-damping": "decay of the ringing at several amplitudes",
     }
     source = "Bowden & Tabor, The Friction and Lubrication of Solids (1950); Kogut & Etsion, J. Tribol. 126 (2004) 34"
-    amplitude = "hardness_ratio"
     family = "geometry"
 
     hardness_ratio: Array = parameter(
-        0.0, unit="1", lower=0.0, upper=10.0, null=0.0, symbol="h",
+        null=0.0, unit="1", lower=0.0, upper=10.0, symbol="h",
         doc="elastic over plastic load of the deepest asperity"
     )  # fmt: skip
     sharpness: Array = parameter(

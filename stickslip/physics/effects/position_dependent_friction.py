@@ -29,12 +29,11 @@ class PositionDependentFriction(Threshold):
         "nonlinear-spring": "calibrate the spring with weights",
     }
     source = "Armstrong-Helouvry, Control of Machines with Friction (1991), ch. 4"
-    amplitude = "depth"
     periodic = ("wavelength", "displacement")
     family = "friction"
 
     depth: Array = parameter(
-        0.0, unit="1", lower=-0.3, upper=0.3, null=0.0, symbol=r"\varepsilon",
+        null=0.0, unit="1", lower=-0.3, upper=0.3, symbol=r"\varepsilon",
         doc="relative change of friction: amplitude of the wave, or change over one wavelength"
     )  # fmt: skip
     wavelength: Array = parameter(

@@ -38,12 +38,11 @@ class RateAndState(Memory, Threshold):
         "velocity-weakening": "holds of 1 s and 25 s",
     }
     source = "Ruina, J. Geophys. Res. 88 (1983) 10359; Rice & Ruina, J. Appl. Mech. 50 (1983) 343"
-    amplitude = "evolution"
     generalises = ("contact-ageing", "direct-effect")
     family = "friction"
 
     evolution: Array = parameter(
-        0.0, unit="1", lower=-0.02, upper=0.1, null=0.0, symbol="b",
+        null=0.0, unit="1", lower=-0.02, upper=0.1, symbol="b",
         doc="relative growth of strength per e-fold of the state"
     )  # fmt: skip
     ratio: Array = parameter(

@@ -42,11 +42,10 @@ class ResidualLoad(Memory, Flow):
         "contact-renewal": "slip size against slip distance: only renewal weakens sliding contacts",
     }
     source = "Mindlin & Deresiewicz, J. Appl. Mech. 20 (1953) 327: the load history of a contact at rest"
-    amplitude = "lost"
     family = "contact"
 
     lost: Array = parameter(
-        0.0, unit="1", lower=0.0, upper=0.98, null=0.0, symbol=r"\varepsilon",
+        null=0.0, unit="1", lower=0.0, upper=0.98, symbol=r"\varepsilon",
         doc="share of every force that is lost as a slip comes to rest (1: virgin again)", ends=(0.98,)
     )  # fmt: skip
     slip_length: Array = parameter(

@@ -36,7 +36,6 @@ class RollOff(Geometry):
         "rate-and-state": "velocity steps in steady sliding",
     }
     source = "Greenwood & Williamson, Proc. R. Soc. A 295 (1966) 300; Persson, Phys. Rev. Lett. 99 (2007) 125502"
-    amplitude = "share"
     family = "geometry"
 
     share: Array = share("how far the distribution of thresholds is exponential")

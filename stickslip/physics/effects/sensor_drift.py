@@ -26,12 +26,11 @@ class SensorDrift(Sensor):
         "machine-compliance": "change the drive velocity: drift is fixed to the clock",
     }
     source = "thermal expansion of the mount, 12 ppm/K of its length in steel"
-    amplitude = "rate"
     family = "sensor"
     place = Sensor.OFFSET
 
     rate: Array = parameter(
-        0.0, unit="m/s", lower=-5e-8, upper=5e-8, null=0.0, symbol=r"\varepsilon", doc="rate of the drift"
+        null=0.0, unit="m/s", lower=-5e-8, upper=5e-8, symbol=r"\varepsilon", doc="rate of the drift"
     )
 
     def read(self, state: Any, reading: Array, motion: Motion, contact_force: Array) -> Array:

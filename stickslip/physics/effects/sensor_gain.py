@@ -24,12 +24,11 @@ class SensorGain(Sensor):
         "machine-compliance": "steady sliding at the drive's velocity: only a gain shows there",
     }
     source = "Polytec OFV-3001 manual: amplitude error of the displacement decoder; cosine error of a tilted beam"
-    amplitude = "gain"
     family = "sensor"
     place = Sensor.GAIN
 
     gain: Array = parameter(
-        0.0, unit="1", lower=-0.05, upper=0.05, null=0.0, symbol=r"\gamma", doc="relative error of the scale"
+        null=0.0, unit="1", lower=-0.05, upper=0.05, symbol=r"\gamma", doc="relative error of the scale"
     )
 
     def read(self, state: Any, reading: Array, motion: Motion, contact_force: Array) -> Array:

@@ -31,12 +31,11 @@ class SensorHighPass(Memory, Sensor):
         "thermal-creep": "step test of the sensor on a rigid stop",
     }
     source = "first-order RC coupling; Oppenheim & Willsky, Signals and Systems (1997), ch. 6"
-    amplitude = "cutoff"
     family = "sensor"
     place = Sensor.HIGH_PASS
 
     cutoff: Array = parameter(
-        0.0, unit="Hz", lower=0.0, upper=5.0, null=0.0, symbol="f_c", doc="frequency below which motion is lost"
+        null=0.0, unit="Hz", lower=0.0, upper=5.0, symbol="f_c", doc="frequency below which motion is lost"
     )
 
     def start(self, bank: Bank) -> Array:

@@ -27,12 +27,11 @@ class SensorLowPass(Memory, Sensor):
         "contact-damping": "frequency and phase of the ring-down stay, its first rebound is small",
     }
     source = "first-order RC filter; Oppenheim & Willsky, Signals and Systems (1997), ch. 6"
-    amplitude = "time_constant"
     family = "sensor"
     place = Sensor.LOW_PASS
 
     time_constant: Array = parameter(
-        0.0, unit="s", lower=0.0, upper=2e-3, usual=(0.0, 1e-3), null=0.0, symbol=r"\tau",
+        null=0.0, unit="s", lower=0.0, upper=2e-3, usual=(0.0, 1e-3), symbol=r"\tau",
         doc="time constant of the sensor"
     )  # fmt: skip
 

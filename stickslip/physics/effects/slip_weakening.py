@@ -36,11 +36,10 @@ class SlipWeakening(Memory, Threshold):
         "roll-off": "load series",
     }
     source = "Ida, J. Geophys. Res. 77 (1972) 3796; Palmer & Rice, Proc. R. Soc. A 332 (1973) 527"
-    amplitude = "drop"
     family = "friction"
 
     drop: Array = parameter(
-        0.0, unit="1", lower=-0.2, upper=0.5, usual=(0.0, 0.4), null=0.0, symbol=r"\varepsilon",
+        null=0.0, unit="1", lower=-0.2, upper=0.5, usual=(0.0, 0.4), symbol=r"\varepsilon",
         doc="share of the strength that sliding takes"
     )  # fmt: skip
     distance: Array = parameter(

@@ -33,11 +33,10 @@ class ThermalCreep(Flow):
         "base-vibration": "spectrum with the drive off",
     }
     source = "Eyring, J. Chem. Phys. 4 (1936) 283; Yang, Zhang & Marder, PNAS 105 (2008) 13264"
-    amplitude = "velocity"
     family = "contact"
 
     velocity: Array = parameter(
-        0.0, unit="m/s", lower=0.0, upper=1e-6, usual=(0.0, 1e-7), null=0.0, symbol="v_1",
+        null=0.0, unit="m/s", lower=0.0, upper=1e-6, usual=(0.0, 1e-7), symbol="v_1",
         doc="slip velocity of an element that is just below its cap"
     )  # fmt: skip
     activation: Array = parameter(

@@ -31,11 +31,10 @@ class Tilt(Threshold):
         "machine-compliance": "hold at half load: tilt leaves the creep's shape alone",
     }
     source = "Oden & Martins, Comput. Methods Appl. Mech. Eng. 52 (1985) 527: coupling of normal and tangential motion"
-    amplitude = "coupling"
     family = "contact"
 
     coupling: Array = parameter(
-        0.0, unit="1", lower=-0.3, upper=0.3, usual=(-0.1, 0.1), null=0.0, symbol=r"\kappa",
+        null=0.0, unit="1", lower=-0.3, upper=0.3, usual=(-0.1, 0.1), symbol=r"\kappa",
         doc="relative change of the normal load at the full friction force"
     )  # fmt: skip
     by: str = variant("spring", ("spring", "contact"), "the force that tilts: of the driving spring, or of the contact")

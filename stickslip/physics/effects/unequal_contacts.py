@@ -33,11 +33,10 @@ class UnequalContacts(Geometry):
         "roll-off": "turn the block in its guide",
     }
     source = "Grzemba, Phys. Mesomech. 17 (2014) 39: four contacts, one fitted"
-    amplitude = "spread"
     family = "geometry"
 
     spread: Array = parameter(
-        0.0, unit="1", lower=0.0, upper=0.6, null=0.0, symbol=r"\sigma",
+        null=0.0, unit="1", lower=0.0, upper=0.6, symbol=r"\sigma",
         doc="rms over the contacts of the logarithm of their largest threshold"
     )  # fmt: skip
 

@@ -29,12 +29,11 @@ class UnevenCompliance(Sensor):
         "machine-compliance": "loops about zero force: a linear fixture leaves them symmetric",
     }
     source = "Nayfeh & Mook, Nonlinear Oscillations (1979), ch. 4 (quadratic stiffness)"
-    amplitude = "bend"
     family = "sensor"
     both_ways = True
 
     bend: Array = parameter(
-        0.0, unit="m/N^2", lower=-1e-4, upper=1e-4, null=0.0, symbol=r"\beta", doc="deflection over force squared"
+        null=0.0, unit="m/N^2", lower=-1e-4, upper=1e-4, symbol=r"\beta", doc="deflection over force squared"
     )
 
     def read(self, state: Any, reading: Array, motion: Motion, contact_force: Array) -> Array:

@@ -34,12 +34,11 @@ class VelocityWeakening(Threshold):
         "viscous-drag": "velocities far above the slip's own",
     }
     source = "Stribeck (1902); Bo & Pavelescu, Wear 82 (1982) 277; Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
-    amplitude = "drop"
     exponents = ("exponent",)
     family = "friction"
 
     drop: Array = parameter(
-        0.0, unit="1", lower=-0.3, upper=0.5, usual=(0.0, 0.4), null=0.0, symbol=r"\varepsilon",
+        null=0.0, unit="1", lower=-0.3, upper=0.5, usual=(0.0, 0.4), symbol=r"\varepsilon",
         doc="share of the strength that velocity takes"
     )  # fmt: skip
     velocity: Array = parameter(

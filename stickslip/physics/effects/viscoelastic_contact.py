@@ -62,11 +62,10 @@ class ViscoelasticContact(Memory, Flow):
         "direct-effect": "a hold at half load",
     }
     source = "Popov, Contact Mechanics and Friction (2010), ch. 15: standard linear solid"
-    amplitude = "share"
     family = "contact"
 
     share: Array = parameter(
-        0.0, unit="1", lower=0.0, upper=0.5, usual=(0.0, 0.1), null=0.0, symbol="g",
+        null=0.0, unit="1", lower=0.0, upper=0.5, usual=(0.0, 0.1), symbol="g",
         doc="share of the stiffness that relaxes"
     )  # fmt: skip
     time: Array = parameter(

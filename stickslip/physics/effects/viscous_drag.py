@@ -37,13 +37,10 @@ class ViscousDrag(BodyForce):
         "velocity-weakening": "velocities far above the slip's own",
     }
     source = "Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994) 1083"
-    amplitude = "drag"
     exponents = ("exponent",)
     family = "block"
 
-    drag: Array = parameter(
-        0.0, unit="N", lower=0.0, upper=0.05, null=0.0, symbol="F_1", doc="force at a speed of 1 mm/s"
-    )
+    drag: Array = parameter(null=0.0, unit="N", lower=0.0, upper=0.05, symbol="F_1", doc="force at a speed of 1 mm/s")
     exponent: Array = parameter(
         1.0, unit="1", lower=0.3, upper=2.5, grid=(0.5, 1.0, 2.0), symbol="q",
         doc="power of the speed; at 1 it is the damping of the base model",

@@ -60,12 +60,11 @@ class WanderingFriction(Memory, Threshold):
         "wear": "a longer path: a run-in ends, a wander does not",
     }
     source = "Shinozuka & Deodatis, Appl. Mech. Rev. 44 (1991) 191; Hartikainen & Sarkka, MLSP (2010) 379"
-    amplitude = "size"
     family = "friction"
     drawn = True
 
     size: Array = parameter(
-        0.0, unit="1", lower=0.0, upper=0.5, null=0.0, symbol=r"\varepsilon",
+        null=0.0, unit="1", lower=0.0, upper=0.5, symbol=r"\varepsilon",
         doc="standard deviation of the logarithm of friction"
     )  # fmt: skip
     length: Array = parameter(

@@ -40,11 +40,10 @@ class Wear(Memory, Threshold, Stiffness):
         "contact-ageing": "equal slip with and without holds",
     }
     source = "Archard, J. Appl. Phys. 24 (1953) 981; Blau, Wear 71 (1981) 29 (running-in)"
-    amplitude = "drift"
     family = "friction"
 
     drift: Array = parameter(
-        0.0, unit="1", lower=-0.5, upper=0.5, null=0.0, symbol=r"\varepsilon",
+        null=0.0, unit="1", lower=-0.5, upper=0.5, symbol=r"\varepsilon",
         doc="relative change over the path s_1 (logarithmic: per e-fold beyond it)"
     )  # fmt: skip
     path: Array = parameter(
