@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from ..errors import InputError
 from ..inference.diagnose.decide import standard_error
@@ -29,7 +31,8 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
         A row for each: ``model``; ``error`` and ``unseen error`` in floors of the first one, with their standard
         deviations; ``behind``, twice the difference in log-likelihood of the left-out runs (each left out in turn) to
         the first row, and ``+-``, its standard error from event to event. Fits within two or three of it predict
-        equally well.
+        equally well. ``weight`` is the share of each in the mixture that predicts the left-out events best (stacking,
+        Yao et al., Bayesian Analysis 13 (2018) 917): one that adds nothing to the others has none.
 
     Raises:
         InputError: no fit, fits without names, fits of other runs, or a single event, which leaves nothing to predict
@@ -54,13 +57,34 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
     order = sorted(fits, key=lambda name: float(costs[name].sum()))
     best = fits[order[0]].force_fit
     floor = deviations(best)
-    rows = {}
-    for name in order:
+    rows, shares = {}, weights(np.array([-0.5 * costs[name] for name in order]))
+    for share, name in zip(shares, order, strict=True):
         fit, worse = fits[name].force_fit, costs[name] - costs[order[0]]
         error, std = of_all(sums(best, fit.marginal, floor))
         unseen_error, unseen_std = of_all(sums(best, apart(fit), floor))
         rows[name] = {
             "model": " + ".join(fits[name].parts), "error": error, "error std": std, "unseen error": unseen_error,
-            "unseen std": unseen_std, "behind": float(worse.sum()), "+-": standard_error(worse),
+            "unseen std": unseen_std, "weight": share, "behind": float(worse.sum()), "+-": standard_error(worse),
         }  # fmt: skip
     return table(rows, "fit")
+
+
+def weights(densities: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Shares of models in the mixture under which left-out events are most likely, shape (m,).
+
+    Args:
+        densities: logarithm of each model's density of each event, shape (m, E).
+    """
+    likely = np.exp(densities - densities.max(axis=0))
+
+    def surprise(shares: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        mixed = shares @ likely
+        return -float(np.log(mixed).mean()), -(likely / mixed).mean(axis=1)
+
+    count = len(likely)
+    found = minimize(
+        surprise, np.full(count, 1.0 / count), jac=True, method="SLSQP", bounds=[(1e-12, 1.0)] * count,
+        constraints={"type": "eq", "fun": lambda shares: shares.sum() - 1.0, "jac": np.ones_like},
+        options={"maxiter": 1000, "ftol": 1e-12},
+    )  # fmt: skip
+    return np.asarray(found.x / found.x.sum())
