@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import importlib
+from functools import update_wrapper
+from types import FunctionType
 from typing import Any
 
 
 class LazyMethod:
     """Stands in a class for the function of the same name of another module, written beside what it returns.
 
-    Type checkers take the function itself (an import under ``TYPE_CHECKING``), and so does the class once it was
-    asked for: signature and text are written once.
+    Type checkers take the function itself (an import under ``TYPE_CHECKING``), and the class has it as a method once it
+    was asked for: signature and text are written once.
 
     Args:
         module: where the function is, absolute.
@@ -24,5 +26,10 @@ class LazyMethod:
 
     def __get__(self, instance: object | None, owner: type) -> Any:
         function = getattr(importlib.import_module(self.module), self.name)
-        setattr(self.owner, self.name, function)
-        return function.__get__(instance, owner)
+        method = FunctionType(function.__code__, function.__globals__, self.name, function.__defaults__)
+        update_wrapper(method, function)
+        method.__kwdefaults__ = function.__kwdefaults__
+        method.__module__ = self.owner.__module__
+        method.__qualname__ = f"{self.owner.__qualname__}.{self.name}"  # as errors call it
+        setattr(self.owner, self.name, method)
+        return method.__get__(instance, owner)
