@@ -8,7 +8,6 @@ import importlib
 import io
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -703,23 +702,3 @@ def test_compiled_code_is_kept_and_can_be_switched_off(scenario, tmp_path_factor
     (off / "file").write_text("")
     environment |= {"XDG_CACHE_HOME": str(off / "file"), "STICKSLIP_NO_CACHE": "0"}
     assert subprocess.run([sys.executable, "-c", code], env=environment, timeout=60).returncode == 0
-
-
-def test_options_from_a_file_of_settings(tmp_path, monkeypatch, capsys):
-    """What stands on the command line goes before; a wrong file is an error, and not silently without effect."""
-    monkeypatch.chdir(tmp_path)
-    settings = Path("stickslip.toml")
-    settings.write_text('[effects]\nmodel = "static,inertia"\n')
-    assert run(["effects"]) == 0 and "static + inertia" in capsys.readouterr().out.splitlines()[0]
-    assert run(["effects", "--model", "static"]) == 0
-    assert capsys.readouterr().out.splitlines()[0].endswith("static")
-    for content, said in (
-        ('[effects]\nmodell = "static"\n', "modell.*stickslip.toml.*did you mean --model"),
-        ('[effect]\nmodel = "static"\n', "stickslip.toml: effect: .*no such command.*'effects'"),
-        ("effects = 3\n", r"stickslip.toml: effects: .*\[effects\]"),
-        ("[effects\n", "stickslip.toml: .*cannot be read"),
-        ('[simulate]\njobs = "many"\n', "jobs.*stickslip.toml"),
-    ):
-        settings.write_text(content)
-        assert run(["simulate", "rig.toml"] if "jobs" in content else ["effects"]) == 2
-        assert re.search(f"(?si){said}", capsys.readouterr().err), content

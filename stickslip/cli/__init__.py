@@ -12,12 +12,9 @@ import sys
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
-from pathlib import Path
 from types import FrameType
-from typing import Any
 
 from cyclopts import App, CycloptsError, MissingArgumentError
-from cyclopts.config import Dict
 
 from .. import __version__
 from ..errors import ArgumentError, InputError, StickslipError, nearest
@@ -58,7 +55,6 @@ EXAMPLES = {
 
 GROUPS = ("challenge",)  # commands that have commands, and say themselves how their help looks
 EXIT_CODES = "Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted."
-SETTINGS = "stickslip.toml"
 ABOUT = ("--help", "-h", "--version", "-V")
 INTERRUPTED = 130
 OPTIONS = {"effects": "add", "profiles": "profile"}  # those called otherwise than the argument
@@ -75,7 +71,6 @@ def make_app() -> App:
         help_flags=ABOUT[:2],
         help_format="plaintext",  # Markdown takes a third of the time; that of a command is read when it is called
         suppress_keyboard_interrupt=False,
-        config=Dict(settings(Path(SETTINGS)), source=SETTINGS),
     )
     for number, (name, text) in enumerate(COMMANDS.items()):  # listed in the order of one's work
         told = f"{text}\n\nExample: `stickslip {EXAMPLES[name]}`"
@@ -83,29 +78,6 @@ def make_app() -> App:
         app.command(f"stickslip.cli.{name}:{name}", name=name, help=told, sort_key=number, **look)
     app.register_install_completion_command(help="Have the shell complete commands and options by the tab key.")
     return app
-
-
-def settings(path: Path) -> dict[str, Any]:
-    """Options by command from a file of the folder one works in; none where it is not there.
-
-    Raises:
-        InputError: it is no TOML, or has what is no command.
-    """
-    if not path.exists():
-        return {}
-    import tomllib
-
-    try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"the file of settings cannot be read ({error})", file=path) from None
-    for name in found:
-        if name not in COMMANDS:
-            raise InputError("there is no such command", file=path, key=name, hint=nearest(name, COMMANDS))
-        if not isinstance(found[name], dict):
-            hint = f"[{name}] and below it lines such as jobs = 1"
-            raise InputError("options of a command stand in its table", file=path, key=name, hint=hint)
-    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

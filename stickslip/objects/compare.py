@@ -20,6 +20,8 @@ from .fit import Fit
 if TYPE_CHECKING:
     import pandas
 
+LEAST = 1e-6  # share of a mixture that is one
+
 
 def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
     """Fits of the same runs, the one that predicts unseen runs best first.
@@ -57,7 +59,7 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
     order = sorted(fits, key=lambda name: float(costs[name].sum()))
     best = fits[order[0]].force_fit
     floor = deviations(best)
-    rows, shares = {}, weights(np.array([-0.5 * costs[name] for name in order]))
+    rows, shares = {}, stacked(np.array([-0.5 * costs[name] for name in order]))
     for share, name in zip(shares, order, strict=True):
         fit, worse = fits[name].force_fit, costs[name] - costs[order[0]]
         error, std = of_all(sums(best, fit.marginal, floor))
@@ -69,13 +71,15 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
     return table(rows, "fit")
 
 
-def weights(densities: NDArray[np.float64]) -> NDArray[np.float64]:
+def stacked(densities: NDArray[np.float64]) -> NDArray[np.float64]:
     """Shares of models in the mixture under which left-out events are most likely, shape (m,).
 
     Args:
-        densities: logarithm of each model's density of each event, shape (m, E).
+        densities: logarithm of each model's density of each event, shape (m, E); nan gives nan.
     """
     likely = np.exp(densities - densities.max(axis=0))
+    if not np.isfinite(likely).all():
+        return np.full(len(densities), np.nan)
 
     def surprise(shares: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         mixed = shares @ likely
@@ -87,4 +91,5 @@ def weights(densities: NDArray[np.float64]) -> NDArray[np.float64]:
         constraints={"type": "eq", "fun": lambda shares: shares.sum() - 1.0, "jac": np.ones_like},
         options={"maxiter": 1000, "ftol": 1e-12},
     )  # fmt: skip
-    return np.asarray(found.x / found.x.sum())
+    shares = np.where(found.x > LEAST, found.x, 0.0)
+    return np.asarray(shares / shares.sum())

@@ -109,11 +109,11 @@ def parameter(
     Arguments as there; without a default it is the null value.
 
     Raises:
-        InputError: neither a default nor a null value.
+        TypeError: neither a default nor a null value.
     """
     default = null if default is None else default
     if default is None:
-        raise InputError("a parameter needs a default, or a null value that is its default", key=doc)
+        raise TypeError("a parameter needs a default, or a null value that is its default")
     spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, symbol, ends, prior, width, usual)
     return eqx.field(default=float(default), converter=_as_float, metadata={"spec": spec})
 

@@ -14,6 +14,9 @@ class LazyMethod:
     Type checkers take the function itself (an import under ``TYPE_CHECKING``), and the class has it as a method once it
     was asked for: signature and text are written once.
 
+    The class keeps the function as it is when it is first asked for; what is put in its place in the module later
+    is not seen.
+
     Args:
         module: where the function is, absolute.
     """
@@ -26,7 +29,9 @@ class LazyMethod:
 
     def __get__(self, instance: object | None, owner: type) -> Any:
         function = getattr(importlib.import_module(self.module), self.name)
-        method = FunctionType(function.__code__, function.__globals__, self.name, function.__defaults__)
+        method = FunctionType(
+            function.__code__, function.__globals__, self.name, function.__defaults__, function.__closure__
+        )
         update_wrapper(method, function)
         method.__kwdefaults__ = function.__kwdefaults__
         method.__module__ = self.owner.__module__

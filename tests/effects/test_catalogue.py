@@ -8,7 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax import Array
 
+from stickslip.effects import Threshold, parameter
 from stickslip.errors import InputError
 from stickslip.physics.contact import power_law_bank
 from stickslip.physics.effects import catalogue
@@ -224,7 +226,23 @@ def test_the_amplitude_is_the_parameter_that_can_vanish(tmp_path: Path, no_user_
     made = catalogue.make("humming")
     assert made.amplitude == "size" and float(made.size) == 0.0
     both = short.replace("humming", "buzzing").replace("20e-6, unit", "20e-6, null=20e-6, unit")
-    with pytest.raises(InputError, match="needs an amplitude"):
+    with pytest.raises(InputError, match=r"(?s)several parameters have a null value.*size, length.*amplitude = "):
         catalogue.load_file(write(tmp_path / "other_effect.py", both))
-    with pytest.raises(InputError, match="needs a default"):
+    named = both.replace("    size: Array", '    amplitude = "length"\n    size: Array')
+    catalogue.load_file(write(tmp_path / "named_effect.py", named))
+    assert catalogue.get("buzzing").amplitude == "length"
+    with pytest.raises(InputError, match=r"line 11.*needs a default"):
         catalogue.load_file(write(tmp_path / "third_effect.py", short.replace("null=0.0, ", "")))
+
+
+def test_parameters_that_can_vanish_are_counted_with_those_of_a_base() -> None:
+    class Loud(Threshold):
+        size: Array = parameter(null=0.0, unit="1", lower=-1.0, upper=1.0, doc="a factor")
+
+    class Alone(Loud):
+        pass
+
+    class Shrill(Loud):
+        pitch: Array = parameter(null=0.0, unit="1", lower=-1.0, upper=1.0, doc="another")
+
+    assert (Loud.amplitude, Alone.amplitude, Shrill.amplitude) == ("size", "size", "")

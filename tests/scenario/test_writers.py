@@ -26,6 +26,24 @@ def test_columns_come_back(tmp_path, ending):
         np.testing.assert_allclose(found.data[name], values, rtol=1e-11, atol=1e-12)
 
 
+def test_text_has_fifteen_digits_of_the_largest_value(tmp_path):
+    """What is not finite, zero or too small for that is written too."""
+    t = np.arange(2001) / 3000.0
+    counts = np.floor(1e4 * np.sin(t)) * 0.00791
+    odd = np.full(t.size, 1e-300)
+    odd[:4] = np.nan, np.inf, -np.inf, 0.0
+    path = write_trace(
+        tmp_path / "a.csv", {"time": (t, "s"), "displacement": (counts, "um"), "odd": (odd, "N"), "none": (0 * t, "N")}
+    )
+    lines = path.read_text().splitlines()
+    assert lines[0] == "time [s],displacement [um],odd [N],none [N]" and lines[-1].endswith(",1e-300,0")
+    assert [line.split(",")[2] for line in lines[1:5]] == ["nan", "inf", "-inf", "0"]
+    assert max(len(line.split(",")[1]) for line in lines[1:]) <= len("48.91544")  # no digits of binary fractions
+    back = np.loadtxt(path, delimiter=",", skiprows=1)
+    np.testing.assert_allclose(back[:, 0], t, rtol=0.0, atol=1e-15)
+    np.testing.assert_array_equal(back[:, 2], odd)
+
+
 def test_an_unknown_ending_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"\.csv \.nc"):
         write_trace(tmp_path / "a.xls", {"time": (np.arange(3.0), "s")})

@@ -31,7 +31,7 @@ class Linearised:
 
     def __init__(self, problem: Problem, point: Point, slopes: Slopes, scatter: Scatter, white: Whitening):
         self.problem, self.point, self.slopes = problem, point, slopes
-        self.blocks = blocks = problem.blocks
+        blocks = problem.blocks
         self.random = np.exp(2.0 * scatter.sizes[: len(EVENTS)])
         self.prior, self.target = prior_rows(problem, point)
         self.local = local = blocks(slopes.local)
@@ -44,7 +44,7 @@ class Linearised:
     def alone(self, forces: Array) -> Linearised:
         """The same with forces (N), shape (p,), in place of the residual, and priors that are met."""
         other = copy(self)
-        other.marginal = self.blocks(forces)
+        other.marginal = self.problem.blocks(forces)
         other.rest = self.white(other.marginal[..., None])[..., 0]
         other.target = np.zeros_like(self.target)
         return other
@@ -52,7 +52,7 @@ class Linearised:
     def objective(self, point: Point, slopes: Forces) -> float:
         """Of residual, random effects and priors, with this covariance."""
         _, target = prior_rows(self.problem, point)
-        return self.plain.squares(self.blocks(slopes.residual), point.events) + float((target**2).sum())
+        return self.plain.squares(self.problem.blocks(slopes.residual), point.events) + float((target**2).sum())
 
     def step(self, damping: float = 0.0, farthest: float = FARTHEST) -> tuple[Array, Array, float]:
         """Changes of what is shared, the events' own values after them, and the cost expected.

@@ -62,6 +62,8 @@ class Problem:
     the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`). Another
     spring or mass leaves it as it is: residuals grow as errors of the reading do, not as forces. What a level of the
     caps does within events ``beyond`` first order (N), shape (p,), is added as well (:mod:`.level_within_events`).
+
+    ``blocks`` puts what is known at points side by side by event.
     """
 
     def __init__(self, composition: Composition, runs: Sequence[Knots]) -> None:
@@ -275,7 +277,7 @@ class Problem:
         """What the forces of each run are computed from besides."""
         springs = [np.float64(np.nan if k.stiffness is None else k.stiffness) for k in self.runs]
         knots = [np.int64(k.t.size) for k in self.runs]
-        return list(map(RunInput, springs, self.ways, knots, self.own(point)))
+        return [RunInput(*own) for own in zip(springs, self.ways, knots, self.own(point), strict=True)]
 
     def evaluate(self, point: Point) -> Slopes:
         """Residuals and derivatives."""

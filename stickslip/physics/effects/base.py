@@ -133,7 +133,8 @@ class Effect(Parametrised):
         signature: what it does to a measured trace.
         confused_with: tags with a similar signature, each with the experiment that separates the two.
         source: paper or book.
-        amplitude: name of the parameter whose null value makes the effect vanish: the only one with such a value.
+        amplitude: name of the parameter whose null value makes the effect vanish; where it is the only one with such a
+            value, those of its bases included, it need not be named.
         generalises: tags of effects that this law contains as special cases; where both describe the data, the special
             case is named.
         exponents: names of inner parameters that make of one formula what the literature has as several forms (linear
@@ -166,18 +167,24 @@ class Effect(Parametrised):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        vanishing = [name for name, field in vars(cls).items() if _has_null(field)]
-        if "amplitude" not in vars(cls) and len(vanishing) == 1:
-            cls.amplitude = vanishing[0]
+        if "amplitude" not in vars(cls):
+            cls.amplitude, *others = _vanishing(cls) or ("",)
+            if others:
+                cls.amplitude = ""
 
     def formula(self) -> str:
         """LaTeX of the law in the form chosen, equations of its state included; to be overridden where forms differ."""
         return self.equation
 
 
-def _has_null(field: object) -> bool:
-    spec = field.metadata.get("spec") if isinstance(field, dataclasses.Field) else None
-    return spec is not None and spec.null is not None
+def _vanishing(cls: type[Effect]) -> list[str]:
+    """Names of the parameters with a null value of a class of which equinox has not made a data class yet."""
+    inherited = {
+        f.name: f for base in cls.__mro__[1:] if dataclasses.is_dataclass(base) for f in dataclasses.fields(base)
+    }
+    own = {name: field for name, field in vars(cls).items() if isinstance(field, dataclasses.Field)}
+    told = {name: field.metadata.get("spec") for name, field in {**inherited, **own}.items()}
+    return [name for name, spec in told.items() if spec is not None and spec.null is not None]
 
 
 class Memory(Effect):

@@ -52,6 +52,14 @@ def accept(cls: object) -> type[Effect]:
     if cls.family not in FAMILIES:
         raise InputError("unknown family", key=f"{here}.family", value=cls.family, hint=nearest(cls.family, FAMILIES))
     known = specs(cls)
+    several = [name for name, spec in known.items() if spec.null is not None]
+    if not cls.amplitude and len(several) > 1:
+        raise InputError(
+            "an effect needs an amplitude, and several parameters have a null value",
+            key=f"{here}.amplitude",
+            allowed=", ".join(several),
+            hint=f'a line such as  amplitude = "{several[0]}"  says which it is',
+        )
     if cls.amplitude not in known or known[cls.amplitude].null is None:
         raise InputError(
             "an effect needs an amplitude: the parameter whose null value removes it",

@@ -38,7 +38,7 @@ def scaled(bank: Bank, factor: Array) -> Bank:
 
 def share(doc: str) -> Any:
     """The parameter of effects that lead a bank towards another one."""
-    return parameter(0.0, unit="1", lower=0.0, upper=1.0, null=0.0, symbol=r"\varepsilon", doc=doc, ends=(1.0,))
+    return parameter(null=0.0, unit="1", lower=0.0, upper=1.0, symbol=r"\varepsilon", doc=doc, ends=(1.0,))
 
 
 def towards(bank: Bank, threshold: Array, share: Array) -> Bank:

@@ -33,6 +33,7 @@ CHANNELS = {
 }
 CAMPAIGN = "campaign.toml"
 DIGITS = 15  # of the largest value of a column, in text
+SMALLEST = 1e-250
 
 
 def write_trace(path: str | Path, columns: Mapping[str, tuple[Array, str]]) -> Path:
@@ -172,7 +173,9 @@ def _csv(path: Path, columns: Mapping[str, tuple[Array, str]]) -> None:
 
 def _rounded(values: Array) -> Array:
     largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
-    return np.round(values, DIGITS - int(np.ceil(np.log10(largest)))) if largest > 0.0 else values
+    if largest < SMALLEST:  # tens to the power of more than 308 are none
+        return values
+    return np.round(values, DIGITS - int(np.ceil(np.log10(largest))))
 
 
 def _netcdf(path: Path, columns: Mapping[str, tuple[Array, str]]) -> None:
