@@ -182,6 +182,7 @@ def diagnose(
     """Find the physical effect that the base model lacks, add it, repeat.
 
     Args:
+        campaign: the runs; called as its method, the campaign itself.
         candidates: tags of the effects to try; default the whole catalogue.
         max_effects: at most so many are added one after the other.
         holdout: runs to keep aside, besides those whose role in the campaign is "held-out".

@@ -157,6 +157,7 @@ def forecast(
     ``campaign.forecast("v050", at=0.5)``.
 
     Args:
+        campaign: the runs; called as its method, the campaign itself.
         run: name of the run; default the one with the most slips.
         train: share of its length from which everything is learned.
         at: mean recurrences after an arrest at which a forecast is made, once in each stick; default moments all

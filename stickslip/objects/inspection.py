@@ -86,6 +86,7 @@ def inspect(campaign: Campaign, progress: Tell | None = None) -> Inspection:
     """Events of every run, what was mended or left out, and what these data can tell.
 
     Args:
+        campaign: the runs; called as its method, the campaign itself.
         progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
     """
     from ..data.checks import rig_against_motion, stopping
