@@ -311,7 +311,7 @@ def test_fits_are_compared_by_what_they_predict(campaign, base, aged):
     judged = Judge(base.force_fit, 1).beside(aged.force_fit, 1)
     assert found.loc["base", "behind"] == pytest.approx(judged.unseen.sum(), rel=1e-9)
     assert 0.0 < found.loc["base", "+-"] < 0.2 * found.loc["base", "behind"]
-    assert found.weight.sum() == pytest.approx(1.0) and found.loc["aged", "weight"] > 0.99
+    assert found.weight.sum() == pytest.approx(1.0) and found.loc["aged", "weight"] > 0.95
     with pytest.raises(InputError, match="'holds' is a fit of other runs than 'all'"):
         ss.compare({"all": base, "holds": campaign.fit(holdout=["v050", "v100", "v200"])})
     with pytest.raises(InputError, match="nothing to compare"):
