@@ -147,9 +147,10 @@ class Blocks:
         count = np.bincount(event, minlength=events)
         index = np.zeros((events, max(int(count.max(initial=0)), 1)), np.intp)
         there = np.zeros(index.shape, bool)
-        for e in range(events):
-            own = np.flatnonzero(event == e)
-            index[e, : own.size], there[e, : own.size] = own, True
+        order = np.argsort(event, kind="stable")
+        row = event[order]
+        column = np.arange(order.size) - (np.cumsum(count) - count)[row]
+        index[row, column], there[row, column] = order, True
         return cls(index, there)
 
     def __call__(self, values: Array, fill: float = 0.0) -> Array:
