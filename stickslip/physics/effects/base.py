@@ -168,9 +168,8 @@ class Effect(Parametrised):
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "amplitude" not in vars(cls):
-            cls.amplitude, *others = _vanishing(cls) or ("",)
-            if others:
-                cls.amplitude = ""
+            names = _vanishing(cls)
+            cls.amplitude = names[0] if len(names) == 1 else ""
 
     def formula(self) -> str:
         """LaTeX of the law in the form chosen, equations of its state included; to be overridden where forms differ."""
