@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from stickslip.physics.contact import Moduli, rough_table, static_contact
+from stickslip.physics.contact import Moduli, RoughLines, static_contact
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, MIDDLE, figure, logarithmic, styled
 
@@ -82,7 +82,7 @@ def hertz() -> float:
 
 def line(hurst: float, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same of the lines: mean depth and share of the length in contact."""
-    table = rough_table(hurst, 1.0, N, LINES, 0)
+    table = RoughLines(hurst, 1.0, 1.0, n_springs=N, lines=LINES).indentation
     made = [static_contact(table, float(f), 1.0, Moduli(1.0, 1.0)) for f in forces]
     return np.array([np.mean(c.depth) for c in made]), np.array([np.mean(c.contact_share) for c in made])
 

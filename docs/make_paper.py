@@ -32,7 +32,7 @@ from stickslip.inference.fit.static import CreepFit, StaticFit, fit_static
 from stickslip.inference.fit.static_table import StaticRig, static_table, virtual_curve
 from stickslip.inference.force.backbone import Backbone
 from stickslip.inference.force.geometry import rough_line
-from stickslip.physics.contact import default_loads, power_law_bank, rough_table, static_contact
+from stickslip.physics.contact import RoughLines, default_loads, power_law_bank
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, styled
 from stickslip.simulation.scenario import load_scenario, simulate, static_creep
@@ -321,7 +321,7 @@ def alignment() -> dict[str, Any]:
 
 def realisations() -> dict[str, float]:
     """How u_max differs from line to line at the truth of the statistics."""
-    lines = static_contact(rough_table(0.24, 20e-6, 4096, 400, 1).scaled(1.87e-6), 0.31, 0.21)
+    lines = RoughLines(0.24, 1.87e-6, lines=400, seed=1).contact(0.31, 0.21)
     u = np.asarray(lines.u_max)
     return {"u_max_um": float(u.mean() * 1e6), "spread": float(u.std(ddof=1) / u.mean())}
 

@@ -29,11 +29,11 @@ import jax.numpy as jnp
 from stickslip import __version__
 from stickslip.blind.generator import Surface, make_bank
 from stickslip.physics.contact import (
+    RoughLines,
     flat_punch,
     indentation,
     power_law,
     reload_displacement,
-    rough_table,
     sphere,
     static_contact,
 )
@@ -137,8 +137,7 @@ def contact() -> plt.Figure:
     middle.legend()
     tau = np.linspace(0.0, 1.0, 101)
     for H, mark in zip((0.1, 0.5, 0.9), MARKS, strict=False):
-        table = rough_table(H, length, 4096, 100, 0).scaled(2.86e-6)
-        made = static_contact(table, load, friction)
+        made = RoughLines(H, 2.86e-6, length).contact(load, friction)
         u = np.asarray(made.displacement(tau[:, None]).mean(axis=1) / made.u_max.mean())
         right.plot(u, tau, mark[1:], label=f"H = {H:g}")
     loads = (0.03, 0.1, 0.31, 1.0)

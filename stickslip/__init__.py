@@ -19,7 +19,8 @@ _PUBLIC = {
     "build": "simulation.scenario",
     "steady_sliding": "simulation.scenario",
     "creep_curve": "physics.contact",
-    "rough_bank": "physics.contact",
+    "bank_from_contact": "physics.contact",
+    "RoughLines": "physics.contact",
     "power_law_bank": "physics.contact",
     "load_run": "objects.fitted_run",
     "load_fit": "objects.stored_fit",
@@ -74,9 +75,10 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .objects.stored_fit import load_fit as load_fit
     from .objects.study import study as study
     from .objects.sweep import sweep as sweep
+    from .physics.contact import RoughLines as RoughLines
+    from .physics.contact import bank_from_contact as bank_from_contact
     from .physics.contact import creep_curve as creep_curve
     from .physics.contact import power_law_bank as power_law_bank
-    from .physics.contact import rough_bank as rough_bank
     from .physics.effects.catalogue import make as _make
     from .physics.model import Block as Block
     from .physics.model import LoadPoint as LoadPoint

@@ -42,7 +42,7 @@ def no_cache(monkeypatch, tmp_path):
 
 def motion(slips=3, rate=5e3):
     """A static virgin creep, then slips of 40 um with the same creep before each; time (s) and position (um)."""
-    curve = creep_curve(0.3, 2.46e-6, spring_stiffness=1000.0, velocity=5e-5, tau=default_loads(500))
+    curve = creep_curve(tau=default_loads(500))
     t_curve, u_curve = np.asarray(curve.t), np.asarray(curve.u)
     t = np.arange(0.0, t_curve[-1] * slips + 0.5, 1 / rate)
     x = np.zeros_like(t)

@@ -9,7 +9,14 @@ import numpy as np
 from scipy.signal import welch
 
 import stickslip as ss
-from stickslip.physics.contact import default_loads, equal_bodies, from_heights, heights_from_scan
+from stickslip.physics.contact import (
+    default_loads,
+    equal_bodies,
+    from_heights,
+    heights_from_scan,
+    indentation,
+    static_contact,
+)
 from stickslip.show.plots.style import DARK, MIDDLE, figure, plain, styled
 
 from .campaigns import keep, rms
@@ -36,9 +43,12 @@ def topographies(data: Path, work: Path) -> dict[str, Any]:
         kept = [line for line in lines if line.std() > 0.0]
         height = float(np.sqrt(np.mean([line.var() for line in kept])))
         loads = [CROWDING * equal_bodies().normal * spacing * line.size * float(line.std()) for line in kept]
-        own = normalised([ss.creep_curve(profile=from_heights(z, spacing), normal_force=f)
+        own = normalised([ss.creep_curve(static_contact(indentation(from_heights(z, spacing)), f, 0.21))
                           for z, f in zip(kept, loads, strict=True)])  # fmt: skip
-        random = {float(h): normalised([ss.creep_curve(H=float(h), n_springs=kept[0].size)]) for h in HURSTS}
+        random = {
+            float(h): normalised([ss.creep_curve(ss.RoughLines(float(h), n_springs=kept[0].size).contact())])
+            for h in HURSTS
+        }
         off = {h: rms(own - curve) for h, curve in random.items()}
         best = min(off, key=off.__getitem__)
         hurst = spectral_hurst(np.array(kept), spacing)

@@ -8,6 +8,7 @@ import pytest
 from stickslip.errors import InputError
 from stickslip.physics.contact import (
     Bank,
+    RoughLines,
     bank_from_backbone,
     bank_from_contact,
     binning_error,
@@ -17,8 +18,6 @@ from stickslip.physics.contact import (
     normal_scores,
     power_law_backbone,
     power_law_bank,
-    rough_bank,
-    rough_table,
     static_contact,
 )
 
@@ -149,7 +148,7 @@ def test_effect_of_the_spread_is_of_second_order():
 
 
 def test_rough_bank_follows_every_spring():
-    table = rough_table(0.3, n_springs=2048, lines=4, seed=3).scaled(2.46e-6)
+    table = RoughLines(n_springs=2048, lines=4, seed=3).indentation
     contact = static_contact(table, np.array([0.25, 0.31, 0.31, 0.37]), 0.21)
     springs, u = spring_bank(contact), np.linspace(0, 1.6e-6, 300)
     assert float(springs.total_strength) == pytest.approx(0.21 * 1.24, rel=1e-12)
@@ -166,12 +165,12 @@ def test_rough_bank_follows_every_spring():
 
 
 def test_rough_bank_of_the_rig_and_its_derivatives():
-    bank = rough_bank()
+    bank = bank_from_contact(RoughLines(lines=4).contact())
     assert float(bank.total_strength) == pytest.approx(4 * 0.21 * 0.31, rel=1e-12)
     assert 0.8e6 < float(bank.total_stiffness) < 1.3e6
     assert 0.6e-6 < float(bank.threshold[-1]) < 1.5e-6
-    moduli = equal_bodies()
-    shape = jax.jacfwd(lambda q: rough_bank(*q, moduli=moduli, n_springs=512, n=16).strength)(
+    moduli, few = equal_bodies(), {"n_springs": 512, "lines": 4}
+    shape = jax.jacfwd(lambda q: bank_from_contact(RoughLines(*q[:2], **few).contact(*q[2:], moduli), 16).strength)(
         jnp.array([0.3, 2.46e-6, 0.31, 0.21])
     )
     total = np.asarray(shape).sum(axis=0)

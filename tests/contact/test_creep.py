@@ -7,13 +7,13 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.physics.contact import (
+    RoughLines,
     creep_curve,
     creep_displacements,
     default_loads,
     equal_bodies,
     from_heights,
     indentation,
-    rough_lines,
     sphere,
     static_contact,
     virtual_time,
@@ -21,6 +21,15 @@ from stickslip.physics.contact import (
 
 L = 20e-6
 SMALL = {"lines": 6, "n_springs": 512}
+
+
+def small(H=0.3, h_rms=2.46e-6, normal_force=0.31, friction=0.21, **drive):
+    """A curve of few lines with few springs."""
+    return creep_curve(RoughLines(H, h_rms, **SMALL).contact(normal_force, friction), **drive)
+
+
+def one_line(**drive):
+    return creep_curve(RoughLines(lines=1).contact(), **drive)
 
 
 def test_curve_of_the_paper():
@@ -41,14 +50,14 @@ def test_virtual_time():
     assert np.allclose(virtual_time(force, u, 1000, 5e-5, "paper"), force / 0.05)
     exact = np.asarray(virtual_time(force, u, 1000, 5e-5))
     assert np.allclose(1000 * (5e-5 * exact - u), force, rtol=1e-12, atol=1e-18)
-    assert np.allclose(creep_curve(**SMALL, time="paper").t, creep_curve(**SMALL).force / 0.05)
+    assert np.allclose(small(time="paper").t, small().force / 0.05)
 
 
 def test_speed_is_shared_between_spring_and_contact():
     """c_s v0/(k_t + c_s), from the virgin stiffness down to that of the last spring that sticks in each contact."""
-    one = creep_curve(lines=1)
+    one = one_line()
     speeds = np.diff(one.u) / np.diff(one.t)
-    start = creep_curve(lines=1, tau=np.array([0.0, 1e-6]))
+    start = one_line(tau=np.array([0.0, 1e-6]))
     assert float(start.u[1] / start.t[1]) == pytest.approx(1000 * 5e-5 / (4 * float(one.stiffness) + 1000), rel=1e-9)
     last_spring = 4 * equal_bodies().tangential * 20e-6 / 4096
     assert speeds[-1] == pytest.approx(1000 * 5e-5 / (last_spring + 1000), rel=1e-6)
@@ -57,12 +66,12 @@ def test_speed_is_shared_between_spring_and_contact():
 
 def test_both_averages_by_hand():
     tau = default_loads(30)
-    z = 2.46e-6 * np.asarray(rough_lines(0.3, 6, 512))
+    z = np.asarray(RoughLines(0.3, **SMALL).heights)
     contact = static_contact(indentation(from_heights(z, L / 512)), 0.31, 0.21)
-    curve = creep_curve(**SMALL, tau=tau)
+    curve = small(tau=tau)
     assert np.allclose(curve.u, contact.displacement(tau[:, None]).mean(axis=1), rtol=1e-12)
     assert np.array_equal(curve.tau, tau)
-    other = creep_curve(**SMALL, tau=tau, average="force")
+    other = small(tau=tau, average="force")
     assert np.allclose(other.tau, contact.force(other.u[:, None]).mean(axis=1) / (0.21 * 0.31), rtol=1e-12)
     assert float(other.u[-1]) == pytest.approx(float(contact.u_max.max()))
     assert float(other.u[-1]) > 1.1 * float(curve.u[-1])
@@ -76,35 +85,34 @@ def test_default_loads_lie_evenly_in_displacement():
 
 def test_sweep_equals_the_loop():
     rng = np.random.default_rng(2)
-    H, h, f, mu = (
-        rng.choice([0.2, 0.5], 30),
-        rng.uniform(1e-6, 4e-6, 30),
-        rng.uniform(0.1, 0.5, 30),
-        rng.uniform(0.1, 1, 30),
-    )
+    h, f, mu = (rng.uniform(*ends, (30, 1)) for ends in ((1e-6, 4e-6), (0.1, 0.5), (0.1, 1.0)))
     tau = default_loads(7)
-    sweep = creep_displacements(H, h, f, mu, tau, **SMALL, memory=80 * 6 * 7 * 4)
-    loop = np.stack([creep_curve(*p, tau=tau, **SMALL).u for p in zip(H, h, f, mu, strict=True)])
+    lines = RoughLines(0.2, 1.0, **SMALL).indentation
+    sweep = creep_displacements(static_contact(lines.scaled(h), f, mu), tau, memory=80 * 6 * 7 * 4)
+    loop = np.stack([small(0.2, *map(float, p), tau=tau).u for p in np.hstack([h, f, mu])])
     assert sweep.shape == (30, 7)
     assert np.allclose(sweep, loop, rtol=1e-12, atol=1e-20)
 
 
 def test_scalars_broadcast_in_a_sweep():
-    sweep = creep_displacements(0.3, [1e-6, 2e-6, 3e-6], 0.31, 0.21, [0.5, 1.0], **SMALL)
+    lines = RoughLines(0.3, 1.0, **SMALL).indentation
+    sweep = creep_displacements(
+        static_contact(lines.scaled(np.array([[1e-6], [2e-6], [3e-6]])), 0.31, 0.21), [0.5, 1.0]
+    )
     assert (np.diff(sweep, axis=0) > 0).all()
 
 
 def test_vmap_over_H_equals_the_loop():
     H = jnp.array([0.2, 0.4, 0.8])
-    together = jax.vmap(lambda h: creep_curve(H=h, **SMALL).u)(H)
-    assert np.allclose(together, np.stack([creep_curve(H=float(h), **SMALL).u for h in H]), rtol=1e-12, atol=1e-22)
+    together = jax.vmap(lambda h: small(h).u)(H)
+    assert np.allclose(together, np.stack([small(float(h)).u for h in H]), rtol=1e-12, atol=1e-22)
 
 
 @pytest.fixture(scope="module")
 def differentiable():
     """A curve of four loads as a function of (H, h_rms, normal_force, friction), where, and its Jacobians both ways."""
     tau = np.array([0.2, 0.5, 0.9, 1.0])
-    curve = jax.jit(lambda q: creep_curve(*q, tau=tau, lines=20, n_springs=2048).u)
+    curve = jax.jit(lambda q: creep_curve(RoughLines(*q[:2], lines=20, n_springs=2048).contact(*q[2:]), tau=tau).u)
     point = np.array([0.3, 2.46e-6, 0.31, 0.21])
     return curve, point, np.asarray(jax.jacfwd(curve)(point)), np.asarray(jax.jacrev(curve)(point))
 
@@ -122,16 +130,20 @@ def test_derivatives_against_a_ladder_of_steps(differentiable, which):
 
 
 def test_derivatives_pass_through_the_whole_curve():
-    gradient = jax.jacfwd(lambda q: creep_curve(*q[:4], spring_stiffness=q[4], velocity=q[5], **SMALL).t[-1])(
+    gradient = jax.jacfwd(lambda q: small(*q[:4], spring_stiffness=q[4], velocity=q[5]).t[-1])(
         jnp.array([0.3, 2.46e-6, 0.31, 0.21, 1000.0, 5e-5])
     )
     assert np.isfinite(gradient).all()
-    assert float(gradient[5]) == pytest.approx(-float(creep_curve(**SMALL).t[-1]) / 5e-5, rel=1e-12)
+    assert float(gradient[5]) == pytest.approx(-float(small().t[-1]) / 5e-5, rel=1e-12)
 
 
 def test_creep_accelerates_with_the_power_of_the_remaining_time():
     """v ~ (t_end - t)^-(1 - 1/p): a sphere, p = 1.5, in the form of time without the block's own motion."""
-    curve = creep_curve(profile=sphere(30e-6, 100_000, 1e-3), tau=1 - np.geomspace(1, 1e-4, 60), time="paper")
+    curve = creep_curve(
+        static_contact(indentation(sphere(30e-6, 100_000, 1e-3)), 0.31, 0.21),
+        tau=1 - np.geomspace(1, 1e-4, 60),
+        time="paper",
+    )
     end = 4 * 0.21 * 0.31 / 0.05
     v = np.diff(curve.u) / np.diff(curve.t)
     left = end - 0.5 * np.asarray(curve.t[1:] + curve.t[:-1])
@@ -148,9 +160,6 @@ def test_creep_accelerates_with_the_power_of_the_remaining_time():
         {"friction": 0.0},
         {"velocity": 0.0},
         {"spring_stiffness": -5.0},
-        {"length": 0.0},
-        {"n_springs": 3},
-        {"lines": 0},
         {"contacts": 0},
         {"tau": [0.5, 1.5]},
         {"average": "displacment"},
@@ -160,16 +169,17 @@ def test_creep_accelerates_with_the_power_of_the_remaining_time():
 )
 def test_bad_input_is_refused(change):
     with pytest.raises(InputError):
-        creep_curve(**{**SMALL, **change})
+        small(**change)
 
 
-def test_bad_sweep_is_refused():
-    with pytest.raises(InputError, match=r"got 0\.0"):
-        creep_displacements([0.3, 0.3], [1e-6, 0.0], 0.31, 0.21, [1.0], **SMALL)
+@pytest.mark.parametrize("change", [{"length": 0.0}, {"n_springs": 3}, {"lines": 0}, {"h_rms": [1e-6, 0.0]}], ids=str)
+def test_bad_lines_are_refused(change):
+    with pytest.raises(InputError):
+        RoughLines(**{**SMALL, **change})
 
 
 def test_a_curve_shows_its_ends_and_not_its_points():
-    curve = creep_curve(lines=2, n_springs=64)
+    curve = creep_curve(RoughLines(lines=2, n_springs=64).contact())
     text = repr(curve)
     assert len(text) < 250 and "400 points; u: 0 m to " in text and "force: 0 N to 260.4 mN" in text
     assert "n_springs: 64" in text and f"{1e9 * float(curve.u[-1]):.4g} nm" in text

@@ -5,9 +5,9 @@ import pytest
 
 from stickslip.physics.contact import (
     Hysteresis,
+    RoughLines,
     power_law_backbone,
     power_law_bank,
-    rough_table,
     static_contact,
 )
 from tests.solve.ringing import microslip_ring_down
@@ -35,7 +35,7 @@ class Springs:
 
 @pytest.fixture(scope="module")
 def rough():
-    table = rough_table(0.3, n_springs=16384, lines=4, seed=1).scaled(2.46e-6)
+    table = RoughLines(n_springs=16384, lines=4, seed=1).indentation
     springs = Springs(spring_bank(static_contact(table, 0.31, 0.21)))
     assert springs.k.size > 4000
     return springs

@@ -10,6 +10,7 @@ import pytest
 from stickslip.errors import InputError
 from stickslip.physics.contact import (
     Profile,
+    RoughLines,
     SaturationWarning,
     check_saturation,
     creep_curve,
@@ -17,8 +18,7 @@ from stickslip.physics.contact import (
     flat_punch,
     from_heights,
     indentation,
-    rough_lines,
-    rough_table,
+    static_contact,
 )
 from stickslip.physics.contact.indentation import sort_gaps
 
@@ -32,7 +32,7 @@ def brute_force(gaps, dx, depth):
 
 @pytest.fixture(scope="module")
 def lines():
-    z = 2.46e-6 * np.asarray(rough_lines(0.3, 12, 1024, seed=4))
+    z = np.asarray(RoughLines(0.3, lines=12, n_springs=1024, seed=4).heights)
     return from_heights(z, L / 1024)
 
 
@@ -119,7 +119,7 @@ def test_derivatives_in_heights_and_force(lines):
 
 def exponents(H, n_springs, lines):
     """Exponents of F_n against d, and of k_n against F_n, over 0.01 to 1 N (1 to 30 % in contact)."""
-    table = rough_table(H, L, n_springs, lines, seed=0).scaled(2.46e-6)
+    table = RoughLines(H, length=L, n_springs=n_springs, lines=lines).indentation
     force = np.geomspace(0.01, 1.0, 41)
     depth = table.depth(force[:, None], STEEL.normal)
     fit = lambda y: np.polyfit(np.log(force), np.log(np.asarray(y).mean(axis=1)), 1)[0]  # noqa: E731
@@ -146,16 +146,16 @@ def test_stiffness_exponent(H, exponent):
 @pytest.mark.slow
 def test_saturation_warns_above_half_contact():
     with pytest.warns(SaturationWarning, match="line_length L"):
-        creep_curve(H=0.3, h_rms=0.35e-6)
+        creep_curve(RoughLines(h_rms=0.35e-6).contact())
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_saturation(np.array([0.1, 0.5]))
-        creep_curve(H=0.3, h_rms=2.46e-6, lines=20)
+        creep_curve(RoughLines(lines=20).contact())
 
 
 def test_saturation_is_an_error_at_full_contact():
     with pytest.raises(InputError, match="touch over their whole length") as caught:
-        creep_curve(H=0.3, h_rms=0.01e-6, lines=5)
+        creep_curve(RoughLines(h_rms=0.01e-6, lines=5).contact())
     for knob in ("line_length L", "h_rms", "F_n"):
         assert knob in str(caught.value)
 
@@ -163,5 +163,5 @@ def test_saturation_is_an_error_at_full_contact():
 def test_a_punch_that_is_flat_is_not_called_saturated():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        curve = creep_curve(profile=flat_punch(L / 2, 64))
+        curve = creep_curve(static_contact(indentation(flat_punch(L / 2, 64)), 0.31, 0.21))
     assert np.allclose(curve.u / curve.u_max, curve.tau)

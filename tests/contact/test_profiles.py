@@ -5,13 +5,13 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.physics.contact import (
+    RoughLines,
     add_curvature,
     cone,
     flat_punch,
     from_heights,
     heights_from_scan,
     power_law,
-    rough_lines,
     sphere,
 )
 
@@ -26,7 +26,7 @@ def test_analytic_gaps():
 
 
 def test_gaps_of_a_line_start_at_its_top():
-    z = np.asarray(rough_lines(0.5, 3, 64)) * 1e-6
+    z = np.asarray(RoughLines(0.5, 1e-6, lines=3, n_springs=64).heights)
     profile = from_heights(z, 1e-8)
     assert np.asarray(profile.gaps).min(axis=1) == pytest.approx(0.0, abs=0.0)
     assert np.allclose(profile.gaps, z.max(axis=1, keepdims=True) - z)

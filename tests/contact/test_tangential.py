@@ -6,6 +6,7 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.physics.contact import (
+    RoughLines,
     add_curvature,
     cone,
     equal_bodies,
@@ -13,8 +14,6 @@ from stickslip.physics.contact import (
     from_heights,
     indentation,
     power_law,
-    rough_lines,
-    rough_table,
     sphere,
     static_contact,
 )
@@ -33,8 +32,8 @@ def brute_force(gaps, dx, depth, u):
 
 
 def profiles():
-    z = 2.46e-6 * np.asarray(rough_lines(0.3, 5, 1024, seed=1))
-    rolled = 2.46e-6 * np.asarray(rough_lines(0.3, 5, 1024, seed=1, roll_off=0.1, cut_off=0.01))
+    z = np.asarray(RoughLines(0.3, lines=5, n_springs=1024, seed=1).heights)
+    rolled = np.asarray(RoughLines(0.3, lines=5, n_springs=1024, seed=1, roll_off=0.1 * L, cut_off=0.01 * L).heights)
     return {
         "rough": from_heights(z, L / 1024),
         "rolled-off": from_heights(rolled, L / 1024),
@@ -120,8 +119,7 @@ def test_exponential_gaps_make_the_exponential_iwan_bank():
 
 
 def mean_w(H, h_rms, force, tau, n_springs=4096, lines=100, seed=0):
-    table = rough_table(H, L, n_springs, lines, seed).scaled(h_rms)
-    contact = static_contact(table, force, MU)
+    contact = RoughLines(H, h_rms, L, n_springs=n_springs, lines=lines, seed=seed).contact(force, MU)
     return float(contact.displacement(tau).mean() / contact.u_max.mean())
 
 
@@ -147,7 +145,7 @@ def test_normal_force_does_not_change_the_normalised_curve():
 def test_scale_of_u_max():
     """u_max ~ mu h^(1/(1+H)) (F_n/E* L)^(H/(1+H)), where the exponent of F_n against d is the theory's."""
     H = 0.7
-    table = rough_table(H, L, 16384, 100, 0)
+    table = RoughLines(H, 1.0, L, n_springs=16384).indentation
     u_max = lambda h, f, mu: float(static_contact(table.scaled(h), f, mu).u_max.mean())  # noqa: E731
     base = u_max(3e-6, 0.1, 0.21)
     assert u_max(3e-6, 0.1, 0.42) == pytest.approx(2 * base, rel=1e-12)
@@ -158,4 +156,4 @@ def test_scale_of_u_max():
 @pytest.mark.parametrize("force, friction", [(0.0, 0.2), (-0.3, 0.2), (0.3, 0.0), (0.3, float("inf"))])
 def test_bad_loads_are_refused(force, friction):
     with pytest.raises(InputError, match="out of range"):
-        static_contact(rough_table(0.3, L, 64, 2), force, friction)
+        RoughLines(n_springs=64, lines=2).contact(force, friction)

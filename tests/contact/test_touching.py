@@ -7,13 +7,13 @@ import pytest
 
 from stickslip.physics.contact import (
     Profile,
+    RoughLines,
     creep_curve,
     default_loads,
     equal_bodies,
     flat_punch,
     from_heights,
     indentation,
-    rough_lines,
     sphere,
     static_contact,
     touching,
@@ -26,7 +26,7 @@ L = 20e-6
 
 
 def rough(H=0.3, springs=1024, h_rms=2.46e-6):
-    return from_heights(h_rms * np.asarray(rough_lines(H, 12, springs, seed=4)), L / springs)
+    return from_heights(RoughLines(H, h_rms, L, n_springs=springs, lines=12, seed=4).heights, L / springs)
 
 
 @pytest.mark.slow
@@ -80,8 +80,10 @@ def test_a_highest_spring_between_the_thinned_ones():
 
 @pytest.mark.slow
 def test_traced_and_known_curves_are_the_same():
-    known = creep_curve(lines=6, n_springs=1024)
-    traced = jax.jit(lambda H: creep_curve(H, lines=6, n_springs=1024))(0.3)
+    def curve(H):
+        return creep_curve(RoughLines(H, lines=6, n_springs=1024).contact())
+
+    known, traced = curve(0.3), jax.jit(curve)(0.3)
     assert known.n_springs == traced.n_springs == 1024
     for name in ("u", "t", "force", "u_max", "stiffness", "contact_share"):
         one, other = np.asarray(getattr(known, name)), np.asarray(getattr(traced, name))

@@ -14,7 +14,7 @@ from stickslip.inference.fit.creep_process import CreepProcess, creep_processes
 from stickslip.inference.fit.normalised import Ramp, break_away, fit_ramps
 from stickslip.inference.fit.static import fit_static, tied_quantities
 from stickslip.inference.fit.static_table import StaticRig, static_table, virtual_curve
-from stickslip.physics.contact import creep_curve, creep_displacements, default_loads
+from stickslip.physics.contact import RoughLines, creep_curve, default_loads
 
 V0, V_LIM = 50e-6, 1e-6
 RIG = StaticRig(0.31, 0.21, 4, 1000.0)
@@ -23,10 +23,8 @@ RIG = StaticRig(0.31, 0.21, 4, 1000.0)
 def process(hurst, h_rms, *, lines=100, seed=0, spacing=np.geomspace, number=0):
     """A creep process of the static model itself, by the exact curve and not by the table."""
     tau = default_loads(2000)
-    curve = creep_curve(
-        hurst, h_rms, RIG.normal_force, RIG.friction, spring_stiffness=RIG.spring_stiffness, velocity=V0, tau=tau,
-        lines=lines, seed=seed,
-    )  # fmt: skip
+    contact = RoughLines(hurst, h_rms, lines=lines, seed=seed).contact(RIG.normal_force, RIG.friction)
+    curve = creep_curve(contact, spring_stiffness=RIG.spring_stiffness, velocity=V0, tau=tau)
     t, u = np.asarray(curve.t), np.asarray(curve.u)
     speed = np.diff(u) / np.diff(t)
     end = 0.5 * (t[1:] + t[:-1])[np.flatnonzero(speed <= V_LIM)[-1]]
@@ -38,7 +36,8 @@ def process(hurst, h_rms, *, lines=100, seed=0, spacing=np.geomspace, number=0):
 @pytest.mark.parametrize(("hurst", "h_rms"), [(0.05, 1e-6), (0.24, 1.87e-6), (0.57, 4e-6), (0.9, 0.6e-6)])
 def test_table_agrees_with_lines_sorted_for_these_parameters(hurst, h_rms):
     table = static_table()
-    exact = creep_displacements(hurst, h_rms, RIG.normal_force, RIG.friction, table.tau)[0]
+    contact = RoughLines(hurst, h_rms).contact(RIG.normal_force, RIG.friction)
+    exact = np.asarray(creep_curve(contact, tau=table.tau).u)
     assert np.abs(table.displacement(RIG, hurst, h_rms) - exact).max() < 1.5e-3 * exact.max()
 
 
@@ -98,7 +97,7 @@ def test_virtual_time_with_and_without_the_block_s_motion():
 
 def record(hurst=0.3, h_rms=2.46e-6, *, rate=10e3, count=7.91e-9, hum=0.0, hold=False, v0=V0):
     """A virgin stick after the static model, then a slip of 50 um in 30 ms, in counts."""
-    curve = creep_curve(hurst, h_rms, spring_stiffness=1000.0, velocity=v0, tau=default_loads(2000))
+    curve = creep_curve(RoughLines(hurst, h_rms).contact(), velocity=v0, tau=default_loads(2000))
     t_curve, u_curve = np.asarray(curve.t), np.asarray(curve.u)
     stop = float(t_curve[-1])
     t = np.arange(0.0, stop + 0.4, 1 / rate)

@@ -7,7 +7,7 @@ from stickslip.data.campaign import Rig
 from stickslip.errors import InputError
 from stickslip.inference.fit.surface import LINES, LOADS, nearest_exponent, sensitivity
 from stickslip.inference.uncertainty import null_directions
-from stickslip.physics.contact import rough_table, static_contact
+from stickslip.physics.contact import RoughLines
 
 KNOWN = {"contacts": 4, "normal_force": 0.31, "friction_coefficient": 0.21, "H": 0.3, "h_rms": 2.46e-6}
 
@@ -62,8 +62,8 @@ def test_the_derivatives_are_those_of_lines():
     column = {name: found.jacobian[:, k] for k, name in enumerate(found.names)}
     change = []
     for load in (0.31 * 1.2**-0.5, 0.31 * 1.2**0.5):
-        table = rough_table(0.3, 20e-6, 4096, LINES, 0).scaled(2.46e-6)
-        curves = np.asarray(static_contact(table, load, 0.21).displacement(np.append(LOADS, 1.0)[:, None])).T
+        contact = RoughLines(lines=LINES).contact(load, 0.21)
+        curves = np.asarray(contact.displacement(np.append(LOADS, 1.0)[:, None])).T
         shapes = [nearest_exponent(LOADS, u[:-1] / u[-1])[0] for u in curves]
         change.append([np.mean(np.log(curves[:, -1])), np.mean(shapes)])
     slope = (np.array(change[1]) - change[0]) / np.log(1.2)

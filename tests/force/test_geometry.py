@@ -22,7 +22,7 @@ from stickslip.inference.force import geometry
 from stickslip.inference.force.backbone import Backbone, power_law
 from stickslip.inference.force.geometry import Laws, geometry_laws, in_logarithms
 from stickslip.inference.force.rough_contacts import RoughContacts, rough_contacts
-from stickslip.physics.contact import Bank, rough_bank, rough_table, static_contact
+from stickslip.physics.contact import Bank, RoughLines, bank_from_contact
 
 pytestmark = pytest.mark.slow
 
@@ -120,8 +120,8 @@ def test_the_table_is_that_of_lines_sorted_for_these_parameters():
     alone = RoughContacts(1, 1024, lines=40)
     rig = StaticRig(LOAD, FRICTION, 1, 1000.0, n_springs=1024)
     for hurst, height in ((0.23, 3e-6), (0.66, 1.7e-6)):
-        lines = rough_table(hurst, rig.length, 1024, 40, 0).scaled(height)
-        u = np.asarray(static_contact(lines, LOAD, FRICTION).displacement(alone.tau[:, None]))
+        lines = RoughLines(hurst, height, rig.length, n_springs=1024, lines=40)
+        u = np.asarray(lines.contact(LOAD, FRICTION).displacement(alone.tau[:, None]))
         expected = np.log(u).mean(axis=1)
         part = alone.tau > 0.02
         found = np.log(alone.displacement(rig, hurst, height))
@@ -210,7 +210,7 @@ def test_an_amplitude_at_the_limit_of_what_is_visible_gains_five_deviations_squa
 
 
 def test_an_effect_of_ten_deviations_is_told_where_the_roughness_is_known_and_only_there():
-    lines = rough_bank(HURST, HEIGHT, LOAD, FRICTION, contacts=CONTACTS, seed=200, n=400)
+    lines = bank_from_contact(RoughLines(HURST, HEIGHT, lines=CONTACTS, seed=200).contact(LOAD, FRICTION), 400)
     compliance = 9e-7
     curve = measured(of_bank(make("machine-compliance", where="series", compliance=compliance).reshape(lines)), 1)
     tags = ("adhesion", "curvature", "machine-compliance")
@@ -238,7 +238,7 @@ def test_an_effect_of_ten_deviations_is_told_where_the_roughness_is_known_and_on
 
 def test_effects_alike_are_a_set():
     """A flank as of a smooth sphere and asperities that all yield: both bring the last elements nearer to the first."""
-    lines = rough_bank(HURST, HEIGHT, LOAD, FRICTION, contacts=CONTACTS, seed=200, n=400)
+    lines = bank_from_contact(RoughLines(HURST, HEIGHT, lines=CONTACTS, seed=200).contact(LOAD, FRICTION), 400)
     known = laws(measured(of_bank(make("curvature", share=1.0).reshape(lines)), 1), **STATED)
     assert {law.tag for law in known.close} == {"curvature", "plasticity"}
     assert not any(row["unique"] for row in section(known)["laws"])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.physics.contact import equal_bodies, power_law_backbone, rough_bank
+from stickslip.physics.contact import RoughLines, bank_from_contact, equal_bodies, power_law_backbone
 from stickslip.simulation.scenario import build, load_scenario, make_scenario, static_creep
 from stickslip.simulation.scenario.contacts import build_contact
 
@@ -25,7 +25,8 @@ def contact(**table):
 
 def test_rough_contacts_have_each_their_own_line():
     built = build_contact(contact(**ROUGH))
-    reference = rough_bank(0.5, 2.46e-6, LOAD, MU, contacts=4, n_springs=1024, seed=3, n=200)
+    lines = RoughLines(0.5, 2.46e-6, lines=4, n_springs=1024, seed=3)
+    reference = bank_from_contact(lines.contact(LOAD, MU), 200)
     np.testing.assert_allclose(built.bank.stiffness, reference.stiffness, rtol=1e-9, atol=1e-6)
     assert built.strength == pytest.approx(4 * MU * LOAD, rel=1e-12)
     assert 0.0 < built.contact_share < 0.5

@@ -9,11 +9,11 @@ import numpy as np
 from stickslip.physics.contact import (
     Bank,
     Indentation,
+    RoughLines,
     bank_from_contact,
     equal_bodies,
     from_heights,
     indentation,
-    rough_lines,
     static_contact,
 )
 from stickslip.simulation.solve import Tolerance
@@ -38,7 +38,7 @@ def rough_contact(lines: int, n_springs: int, hurst: float, h_rms: float, bins: 
 
     The total load is always that of four contacts.
     """
-    heights = h_rms * np.asarray(rough_lines(hurst, lines, n_springs, seed=seed))
+    heights = np.asarray(RoughLines(hurst, h_rms, lines=lines, n_springs=n_springs, seed=seed).heights)
     moduli = equal_bodies()
     load = 4.0 * LOAD / lines
     each = [

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from stickslip.physics.contact.rough_bank import rough_bank
+from stickslip.physics.contact import RoughLines, bank_from_contact
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
 from stickslip.simulation.solve import slip_derivatives
 
@@ -21,7 +21,8 @@ SPEED = 5e-5
 
 def contact(theta):
     H, h_rms, load, friction = jnp.asarray(CONTACT) * jnp.exp(theta)
-    return rough_bank(H, h_rms, load, friction, n_springs=1024, seed=3, n=128)
+    lines = RoughLines(H, h_rms, n_springs=1024, lines=4, seed=3)
+    return bank_from_contact(lines.contact(load, friction), 128)
 
 
 def build(theta):

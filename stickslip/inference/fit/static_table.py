@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from ...errors import InputError
-from ...physics.contact import Moduli, creep_displacements, default_loads, equal_bodies
+from ...physics.contact import Moduli, RoughLines, creep_displacements, default_loads, equal_bodies, static_contact
 
 Array = NDArray[np.float64]
 HURST = (0.02, 0.98)
@@ -138,11 +138,9 @@ class StaticTable:
         normal, tangential = (float(np.asarray(m)) for m in equal_bodies())
         length, height = _REFERENCE
         force = np.exp(self._load) * normal * length * height
-        sets = [a.ravel() for a in np.meshgrid(self._hurst, force, indexing="ij")]
-        u = creep_displacements(
-            sets[0], height, sets[1], 1.0, self.tau, length=length, n_springs=n_springs, lines=lines, seed=seed
-        )
-        shape = u.reshape(_HURST_NODES, _LOAD_NODES, LOADS) * (tangential / normal) / height
+        made = [RoughLines(float(H), height, length, n_springs=n_springs, lines=lines, seed=seed) for H in self._hurst]
+        u = np.stack([creep_displacements(static_contact(m.indentation, force[:, None], 1.0), self.tau) for m in made])
+        shape = u * (tangential / normal) / height
         # logarithms, the zero at no load left out: power laws become smooth
         columns = np.log(shape[..., 1:])
         self._logarithm = Bicubic(self._hurst, self._load, columns)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ...data.campaign import Rig, Unmeasured
-from ...physics.contact import check_saturation, rough_table, static_contact
+from ...physics.contact import RoughLines, check_saturation
 from .static_table import StaticRig
 
 LINES = 60
@@ -86,8 +86,9 @@ def _lines(rig: Rig) -> _Lines:
     static = StaticRig.of(rig, spring_stiffness=1.0)
     assert rig.H is not None
     assert rig.h_rms is not None
-    table = rough_table(_known(rig.H), static.length, static.n_springs, LINES, static.seed).scaled(_known(rig.h_rms))
-    contact = static_contact(table, static.normal_force, static.friction, static.elastic)
+    H, h_rms = _known(rig.H), _known(rig.h_rms)
+    lines = RoughLines(H, h_rms, static.length, n_springs=static.n_springs, lines=LINES, seed=static.seed)
+    contact = lines.contact(static.normal_force, static.friction, static.elastic)
     check_saturation(contact.contact_share, key="rig.h_rms")
     curves = np.asarray(contact.displacement(np.append(LOADS, 1.0)[:, None])).T
     reach = curves[:, -1]

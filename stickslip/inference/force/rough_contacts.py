@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...physics.contact import default_edges, default_loads, rough_table
+from ...physics.contact import RoughLines, default_edges, default_loads
 from ..fit.static_table import HURST, LOAD_RANGE, Bicubic, StaticRig
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ class RoughContacts:
         mean = np.empty((HURST_NODES, LOAD_NODES, LOADS))
         self._covariance = np.empty((HURST_NODES, LOAD_NODES, self.sparse.size, self.sparse.size))
         for i, hurst in enumerate(self._hurst):
-            table = rough_table(float(hurst), 1.0, n_springs, lines, seed)
+            table = RoughLines(float(hurst), 1.0, 1.0, n_springs=n_springs, lines=lines, seed=seed).indentation
             gaps, sums = np.asarray(table.gaps), np.asarray(table.sums) / n_springs
             for j, load in enumerate(np.exp(self._load)):
                 logs = np.log(_displacements(gaps, sums, float(load), chosen, self.tau))

@@ -2,13 +2,12 @@
 
 from ...system import jax_settings  # noqa: F401  (before the first array)
 from .bank import Bank, bank_from_backbone, binning_error, default_edges
+from .contact_bank import bank_from_contact
 from .creep import (
     creep_curve,
     creep_displacements,
     default_loads,
     line_average,
-    rough_table,
-    static_contact,
     virtual_time,
 )
 from .elastic import Moduli, equal_bodies, two_bodies
@@ -26,9 +25,9 @@ from .profiles import (
     power_law,
     sphere,
 )
-from .rough_bank import bank_from_contact, rough_bank
-from .roughness import cut_to_line_factor, line_phasors, rough_lines
-from .tangential import StaticContact
+from .rough_lines import RoughLines
+from .roughness import cut_to_line_factor, line_phasors
+from .tangential import StaticContact, static_contact
 from .touching import touching
 
 __all__ = [
@@ -37,6 +36,7 @@ __all__ = [
     "Indentation",
     "Moduli",
     "Profile",
+    "RoughLines",
     "SaturationWarning",
     "StaticContact",
     "add_curvature",
@@ -66,9 +66,6 @@ __all__ = [
     "power_law_backbone",
     "power_law_bank",
     "reload_displacement",
-    "rough_bank",
-    "rough_lines",
-    "rough_table",
     "sphere",
     "static_contact",
     "touching",

@@ -2,7 +2,7 @@
 
 The line is the one-dimensional equivalent of an isotropic surface in the method of dimensionality reduction (Geike
 and Popov 2007), with spectral density C_1D(q) = pi q C_2D(q) ~ q^(-2H-1); it has the surface's H and rms height. It
-is not a cut through the surface, see `cut_to_line_factor`.
+is not a cut through the surface, see `cut_to_line_factor`. Lines as a user makes them are `.rough_lines.RoughLines`.
 """
 
 from __future__ import annotations
@@ -20,44 +20,10 @@ from ...system import jax_settings  # noqa: F401  (before the first array)
 from ._ranges import check_within
 
 
-def rough_lines(
-    H: ArrayLike,
-    n_lines: int = 100,
-    n_springs: int = 4096,
-    seed: int = 0,
-    *,
-    roll_off: ArrayLike | None = None,
-    cut_off: ArrayLike | None = None,
-) -> Array:
-    """Periodic lines with zero mean and unit rms height; multiply by the rms height wanted.
-
-    Line i of a seed keeps its phases whatever H, the rms height, ``n_lines`` and ``n_springs`` are (a finer line adds
-    short waves to the same long ones), so differences between parameters are not hidden by chance.
-    Differentiable in H, ``roll_off`` and ``cut_off``.
-
-    Args:
-        H: Hurst exponent in (0, 1).
-        n_lines: how many lines.
-        n_springs: points of a line, an even number. At small H the contact depends on it: quote it with every result.
-        seed: of the phases.
-        roll_off: wavelength, as a share of the line's length, above which the spectrum is flat. Default: no roll-off.
-        cut_off: wavelength, as a share of the line's length, below which there is no roughness. Default: down to two
-            spacings.
-
-    Returns:
-        (n_lines, n_springs) heights.
-
-    Raises:
-        InputError: a value out of its range.
-    """
-    check_line(H, n_lines, n_springs)
-    return lines_from_phasors(H, line_phasors(n_lines, n_springs, seed), roll_off=roll_off, cut_off=cut_off)
-
-
 def lines_from_phasors(
     H: ArrayLike, phasors: ArrayLike, *, roll_off: ArrayLike | None = None, cut_off: ArrayLike | None = None
 ) -> Array:
-    """`rough_lines` from given phase factors (n_lines, n_springs/2); for use inside jit, where they are an argument."""
+    """Lines of zero mean and unit rms height from phase factors (n_lines, n_springs/2); waves as shares of a line."""
     phasors = jnp.asarray(phasors)
     half = phasors.shape[-1]
     amplitude = amplitudes(H, half, roll_off=roll_off, cut_off=cut_off)

@@ -11,7 +11,8 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from .elastic import Moduli
+from ._ranges import check_within
+from .elastic import Moduli, equal_bodies
 from .indentation import Indentation
 
 
@@ -75,3 +76,17 @@ class StaticContact(eqx.Module):
     def _reach(self) -> Array:
         """Tangential displacement at which a spring slides for each unit of its depth, mu E*/G*."""
         return jnp.asarray(self.friction) * self.moduli.normal / self.moduli.tangential
+
+
+def static_contact(
+    table: Indentation, normal_force: ArrayLike, friction: ArrayLike, moduli: Moduli | None = None
+) -> StaticContact:
+    """`StaticContact` after a check of the ranges; default moduli: steel on steel."""
+    check_load(normal_force, friction)
+    return StaticContact(table, normal_force, friction, moduli or equal_bodies())
+
+
+def check_load(normal_force: ArrayLike, friction: ArrayLike) -> None:
+    """Raise InputError unless normal force (N) and friction coefficient are above zero."""
+    check_within("the normal force", normal_force, above=0.0, key="normal_force", unit="N")
+    check_within("the friction coefficient", friction, above=0.0, key="friction_coefficient")

@@ -174,24 +174,28 @@ def _rough_parts(table: tables.RoughLineTable) -> list[Part]:
     return parts
 
 
+def stated_lines(table: tables.RoughLineTable, H: float, h_rms: float, lines: int) -> physics.RoughLines:
+    """Rough lines as a scenario states them, so many, with this exponent and rms height (m)."""
+    return physics.RoughLines(
+        H, h_rms, table.line_length, n_springs=table.springs, lines=lines, seed=table.seed,
+        roll_off=table.roll_off, cut_off=table.cut_off,
+    )  # fmt: skip
+
+
 def rough_indentation(
     table: tables.RoughLineTable, H: float, heights: Any, lines: int, rows: np.ndarray | None = None
 ) -> physics.Indentation:
     """The table of a scenario's rough lines: ``lines`` of them, of which ``rows`` are kept."""
-    waves = {
-        key: None if value is None else value / table.line_length
-        for key, value in (("roll_off", table.roll_off), ("cut_off", table.cut_off))
-    }
+    rough = stated_lines(table, H, 1.0, lines)
     if not table.curvature:
-        made = physics.rough_table(H, table.line_length, table.springs, lines, table.seed, **waves)
+        made = rough.indentation
         if rows is not None and rows.size < lines:
             made = physics.Indentation(made.gaps[rows], made.sums[rows], made.dx, made.height)
         return made.scaled(heights)
     # curvature does not scale with the rms height, so these lines are sorted at their real height
-    unit = physics.rough_lines(H, lines, table.springs, table.seed, **waves)[slice(None) if rows is None else rows]
-    dx = table.line_length / table.springs
-    curved = physics.add_curvature(unit * jnp.reshape(heights, (-1, 1)), dx, table.curvature)
-    return physics.indentation(physics.from_heights(curved, dx))
+    unit = rough.heights[slice(None) if rows is None else rows]
+    curved = physics.add_curvature(unit * jnp.reshape(heights, (-1, 1)), rough.dx, table.curvature)
+    return physics.indentation(physics.from_heights(curved, rough.dx))
 
 
 def _mean_line(table: tables.RoughLineTable, i: int, number: int) -> MeanLine:

@@ -13,7 +13,7 @@ from ...physics.contact.creep import Average, TimeForm
 from ...system.units import ends
 from .build import Setup
 from .contact_tables import ElasticTable, RoughLineTable
-from .contacts import build_contact, moduli, profile_of
+from .contacts import build_contact, moduli, profile_of, stated_lines
 from .drive import load_point
 from .load import Scenario
 
@@ -58,14 +58,12 @@ def static_creep(
     drive: dict[str, Any] = {"spring_stiffness": file.block.spring_stiffness, "velocity": velocity}
     equal = getattr(table, "each", None) is None and not getattr(table, "curvature", 0.0)
     if isinstance(table, ElasticTable) and equal:
+        pressed = table.normal_force, table.friction_coefficient, moduli(table)
         if isinstance(table, RoughLineTable):
-            keys = ("H", "h_rms", "lines", "seed", "roll_off", "cut_off")
-            held: dict[str, Any] = {key: getattr(table, key) for key in keys}
-            held |= {"length": table.line_length, "n_springs": table.springs}
+            contact = stated_lines(table, table.H, table.h_rms, table.lines).contact(*pressed)
         else:
-            held = {"profile": profile_of(table, 0, scenario.folder)}
-        held |= {"normal_force": table.normal_force, "friction": table.friction_coefficient, "contacts": table.contacts}
-        curve = physics.creep_curve(**held, **drive, moduli=moduli(table), tau=tau, average=average, time=time)
+            contact = physics.static_contact(physics.indentation(profile_of(table, 0, scenario.folder)), *pressed)
+        curve = physics.creep_curve(contact, **drive, contacts=table.contacts, tau=tau, average=average, time=time)
         return StaticCreep(*(np.asarray(a) for a in (curve.tau, curve.u, curve.t)))
     built = build_contact(table.model_copy(update={"bins": max(table.bins, 4096)}), scenario.folder)
     u = np.asarray(_loading(built.bank.stiffness, built.bank.strength, tau * built.strength))
