@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from .forecast import forecast as _forecast
     from .inspection import inspect as _inspect
     from .result_base import Tell
-    from .static_fit import Align, Sampling, StaticFit, Time
+    from .static_fit import StaticFit
+    from .static_fit import fit_static as _fit_static
 
 
 class Campaign(Shown, Mapping[str, Trace]):
@@ -167,11 +168,12 @@ class Campaign(Shown, Mapping[str, Trace]):
             raise error.at(file=self._file) from None
 
     if TYPE_CHECKING:
-        inspect, diagnose, forecast = _inspect, _diagnose, _forecast
+        inspect, diagnose, forecast, fit_static = _inspect, _diagnose, _forecast, _fit_static
     else:
         inspect = LazyMethod("stickslip.objects.inspection")
         diagnose = LazyMethod("stickslip.objects.diagnosis")
         forecast = LazyMethod("stickslip.objects.forecast")
+        fit_static = LazyMethod("stickslip.objects.static_fit")
 
     @overload
     def fit(
@@ -179,50 +181,40 @@ class Campaign(Shown, Mapping[str, Trace]):
         holdout: str | Sequence[str] = ..., progress: Tell | None = ...,
     ) -> Fit: ...  # fmt: skip
     @overload
-    def fit(
-        self, effects: tuple[()] = ..., *, model: Literal["static"], align: Align | None = ...,
-        time: Time | None = ..., v_lim: float | str | None = ..., sampling: Sampling | None = ...,
-        progress: Tell | None = ...,
-    ) -> StaticFit: ...  # fmt: skip
+    def fit(self, *, model: Literal["static"], progress: Tell | None = ...) -> StaticFit: ...
     def fit(
         self, effects: str | Sequence[str] = (), model: Literal["inertial", "static"] = "inertial", *,
-        holdout: str | Sequence[str] = (), align: Align | None = None, time: Time | None = None,
-        v_lim: float | str | None = None, sampling: Sampling | None = None, progress: Tell | None = None,
+        holdout: str | Sequence[str] = (), progress: Tell | None = None,
     ) -> Fit | StaticFit:  # fmt: skip
         """Fit a model to all runs.
 
         Args:
             effects: of the dynamic model, such as ``"contact-ageing"`` or ``"machine-compliance:where=series"``.
-            model: ``"inertial"``, the force along the measured motion, or ``"static"``, every creep process by itself.
+            model: ``"inertial"``, the force along the measured motion, or ``"static"``, every creep process by itself
+                (:meth:`fit_static`, which has choices of its own).
             holdout: runs that no fit of the dynamic model sees.
-            align, time, v_lim, sampling: of the static model; see :func:`stickslip.objects.static_fit.fit_static`.
             progress: told the stage and the share of it done; default a bar in a terminal or a notebook.
 
         Raises:
-            InputError: no such model, an argument that belongs to the other one, no run can take part, an effect that
+            InputError: no such model, effects or runs held out of the static one, no run can take part, an effect that
                 is not known or only shapes the backbone.
             FitError: no finite model.
         """
         from .fit import fit
-        from .static_fit import fit_static
 
-        dynamic = {"effects": effects, "holdout": holdout}
-        every = {"align": align, "time": time, "v_lim": v_lim, "sampling": sampling}
-        static: dict[str, Any] = {key: value for key, value in every.items() if value is not None}
-        if model not in ("inertial", "static"):
+        if model == "inertial":
+            return fit(self, effects, holdout=holdout, progress=progress)
+        if model != "static":
             raise InputError(
                 "no such model", key="model", value=model, allowed='"inertial" or "static"',
                 hint="inertial is the dynamic one, which takes effects; static fits every creep process by itself",
             )  # fmt: skip
-        for key, value in static.items() if model == "inertial" else dynamic.items():
+        for key, value in {"effects": effects, "holdout": holdout}.items():
             if value:
-                other = "static" if model == "inertial" else "inertial"
                 raise InputError(
-                    f"an argument of the {other} model", key=key, value=value, hint=f'leave it out, or model="{other}"'
+                    "an argument of the inertial model", key=key, value=value, hint='leave it out, or model="inertial"'
                 )
-        if model == "static":
-            return fit_static(self, **static, progress=progress)
-        return fit(self, effects, holdout=holdout, progress=progress)
+        return self.fit_static(progress=progress)
 
     def levels(self, run: str | None = None) -> xarray.Dataset:
         """Force of the spring at onset and arrest of every slip of a run, and when and where; no fit is needed.

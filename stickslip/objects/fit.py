@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property, partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from ..inference.uncertainty import TIED
 from ..physics.effects import catalogue
 from ..physics.effects.effects_from_text import with_form
 from ..simulation.conformance import try_laws
+from ..system.lazy_method import LazyMethod
 from ..system.object_repr import facts
 from ..system.progress import portion, reporting
 from ..system.runstore import Run
@@ -34,21 +34,20 @@ from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rou
 from .fit_plots import FitPlots
 from .fit_result import fit_result
 from .fit_tables import STRENGTH, correlation_table, error_table, ladder_table, parameter_table
+from .fitted_model import FittedModel
 from .free_cycles import free_run_errors, simulated_cycles
 from .parameters_by_hand import moved, profile, refitted
 from .result_base import Savable, Tell, dataset, finish, several
 
 if TYPE_CHECKING:
-    import arviz
     import pandas
     import xarray
 
-    from ..simulation.scenario.load import Scenario
     from .campaign import Campaign
-    from .fitted_run import Moves
+    from .posterior import sample as _sample
 
 
-class Fit(Savable):
+class Fit(FittedModel, Savable):
     """The dynamic model along the measured motion, with the effects that were added.
 
     It does not change: whatever changes the model returns another.
@@ -91,8 +90,13 @@ class Fit(Savable):
         return self._climbed if self._moved is None else replaced(self._climbed, self._moved)
 
     @property
+    def title(self) -> str:
+        """Title of the campaign."""
+        return self.campaign.title
+
+    @property
     def parts(self) -> tuple[str, ...]:
-        """Tags of what is in the model."""
+        """Tags of what is in the model, such as ``("static", "inertia", "contact-ageing")``."""
         return self._climbed.ladder[-1].model
 
     @property
@@ -320,31 +324,6 @@ class Fit(Savable):
         law = power_law(backbone(self.force_fit), self._contacts)
         return fitted_model(self.force_fit, law, self.climbed.prepared.traces, self._contacts, self.campaign.rig)
 
-    def scenario(
-        self, changes: str | Sequence[str] = (), run: str | None = None, events: int = 5, drive: Moves | None = None
-    ) -> Scenario:
-        """The model as a scenario, for :func:`stickslip.simulate`.
-
-        Args:
-            changes: such as ``"drive.velocity=100um/s"``.
-            run: drive as this measured run was; default at the first run's velocity, for so many ``events``.
-            events: slips to simulate where the drive has one velocity.
-            drive: another one: a velocity such as ``"800 um/s"`` (a number in m/s), or until when and how fast, piece
-                by piece, as of :meth:`stickslip.Trace.from_arrays`: ``[("4 s", "100 um/s"), ("5 s", 0)]``.
-        """
-        from .fitted_run import FittedRun
-
-        record = FittedRun(Path(), {"title": self.campaign.title}, self.fitted)
-        return record.scenario(changes, run, events, drive)
-
-    def simulate(
-        self, changes: str | Sequence[str] = (), run: str | None = None, events: int = 5, drive: Moves | None = None
-    ) -> xarray.Dataset:
-        """Run the model freely: ``fit.simulate(drive="800 um/s")``; arguments as of :meth:`scenario`."""
-        from ..simulation.scenario import simulate
-
-        return simulate(self.scenario(changes, run, events, drive))
-
     def profile(self, name: str, progress: Tell | None = None) -> dict[str, Any]:
         """Profile likelihood of a parameter: held at values around its best one, all others fitted.
 
@@ -360,33 +339,10 @@ class Fit(Savable):
         with reporting(f"profile of {name}", progress) as tell:
             return profile(self, name, tell)
 
-    def sample(
-        self, draws: int = 200, tune: int = 100, chains: int = 2, seed: int = 0, progress: Tell | None = None
-    ) -> arviz.InferenceData:
-        """Draw from the posterior by the No-U-Turn sampler (Hoffman & Gelman, JMLR 15 (2014) 1593; by nutpie).
-
-        Sampled are the free parameters, with exact gradients. The covariance of the residuals is held as the fit found
-        it, what differs from event to event is marginalised, and what the force is linear in (the strengths of the
-        elements, errors that all cycles share, phases) is at its best for every draw, so that its uncertainty is not
-        in the sample.
-
-        Args:
-            draws, tune: of each chain, kept and for adaptation.
-            chains: side by side.
-            seed: of the draws.
-            progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
-
-        Returns:
-            ``posterior`` holds the free parameters (SI, ``attrs["units"]``) and ``contact.strength``; its
-            ``attrs["trust"]`` says in words whether divergences or R-hat speak against it.
-
-        Raises:
-            InputError: nutpie is not installed, or a number below one.
-        """
-        from .posterior import sample
-
-        with reporting("sampling", progress) as tell:
-            return sample(self, draws, tune, chains, seed, tell)
+    if TYPE_CHECKING:
+        sample = _sample
+    else:
+        sample = LazyMethod("stickslip.objects.posterior")
 
     # what is kept
 

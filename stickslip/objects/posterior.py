@@ -14,6 +14,7 @@ from ..inference.fit.parameters import to_si
 from ..inference.force.point import Point
 from ..inference.force.posterior import Walked, walked
 from ..system.extras import need
+from ..system.progress import reporting
 from .fit_tables import STRENGTH
 from .result_base import Tell
 
@@ -27,8 +28,30 @@ FEW = 100  # effective draws below which a 95 % interval is rough
 LOOK = 0.1  # s between two looks at whether the chains are done
 
 
-def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int, tell: Tell) -> arviz.InferenceData:
-    """See :meth:`stickslip.Fit.sample`."""
+def sample(
+    fit: Fit, draws: int = 200, tune: int = 100, chains: int = 2, seed: int = 0, progress: Tell | None = None
+) -> arviz.InferenceData:
+    """Draw from the posterior by the No-U-Turn sampler (Hoffman & Gelman, JMLR 15 (2014) 1593; by nutpie).
+
+    Sampled are the free parameters, with exact gradients. The covariance of the residuals is held as the fit found
+    it, what differs from event to event is marginalised, and what the force is linear in (the strengths of the
+    elements, errors that all cycles share, phases) is at its best for every draw, so that its uncertainty is not
+    in the sample.
+
+    Args:
+        fit: what is sampled; called as its method, the fit itself.
+        draws, tune: of each chain, kept and for adaptation.
+        chains: side by side.
+        seed: of the draws.
+        progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
+
+    Returns:
+        ``posterior`` holds the free parameters (SI, ``attrs["units"]``) and ``contact.strength``; its
+        ``attrs["trust"]`` says in words whether divergences or R-hat speak against it.
+
+    Raises:
+        InputError: nutpie is not installed, or a number below one.
+    """
     if min(draws, tune, chains) < 1:
         raise InputError(
             "out of range", key="draws, tune, chains", value=f"{draws}, {tune}, {chains}", allowed="1 or more"
@@ -60,12 +83,13 @@ def sample(fit: Fit, draws: int, tune: int, chains: int, seed: int, tell: Tell) 
     # told in this thread, which an interruption reaches: nutpie by itself ends with the draws so far as the sample
     found: Any = None
     try:
-        while found is None:
-            with suppress(TimeoutError):
-                found = sampler.wait(timeout=LOOK)
-            while not drawn.empty():
-                n = drawn.get()
-                tell(f"{n} of {total} draws", n / total)
+        with reporting("sampling", progress) as tell:
+            while found is None:
+                with suppress(TimeoutError):
+                    found = sampler.wait(timeout=LOOK)
+                while not drawn.empty():
+                    n = drawn.get()
+                    tell(f"{n} of {total} draws", n / total)
     except BaseException:
         if found is None:
             sampler.cancel()

@@ -45,10 +45,10 @@ def fit_static(
     sampling: Sampling = "log",
     progress: Tell | None = None,
 ) -> StaticFit:
-    """Fit the static model to every creep process (see :meth:`Campaign.fit`).
+    """Fit the paper's static model (Grzemba 2014) to every creep process by itself.
 
     Args:
-        campaign: the runs.
+        campaign: the runs; called as its method, the campaign itself.
         align: the point of the model's curve that is shifted onto the measured passage of ``v_lim``: its own
             passage, or ("paper") its end.
         time: virtual time with the block's own motion ("exact") or without it ("paper").

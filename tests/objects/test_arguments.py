@@ -43,8 +43,6 @@ def test_a_misspelt_argument_is_refused_by_the_method_itself(campaign):
     [
         {"model": "static", "effects": "wear"},
         {"model": "static", "holdout": "v050"},
-        {"v_lim": "1 um/s"},
-        {"align": "paper"},
     ],
 )
 def test_an_argument_of_the_other_model_is_refused(campaign, arguments):
@@ -52,6 +50,15 @@ def test_an_argument_of_the_other_model_is_refused(campaign, arguments):
     with pytest.raises(InputError, match=f"{key}: an argument of the") as refused:
         campaign.fit(**arguments)
     assert "leave it out" in refused.value.hint
+
+
+def test_the_static_model_is_the_same_by_either_name_and_has_choices_of_its_own(campaign):
+    one, other, faster = campaign.fit(model="static"), campaign.fit_static(), campaign.fit_static(v_lim="10 um/s")
+    assert one.arrays.identical(other.arrays)
+    assert faster.result["static"] != one.result["static"]
+    with pytest.raises(TypeError, match=r"fit_static\(\) got an unexpected keyword argument 'aling'"):
+        campaign.fit_static(aling="paper")
+
 
 
 @pytest.mark.slow

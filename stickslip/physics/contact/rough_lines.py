@@ -57,8 +57,8 @@ class RoughLines(eqx.Module):
     def __repr__(self) -> str:
         given = {"h_rms": self.h_rms, "length": self.length, "roll_off": self.roll_off, "cut_off": self.cut_off}
         known = {key: value for key, value in given.items() if value is not None and np.ndim(value) == 0}
-        said = [f"{key}={shown(float(v), 'm') if concrete(v) else 'traced'}" for key, v in known.items()]
-        hurst = f"{float(self.H):g}" if concrete(self.H) else "traced"
+        said = [f"{key}={shown(float(np.asarray(v)), 'm') if concrete(v) else 'traced'}" for key, v in known.items()]
+        hurst = f"{float(np.asarray(self.H)):g}" if concrete(self.H) else "traced"
         counts = f"n_springs={self.n_springs}, lines={self.lines}, seed={self.seed}"
         return f"RoughLines(H={hurst}, {', '.join(said)}, {counts})"
 
