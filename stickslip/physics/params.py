@@ -7,8 +7,10 @@ Names are local to the class; nothing here is a global table.
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
-from typing import Any
+import inspect
+from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, ParamSpec
 
 import equinox as eqx
 import jax
@@ -18,12 +20,15 @@ import numpy as np
 from ..errors import InputError
 from ..system.units import shown
 
+P = ParamSpec("P")
+
 
 @dataclass(frozen=True)
 class Spec:
     """What a person must know of one parameter.
 
     Attributes:
+        default: the value where none is given; without one it is the null value.
         unit: SI unit (``"1"`` for a pure number).
         lower, upper: the plausible range; values outside are refused.
         null: the value at which the effect is absent (``None`` for a shape parameter, which has no null).
@@ -39,8 +44,13 @@ class Spec:
             ``None`` leaves it to the rule of :func:`stickslip.inference.fit.parameters.effect_parameters`.
         usual: from where to where values lie as a rule, if that is less than lower to upper; one beyond is doubted in
             words, and not refused.
+
+    Raises:
+        TypeError: neither a default nor a null value.
     """
 
+    default: float | None = None
+    _: KW_ONLY
     unit: str
     lower: float
     upper: float
@@ -53,6 +63,13 @@ class Spec:
     prior: float | None = None
     width: float | None = None
     usual: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        default = self.null if self.default is None else self.default
+        if default is None:
+            raise TypeError("a parameter needs a default, or a null value that is its default")
+        for name, value in (("default", default), ("lower", self.lower), ("upper", self.upper)):
+            object.__setattr__(self, name, float(value))
 
     @property
     def range(self) -> str:
@@ -88,34 +105,19 @@ def _as_float(value: Any) -> Any:
     return value
 
 
-def parameter(
-    default: float | None = None,
-    *,
-    unit: str,
-    lower: float,
-    upper: float,
-    doc: str,
-    null: float | None = None,
-    log: bool = False,
-    grid: tuple[float, ...] = (),
-    symbol: str = "",
-    ends: tuple[float, ...] = (),
-    prior: float | None = None,
-    width: float | None = None,
-    usual: tuple[float, float] | None = None,
-) -> Any:
-    """A field of a physical class: a 64-bit float with its :class:`Spec`.
+def _described(spec: Callable[P, Spec]) -> Callable[P, Any]:
+    def parameter(*args: P.args, **kwargs: P.kwargs) -> Any:
+        """A field of a physical class: a 64-bit float with its :class:`Spec`, whose arguments it takes."""
+        known = spec(*args, **kwargs)
+        return eqx.field(default=known.default, converter=_as_float, metadata={"spec": known})
 
-    Arguments as there; without a default it is the null value.
+    taken = inspect.signature(spec).replace(return_annotation=Any)
+    parameter.__signature__ = taken  # type: ignore[attr-defined]
+    parameter.__qualname__ = "parameter"
+    return parameter
 
-    Raises:
-        TypeError: neither a default nor a null value.
-    """
-    default = null if default is None else default
-    if default is None:
-        raise TypeError("a parameter needs a default, or a null value that is its default")
-    spec = Spec(unit, float(lower), float(upper), doc, null, log, grid, symbol, ends, prior, width, usual)
-    return eqx.field(default=float(default), converter=_as_float, metadata={"spec": spec})
+
+parameter = _described(Spec)
 
 
 def phase(doc: str) -> Any:

@@ -60,7 +60,6 @@ def test_the_static_model_is_the_same_by_either_name_and_has_choices_of_its_own(
         campaign.fit_static(aling="paper")
 
 
-
 @pytest.mark.slow
 def test_a_single_name_is_not_read_letter_by_letter(campaign, tmp_path):
     assert [k.name for k in campaign.prepare("v050").runs] == [k.name for k in campaign.prepare(["v050"]).runs]
