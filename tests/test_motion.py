@@ -71,8 +71,8 @@ def test_a_diagnosis_of_spring_force_is_given_the_displacement(tmp_path, monkeyp
     class Seen(Exception):
         pass
 
-    def diagnose(campaign, traces, segmentations, **options):
-        raise Seen(traces[0].displacement, segmentations[0])
+    def diagnose(prepared, *_):
+        raise Seen(prepared.traces[0].displacement, prepared.segmentations[0])
 
     monkeypatch.setattr(diagnosis, "search", diagnose)
     with pytest.raises(Seen) as seen:

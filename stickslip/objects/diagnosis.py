@@ -17,12 +17,14 @@ from ..inference.diagnose.model_ladder import Climbed
 from ..inference.diagnose.stepwise_selection import Diagnosis as Found
 from ..inference.diagnose.stepwise_selection import diagnose as search
 from ..inference.diagnose.summary import summary
+from ..inference.diagnose.work import Work
 from ..physics.effects import catalogue
 from ..show.report.excerpts import trace_sections
 from ..simulation.conformance import try_laws
 from ..system.object_repr import facts, table
 from ..system.progress import reporting
 from ..system.runstore import Run, json_text, open_run, refuse_existing, versions
+from ..system.threads import processors
 from .campaign import Campaign, load_campaign
 from .checkpoints import Pieces, code_digest
 from .data_abilities import abilities
@@ -210,32 +212,24 @@ def diagnose(
     except InputError as error:
         raise error.at(file=campaign.description.path) from None
 
+    def in_time() -> bool:
+        return time_limit is None or time.perf_counter() - began < time_limit
+
     def found(store: Store | None, ready: int, tell: Tell) -> Diagnosis:
         # before minutes of fitting, in which a wrong unit may be mended
         first = [f.sentence for f in rig] + list(able.cannot)
         first += [f"resuming from {ready} finished parts"] if ready else []
         if first:
             tell("\n         ".join(["before anything is fitted:", *first]), 0.0)
-        left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), 0.0)
+        work = Work(processors() if jobs is None else jobs, tell, in_time, store)
         try:
-            done = search(
-                campaign.description,
-                campaign.displaced[0],
-                campaign.scaled[0],
-                candidates=candidates,
-                max_effects=max_effects,
-                holdout=holdout,
-                jobs=jobs,
-                store=store,
-                time_limit=left,
-                wrong=stopping(rig),
-                progress=tell,
-            )
+            tell("the measured force", 0.0)
+            done = search(campaign.prepare(holdout), campaign.rig, candidates, max_effects, stopping(rig), work)
         except InputError as error:
             for finding in reversed(stopping(rig)):  # with the sign wrong in every run there are no slips to fit
                 error = error.with_hint(finding.sentence)
             raise error.at(file=campaign.description.path) from None
-        return _made(campaign, done, able, began, time_limit, tell)
+        return _made(campaign, done, able, began, work)
 
     if out is None:
         with reporting("diagnosing", progress) as tell:
@@ -261,13 +255,9 @@ def diagnose(
     return made
 
 
-def _made(campaign: Campaign, done: Found, able: Any, began: float, limit: float | None, tell: Tell) -> Diagnosis:
+def _made(campaign: Campaign, done: Found, able: Any, began: float, work: Work) -> Diagnosis:
     sections, variables = summary(done, campaign.rig)
-
-    def in_time() -> bool:
-        return limit is None or time.perf_counter() - began < limit
-
-    proposed = next_experiment(campaign, done, sections["next_experiment"], tell, in_time)
+    proposed = next_experiment(campaign, done, sections["next_experiment"], work)
     traces, segmentations = campaign.displaced[0], campaign.scaled[0]
     described, pictured = trace_sections(traces, segmentations)
     # the fit knows slips better than their forces at the onsets do

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from ..inference.diagnose.model_ladder import Climbed
 from ..inference.diagnose.search import Rung
 from ..inference.diagnose.search_round import Round
 from ..inference.diagnose.stepwise_selection import Diagnosis as Found
+from ..inference.diagnose.work import Work
 from .campaign import Campaign
 from .experiments import Setting, SimulatedExperiment, part, practicable, scenario, simulate_rivals
 from .fit import Fit
@@ -21,23 +22,21 @@ from .result_base import Tell
 
 
 def next_experiment(
-    campaign: Campaign, found: Found, known: dict[str, Any] | None, tell: Tell,
-    in_time: Callable[[], bool] = lambda: True,
-) -> dict[str, Any] | None:  # fmt: skip
+    campaign: Campaign, found: Found, known: dict[str, Any] | None, work: Work = Work()
+) -> dict[str, Any] | None:
     """What the catalogue knows to separate the effects of each set, with the experiments that are easily made.
 
     Args:
         campaign: that was diagnosed.
         found: where the search ended.
         known: of :func:`stickslip.inference.diagnose.summary.next_experiment`.
-        tell: told the progress.
-        in_time: whether there is time for another experiment.
+        work: how.
     """
     if known is None or found.prepared.prescribed:
         return known
     rounds = {tuple(j.tag for j in done.close): done for done in found.named.values() if len(done.close) > 1}
     every = [{key: value for key, value in known.items() if key != "others"}, *known.get("others", ())]
-    made = [_with(campaign, found, one, rounds.get(tuple(one["separates"])), tell, in_time) for one in every]
+    made = [_with(campaign, found, one, rounds.get(tuple(one["separates"])), work) for one in every]
     return {**made[0], "others": made[1:]} if len(made) > 1 else made[0]
 
 
@@ -65,15 +64,12 @@ def sampled_experiments(
     return simulate_rivals(first, fits, _options(first), part(tell, len(fits), len(fits) + 1), drawn=drawn)
 
 
-def _with(
-    campaign: Campaign, found: Found, known: dict[str, Any], done: Round | None, tell: Tell,
-    in_time: Callable[[], bool],
-) -> dict[str, Any]:  # fmt: skip
-    if done is None or not in_time():  # laws of the backbone have no model of their own along the motion
+def _with(campaign: Campaign, found: Found, known: dict[str, Any], done: Round | None, work: Work) -> dict[str, Any]:
+    if done is None or not work.in_time():  # laws of the backbone have no model of their own along the motion
         return known
     fits = {j.tag: _fit(campaign, found, done, j.tag, j.candidate.fit) for j in done.close}
     first = next(iter(fits.values()))
-    options = simulate_rivals(first, fits, _options(first), tell, until=in_time)
+    options = simulate_rivals(first, fits, _options(first), work.tell, until=work.in_time)
     if not options:
         return known
     return {**known, "text": _text(known["text"], options), "experiments": rows(options)}

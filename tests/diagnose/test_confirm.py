@@ -15,6 +15,7 @@ from stickslip.inference.diagnose.free_errors import contradiction, errors, pred
 from stickslip.inference.diagnose.free_measures import CHANGES, simulated
 from stickslip.inference.diagnose.free_report import cautions, free_variables
 from stickslip.inference.diagnose.free_simulation import confirm
+from stickslip.inference.diagnose.work import Work
 from stickslip.inference.force.candidates import try_effect
 from stickslip.inference.force.fit import fit_base
 from stickslip.inference.force.heldout import halves, points
@@ -183,7 +184,7 @@ def test_a_simulation_that_fails_is_a_note(plain, monkeypatch):
 
 def test_without_time_nothing_is_run_and_it_is_said(plain):
     data, base = plain
-    c = confirm({BASE: base}, BASE, data, in_time=lambda: False)
+    c = confirm({BASE: base}, BASE, data, Work(in_time=lambda: False))
     assert c.models == {}
     assert "time limit" in c.notes[0]
 

@@ -56,7 +56,7 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Any:
         return Round(base, tuple(found), tuple(j.candidate for j in found), tuple(named(found)))
 
     def replace(made: Any, **changes: Any) -> Any:
-        return dataclasses.replace(made, **changes) if isinstance(made, Candidate | Judged) else made
+        return dataclasses.replace(made, **changes) if isinstance(made, Candidate | Judged | module.Work) else made
 
     monkeypatch.setattr(module, "one_round", one_round)
     monkeypatch.setattr(module, "replace", replace)
@@ -70,7 +70,7 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Any:
         lambda model, added, fit, removed=None: module.Rung(model, added, np.zeros(0), None, fit, removed),
     )
     ladder = [module.Rung.of(("static", "inertia"), "inertia", Model(()))]
-    made = module.Search(Model(()), ladder, 1, lambda *_: None, lambda: True, None)
+    made = module.Search(Model(()), ladder, module.Work())
     made.table, made.worse = table, worse
     return made
 

@@ -9,6 +9,7 @@ import pytest
 from stickslip.inference.diagnose.decide import Judge
 from stickslip.inference.diagnose.search import Rung, Search
 from stickslip.inference.diagnose.search_round import Round
+from stickslip.inference.diagnose.work import Work
 from stickslip.inference.force.candidates import with_start
 from stickslip.inference.force.fit import fit
 from stickslip.inference.force.stated_spring import (
@@ -73,7 +74,7 @@ def test_then_the_last_round_begins_anew_with_the_spring_that_the_slips_want(sma
     freed = spring_freed(base)
     assert freed is not None
     ladder = [Rung.of(("static", "inertia"), "inertia", base)]
-    search = Search(base, ladder, 1, lambda text, share: None, lambda: True, None)
+    search = Search(base, ladder, Work())
     search.rounds.append(Round(base, (), (), ()))
     text = search.free_spring(freed)
     true = small.truth["rig"]["spring_stiffness"]

@@ -14,6 +14,7 @@ from stickslip.blind.generator import Run, make_campaign
 from stickslip.blind.generator.forms import EFFECTS
 from stickslip.errors import InputError, RunFolderError
 from stickslip.inference.diagnose.search_round import Round
+from stickslip.inference.diagnose.work import Work
 from stickslip.objects import next_experiment as module
 from stickslip.objects.diagnosis import Diagnosis
 from stickslip.objects.experiments import Setting, rival_experiments
@@ -51,7 +52,7 @@ def test_every_experiment_is_simulated_and_the_best_is_proposed(undecided, monke
     usual = module.practicable
     monkeypatch.setattr(module, "practicable", lambda *args: {k: v for k, v in usual(*args).items() if k in few})
     said = []
-    made = next_experiment(campaign, found, KNOWN, lambda text, share: said.append((text, share)))
+    made = next_experiment(campaign, found, KNOWN, Work(tell=lambda text, share: said.append((text, share))))
     rows = made["experiments"]
     assert {row["experiment"] for row in rows} == few
     done = [row for row in rows if not row["note"]]
@@ -77,7 +78,7 @@ def test_experiments_over_draws_of_the_posterior(undecided, monkeypatch):
     said = []
     made = Diagnosis(campaign, found, {}, {})
     table = made.sampled_experiments(20, 20, progress=lambda text, share: said.append((text, share)))
-    gaussian = next_experiment(campaign, found, KNOWN, lambda text, share: None)["experiments"]
+    gaussian = next_experiment(campaign, found, KNOWN)["experiments"]
     assert set(table.index) == few and not table["note"].any()
     for row in gaussian:
         assert table["margin"][row["experiment"]] == pytest.approx(row["margin"], rel=0.5)
@@ -100,13 +101,13 @@ def test_sampled_experiments_need_models_and_a_set(undecided):
 def test_without_models_or_time_the_words_of_the_catalogue_stand(undecided):
     campaign, found = undecided
     of_geometry = SimpleNamespace(**{**vars(found), "named": {}})
-    assert next_experiment(campaign, of_geometry, KNOWN, lambda text, share: None) == KNOWN
-    assert next_experiment(campaign, found, KNOWN, lambda text, share: None, lambda: False) == KNOWN
+    assert next_experiment(campaign, of_geometry, KNOWN) == KNOWN
+    assert next_experiment(campaign, found, KNOWN, Work(in_time=lambda: False)) == KNOWN
     once = iter([True, False])
-    assert next_experiment(campaign, found, KNOWN, lambda text, share: None, lambda: next(once)) == KNOWN
-    assert next_experiment(campaign, found, None, lambda text, share: None) is None
+    assert next_experiment(campaign, found, KNOWN, Work(in_time=lambda: next(once))) == KNOWN
+    assert next_experiment(campaign, found, None) is None
     sets = {**KNOWN, "others": [{"text": "weigh it", "separates": ["curvature", "roll-off"]}]}
-    made = next_experiment(campaign, of_geometry, sets, lambda text, share: None)
+    made = next_experiment(campaign, of_geometry, sets)
     assert made == sets
 
 

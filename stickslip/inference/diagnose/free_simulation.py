@@ -22,8 +22,8 @@ from ..force.fit import Fit
 from ..force.heldout import folds, halves, points
 from .checkpoints import Store
 from .free_measures import Array, Measures, measured, scatter, simulated
-from .parallel_refits import Tell
 from .prepare import Prepared
+from .work import Work
 
 Parts = tuple[str, ...]  # tags of what is in a model
 FOLLOWED = (
@@ -72,23 +72,14 @@ class Confirmation:
     notes: tuple[str, ...] = ()
 
 
-def confirm(
-    fits: Mapping[Parts, Fit],
-    last: Parts,
-    prepared: Prepared,
-    store: Store | None = None,
-    tell: Tell = lambda text, share: None,
-    in_time: Callable[[], bool] = lambda: True,
-) -> Confirmation:
+def confirm(fits: Mapping[Parts, Fit], last: Parts, prepared: Prepared, work: Work = Work()) -> Confirmation:
     """Run models freely through the measured cycles (at most the first :data:`MOST_CYCLES` of a run).
 
     Args:
         fits: along the motion, of the models to be run, by their parts.
         last: parts of the model whose scatter is the unit of errors.
         prepared: the data.
-        store: keeps finished pieces.
-        tell: told the stage and the share of it done.
-        in_time: whether there is time for more.
+        work: how.
 
     Returns:
         What was found. A simulation that fails is a note and raises nothing.
@@ -106,18 +97,18 @@ def confirm(
     # two models are compared event by event only if both are left out in the same way
     apart = any(len(folds(fit)) != len(names) for fit in fits.values())
     for done, (parts, fit) in enumerate(fits.items()):
-        if not in_time():
+        if not work.in_time():
             notes.append(f"the time limit came before the free simulation of the model {_named(parts)}")
             continue
-        tell(f"free simulation of {_named(parts)}", done / len(fits))
+        work.tell(f"free simulation of {_named(parts)}", done / len(fits))
         try:
-            found[parts] = _kept(store, _key("free", parts, fit), Freely, partial(freely, m, fit, runs, apart))
+            found[parts] = _kept(work.store, _key("free", parts, fit), Freely, partial(freely, m, fit, runs, apart))
             if parts == last:
                 key = _key("scatter", parts, fit)
-                unit = _kept(store, key, Measures, partial(scatter, m, fit, runs))
+                unit = _kept(work.store, key, Measures, partial(scatter, m, fit, runs))
         except Exception as error:  # an effect of one's own may fail in any way
             notes.append(f"the free simulation of the model {_named(parts)} failed: {_line(error)}")
-    tell("free simulation", 1.0)
+    work.tell("free simulation", 1.0)
     used = np.asarray(m.cycles.used).sum(axis=1)
     ends = [prepared.segmentations[k].events[int(n) - 1].t_arrest for k, n in zip(runs, used, strict=True)]
     return Confirmation(m, measured(m, np.array(ends)), unit, found, tuple(notes))

@@ -13,7 +13,7 @@ from ...errors import ArgumentError, FitError, InputError
 from ...physics.effects import catalogue
 from ...physics.effects.base import Effect
 from ...physics.params import specs, variants
-from ...system.progress import portion
+from ...system.progress import Tell, portion
 from ..force.candidates import shapes_backbone, try_effect
 from ..force.fit import Fit, deviations, fit_base
 from ..force.profile_deviations import LEVEL, held, widened
@@ -23,11 +23,11 @@ from .backbone_laws import shape_of, unshaped
 from .decide import DISPERSION
 from .final_comparison import settled
 from .free_simulation import Confirmation, confirm
-from .parallel_refits import Tell
 from .prepare import Prepared
 from .search import Rung, without
 from .stepwise_selection import Diagnosis, Verdict, leading, static_residual
 from .wandering_level import level_of
+from .work import Work
 
 Form = tuple[str, Mapping[str, str]]  # tag and variants of an effect
 
@@ -53,9 +53,9 @@ class Climbed:
         assert last is not None
         return last
 
-    def confirmed(self, tell: Tell = lambda text, share: None) -> Confirmation:
+    def confirmed(self, tell: Tell) -> Confirmation:
         """Base and last model run freely through the measured cycles."""
-        return confirm(leading(self.ladder, {}), self.ladder[-1].model, self.prepared, tell=tell)
+        return confirm(leading(self.ladder, {}), self.ladder[-1].model, self.prepared, Work(tell=tell))
 
     def as_diagnosis(self, confirmation: Confirmation, rig: Any) -> Diagnosis:
         """The same ladder without a search behind it, with the laws of its backbone; ``rig`` of the campaign."""

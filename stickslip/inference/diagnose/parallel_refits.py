@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,37 +18,27 @@ from ...physics.effects import catalogue
 from ...physics.effects.base import Memory
 from ...system import process, threads
 from ...system.parent_watch import end_with
-from ...system.progress import Tell as Tell
 from ..force.candidates import Candidate, every_form, try_effect
 from ..force.fit import Fit
 from ..force.signatures import Explained
-from .checkpoints import Store, load_candidate, name_of, save_candidate
+from .checkpoints import load_candidate, name_of, save_candidate
 from .fit_pickling import FitPickler
+from .work import Work
 
 
-def trials(
-    base: Fit,
-    tags: Sequence[str],
-    jobs: int,
-    tell: Tell,
-    until: Callable[[], bool],
-    store: Store | None = None,
-    name: str = "round",
-) -> list[Candidate]:
+def trials(base: Fit, tags: Sequence[str], work: Work, name: str = "round") -> list[Candidate]:
     """Every form of every effect, refitted with the base.
 
     Args:
         base: the model they are added to.
         tags: effects to try.
-        jobs: processes.
-        tell: told what was tried and the share done.
-        until: whether there is time for more; what is not tried then is missing from the answer.
-        store, name: keeps what is finished, under this name.
+        work: how.
+        name: of what is kept.
     """
-    work = every_form(tags)
+    forms, store = every_form(tags), work.store
     out: list[Candidate] = []
     left = []
-    for tag, form in work:
+    for tag, form in forms:
         known = None if store is None else load_candidate(store, f"{name}-{name_of(tag, form)}", base)
         if known is None:
             left.append((tag, form))
@@ -57,15 +47,15 @@ def trials(
     # the largest first, so that no process waits for one that was begun last
     groups = [(tag, [form for other, form in left if other == tag]) for tag in dict.fromkeys(t for t, _ in left)]
     groups.sort(key=lambda job: -_size(base, *job))
-    for made in _made(base, groups, jobs):
+    for made in _made(base, groups, work.jobs):
         out += made
         if store is not None:
             for candidate in made:
                 save_candidate(store, f"{name}-{name_of(candidate.tag, candidate.form)}", candidate)
-        tell(made[-1].tag, len(out) / len(work))
-        if not until():
+        work.tell(made[-1].tag, len(out) / len(forms))
+        if not work.in_time():
             break
-    order = {(tag, tuple(form.items())): i for i, (tag, form) in enumerate(work)}
+    order = {(tag, tuple(form.items())): i for i, (tag, form) in enumerate(forms)}
     return sorted(out, key=lambda c: order[c.tag, tuple(c.form.items())])
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 from ...physics.effects import catalogue
+from ...system.progress import Tell
 from ...system.units import shown
 from ..force.fit import Fit, fit
 from ..force.heldout import apart
@@ -14,11 +15,11 @@ from ..force.linearised import Array
 from ..force.point import Point
 from ..force.problem import Problem
 from ..force.stated_spring import EXACT, SPRING
-from .checkpoints import Store, kept
+from .checkpoints import kept
 from .decide import Judge, Judged, best_forms, inside, named
 from .final_comparison import settled
-from .parallel_refits import Tell
 from .search_round import Round, one_round
+from .work import Work
 
 TAKEN_OUT = "detected, then removed: the resulting model predicts unseen runs no better"
 BEST = 10  # effects of a round that are tried again beside the one that was named
@@ -64,14 +65,11 @@ class Search:
     _left: Round | None = None  # of a round whose effect was not kept, what else it tried
     _spring = ""  # what names the rounds once the spring is free
 
-    def __init__(
-        self, base: Fit, ladder: list[Rung], jobs: int, tell: Tell, in_time: Callable[[], bool], store: Store | None
-    ) -> None:
-        self.base, self.ladder = base, ladder
+    def __init__(self, base: Fit, ladder: list[Rung], work: Work) -> None:
+        self.base, self.ladder, self._work = base, ladder, work
         self.rounds: list[Round] = []
         self.named: dict[str, Round] = {}
         self.gone: set[str] = set()
-        self._jobs, self._tell, self._in_time, self._store = jobs, tell, in_time, store
 
     def round(self, tags: Sequence[str]) -> Round:
         """Every effect of these on top of the model."""
@@ -89,7 +87,7 @@ class Search:
         self.rounds.pop()
         stated, self._spring = self.base.values[SPRING], " with its own spring"
         self.base = kept(
-            self._store, f"round{len(self.rounds) + 1}-spring", freed.problem,
+            self._work.store, f"round{len(self.rounds) + 1}-spring", freed.problem,
             lambda: fit(freed.problem, freed.point, freed.scatter.unbound(), first=True),
         )  # fmt: skip
         last = self.ladder[-1]
@@ -109,15 +107,15 @@ class Search:
         best, key = done.close[0], f"round{len(self.rounds)}"
         tag = best.tag
         before = self.base, self.ladder[:], dict(self.named), set(self.gone)
-        self._tell(f"round {len(self.rounds)}: the model with {tag}", 1.0)
-        found = ended(best, settled(done.base, best.candidate, self._store, key))
+        self._work.tell(f"round {len(self.rounds)}: the model with {tag}", 1.0)
+        found = ended(best, settled(done.base, best.candidate, self._work.store, key))
         if not found.inside:
             self._give_up(done, found)
             return
         self._take(found.fit, tag, None)
         self.named[tag] = done
         for earlier in list(self.named)[:-1]:
-            if self._in_time():
+            if self._work.in_time():
                 self._again(earlier, tag)
         if not (predicts_better(before[0], self.base) and in_range(self.base, self.named)):
             self.base, self.ladder[:], self.named, self.gone = before
@@ -137,7 +135,7 @@ class Search:
         name = f"again {tag} with {added} in round {len(self.rounds)}"
         key = name.replace(" ", "-")
         problem, _ = _taken_out(self.base, tag)
-        apart = kept(self._store, f"{key}-without", problem, lambda: without(self.base, tag))
+        apart = kept(self._work.store, f"{key}-without", problem, lambda: without(self.base, tag))
         seen = sorted((j for j in best_forms(self.named[tag].judged) if j.seen), key=lambda j: -j.better)
         tags = [j.tag for j in seen if j.tag == tag or j.tag not in {*self.named, *self.gone}][:BEST]
         done = self._tried(apart, tags, name, self.base)
@@ -148,12 +146,12 @@ class Search:
             self.named[tag] = done
         else:
             other = done.close[0].tag
-            self._take(settled(apart, done.close[0].candidate, self._store, key), other, tag)
+            self._take(settled(apart, done.close[0].candidate, self._work.store, key), other, tag)
             self.named = {other if t == tag else t: done if t == tag else r for t, r in self.named.items()}
 
     def _tried(self, base: Fit, tags: Sequence[str], name: str, before: Fit | None = None) -> Round:
-        key, tell = name.replace(" ", ""), partial(_told, self._tell, name)
-        return one_round(base, tags, self._jobs, tell, self._in_time, self._store, key, before)
+        work = replace(self._work, tell=partial(_told, self._work.tell, name))
+        return one_round(base, tags, work, name.replace(" ", ""), before)
 
     def _take(self, base: Fit, added: str | None, removed: str | None) -> None:
         self.base = base

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..force.candidates import Candidate, every_form, from_end
 from ..force.fit import Fit
 from ..force.stated_spring import spring_freed
-from .checkpoints import Store
 from .decide import Compared, Judge, Judged, as_well, held_back, named
 from .final_comparison import Finals, finalists
-from .parallel_refits import Tell, trials
+from .parallel_refits import trials
+from .work import Work
 
 
 @dataclass(frozen=True)
@@ -45,18 +45,9 @@ class Round:
         return None if self.close else held_back(self.judged)
 
 
-def one_round(
-    base: Fit,
-    tags: Sequence[str],
-    jobs: int,
-    tell: Tell,
-    in_time: Callable[[], bool],
-    store: Store | None = None,
-    name: str = "round",
-    before: Fit | None = None,
-) -> Round:
+def one_round(base: Fit, tags: Sequence[str], work: Work, name: str = "round", before: Fit | None = None) -> Round:
     """Every effect on top of one model, and which of them is to be named; one was taken out of the model ``before``."""
-    tried = trials(base, tags, jobs, tell, in_time, store, name)
+    tried = trials(base, tags, work, name)
     if before is not None:
         out = {e.tag for e in before.problem.composition.effects} - {e.tag for e in base.problem.composition.effects}
         tried = [from_end(base, c, before) if c.tag in out else c for c in tried]
@@ -65,9 +56,9 @@ def one_round(
     judged = tuple(j for j in map(judge, tried) if j is not None)
     freed = spring_freed(base)
     best = [j.candidate for j in finalists(judged)]
-    if len(best) > 1 and in_time():
-        tell("refitting the best effects", 1.0)
-        finals = Finals.of(base, best, store, name)
+    if len(best) > 1 and work.in_time():
+        work.tell("refitting the best effects", 1.0)
+        finals = Finals.of(base, best, work.store, name)
         judge = Judge(finals.base, number)
         again = {c.tag for c in finals.ends}
         judged = (*(j for j in map(judge, finals.ends) if j is not None), *(j for j in judged if j.tag not in again))

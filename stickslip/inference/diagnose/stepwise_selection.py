@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...data.campaign import Campaign
+from ...data.campaign import Rig
 from ...data.checks import Finding
-from ...data.segment import Segmentation, segment
-from ...data.trace import Trace
 from ...errors import InputError
 from ...physics.effects import catalogue
-from ...system.threads import processors
 from ..force.fit import Fit, deviations, fit_base
 from ..force.linearised import Array
 from ..force.prescribed import applies
@@ -23,14 +19,14 @@ from ..force.residual import Structure, structures
 from ..force.signatures import Explained
 from ..force.stated_spring import slips_finding, within_knowledge
 from .backbone_laws import Shape, shape_of, unshaped
-from .checkpoints import Store, kept
+from .checkpoints import kept
 from .decide import DISPERSION, Judged, as_well
 from .free_simulation import Confirmation, Parts, confirm
-from .parallel_refits import Tell
-from .prepare import FEWEST, Prepared, prepare
+from .prepare import FEWEST, Prepared
 from .search import Rung, Search
 from .search_round import Round
 from .wandering_level import TAG, Level, level_of
+from .work import Work
 
 SEVERAL = "unequal-contacts"  # means nothing where there is one
 LEFT = 0.5  # of what named effects explain, from which what is left is no matter of a law's form any more
@@ -98,50 +94,31 @@ class Diagnosis:
 
 
 def diagnose(
-    campaign: Campaign,
-    traces: Sequence[Trace],
-    segmentations: Sequence[Segmentation] | None = None,
-    *,
+    prepared: Prepared,
+    rig: Rig,
     candidates: Sequence[str] | None = None,
     max_effects: int = 4,
-    holdout: Sequence[str] = (),
-    jobs: int | None = None,
-    store: Store | None = None,
-    time_limit: float | None = None,
     wrong: Sequence[Finding] = (),
-    progress: Callable[[str, float], None] | None = None,
+    work: Work = Work(),
 ) -> Diagnosis:
     """Find out what the base model lacks.
 
     Args:
-        campaign, traces, segmentations: the measurement.
+        prepared: the data.
+        rig: as it is stated.
         candidates: tags to try; default the whole catalogue.
         max_effects: at most so many are added one after the other.
-        holdout: runs to keep aside, besides those whose role in the campaign is "held-out".
-        jobs: processes; default the number of processors that this process may use.
-        store: keeps finished pieces.
-        time_limit: seconds after which the best answer so far is given.
-        wrong: what the motion contradicts of the rig as it is stated: with any, the base is fitted and no effect tried.
-        progress: told the stage and the share of it done.
+        wrong: what the motion contradicts of the rig: with any, the base is fitted and no effect tried.
+        work: how.
 
     Raises:
-        InputError: no run can take part, or the mass is not given.
+        InputError: too few events to leave any out.
         FitError: the base model gives no finite force.
     """
-    began = time.monotonic()
-
-    def in_time() -> bool:
-        return time_limit is None or time.monotonic() - began < time_limit
-
-    tell: Tell = progress or (lambda text, share: None)
-    segmentations = [segment(t) for t in traces] if segmentations is None else segmentations
-    tell("the measured force", 0.0)
-    prepared = prepare(campaign, traces, segmentations, holdout)
     if prepared.problem.events < FEWEST:
         raise InputError(
             "the motion turns, stops or changes its speed less than twice, so no part of the record can be left "
             "out to test an effect",
-            file=campaign.path,
             key=", ".join(f"trace '{t.name}' ({t.provenance.file})" for t in prepared.traces[:4]),
             hint="record it again: two loops, or a step up and down; stickslip fit accepts it as it is",
         )
@@ -149,20 +126,20 @@ def diagnose(
     tags = catalogue.tags() if candidates is None else [catalogue.get(t).tag for t in candidates]
     if candidates is not None:
         dropped += [f"{t}: not tried, because it is a random process" for t in tags if catalogue.get(t).drawn]
-    if campaign.rig.contacts == 1 and SEVERAL in tags:
+    if rig.contacts == 1 and SEVERAL in tags:
         tags.remove(SEVERAL)
         dropped.append(f"{SEVERAL}: not tried, for the rig has one contact")
     if prepared.prescribed:
         tags = [t for t in tags if applies(t)]
     tags = [t for t in tags if prepared.shows(catalogue.get(t))]
-    jobs = processors() if jobs is None else jobs
-    tell("fitting the base model", 0.5)
+    store, in_time = work.store, work.in_time
+    work.tell("fitting the base model", 0.5)
     base = kept(store, "base", prepared.problem, lambda: fit_base(prepared.problem, prepared.start))
     ladder = [
         Rung(("static",), None, static_residual(base), None, None),
         Rung.of(("static", "inertia"), "inertia", base),
     ]
-    search = Search(base, ladder, jobs, tell, in_time, store)
+    search = Search(base, ladder, work)
     verdict: Verdict | None = None
     if wrong:  # an effect would be fitted to the wrong entry
         search.rounds.append(Round(base, (), (), ()))
@@ -186,12 +163,12 @@ def diagnose(
         search.base = kept(store, "wide", search.base.problem, lambda: widened(search.base, [LEVEL], DISPERSION))
         ladder[-1] = replace(ladder[-1], fit=search.base)
     floor = deviations(search.base)
-    tell("the laws of the backbone", 1.0)
-    shape = unshaped(search.base, campaign.rig) if prepared.prescribed else shape_of(search.base, campaign.rig, tags)
+    work.tell("the laws of the backbone", 1.0)
+    shape = unshaped(search.base, rig) if prepared.prescribed else shape_of(search.base, rig, tags)
     level = None if wrong else level_of(search.base)
     verdict = verdict if wrong else with_shape(with_level(verdict, level), shape)
     complete = in_time()
-    confirmed = confirm(leading(ladder, search.named), ladder[-1].model, prepared, store, tell, in_time)
+    confirmed = confirm(leading(ladder, search.named), ladder[-1].model, prepared, work)
     return Diagnosis(
         verdict, tuple(ladder), tuple(search.rounds), dict(search.named), prepared, floor, shape, tuple(dropped),
         complete, confirmed, tuple(wrong), level,
