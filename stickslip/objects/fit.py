@@ -30,10 +30,11 @@ from ..system.lazy_method import LazyMethod
 from ..system.object_repr import facts
 from ..system.progress import portion, reporting
 from ..system.runstore import Run
-from .fit_arrays import backbone_curve, contact_force, parameter_covariance, rough_lines
+from .derived import Derived, derived
+from .fit_arrays import backbone_curve, contact_force, parameter_covariance, residual_deviation, rough_lines
 from .fit_plots import FitPlots
 from .fit_result import fit_result
-from .fit_tables import STRENGTH, correlation_table, error_table, ladder_table, parameter_table
+from .fit_tables import STRENGTH, correlation_table, error_table, ladder_table, parameter_table, statistics_of
 from .fitted_model import FittedModel
 from .free_cycles import free_run_errors, simulated_cycles
 from .parameters_by_hand import moved, profile, refitted
@@ -144,6 +145,23 @@ class Fit(FittedModel, Savable):
         """
         return correlation_table(self)
 
+    def derived(self, function: Callable[[Mapping[str, float]], Any]) -> Derived:
+        """A quantity that follows from the parameters, with the deviation that they leave to it:
+        ``fit.derived(lambda p: p["weakening.drop"] * p["contact.strength"])``.
+
+        To first order: by the gradient (finite differences) and :attr:`covariance`. What is not fitted is exact.
+
+        Args:
+            function: takes :attr:`values` (name -> SI) and returns a number, or an array of any shape.
+
+        Returns:
+            ``value`` and ``std``, in the unit of what the function returns and of its shape.
+
+        Raises:
+            InputError: the function asks for a parameter that is none, or does not return finite numbers.
+        """
+        return derived(self, function)
+
     # how far it is from the measurement
 
     @cached_property
@@ -160,6 +178,38 @@ class Fit(FittedModel, Savable):
         """Residual force over the floor of this fit at every point (1), near 1 if the model is right."""
         found = (self.force.residual / self.force.floor).rename("residual")
         return found.assign_attrs(units="1", long_name="residual force / floor")
+
+    @cached_property
+    def residual_std(self) -> xarray.DataArray:
+        """Standard deviation that the uncertainty of what all runs share gives ``residual`` of :attr:`force` (N).
+
+        To first order, by the derivatives and the covariance of the fit: parameters, elements of the contact, what is
+        alike in all cycles. An event of its own deviates by ``floor`` besides, so that a prediction is off by
+        ``numpy.hypot(fit.residual_std, fit.force.floor)``. Errors of the reading that are alike in all cycles are part
+        of the difference of measured and model force, so that this is the deviation of neither alone.
+        """
+        return residual_deviation(self)
+
+    @cached_property
+    def statistics(self) -> pandas.Series:
+        """Numbers of points and parameters, likelihood, chi-square and information criteria, by name.
+
+        Those of several fits are a table, ``pandas.DataFrame({"base": base.statistics, "aged": aged.statistics})``.
+
+        ``points`` are those in use, of so many ``events``. ``parameters`` are the free ones of :attr:`parameters`;
+        ``effective parameters`` are all that the data determine, elements of the contact included, priors taken off;
+        ``sizes`` of noise, misfit and scatter are estimated besides. ``evaluations`` of the model led to the last one.
+        ``cost`` is -2 log-likelihood and priors. The likelihood lacks log(2 pi) for each point; an outlier stays in it,
+        with the strength of the contact as its deviation.
+
+        ``chi-square`` is that of residuals made independent by their covariance, for those of one event go together;
+        reduced, it is over points less effective parameters. The sizes are estimated from the same residuals, so that
+        it is near 1 by itself, and tells a wrong model less than :attr:`error` does.
+
+        ``AIC`` and ``BIC`` count effective parameters and sizes. More points within an event tell little that is new:
+        what counts as an independent datum in ``BIC`` is an event. :func:`stickslip.compare` assumes less.
+        """
+        return statistics_of(self)
 
     @cached_property
     def errors(self) -> pandas.DataFrame:

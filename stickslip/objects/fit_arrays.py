@@ -40,6 +40,15 @@ def parameter_covariance(fit: Fit) -> xarray.DataArray:
     )
 
 
+def residual_deviation(fit: Fit) -> xarray.DataArray:
+    """See :attr:`stickslip.Fit.residual_std`."""
+    found = fit.force_fit
+    slopes = found.slopes.shared
+    variance = ((slopes @ found.covariance) * slopes).sum(axis=1)
+    made = fit.force.residual.copy(data=np.sqrt(np.maximum(variance, 0.0))).rename("residual_std")
+    return made.assign_attrs(long_name="standard deviation of the residual force by the parameters")
+
+
 def contact_force(fit: Fit, where: dict[str, np.ndarray], floor: np.ndarray) -> xarray.Dataset:
     """See :attr:`stickslip.Fit.force`; ``where`` are the coordinates of its points, ``floor`` is theirs (N)."""
     import xarray

@@ -56,6 +56,31 @@ def correlation_table(fit: Fit) -> pandas.DataFrame:
     return table(rows, "pair")
 
 
+def statistics_of(fit: Fit) -> pandas.Series:
+    """See :attr:`stickslip.Fit.statistics`."""
+    import pandas
+
+    found = fit.force_fit
+    points, events = int((~found.dropped).sum()), found.problem.events
+    number, unlikely = found.effective_parameters, float(found.likelihood.sum())
+    counted = number + found.scatter.sizes.size
+    rows = {
+        "points": points,
+        "events": events,
+        "parameters": len(fit.free),
+        "effective parameters": number,
+        "sizes": found.scatter.sizes.size,
+        "evaluations": found.evaluations,
+        "cost": found.cost,
+        "-2 log-likelihood": unlikely,
+        "chi-square": found.chi_square,
+        "reduced chi-square": found.chi_square / (points - number),
+        "AIC": unlikely + 2.0 * counted,
+        "BIC": unlikely + np.log(events) * counted,
+    }
+    return pandas.Series(rows, name="value", dtype=float).rename_axis("statistic")
+
+
 def error_table(fit: ForceFit, found: Sums, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:
     """A measure of :func:`sums`: a row for each phase, a column for each run."""
     problem, (squares, numbers) = fit.problem, found

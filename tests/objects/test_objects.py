@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 import stickslip as ss
 from stickslip.errors import InputError, RunFolderError
 from stickslip.inference.diagnose.decide import Judge
+from stickslip.inference.force.linearised import moved, prior_rows
 from stickslip.inference.force.problem import Problem
 from stickslip.system.runstore import read_result
 
@@ -95,6 +96,45 @@ def test_values_set_by_hand_move_the_force_as_the_derivatives_say(base):
     assert moved.errors.notna().any(axis=None) and moved.error > 0.0
     assert "slopes" not in vars(moved.force_fit)  # which take most of the time, and a hand does not wait for
     assert moved.covariance.shape == base.covariance.shape
+
+
+def test_the_deviation_of_the_residual_is_that_of_draws_of_the_parameters(base):
+    """Forces of draws from the covariance, so near that no weight of an element is drawn below zero."""
+    found, size, draws = base.force_fit, 1e-3, 400
+    scale = np.sqrt(np.diag(found.covariance))  # of newtons and of nanometres
+    values, vectors = np.linalg.eigh(found.covariance / np.maximum(np.outer(scale, scale), 1e-300))
+    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    drawn = []
+    for z in np.random.default_rng(3).standard_normal((draws, values.size)):
+        point = moved(found.point, size * root @ z, found.point.events)
+        drawn.append(found.problem.forces(point).residual)
+    ratio = base.residual_std.values / (np.std(drawn, axis=0) / size)
+    assert np.abs(ratio - 1.0).max() < 5.0 / np.sqrt(2.0 * draws)
+    assert base.residual_std.attrs["units"] == "N" and (base.residual_std.run == base.force.run).all()
+
+
+def test_statistics_are_those_of_independent_residuals_and_determined_parameters(base, aged):
+    data, found, told = base.force, base.force_fit, base.statistics
+    assert told["points"] == (~data.left_out).sum()
+    assert told["events"] == len(set(zip(data.run.values.tolist(), data.event.values.tolist(), strict=True)))
+    assert told["parameters"] == len(base.free) and told["evaluations"] == found.evaluations
+    # the events' own as they are found, not marginalised
+    squares = found._system.plain.squares(found.blocks(found.residual), found.point.events)
+    assert told["chi-square"] == pytest.approx(squares, rel=1e-4)
+    # of what can move, less what the priors determine of it
+    prior, target = prior_rows(found.problem, found.point)
+    assert told["cost"] - told["-2 log-likelihood"] == pytest.approx(
+        target @ target + found.known.prior(found.scatter.sizes)
+    )
+    determined = np.count_nonzero(np.diag(found.covariance)) - np.trace(prior @ found.covariance @ prior.T)
+    assert told["effective parameters"] == pytest.approx(determined, rel=2e-3)
+    counted = told["effective parameters"] + told["sizes"]
+    assert told["AIC"] == pytest.approx(told["-2 log-likelihood"] + 2.0 * counted)
+    assert told["BIC"] == pytest.approx(told["-2 log-likelihood"] + np.log(told["events"]) * counted)
+    better = aged.statistics - told
+    assert better["parameters"] == 4 and better["AIC"] < better["BIC"] < -1000.0
+    off = aged.with_values({"weakening.drop": 1.02 * aged.values["weakening.drop"]}).statistics
+    assert 0.8 < aged.statistics["reduced chi-square"] < 1.2 and off["reduced chi-square"] > 2.0
 
 
 def test_a_fit_comes_back_from_where_a_hand_left_it(base):

@@ -138,6 +138,16 @@ class Fit:
         return self._judged[2] + sum(np.outer(v, v) for v in self.valleys)
 
     @property
+    def chi_square(self) -> float:
+        """Sum of the squared residuals, whitened by the covariance of noise, misfit and events."""
+        return float((self._system.rest**2).sum())
+
+    @property
+    def effective_parameters(self) -> float:
+        """Parameters that the data determine, priors and bounds taken off: the trace of the smoother matrix."""
+        return self._system.effective_parameters(self._judged[2])
+
+    @property
     def cost(self) -> float:
         """Twice the negative logarithm of likelihood and priors, those of the sizes of what is random included."""
         return float(self.likelihood.sum()) + self.prior + self.known.prior(self.scatter.sizes)

@@ -93,6 +93,11 @@ class Linearised:
         out[np.ix_(free, free)] = np.linalg.pinv(part, hermitian=True) * scale[:, None] * scale
         return out
 
+    def effective_parameters(self, covariance: Array) -> float:
+        """Trace of the matrix that makes fitted residuals of measured ones (Hastie & Tibshirani 1990, sec. 3.5)."""
+        rows = self.rows.reshape(-1, self.rows.shape[-1])
+        return float((covariance * (rows.T @ rows)).sum())
+
     def likelihood(self) -> Array:
         """Twice the negative logarithm of the marginal likelihood of each event, shape (E,)."""
         return np.asarray((self.rest**2).sum(axis=1) + self.white.logs)
