@@ -37,6 +37,8 @@ from .wander import wander, wander_sentence
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 class Diagnosis(Savable):
@@ -151,6 +153,11 @@ class Diagnosis(Savable):
         """Arrays behind the pictures, as in ``arrays.nc``."""
         return dataset(self.variables, self.campaign.title)
 
+    @property
+    def plot(self) -> DiagnosisPlots:
+        """Its pictures, such as ``plot.candidates()``; those of its last model are ``best.plot``."""
+        return DiagnosisPlots(self)
+
     def _finish(self, run: Run) -> None:
         finish(run, None if self.found is None and self.folder is None else self.best)
 
@@ -163,6 +170,46 @@ class Diagnosis(Savable):
         if proposed is not None:
             parts.append(facts({"next experiment": proposed["text"]}))
         return parts
+
+
+class DiagnosisPlots:
+    """The pictures of a diagnosis, each of which returns its matplotlib figure.
+
+    All of them take ``ax``: axes to draw in, of a figure of one's own, by its ``rcParams``.
+    """
+
+    def __init__(self, found: Diagnosis) -> None:
+        self._found = found
+
+    def candidates(self, most: int = 15, *, ax: Axes | None = None) -> Figure:
+        """Gain of every effect of the first round, on fitted and on unseen runs, with its deviation.
+
+        Args:
+            most: effects that are drawn, the best.
+            ax: axes to draw in; default a figure of its own.
+        """
+        from ..show.report.fit_figures import candidates_picture
+
+        return candidates_picture(self._found.candidates, most, ax=ax)
+
+    def ladder(self, *, ax: Sequence[Axes] | None = None) -> Figure:
+        """Error of every model on fitted and on unseen runs: over all phases, and by phase (two axes)."""
+        from ..show.report.fit_figures import ladder_picture
+
+        return ladder_picture(self._found.result["ladder"], ax=ax)
+
+    def free(self, *, ax: Sequence[Axes] | None = None) -> Figure:
+        """Free simulations from arrest to arrest: one run, one of its onsets, every recurrence (three axes).
+
+        Raises:
+            InputError: nothing was simulated, for want of time or of cycles.
+        """
+        from ..show.report.free_figures import free_picture
+
+        data = self._found.arrays
+        if "free_run_measured_time" not in data or "free_recurrence_measured" not in data:
+            raise InputError("no cycle of this diagnosis was simulated", hint="allow more time, measure more slips")
+        return free_picture(data, ax=ax)
 
 
 def _experiments(made: Sequence[dict[str, Any]]) -> pandas.DataFrame:

@@ -130,7 +130,7 @@ class Forecast(Savable):
 class ForecastPlots:
     """The pictures of a forecast, each of which returns its matplotlib figure.
 
-    All of them take ``ax``: two axes to draw in, of a figure of one's own.
+    All of them take ``ax``: two axes to draw in, of a figure of one's own, by its ``rcParams``.
     """
 
     def __init__(self, found: Forecast) -> None:
@@ -140,13 +140,13 @@ class ForecastPlots:
         """Levels at onset and arrest against time, and the level at onset against that at the arrest before."""
         from ..show.report.forecast_figures import levels_picture
 
-        return levels_picture(self._data, ax)
+        return levels_picture(self._data, ax=ax)
 
     def calibration(self, *, ax: Sequence[Axes] | None = None) -> Figure:
         """Forecast intervals against what came, and the calibration of every method."""
         from ..show.report.forecast_figures import calibration_picture
 
-        return calibration_picture(self._data, ax)
+        return calibration_picture(self._data, ax=ax)
 
 
 def forecast(

@@ -55,12 +55,17 @@ def of_run(number: int) -> dict[str, str]:
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Decorator of a function that makes a figure: it is drawn in this look, and nobody else's settings change."""
+    """Decorator of a function that makes a figure: it is drawn in this look, and nobody else's settings change.
+
+    Axes of one's own (``ax``) keep the settings of their owner.
+    """
 
     @functools.wraps(draw)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
         from matplotlib import rc_context
 
+        if kwargs.get("ax") is not None:
+            return draw(*args, **kwargs)
         with rc_context(_LOOK):
             return draw(*args, **kwargs)
 

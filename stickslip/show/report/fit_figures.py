@@ -9,12 +9,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, label, plain, scaled, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, figure, label, panels, plain, remark, scaled, styled
 from .figures import series
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
+    from matplotlib.axes import Axes
 
+LINEAR = 10.0  # of a gain, up to which an axis of gains is linear
 _MARKS = {
     "creep": ("o", DARK),
     "slip": ("s", MIDDLE),
@@ -79,9 +82,9 @@ def ramp_grid(data: xarray.Dataset, fits: Sequence[Mapping[str, Any]], most: int
 
 
 @styled
-def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
+def ladder_picture(ladder: Sequence[Mapping[str, Any]], *, ax: Sequence[Axes] | None = None) -> Figure:
     """Errors of every model, on fitted (solid) and on unseen runs (dashed): over all phases, and by phase."""
-    made, axes = figure(1, 2, width=10.0, height=3.8)
+    made, (whole, by_phase) = panels(ax, columns=2, width=10.0, height=3.8)
     labels, before = [], 0
     for i, step in enumerate(ladder):
         parts = step.get("model") or ["model"]
@@ -93,7 +96,7 @@ def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
     for name, text, style in (("train_error", "fitted runs", "-"), ("heldout_error", "unseen runs", "--")):
         y = np.array([np.nan if step.get(name) is None else step[name] for step in ladder], float)
         if np.isfinite(y).any():
-            axes[0, 0].plot(x, y, style, marker="o", color=DARK if style == "-" else MIDDLE, label=text)
+            whole.plot(x, y, style, marker="o", color=DARK if style == "-" else MIDDLE, label=text)
     kinds = ("by_phase", "heldout_by_phase")
     phases = list(dict.fromkeys(p for step in ladder for key in kinds for p in (step.get(key) or {})))
     for phase in phases:
@@ -103,17 +106,44 @@ def ladder_picture(ladder: Sequence[Mapping[str, Any]]) -> Figure:
             found = [(step.get(key) or {}).get(phase) for step in ladder]
             y = np.array([np.nan if v is None else v for v in found], float)
             if np.isfinite(y).any():
-                axes[0, 1].plot(x, y, style, marker=mark, color=colour, label=name)
+                by_phase.plot(x, y, style, marker=mark, color=colour, label=name)
                 name = "_unseen"  # once in the legend
-    axes[0, 0].set_title("all phases", fontsize=9, loc="left")
-    axes[0, 1].set_title("by phase (dashed: unseen runs)", fontsize=9, loc="left")
-    for ax in axes.flat:
-        ax.axhline(1.0, color=LIGHT, ls=":", lw=1.0)
-        if ax.get_lines()[:-1]:
-            ax.set_yscale("log")
-            ax.legend(fontsize=8)
-        ax.set_xticks(x, labels, rotation=20, ha="right")
-        ax.set_ylabel("residual / floor")
+    whole.set_title("all phases")
+    by_phase.set_title("by phase (dashed: unseen runs)")
+    for panel in (whole, by_phase):
+        panel.axhline(1.0, color=LIGHT, ls=":", lw=1.0)
+        if panel.get_lines()[:-1]:
+            panel.set_yscale("log")
+            panel.legend()
+        panel.set_xticks(x, labels, rotation=20, ha="right")
+        panel.set_ylabel("residual / floor")
+    return made
+
+
+@styled
+def candidates_picture(table: pandas.DataFrame, most: int = 15, *, ax: Axes | None = None) -> Figure:
+    """What every effect takes off the cost, of the runs it was fitted to and of unseen ones, the best on top.
+
+    Args:
+        table: with a row for each effect: ``gain``, ``unseen gain`` and its deviation ``+-``.
+        most: rows that are drawn.
+        ax: axes to draw in; default a figure of its own.
+    """
+    columns = ["gain", "unseen gain", "+-"]
+    rows = table.reindex(columns=columns).dropna(subset="gain").head(most)
+    made, (ax,) = panels(ax, width=7.5, height=1.3 + 0.3 * len(rows))
+    if not len(rows):
+        remark(ax, "no effect was refitted")
+        return made
+    y = np.arange(len(rows))
+    gain, unseen, error = (rows[name].to_numpy(float) for name in columns)
+    ax.plot(gain, y, "o", color=DARK, mfc="none", label="fitted runs")
+    ax.errorbar(unseen, y, xerr=error, fmt="D", ms=5, color=MIDDLE, capsize=3, label="unseen runs, one deviation")
+    ax.axvline(0.0, color=LIGHT, lw=1.0)
+    ax.set_xscale("symlog", linthresh=LINEAR, linscale=0.5)
+    ax.set_yticks(y, [plain(name, 40) for name in rows.index])
+    ax.set(xlabel="gain (2 Δ log-likelihood)", ylim=(len(rows) - 0.5, -0.5))
+    ax.legend()
     return made
 
 

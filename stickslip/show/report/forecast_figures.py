@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 
 
 @styled
-def levels_picture(data: xarray.Dataset, axes: Sequence[Axes] | None = None) -> Figure:
+def levels_picture(data: xarray.Dataset, *, ax: Sequence[Axes] | None = None) -> Figure:
     """Levels at onset and arrest against time, and the level at onset against that of the slip before."""
-    made, (ax, beside) = panels(axes, columns=2, width=11.0, height=3.6)
+    made, (first, beside) = panels(ax, columns=2, width=11.0, height=3.6)
     k, unit = scaled(data.onset.values, data.onset.attrs["units"])
     t = data.time_onset.values
-    ax.plot(t, data.onset.values * k, ".-", color=DARK, lw=0.8, ms=4, label="at onset")
-    ax.plot(data.time_arrest.values, data.arrest.values * k, ".-", color=MIDDLE, lw=0.8, ms=4, label="at arrest")
-    ax.axvline(data.attrs["split"], color=LIGHT, ls="--", lw=1.2, label="end of training")
+    first.plot(t, data.onset.values * k, ".-", color=DARK, lw=0.8, ms=4, label="at onset")
+    first.plot(data.time_arrest.values, data.arrest.values * k, ".-", color=MIDDLE, lw=0.8, ms=4, label="at arrest")
+    first.axvline(data.attrs["split"], color=LIGHT, ls="--", lw=1.2, label="end of training")
     name = {"N": "force of the spring", "m": "elongation of the spring"}.get(data.onset.attrs["units"], "level")
-    ax.set(xlabel="time / s", ylabel=f"{name} / {unit}", title=plain(data.attrs["title"]))
-    ax.legend(loc="best", ncols=3)
+    first.set(xlabel="time / s", ylabel=f"{name} / {unit}", title=plain(data.attrs["title"]))
+    first.legend(loc="best", ncols=3)
     on, before = data.onset.values[1:] * k, data.arrest.values[:-1] * k
     beside.plot(before, on, ".", color=DARK, ms=4)
     beside.set(xlabel=f"at the arrest before / {unit}", ylabel=f"at onset / {unit}")
@@ -34,20 +34,20 @@ def levels_picture(data: xarray.Dataset, axes: Sequence[Axes] | None = None) -> 
 
 
 @styled
-def calibration_picture(data: xarray.Dataset, axes: Sequence[Axes] | None = None) -> Figure:
+def calibration_picture(data: xarray.Dataset, *, ax: Sequence[Axes] | None = None) -> Figure:
     """Forecast intervals against measured times, and the distribution of their forecast probabilities."""
-    made, (ax, beside) = panels(axes, columns=2, width=11.0, height=3.8)
+    made, (first, beside) = panels(ax, columns=2, width=11.0, height=3.8)
     order = np.argsort(data.truth.values, kind="stable")
     truth, q = data.truth.values[order], data.quantile_times.values[order]
     every = np.unique(np.linspace(0, truth.size - 1, min(truth.size, 150)).astype(int))
     low, high = q[every, 0], q[every, -1]
-    ax.vlines(truth[every], low, high, color=LIGHT, lw=1.0, label="90 % interval")
-    ax.vlines(truth[every], q[every, 1], q[every, 3], color=MIDDLE, lw=1.6, label="50 % interval")
-    ax.plot(truth[every], q[every, 2], ".", color=DARK, ms=4, label="median")
+    first.vlines(truth[every], low, high, color=LIGHT, lw=1.0, label="90 % interval")
+    first.vlines(truth[every], q[every, 1], q[every, 3], color=MIDDLE, lw=1.6, label="50 % interval")
+    first.plot(truth[every], q[every, 2], ".", color=DARK, ms=4, label="median")
     top = float(max(truth.max(), high.max()))
-    ax.plot([0, top], [0, top], color=DARK, lw=0.8, ls="--")
-    ax.set(xlabel="time to the slip, measured / s", ylabel="forecast / s")
-    ax.legend(loc="upper left")
+    first.plot([0, top], [0, top], color=DARK, lw=0.8, ls="--")
+    first.set(xlabel="time to the slip, measured / s", ylabel="forecast / s")
+    first.legend(loc="upper left")
     share = np.linspace(0.0, 1.0, 101)
     for name, style, colour in zip(
         data.forecaster.values, ("-", "--", "-.", ":"), (MIDDLE, DARK, LIGHT, LIGHT), strict=True

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, plain, scaled, styled
+from ..plots.style import DARK, LIGHT, MIDDLE, logarithmic, panels, plain, scaled, styled
 from .figures import series
 
 if TYPE_CHECKING:
@@ -22,17 +23,20 @@ _MARKS = {"base": ("o", LIGHT), "last": ("x", MIDDLE)}
 
 
 @styled
-def free_picture(data: xarray.Dataset) -> Figure:
+def free_picture(data: xarray.Dataset, *, ax: Sequence[Axes] | None = None) -> Figure:
     """One run measured and predicted, one of its onsets, and the error of every recurrence against the recurrence."""
-    made, axes = figure(1, 3, width=13.0, height=3.8)
+    made, (pull, onset, late) = panels(ax, columns=3, width=13.0, height=3.8)
     run = plain(data["free_run_measured_time"].attrs.get("run", ""), 28)
     event = int(data["free_onset_measured_time"].attrs.get("event", 0))
-    _lines(axes[0, 0], data, "run", "gap", "s", "load point less displacement")
-    axes[0, 0].set_title(f"{run}: pull of the spring")
-    _lines(axes[0, 1], data, "onset", "position", "ms", "displacement since the arrest")
-    axes[0, 1].set_title(f"slip {event + 1} of {run}")
-    _recurrences(axes[0, 2], data)
-    made.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
+    _lines(pull, data, "run", "gap", "s", "load point less displacement")
+    pull.set_title(f"{run}: pull of the spring")
+    _lines(onset, data, "onset", "position", "ms", "displacement since the arrest")
+    onset.set_title(f"slip {event + 1} of {run}")
+    _recurrences(late, data)
+    if ax is None:
+        made.legend(*pull.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
+    else:
+        pull.legend()
     return made
 
 
@@ -66,4 +70,4 @@ def _recurrences(ax: Axes, data: xarray.Dataset) -> None:
     logarithmic(ax, "x")
     ax.set(xlabel="measured recurrence (arrest to onset) / s", ylabel="predicted less measured / %")
     ax.set_title("recurrence of every slip")
-    ax.legend(fontsize=8)
+    ax.legend()
