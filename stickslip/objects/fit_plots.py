@@ -34,7 +34,7 @@ WIDEST = 4.0  # floors that are shown
 class FitPlots:
     """The pictures of a fit, each of which returns its matplotlib figure.
 
-    All of them take ``ax``: axes to draw in, of a figure of one's own.
+    All but :meth:`browse` take ``ax``: axes to draw in, of a figure of one's own, by its ``rcParams``.
     """
 
     def __init__(self, fit: Fit) -> None:
@@ -87,6 +87,44 @@ class FitPlots:
         return made
 
     @styled
+    def browse(self, run: str | None = None) -> Figure:
+        """:meth:`force` of one cycle after the other, with a slider: ``fit.plot.browse("v050")``.
+
+        A window opens with ``matplotlib.pyplot.show()``; a notebook needs ``%matplotlib widget``.
+
+        Args:
+            run: default all runs, one after the other.
+
+        Returns:
+            The figure, whose attribute ``slider`` a script can move: ``figure.slider.set_val(3)`` is the third cycle.
+        """
+        from matplotlib import pyplot
+        from matplotlib.widgets import Slider
+
+        data = self._fit.force
+        names = list(dict.fromkeys(data.run.values)) if run is None else [self._run(run)]
+        cycles = [(name, int(e)) for name in names for e in np.unique(data.event.values[data.run.values == name])]
+        made: Any = pyplot.figure(figsize=(8.0, 5.8), layout="constrained")
+        top, low, below = made.subplots(3, 1, height_ratios=(1.0, 1.0, 0.08))
+
+        @styled
+        def show(number: float) -> Figure:
+            for ax in (top, low):
+                ax.clear()
+            drawn = self.force(*cycles[int(number) - 1], ax=(top, low))
+            made.canvas.draw_idle()
+            return drawn
+
+        count = len(cycles)
+        # kept with the figure, for matplotlib keeps no widget alive
+        made.slider = Slider(
+            below, "cycle", 0.5, count + 0.5, valinit=1, valstep=np.arange(1, count + 1), valfmt=f"%d of {count}",
+            color=LIGHT, initcolor="none",
+        )  # fmt: skip
+        made.slider.on_changed(show)
+        return show(1)
+
+    @styled
     def creep(self, run: str | None = None, event: int | None = None, *, ax: Axes | None = None) -> Figure:
         """Displacement before an onset against the time to it, measured and where the model would be in balance."""
         own, name, number = self._cycle(run, event)
@@ -131,7 +169,7 @@ class FitPlots:
         if own_figure:
             made.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
         else:
-            ax.legend(fontsize=8)
+            ax.legend()
         return made
 
     @styled
