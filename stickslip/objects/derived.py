@@ -35,7 +35,21 @@ class _Values(dict[str, float]):
 
 
 def derived(fit: Fit, function: Callable[[Mapping[str, float]], Any]) -> Derived:
-    """See :meth:`stickslip.Fit.derived`."""
+    """A quantity that follows from the parameters, with the deviation that they leave to it:
+    ``fit.derived(lambda p: p["weakening.drop"] * p["contact.strength"])``.
+
+    To first order: by the gradient (finite differences) and :attr:`stickslip.Fit.covariance`. What is not fitted is exact.
+
+    Args:
+        fit: whose parameters; called as its method, the fit itself.
+        function: takes :attr:`stickslip.Fit.values` (name -> SI) and returns a number, or an array of any shape.
+
+    Returns:
+        ``value`` and ``std``, in the unit of what the function returns and of its shape.
+
+    Raises:
+        InputError: the function asks for a parameter that is none, or does not return finite numbers.
+    """
     values, names = fit.values, fit.covariance.parameter.values.tolist()
     std = np.array([fit.std[name] for name in names])
 

@@ -30,7 +30,6 @@ from ..system.lazy_method import LazyMethod
 from ..system.object_repr import facts
 from ..system.progress import portion, reporting
 from ..system.runstore import Run
-from .derived import Derived, derived
 from .fit_arrays import backbone_curve, contact_force, parameter_covariance, residual_deviation, rough_lines
 from .fit_plots import FitPlots
 from .fit_result import fit_result
@@ -45,6 +44,7 @@ if TYPE_CHECKING:
     import xarray
 
     from .campaign import Campaign
+    from .derived import derived as _derived
     from .posterior import sample as _sample
 
 
@@ -144,23 +144,6 @@ class Fit(FittedModel, Savable):
         A row for each pair, ``of`` one ``and`` the other, with their ``correlation`` (-1 to 1).
         """
         return correlation_table(self)
-
-    def derived(self, function: Callable[[Mapping[str, float]], Any]) -> Derived:
-        """A quantity that follows from the parameters, with the deviation that they leave to it:
-        ``fit.derived(lambda p: p["weakening.drop"] * p["contact.strength"])``.
-
-        To first order: by the gradient (finite differences) and :attr:`covariance`. What is not fitted is exact.
-
-        Args:
-            function: takes :attr:`values` (name -> SI) and returns a number, or an array of any shape.
-
-        Returns:
-            ``value`` and ``std``, in the unit of what the function returns and of its shape.
-
-        Raises:
-            InputError: the function asks for a parameter that is none, or does not return finite numbers.
-        """
-        return derived(self, function)
 
     # how far it is from the measurement
 
@@ -390,9 +373,10 @@ class Fit(FittedModel, Savable):
             return profile(self, name, tell)
 
     if TYPE_CHECKING:
-        sample = _sample
+        sample, derived = _sample, _derived
     else:
         sample = LazyMethod("stickslip.objects.posterior")
+        derived = LazyMethod("stickslip.objects.derived")
 
     # what is kept
 
