@@ -15,6 +15,7 @@ from stickslip.physics.contact import power_law_bank
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
 from stickslip.physics.sensor import Vibrometer, flicker_noise, measure, random_walk, white_noise
 from stickslip.physics.sensor.chain import FRINGE, low_pass
+from stickslip.simulation.scenario.schema import SensorTable
 
 RATE = 10_000.0
 T = np.arange(20_000) / RATE
@@ -196,12 +197,25 @@ def test_effects_of_the_sensor_stand_in_the_order_of_the_instrument():
         ({"low_pass": np.nan}, "sensor.low_pass"),
         ({"white": -1e-12}, "sensor.white"),
         ({"clock_error": -1.0}, "sensor.clock_error"),
+        ({"delay": "3 m"}, r"sensor.delay: the unit 'm' is not one of s"),
         ({"resolution": 0.0, "counter_steps": 4096}, "sensor.resolution: a counter needs a resolution"),
     ],
 )
 def test_an_impossible_vibrometer_is_refused_where_it_is_made(settings, key):
     with pytest.raises(InputError, match=key):
         Vibrometer(**settings)
+
+
+def test_texts_with_units_are_read_as_those_of_a_scenario_file():
+    texts = {
+        "resolution": "8 nm", "gain": "0.01", "interpolation_error": "2 nm", "delay": "1 ms", "low_pass": "2 ms",
+        "high_pass": "3 mHz", "drift": "1 um/min", "random_walk": "2 nm/s**0.5", "white": "3 pm/Hz**0.5",
+        "flicker": "4 nm", "mains": "5 nm", "mains_frequency": "0.06 kHz", "speckle_rate": "2/mm",
+        "speckle_jump": "6 nm", "dropout_rate": "3 1/m", "dropout_time": "4 ms", "clock_error": "1e-5",
+    }  # fmt: skip
+    given = Vibrometer(**texts, seed=3)
+    assert given == Vibrometer(**SensorTable(**texts, seed=3).model_dump(exclude={"clear_at_arrest"}))
+    assert (given.drift, given.white) == pytest.approx((1e-6 / 60.0, 3e-12), rel=1e-12)
 
 
 def test_a_vibrometer_shows_what_was_chosen():

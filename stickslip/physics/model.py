@@ -178,9 +178,9 @@ class Model(Parametrised):
         >>> from dataclasses import replace
         >>> import stickslip as ss
         >>> drive = ss.LoadPoint([0.0, 1.0], [0.0, 50e-6])
-        >>> model = ss.Model(ss.Block(mass=0.05), ss.power_law_bank(0.26, 1e-6, 2.0), ss.Weakening(), drive)
+        >>> model = ss.Model(ss.Block(mass="50 g"), ss.power_law_bank(0.26, 1e-6, 2.0), ss.Weakening(), drive)
         >>> aged = replace(model, effects=(ss.make_effect("contact-ageing", rate=0.02),))
-        >>> stiff = replace(aged, block=replace(aged.block, spring_stiffness=5e3))
+        >>> stiff = replace(aged, block=replace(aged.block, spring_stiffness="5 N/mm"))
         >>> stiff.block
         Block(mass=50 g, spring_stiffness=5 kN/m, damping=10 N s/m)
         >>> [effect.tag for effect in stiff.effects]

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..errors import InputError
-from ..system.units import shown
+from ..system.units import shown, to_si
 
 P = ParamSpec("P")
 
@@ -85,6 +85,12 @@ def span(lower: float, upper: float, unit: str) -> str:
 class Parametrised(eqx.Module):
     """What has fields made by :func:`parameter`, or is made of such parts: it shows their values with units."""
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        for name, made in vars(cls).items():  # fields, of which equinox has not made a data class yet
+            if isinstance(made, dataclasses.Field) and "spec" in made.metadata:
+                made.metadata["converter"].key = f"{getattr(cls, 'tag', '') or cls.__name__}.{name}"
+
     def __repr__(self) -> str:
         known = specs(self)
         said = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
@@ -99,17 +105,31 @@ def _said(value: Any, unit: str) -> str:
     return shown(float(value), unit) if number and np.ndim(value) == 0 else eqx.tree_pformat(value)
 
 
-def _as_float(value: Any) -> Any:
-    if isinstance(value, (bool, int, float, np.ndarray, np.floating, np.integer)):
-        return jnp.asarray(value, dtype=jnp.float64)
-    return value
+class _Converter:
+    """Of a number in SI, or of text with a unit, a 64-bit array; what is traced passes as it is."""
+
+    key: str | None = None  # class and name of the parameter, which a field is not told
+
+    def __init__(self, unit: str) -> None:
+        self.unit = unit
+
+    def __call__(self, value: Any) -> Any:
+        if isinstance(value, str):
+            value = to_si(value, self.unit, key=self.key)
+        if isinstance(value, (bool, int, float, np.ndarray, np.floating, np.integer)):
+            return jnp.asarray(value, dtype=jnp.float64)
+        return value
 
 
 def _described(spec: Callable[P, Spec]) -> Callable[P, Any]:
     def parameter(*args: P.args, **kwargs: P.kwargs) -> Any:
-        """A field of a physical class: a 64-bit float with its :class:`Spec`, whose arguments it takes."""
+        """A field of a physical class: a 64-bit float with its :class:`Spec`, whose arguments it takes.
+
+        Where the class is made, the value is a number in SI or text with a unit; an `InputError` names the parameter if
+        that cannot be read.
+        """
         known = spec(*args, **kwargs)
-        return eqx.field(default=known.default, converter=_as_float, metadata={"spec": known})
+        return eqx.field(default=known.default, converter=_Converter(known.unit), metadata={"spec": known})
 
     taken = inspect.signature(spec).replace(return_annotation=Any)
     parameter.__signature__ = taken  # type: ignore[attr-defined]

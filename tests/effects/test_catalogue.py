@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -63,6 +64,34 @@ def test_laws_show_their_values_with_units() -> None:
     seen: list[str] = []
     jax.jit(lambda block: seen.append(repr(block)) or block.mass)(Block())
     assert "mass=f64[]" in seen[0]
+
+
+def test_texts_with_units_are_what_their_numbers_in_si_are(tmp_path: Path, no_user_effects: None) -> None:
+    block = Block(mass="89 g", spring_stiffness="1.5 N/mm", damping=3.0)
+    assert [float(v) for v in jax.tree.leaves(block)] == pytest.approx([0.089, 1500.0, 3.0], rel=1e-15)
+    assert block.mass.dtype == jnp.float64 and float(replace(block, mass="0.2 kg").mass) == 0.2
+    ageing = catalogue.get("contact-ageing")(rate="0.02", onset_time="1 min")
+    assert (float(ageing.rate), float(ageing.onset_time)) == (0.02, 60.0)
+    (own,) = catalogue.load_file(write(tmp_path / "my_effect.py", MY_EFFECT))
+    assert float(own(length="0.03 mm").length) == pytest.approx(30e-6, rel=1e-15)
+    for make, message in (
+        (lambda: Block(mass="89 mm"), r"(?s)^Block\.mass: the unit 'mm' is not one of kg.*such as '1 kg'"),
+        (lambda: Weakening(healing_time="3"), r"(?s)^Weakening\.healing_time: the unit is missing.*write '3 s'"),
+        (lambda: type(ageing)(rate="2 s"), r"^contact-ageing\.rate: a pure number has no unit 's'"),
+        (lambda: own(length="30 kg"), r"^humming\.length: .*not one of m"),
+    ):
+        with pytest.raises(InputError, match=message):
+            make()
+
+
+def test_values_that_are_traced_pass_a_parameter_untouched() -> None:
+    def momentum(mass: Array) -> Array:
+        block = Block(mass=mass, damping="2 N s/m")
+        assert block.mass is mass
+        return block.damping * block.mass**2
+
+    assert float(jax.grad(momentum)(jnp.asarray(3.0))) == 12.0
+    np.testing.assert_array_equal(jax.jit(jax.vmap(momentum))(jnp.arange(3.0)), [0.0, 2.0, 8.0])
 
 
 @pytest.mark.slow

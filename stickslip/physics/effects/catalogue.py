@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 from ...errors import InputError, nearest
 from ...system import object_repr
 from ...system.registry import Registry
-from ...system.units import to_si
 from ..params import Spec, check, specs, variants
 from .base import Effect, Memory
 
@@ -179,17 +178,12 @@ def make(tag: str, **params: Any) -> Effect:
     """
     cls = get(tag)
     known, forms = specs(cls), variants(cls)
-    values: dict[str, Any] = {}
-    for name, value in params.items():
-        if name in forms:
-            values[name] = value
-        elif name in known:
-            values[name] = to_si(value, known[name].unit, key=f"{tag}.{name}") if isinstance(value, str) else value
-        else:
+    for name in params:
+        if name not in forms and name not in known:
             raise InputError(
                 f"effect '{tag}' has no such parameter", key=f"{tag}.{name}", hint=nearest(name, [*known, *forms])
             )
-    effect = cls(**values)
+    effect = cls(**params)
     check(effect, where=tag)
     return effect
 

@@ -13,16 +13,25 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ...errors import InputError
+from ...system.units import to_si
 from .noise import flicker_noise, random_walk, white_noise
 
 Array = np.ndarray
 FRINGE = 632.8e-9 / 2.0  # m
 _LEAST = {"gain": -1.0, "drift": -1.0, "clock_error": -0.5}  # of what may be negative
+_UNITS = {
+    "resolution": "m", "gain": "1", "interpolation_error": "m", "delay": "s", "low_pass": "s", "high_pass": "Hz",
+    "drift": "m/s", "random_walk": "m/s**0.5", "white": "m/Hz**0.5", "flicker": "m", "mains": "m",
+    "mains_frequency": "Hz", "speckle_rate": "1/m", "speckle_jump": "m", "dropout_rate": "1/m", "dropout_time": "s",
+    "clock_error": "1",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)
 class Vibrometer:
     """Settings of a simulated vibrometer; a value of zero switches that error off.
+
+    Quantities are numbers in SI or text with a unit: ``Vibrometer(resolution="8 nm", low_pass="0.1 ms")``.
 
     Args:
         resolution: one count (m).
@@ -46,7 +55,8 @@ class Vibrometer:
         seed: of everything random; every part draws from its own stream.
 
     Raises:
-        InputError: a size that is negative or not finite, or a counter without a resolution.
+        InputError: a size that is negative or not finite, a unit that cannot be read, or a counter without a
+            resolution.
     """
 
     resolution: float = 7.91e-9
@@ -74,6 +84,9 @@ class Vibrometer:
     def __post_init__(self) -> None:
         for f in fields(self):
             value, least = getattr(self, f.name), _LEAST.get(f.name, 0.0)
+            if isinstance(value, str) and f.name in _UNITS:
+                value = to_si(value, _UNITS[f.name], key=f"sensor.{f.name}")
+                object.__setattr__(self, f.name, value)
             if f.name != "clears" and not least <= value < np.inf:
                 allowed = f"{least:g} or more, in SI"
                 raise InputError("out of range", key=f"sensor.{f.name}", value=value, allowed=allowed)
