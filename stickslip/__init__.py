@@ -44,6 +44,8 @@ _PUBLIC = {
     "Vibrometer": "physics.sensor",
     "measure": "physics.sensor",
     "keep_compiled": "system.cache",
+    "processor_limit": "system.threads",
+    "progress_to": "system.progress",
     "effects": "effects",
     "make_effect": "physics.effects.catalogue:make",
     "StickslipError": "errors",
@@ -95,6 +97,8 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .simulation.solve import integrate as integrate
     from .simulation.solve import slip_derivatives as slip_derivatives
     from .system.cache import keep_compiled as keep_compiled
+    from .system.progress import progress_to as progress_to
+    from .system.threads import processor_limit as processor_limit
     from .workbench import CallableModule as CallableModule
 
     find_events, make_effect = _segment, _make

@@ -5,10 +5,15 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
+import time
 
 import pytest
 
-from stickslip.system.threads import processors
+import stickslip as ss
+from stickslip.errors import InputError
+from stickslip.system import threads
+from stickslip.system.threads import processors, side_by_side
 
 FAULTS = """
 import resource, sys
@@ -43,6 +48,36 @@ def test_only_processors_that_were_given_to_the_process_count(monkeypatch):
         assert processors() == 1
     finally:
         os.sched_setaffinity(0, given)
+
+
+def test_a_limit_of_processors_holds_for_what_is_within(monkeypatch):
+    monkeypatch.setattr(threads, "_ALONE", True)
+    if hasattr(os, "sched_getaffinity"):
+        monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(8)))
+    monkeypatch.setattr(os, "cpu_count", lambda: 8)
+    at_once, most, lock = 0, 0, threading.Lock()
+
+    def work(item):
+        nonlocal at_once, most
+        with lock:
+            at_once += 1
+            most = max(most, at_once)
+        time.sleep(0.02)
+        with lock:
+            at_once -= 1
+        return item**2
+
+    found = {}
+    for limit in (1, 2, 5, 20):
+        most = 0
+        with pytest.raises(KeyError), ss.processor_limit(5), ss.processor_limit(limit):
+            assert side_by_side(work, range(10), range(10)) == [n**2 for n in range(10)]
+            found[limit] = processors(), most
+            raise KeyError
+        assert processors() == 8
+    assert found == {1: (1, 1), 2: (2, 2), 5: (5, 5), 20: (8, 8)}
+    with pytest.raises(InputError, match=r"(?s)number.*allowed: 1 or more"), ss.processor_limit(0):
+        pass
 
 
 @pytest.mark.parametrize("first", ["", "import jax"])

@@ -76,10 +76,11 @@ def working(title: str) -> Iterator[Tell]:
 
 @contextmanager
 def reporting(title: str, progress: Tell | None) -> Iterator[Tell]:
-    """Gives ``progress``; where that is None, a bar if a terminal or a notebook shows it, else silence.
+    """Gives ``progress``, or what :func:`progress_to` says; where there is neither, a bar in a terminal or a notebook.
 
     Work that can be ended from elsewhere, as in the workbench, shows its progress there.
     """
+    progress = _told.get() if progress is None else progress
     if progress is not None:
         yield progress
     elif _asked.get() is None and (_in_notebook() or sys.stderr.isatty()):
@@ -171,6 +172,7 @@ class Cancelled(StickslipError):
     """Long work was told to end."""
 
 
+_told: ContextVar[Tell | None] = ContextVar("told", default=None)
 _asked: ContextVar[Callable[[], bool] | None] = ContextVar("asked", default=None)
 _shown: ContextVar[Callable[[float], None] | None] = ContextVar("shown", default=None)
 
@@ -182,6 +184,24 @@ def _within(variable: ContextVar, value: object) -> Iterator[None]:
         yield
     finally:
         variable.reset(before)
+
+
+def progress_to(tell: Tell | None) -> AbstractContextManager[None]:
+    """Within it, long work that is given no ``progress`` of its own tells this function, and shows no bar.
+
+    Args:
+        tell: called with what is being done and the share of it that is done (0 to 1; None where that is not known).
+            None: nobody is told.
+
+    Returns:
+        What a ``with`` takes; what was before holds again after it. Other threads are not affected.
+
+    Examples:
+        >>> import stickslip as ss
+        >>> with ss.progress_to(None):
+        ...     campaign = ss.load_example()
+    """
+    return _within(_told, silent if tell is None else tell)
 
 
 def cancellable(asked: Callable[[], bool]) -> AbstractContextManager[None]:

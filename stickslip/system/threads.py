@@ -10,10 +10,14 @@ machine, cost more than they share. It also makes last digits independent of how
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import lru_cache
 from typing import TypeVar
+
+from ..errors import ArgumentError
 
 T = TypeVar("T")
 Found = TypeVar("Found")
@@ -26,14 +30,43 @@ def one_for_linear_algebra() -> None:
         os.environ.setdefault(name, "1")
 
 
+_most: ContextVar[int | None] = ContextVar("most", default=None)
+
+
+@contextmanager
+def processor_limit(number: int) -> Iterator[None]:
+    """Within it, work is shared among so many processors at most; what was before holds again after it.
+
+    It is the default of ``jobs`` and ``workers`` everywhere, and holds for the threads of a fit. What one operation of
+    JAX or of linear algebra uses is not counted, and other threads are not affected.
+
+    Args:
+        number: of processors.
+
+    Raises:
+        InputError: less than one.
+
+    Examples:
+        ``with ss.processor_limit(2): campaign.diagnose()`` leaves the others to your colleagues.
+    """
+    if number < 1:
+        raise ArgumentError("work needs a processor", key="number", value=number, allowed="1 or more")
+    before = _most.set(number)
+    try:
+        yield
+    finally:
+        _most.reset(before)
+
+
 def processors() -> int:
     """How many processors this process may use; a queue of jobs or ``taskset`` leaves it a few of the machine's."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    given = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(given, _most.get() or given)
 
 
-@lru_cache(maxsize=1)
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(processors(), thread_name_prefix="side by side")
+@lru_cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="side by side")
 
 
 def side_by_side(call: Callable[[T], Found], items: Iterable[T], sizes: Sequence[int]) -> list[Found]:
@@ -43,17 +76,18 @@ def side_by_side(call: Callable[[T], Found], items: Iterable[T], sizes: Sequence
     share the processors (see :func:`alone`) one after the other.
     """
     given = list(items)
-    if not _ALONE:
+    threads = processors()
+    if threads == 1 or not _ALONE:
         return [call(item) for item in given]
     order = sorted(range(len(given)), key=lambda i: -sizes[i])
-    found = dict(zip(order, _pool().map(call, [given[i] for i in order]), strict=True))
+    found = dict(zip(order, _pool(threads).map(call, [given[i] for i in order]), strict=True))
     return [found[i] for i in range(len(given))]
 
 
-_ALONE = processors() > 1
+_ALONE = True
 
 
 def alone(yes: bool) -> None:
     """Say whether this process has the processors for itself."""
     global _ALONE
-    _ALONE = yes and processors() > 1
+    _ALONE = yes

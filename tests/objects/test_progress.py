@@ -57,6 +57,26 @@ def test_the_callers_own_is_told_and_no_bar_is_shown(monkeypatch):
     assert "a step" in screen.getvalue()
 
 
+def test_what_is_told_of_a_part_of_a_process_ends_with_it(monkeypatch):
+    """As by ``xarray.set_options``: the inner one holds within the outer one, and an error ends both."""
+    screen, heard = terminal(monkeypatch), []
+
+    def work(name, own=None):
+        with reporting(name, own) as tell:
+            tell(name, 0.5)
+
+    with pytest.raises(KeyError), ss.progress_to(lambda text, share: heard.append(text)):
+        work("outer")
+        with ss.progress_to(None):
+            work("inner")
+        work("own", lambda text, share: heard.append("its own"))
+        ss.load_campaign(SHIPPED)
+        raise KeyError
+    assert heard[:2] == ["outer", "its own"] and heard[2] == "reading v050" and screen.getvalue() == ""
+    work("after")
+    assert "after" in screen.getvalue() and "after" not in heard
+
+
 def test_a_script_is_silent(monkeypatch):
     log = terminal(monkeypatch, io.StringIO)
     monkeypatch.setattr(progress, "EVERY", -1.0)
