@@ -6,6 +6,8 @@ import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..system.object_repr import Shown, facts
 from ..system.units import ends, factor_to_si, shown, to_si
-from .resolution import estimate_resolution, noise_level
+from .resolution import estimate_resolution, noise_level, rounding_of_mean
 
 if TYPE_CHECKING:
     import xarray
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 SIGNALS = {"displacement": "m", "velocity": "m/s", "spring_force": "N"}
 CHANNELS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
+MAINS = (50.0, 60.0)  # Hz
 ROLES = ("", "train", "held-out")
 SIZES = ("resolution", "noise", "walk", "hum", "spring_stiffness", "minimum_slip")  # of a trace: numbers, not negative
 
@@ -467,6 +470,86 @@ class Trace(Shown, _Rebuilt):
             time=time, virgin=self.virgin and first == 0, repairs=(*self.repairs, cut),
             missing=tuple(t for t in self.missing if time[0] <= t < time[-1]),
         )  # fmt: skip
+
+    def coarsened(self, rate: float | str) -> Trace:
+        """The record at a lower sampling rate: means of as many samples as come nearest to it.
+
+        The mean is the low-pass before the thinning. Unlike a sharp filter it does not ring where the block slips, and
+        noise that is independent from sample to sample stays so. Means of time go with means of values. No mean reaches
+        over a gap; samples before a gap, and at the end, that are too few for one are left out.
+
+        ``noise`` becomes that of a mean of white noise and of rounding to counts, ``resolution`` the step between means
+        of counts, ``hum`` what a mean leaves of it. Counts that noise does not blur are best left as they are: a fit
+        corrects their rounding, but not that of their means. The trace's warnings say where it is so.
+
+        Args:
+            rate: at most the record's own (Hz or text). A slip, and each period of the ringing after it, needs some
+                samples.
+
+        Raises:
+            InputError: the rate is not positive or above that of the record, a unit that cannot be read, or less than
+                two means.
+
+        Examples:
+            >>> import stickslip as ss
+            >>> trace = ss.load_example()["v050"]
+            >>> coarse = trace.coarsened("2 kHz")
+            >>> print(coarse.repairs[-1])
+            coarsened: 113680 (all channels): means of 5 samples, 10 kHz to 2 kHz
+        """
+        step = float(np.median(np.diff(self.time[:200_001])))
+        wanted = to_si(rate, "Hz", key="rate")
+        if not 0.0 < wanted <= 1.001 / step:
+            allowed = f"above 0 Hz, up to {shown(1.0 / step, 'Hz')}"
+            raise InputError(f"trace '{self.name}': no coarser sampling", key="rate", value=rate, allowed=allowed)
+        size = round(1.0 / (wanted * step))
+        if size == 1:
+            return self
+        edges = [0, *np.searchsorted(self.time, self.missing, side="right").tolist(), self.time.size]
+        numbers = [(stop - start) // size for start, stop in pairwise(edges)]  # of means between gaps
+        if sum(numbers) < 2:
+            raise InputError(f"trace '{self.name}': less than two means of {size} samples", key="rate", value=rate)
+
+        def means(values: Array) -> Array:
+            parts = [values[a : a + size * n].reshape(n, size) for a, n in zip(edges[:-1], numbers, strict=True)]
+            return np.concatenate([part.mean(axis=1) for part in parts])
+
+        time = means(self.time)
+        last = np.unique(np.cumsum(numbers)) - 1
+        noise, alike = self._of_mean(size)
+        told = f"counts that noise hardly blurs: means of {size} keep their rounding, which a fit can no longer correct"
+        lost, rates = self.time.size - time.size, f"{shown(1.0 / step, 'Hz')} to {shown(1.0 / (size * step), 'Hz')}"
+        note = Repair("coarsened", lost, "all channels", f"means of {size} samples, {rates}")
+        return self.replace(
+            **{name: means(values) for name, values in self.channels.items()}, time=time, noise=noise,
+            resolution=None if self.resolution is None else self.resolution / size,
+            hum=self.hum * max(abs(float(np.sinc(f * size * step))) for f in MAINS),
+            missing=tuple(time[last[(last >= 0) & (last < time.size - 1)]].tolist()),
+            repairs=(*self.repairs, note), warnings=(*self.warnings, *([told] if alike else [])),
+        )  # fmt: skip
+
+    def _of_mean(self, size: int) -> tuple[float | None, bool]:
+        """Noise of the mean of so many samples, and whether most of it is rounding, which errs alike in all of them."""
+        if self.noise is None:
+            return None, False
+        whole, alike, count = self.noise**2, 0.0, self.resolution
+        if count:
+            spread = math.sqrt(max(whole - count**2 / 12.0, 0.0))
+            alike = min(float(rounding_of_mean(np.zeros(()), count, spread)), whole)
+        return math.sqrt((whole - alike) / size + alike), 2.0 * alike > whole
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all that a fit takes of the trace; equal traces have the same."""
+        found = hashlib.sha256()
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, Drive):
+                value = np.stack([value.times, value.positions])
+            if f.name not in ("name", "repairs", "warnings", "provenance"):
+                found.update(f.name.encode())
+                found.update(value if isinstance(value, np.ndarray) else repr(value).encode())
+        return found.hexdigest()
 
     def _parts(self) -> list[str]:
         speed, spring = self.drive_velocity, self.spring_stiffness

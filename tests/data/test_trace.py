@@ -81,6 +81,71 @@ def test_a_part_of_a_trace_is_a_record_of_its_own():
         whole.between(20.0)
 
 
+def test_a_coarser_record_is_what_xarray_makes_of_it():
+    t = np.arange(0.0, 1.0, 1e-3)
+    x, load = np.cumsum(np.random.default_rng(1).normal(0.0, 1e-7, (2, t.size)), axis=1)
+    whole = Trace("a", t, displacement=x, normal_load=load, drive=Drive.constant(2.0), walk=1e-9, virgin=True)
+    coarse = whole.coarsened("0.14 kHz")  # means of 7 samples come nearest
+    expected = whole.to_xarray().coarsen(time=7, boundary="trim").mean()
+    for name in ("displacement", "normal_load", "time"):
+        np.testing.assert_allclose(getattr(coarse, name), expected[name], rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(coarse.drive.position(coarse.time), expected["load_point"], rtol=1e-12)
+    assert coarse.virgin and coarse.walk == 1e-9 and coarse.sampling_rate == pytest.approx(1000.0 / 7.0)
+    assert [(r.kind, r.count) for r in coarse.repairs] == [("coarsened", t.size - t.size // 7)]
+    assert whole.coarsened(900.0) is whole
+    for rate, word in (("2 kHz", "(?s)no coarser sampling.*up to 1 kHz"), (-5.0, "no coarser"), (1.5, "less than two")):
+        with pytest.raises(InputError, match=word):
+            whole.coarsened(rate)
+
+
+def test_no_mean_reaches_over_a_gap():
+    t = np.delete(np.arange(40.0), [13, 14, 15, 30])
+    t = np.delete(t, np.flatnonzero((t > 15.0) & (t < 18.0)))  # 16 and 17 are lost too
+    trace = Trace("a", t, displacement=t.copy(), missing=(12.0, 29.0))
+    coarse = trace.coarsened(0.25)
+    assert coarse.time.tolist() == [1.5, 5.5, 9.5, 19.5, 23.5, 27.5, 32.5, 36.5]
+    assert coarse.missing == (9.5, 27.5) and np.array_equal(coarse.displacement, coarse.time)
+    short = Trace("a", t, displacement=t.copy(), missing=(1.0, 12.0, 29.0, 38.0)).coarsened(0.25)
+    assert short.missing == (7.5, 27.5)  # before the first mean, and after the last, there is none
+
+
+@pytest.mark.parametrize("blur", [0.0, 0.2, 0.35, 0.8])  # of a count
+def test_the_noise_of_means_is_that_of_counted_readings(blur):
+    """Without noise all counts of a mean err alike; noise of half a count makes them err by themselves."""
+    count, size, rng = 8e-9, 25, np.random.default_rng(5)
+    truth = np.repeat(rng.random(4000), size) + np.repeat(np.arange(4000), size)
+    x = count * np.round(truth + blur * rng.standard_normal(truth.size))
+    noise = count * np.sqrt(blur**2 + 1.0 / 12.0)
+    trace = Trace("a", np.arange(x.size) * 1e-4, displacement=x, noise=noise, resolution=count)
+    coarse = trace.coarsened("400 Hz")
+    measured = np.std(coarse.displacement - count * truth[::size])
+    assert coarse.noise == pytest.approx(measured, rel=0.04)  # eight terms of the series leave 3 %
+    assert coarse.resolution == count / size
+    grid = coarse.displacement / coarse.resolution
+    assert np.abs(grid - np.round(grid)).max() < 1e-6
+    assert bool(coarse.warnings) == (blur < 0.2)
+
+
+def test_hum_is_what_means_leave_of_it():
+    t = np.arange(0.0, 2.0, 1e-3)
+    trace = Trace("a", t, displacement=3e-9 * np.sin(99.3 * np.pi * t), hum=3e-9)
+    coarse = trace.coarsened("200 Hz")
+    left = np.ptp(coarse.displacement) / 2.0  # its phase goes through all values, for the mains are a little slow
+    assert left < 2.8e-9 and coarse.hum == pytest.approx(left, rel=0.03)
+
+
+def test_traces_of_one_digest_have_the_same_numbers():
+    t = np.arange(0.0, 1.0, 1e-2)
+    trace = Trace("a", t, displacement=t**2, noise=1e-9, drive=Drive.constant(2.0))
+    same = pickle.loads(pickle.dumps(trace.replace(name="b", warnings=("odd",))))  # noqa: S301  (bytes of its own)
+    assert same.digest == trace.digest
+    others = [
+        trace.coarsened(50.0), trace.between(stop=0.5), trace.replace(noise=2e-9), trace.replace(role="held-out"),
+        trace.replace(drive=Drive.constant(2.1)), trace.replace(displacement=None, velocity=t**2),
+    ]  # fmt: skip
+    assert len({trace.digest, *(other.digest for other in others)}) == 7
+
+
 def test_a_trace_goes_to_xarray_and_back():
     t = np.arange(0.0, 3.0, 0.5)
     trace = Trace("a", t, displacement=t**2, normal_load=t + 1.0, drive=Drive.constant(2.0))

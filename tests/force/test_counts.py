@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.inference.force.counts import counted, of_mean, rounding
+from stickslip.data.resolution import rounding_of_mean
+from stickslip.inference.force.counts import counted, rounding
 from stickslip.inference.force.knots import CREEP, unrounded
 from stickslip.inference.force.scales import Scales
 from stickslip.inference.force.smoothing import smoothed
@@ -32,7 +33,7 @@ def test_the_mean_over_a_way_scatters_as_it_says(counts, noise):
         for k in range(1, 40)
     )
     found = np.var((COUNT / np.pi * faded).mean(axis=1))
-    assert of_mean(np.array([counts * COUNT]), COUNT, noise * COUNT)[0] == pytest.approx(
+    assert rounding_of_mean(np.array([counts * COUNT]), COUNT, noise * COUNT)[0] == pytest.approx(
         found, rel=0.1, abs=2e-4 * COUNT**2
     )
 
@@ -45,7 +46,7 @@ def test_and_so_do_rounded_readings(noise):
     errors = COUNT * np.round((x + draws) / COUNT) - x
     single = COUNT**2 * (noise**2 + 1.0 / 12.0) / samples
     found = np.var(errors.mean(axis=1))
-    expected = of_mean(np.array([counts * COUNT]), COUNT, noise * COUNT)[0]
+    expected = rounding_of_mean(np.array([counts * COUNT]), COUNT, noise * COUNT)[0]
     assert 0.97 * expected < found < 1.03 * expected + single
 
 

@@ -1,7 +1,7 @@
 """Counts of a sensor without what rounding adds to them in the mean.
 
 Between two counts the mean of rounded readings is not the motion's, unless noise of about half a count goes with it
-(Widrow & Kollár, Quantization Noise, 2008, ch. 4 and 9). What is left depends on the position, in the
+(:func:`stickslip.data.resolution.rounding_of_mean`). What is left depends on the position, in the
 same way in all events.
 """
 
@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...data.resolution import TERMS
+
 Array = NDArray[np.float64]
-TERMS = 8  # of the Fourier series, as many as noise of a tenth of a count leaves
 ON_GRID = 0.02  # of a count, by which readings may lie beside a multiple
 
 
@@ -21,22 +22,6 @@ def counted(readings: Array, count: float) -> bool:
         return False
     steps = (readings - readings[0]) / count
     return bool(np.abs(steps - np.round(steps)).max() < ON_GRID)
-
-
-def of_mean(way: Array, count: float, spread: float) -> Array:
-    """Variance of what rounding to counts adds to the mean of readings over an even way (m^2), shape as ``way``.
-
-    Over whole counts nothing is left, over a part of one as much as a twelfth of its square. Where on the count the way
-    begins is not known.
-
-    Args:
-        way: (m).
-        count: (m).
-        spread: standard deviation of the noise before the rounding (m).
-    """
-    k = np.arange(1, TERMS + 1)
-    sizes = count / np.pi / k * np.exp(-2.0 * (np.pi * k * spread / count) ** 2)
-    return np.asarray((0.5 * sizes**2 * np.sinc(np.abs(way)[..., None] / count * k) ** 2).sum(axis=-1))
 
 
 def rounding(x: Array, count: float, spread: Array | float) -> Array:

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from ...data.resolution import rounding_of_mean
 from ...data.segment import Event, Segmentation
 from ...data.trace import Trace
-from .counts import counted, of_mean, rounding
+from .counts import counted, rounding
 from .inserted_knots import Inserted
 from .kernels import band, kernels
 from .later_ringing import Turns, later_turns
@@ -369,7 +370,7 @@ class _Pieces:
         spread = np.sqrt(max(noise**2 - count**2 / 12.0, 0.0))
         for knot, edges in self.window:
             length = np.diff(edges)
-            added = of_mean(v[knot] * length * step, count, spread)
+            added = rounding_of_mean(v[knot] * length * step, count, spread)
             out[edges[0] : edges[-1]] += np.repeat(added * length / noise**2, length)
         return out
 

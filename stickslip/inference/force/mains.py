@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...data.segment import Segmentation
-from ...data.trace import Trace
+from ...data.trace import MAINS, Trace
 from .sampling import even
 
 Array = NDArray[np.float64]
-MAINS = (50.0, 60.0)  # Hz
 BESIDE = np.array([-12.0, -9.0, -6.0, 6.0, 9.0, 12.0])  # Hz, where there is no hum
 ABOVE = 3.0  # times the root mean square of the amplitudes there
 SHORTEST = 1.2  # periods of the mains in a stick that tells of it
