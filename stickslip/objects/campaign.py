@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -111,6 +113,62 @@ class Campaign(Shown, Mapping[str, Trace]):
     def get(self, name: str, default: Any = None) -> Any:
         """The run of that name, or the default where there is none."""
         return next((trace for trace in self.traces if trace.name == name), default)
+
+    def only(self, *names: str) -> Campaign:
+        """A campaign of these runs alone, in the order that they have here, with the same rig.
+
+        Args:
+            names: of the runs to keep.
+
+        Raises:
+            InputError: no name, or no run of that name.
+
+        Examples:
+            >>> import stickslip as ss
+            >>> campaign = ss.load_example()
+            >>> campaign.only("v050", "v400").names
+            ['v050', 'v400']
+            >>> campaign.without("holds").names
+            ['v050', 'v100', 'v200', 'v400']
+        """
+        kept = {self[name].name for name in names}
+        if not kept:
+            raise InputError("a campaign needs at least one trace", key="names", allowed=", ".join(self.names))
+        return self._of(trace for trace in self.traces if trace.name in kept)
+
+    def without(self, *names: str) -> Campaign:
+        """A campaign of all other runs; see :meth:`only`.
+
+        Args:
+            names: of the runs to leave out.
+
+        Raises:
+            InputError: no run of that name, or none is left.
+        """
+        left = {self[name].name for name in names}
+        return self.only(*(name for name in self.names if name not in left))
+
+    def map(self, change: Callable[[Trace], Trace]) -> Campaign:
+        """A campaign of changed runs, with the same rig: ``campaign.map(lambda trace: trace.coarsened("2 kHz"))``.
+
+        Args:
+            change: makes of a run the one to take its place, of the same name.
+
+        Raises:
+            InputError: what it makes is no trace, or has another name.
+        """
+        made = [change(trace) for trace in self.traces]
+        for trace, new in zip(self.traces, made, strict=True):
+            if not isinstance(new, Trace) or new.name != trace.name:
+                value = new.name if isinstance(new, Trace) else type(new).__name__
+                raise InputError("not a run of the same name", key=trace.name, value=value, allowed="a Trace")
+        return self._of(made)
+
+    def _of(self, traces: Iterable[Trace]) -> Campaign:
+        """The same rig with other runs of names that it knows; no file says what it is."""
+        kept = tuple(traces)
+        entries = tuple(self.description.entry(trace.name) for trace in kept)
+        return Campaign(replace(self.description, entries=entries, filed=False), kept, self.effect_files)
 
     __eq__ = object.__eq__  # of itself alone: comparing every sample is not what a dictionary or a set asks for
     __hash__ = object.__hash__
@@ -257,11 +315,14 @@ class Campaign(Shown, Mapping[str, Trace]):
         return table(rows, "run")
 
     def inputs(self) -> list[dict[str, str]]:
-        """Name and SHA-256 of everything with measured numbers."""
+        """Name and SHA-256 of all that a fit depends on: the files, or each run and its rig where none has both."""
         from ..system.runstore import file_record
 
+        def of(trace: Trace) -> str:
+            return hashlib.sha256(f"{self.description.rig_of(trace.name)!r} {trace.digest}".encode()).hexdigest()
+
         if not self.description.filed:
-            return [{"file": t.name, "sha256": t.provenance.sha256} for t in self.traces]
+            return [{"file": trace.name, "sha256": of(trace)} for trace in self.traces]
         return [file_record(path) for path in (self.description.path, *self.description.files)]
 
     @property
