@@ -548,7 +548,7 @@ class Trace(Shown, _Rebuilt):
                 value = np.stack([value.times, value.positions])
             if f.name not in ("name", "repairs", "warnings", "provenance"):
                 found.update(f.name.encode())
-                found.update(value if isinstance(value, np.ndarray) else repr(value).encode())
+                found.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
         return found.hexdigest()
 
     def _parts(self) -> list[str]:
