@@ -45,6 +45,21 @@ def test_attributes_say_how_it_was_made(stick_slip):
     assert stick_slip.attrs["steps"] > 100
 
 
+@pytest.mark.parametrize("length", [{"events": 3}, {"duration": "30 s"}])
+def test_it_ends_where_a_condition_turns_true(stick_slip, length):
+    scenario = make_scenario({**rig(), "drive": {"velocity": "200 um/s", **length}})
+    found = simulate(scenario, until=lambda steps: (steps.v < 0.0) & (steps.x > 5e-5))
+    assert stick_slip.attrs["ended"] == "complete" and found.attrs["ended"] == "until"
+    v, x = stick_slip["velocity"].values, stick_slip["displacement"].values
+    first = float(stick_slip["time"][np.argmax((v < 0.0) & (x > 5e-5))])
+    assert float(found["time"][-1]) == pytest.approx(first, abs=3e-4)
+    n = min(found.sizes["time"], stick_slip.sizes["time"]) - 1
+    np.testing.assert_allclose(found["displacement"][:n], x[:n], atol=1e-8)
+    assert found.attrs["verdict"].startswith("stick-slip: 2 slip events in")
+    short = simulate(scenario, until=lambda steps: steps.x > 1e-7)
+    assert short.attrs["verdict"].endswith("where the run was ended") and short.sizes["event"] == 0
+
+
 def test_it_survives_netcdf(stick_slip, tmp_path):
     stick_slip.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
     with xarray.open_dataset(tmp_path / "a.nc", engine="h5netcdf", decode_times=False) as back:

@@ -18,7 +18,7 @@ from stickslip.physics.effects.catalogue import make
 from stickslip.physics.effects.inertia import AddedMass
 from stickslip.physics.model import LoadPoint
 from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
-from stickslip.simulation.solve.integrate import observe, step_control
+from stickslip.simulation.solve.integrate import PIECE, observe, step_control
 from stickslip.simulation.solve.trajectory import Steps
 from stickslip.system.trace_cache import Program
 
@@ -55,6 +55,65 @@ def test_goes_on_from_a_state(first_event):
         first_event.steps.t[np.argmax(first_event.steps.v > 5e-4)], abs=5e-4
     )
     assert s.x[-1] == pytest.approx(first_event.steps.x[-1], rel=1e-2)
+
+
+def test_a_run_ends_where_its_condition_turns_true(first_event):
+    """To a hundred nanoseconds of the run without it, in states that no two steps end in."""
+    conditions = [
+        (lambda steps: steps.x > 3e-6, first_event.steps.x, 3e-6),
+        (lambda steps: (steps.v > 5e-4) & (steps.t > 1.0), first_event.steps.v, 5e-4),
+        (lambda steps: steps.spring_force - steps.contact_force > 1e-3, None, None),
+    ]
+    for until, values, level in conditions:
+        ended, state = integrate(rig(), 1e3, until=until)
+        assert ended.stats.ended == "until" and ended.to_xarray().attrs["ended"] == "until"
+        true = until(ended.at(ended.steps.t[-1] + np.array([-1e-6, 0.0])))
+        near = until(first_event.at(ended.steps.t[-1] + np.array([-1e-6, 1e-6])))
+        assert not true[0] and near.tolist() == [False, True]
+        if values is not None:
+            i = int(np.argmax(values > level))
+            assert first_event.steps.t[i - 1] < ended.steps.t[-1] < first_event.steps.t[i]
+        assert float(state.x) == ended.steps.x[-1]
+        n = ended.steps.t.size - 1
+        assert np.array_equal(ended.steps.x[:n], first_event.steps.x[:n])  # the way there is the same
+        rest, _ = integrate(rig(), 5.6, t0=float(ended.steps.t[-1]), state=state)
+        assert rest.steps.x[-1] == pytest.approx(first_event.steps.x[-1], rel=1e-3)
+    assert first_event.stats.ended == "complete"
+    never, _ = integrate(rig(), 5.6, until=lambda steps: steps.x > 1.0)
+    assert never.stats.ended == "complete" and np.array_equal(never.steps.x, first_event.steps.x)
+
+
+def test_one_truth_for_all_steps_ends_a_run_at_the_last_of_them():
+    asked = []
+
+    def later(steps):
+        asked.append(float(steps.t[-1]))
+        return len(asked) == 2
+
+    ended, state = integrate(rig(), 5.6, stops=(2.0, 4.0), until=later)
+    assert asked == [2.0, 4.0] and ended.steps.t[-1] == 4.0 and ended.stats.ended == "until"
+    without, same = integrate(rig(), 4.0, stops=(2.0,))
+    assert np.array_equal(ended.steps.x, without.steps.x) and float(state.x) == float(same.x)
+
+
+@pytest.mark.slow
+def test_a_condition_is_met_after_more_steps_than_are_compiled_as_one():
+    ended, state = integrate(rig(), 1e3, until=lambda steps: steps.t > 17.0)
+    assert ended.stats.steps + ended.stats.rejected > PIECE and ended.stats.steps == ended.steps.t.size - 1
+    assert ended.steps.t[-1] == pytest.approx(17.0, abs=1e-7) and float(state.x) == ended.steps.x[-1]
+
+
+@pytest.mark.parametrize(
+    ("until", "said"),
+    [
+        (lambda steps: steps.x - 1e-6, r"until: not a truth at each step.*float64"),
+        (lambda steps: steps.x[1:] > 1e-6, "not a truth at each step"),
+        (lambda steps: steps.x < 1e-6, "true at the start"),
+    ],
+)
+def test_a_condition_that_cannot_end_a_run_is_refused(until, said):
+    with pytest.raises(InputError, match=said):
+        integrate(rig(), 1.0, until=until)
 
 
 def test_a_trace_is_read_off_between_the_steps():
@@ -135,7 +194,7 @@ def test_a_number_lost_on_the_way_is_reported_with_its_time():
     with pytest.raises(SolveError, match=r"t = [1-3]\.\d+ s .*no longer a number|force that jumps") as told:
         integrate(rig(effects=(_Lost(),)), 4.0)
     way = told.value.trajectory  # up to where the fault is
-    assert way.steps.t[0] == 0.0 and way.stats.steps == way.steps.t.size - 1
+    assert way.steps.t[0] == 0.0 and way.stats.ended == "failed" and way.stats.steps == way.steps.t.size - 1
     assert np.nanmax(way.steps.x) == pytest.approx(1e-7, rel=0.05)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from importlib.metadata import version
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -44,12 +45,16 @@ class _Simulated(NamedTuple):
     sliding: Sliding
 
 
-def simulate(scenario: Scenario, progress: Tell | None = None) -> xarray.Dataset:
+def simulate(
+    scenario: Scenario, progress: Tell | None = None, until: Callable[[Steps], Any] | None = None
+) -> xarray.Dataset:
     """Simulate a scenario.
 
     Args:
         scenario: from `load_scenario`.
         progress: told how far it is and the share of it; default a bar in a terminal or a notebook.
+        until: ends the run early, where it first turns true, such as ``lambda steps: steps.x > 1e-4``; see
+            :func:`stickslip.integrate`.
 
     Returns:
         A data set with the dimensions ``time`` (the output's samples), ``event`` and ``static``; every variable has its
@@ -60,23 +65,23 @@ def simulate(scenario: Scenario, progress: Tell | None = None) -> xarray.Dataset
         - on ``event``: onset, arrest (s), slip (m), peak_velocity (m/s), recurrence (s), creep_before_slip (m);
         - on ``static``: static_displacement (m) and static_time (s) of the first stick without inertia and weakening.
 
-        Attributes: N, L, seeds, versions, steps, rejected, energy_error, facts of the contact, and whether and why the
-        rig slides.
+        Attributes: N, L, seeds, versions, steps, rejected, energy_error, how it ended (``"complete"`` or ``"until"``),
+        facts of the contact, and whether and why the rig slides.
 
     Raises:
         SolveError: the integration failed; says when and what to change.
-        InputError: the output would not fit into memory.
+        InputError: the output would not fit into memory, or ``until`` cannot be used.
     """
-    return record(scenario, progress).dataset()
+    return record(scenario, progress, until).dataset()
 
 
-def record(scenario: Scenario, progress: Tell | None = None) -> Recording:
+def record(scenario: Scenario, progress: Tell | None = None, until: Callable[[Steps], Any] | None = None) -> Recording:
     """`simulate` without making a data set of it; arguments and errors as there."""
     setup = build(scenario)
     file = scenario.file
     sliding = steady_sliding(file.block, file.weakening, setup.contact.strength, setup.motion.fastest)
     with reporting("simulating", progress) as tell:
-        trajectory, events, end = _run(scenario, setup, sliding, tell)
+        trajectory, events, end = _run(scenario, setup, sliding, tell, until)
     samples = math.floor(end * file.output.sampling_rate) + 1
     if samples > _MOST_SAMPLES:
         key, value, allowed = "output.sampling_rate", f"{samples} samples", f"at most {_MOST_SAMPLES}"
@@ -85,8 +90,10 @@ def record(scenario: Scenario, progress: Tell | None = None) -> Recording:
     return _recording(_Simulated(scenario, setup, trajectory, events, sliding), t)
 
 
-def _run(scenario: Scenario, setup: Setup, sliding: Sliding, tell: Tell) -> tuple[Trajectory, Events, float]:
-    """Integrate to the end of the drive or until the wanted number of slips is complete."""
+def _run(
+    scenario: Scenario, setup: Setup, sliding: Sliding, tell: Tell, until: Callable[[Steps], Any] | None
+) -> tuple[Trajectory, Events, float]:
+    """Integrate to the end of the drive, or until the wanted number of slips is complete or the condition holds."""
     wanted, solver = scenario.file.drive.events, scenario.file.solver
     parts: list[Trajectory] = []
     state, now = setup.start, 0.0
@@ -108,12 +115,13 @@ def _run(scenario: Scenario, setup: Setup, sliding: Sliding, tell: Tell) -> tupl
             stops=setup.motion.stops,
             largest_step=solver.largest_step,
             progress=report,
+            until=until,
         )
         parts.append(part)
-        now = end
+        now = float(part.steps.t[-1])
         count = len(find_slips(_joined(parts), setup.motion, setup.contact.strength))
-        report(end, part.steps)
-        if wanted is not None and count >= wanted:
+        report(now, part.steps)
+        if part.stats.ended == "until" or (wanted is not None and count >= wanted):
             break
     whole = _joined(parts)
     return whole, find_events(whole, setup.motion, setup.contact.strength), now
@@ -142,7 +150,7 @@ def _joined(parts: list[Trajectory]) -> Trajectory:
     whole = Steps(*(np.concatenate(a) for a in zip(steps[0], *rest, strict=True)))
     stats = [part.stats for part in parts]
     steps_made, rejected, seconds = (sum(getattr(s, key) for s in stats) for key in ("steps", "rejected", "seconds"))
-    return Trajectory(whole, Stats(steps_made, rejected, energy_error(whole), seconds))
+    return Trajectory(whole, Stats(steps_made, rejected, energy_error(whole), seconds, stats[-1].ended))
 
 
 def _recording(made: _Simulated, t: np.ndarray) -> Recording:
@@ -210,6 +218,7 @@ def _attributes(made: _Simulated) -> dict[str, object]:
         "steps": trajectory.stats.steps,
         "rejected": trajectory.stats.rejected,
         "energy_error": trajectory.stats.energy_error,
+        "ended": trajectory.stats.ended,
         "friction_force": built.strength,
         "contact_stiffness": built.stiffness,
         "u_max": built.u_max,
@@ -237,6 +246,8 @@ def _verdict(made: _Simulated) -> str:
         if sliding.stable and n > 1:
             return f"{text}, from rest; once it slides it would go on sliding{beyond}: {sliding.reason}"
         return text
+    if trajectory.stats.ended == "until":
+        return f"no slip event within {end:.4g} s, where the run was ended"
     if sliding.stable:
         return f"no slip event, the block slides{beyond}: {sliding.reason}"
     speed = setup.motion.fastest

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ...errors import InputError, SolveError
+from ...errors import ArgumentError, InputError, SolveError
 from ...physics.contact import Bank
 from ...physics.effects.base import Motion
 from ...physics.model import Model, State
@@ -25,6 +25,7 @@ from .trajectory import Stats, Steps, Trajectory, energy_error
 PIECE = 16384  # steps between two looks at the clock; bounds the memory of one compiled call
 SMALLEST_STEP = 1e-10  # s; four orders below the period of any contact resonance a vibrometer could see
 LEAST_ADVANCE = 4e-2  # of the contact's period in PIECE steps; the tightest tolerance takes a hundred times as much
+ZOOMS = 3  # into a hundredth of a step each, to find where a condition turns true
 
 _TERM = Increments()
 _ARRAY = "an array"  # in the place of an argument's leaf that is traced
@@ -148,6 +149,7 @@ def integrate(
     largest_step: float = 0.02,
     most_steps: int = 50_000_000,
     progress: Callable[[float, Steps], None] | None = None,
+    until: Callable[[Steps], Any] | None = None,
 ) -> tuple[Trajectory, State]:
     """Integrate the equation of motion.
 
@@ -160,13 +162,17 @@ def integrate(
         largest_step: longest step (s).
         most_steps: give up after so many steps.
         progress: called now and then with the time reached (s) and the last piece's steps.
+        until: ends the run early, where it first turns true: whether it is at each of some :class:`Steps`, such as
+            ``lambda steps: steps.x > 1e-4``. What is true within a step only is not seen. One truth for all of them,
+            such as ``lambda steps: time.monotonic() > deadline``, ends the run at the last of them.
 
     Returns:
-        The trajectory and the state at ``t1``.
+        The trajectory and the state at its end, which is ``t1`` or where ``until`` turned true.
 
     Raises:
         InputError: mass, spring, damping, weakening or an element of the contact is outside its range; the end is not
-            after the start, the longest step is not positive, or the state is that of a model of another form.
+            after the start, the longest step is not positive, the state is that of a model of another form, or
+            ``until`` is true at the start or not a truth at each step.
         SolveError: the steps became too small to get anywhere or a number was lost; says when and what to change, and
             has the motion up to there as its ``trajectory``.
     """
@@ -189,18 +195,24 @@ def integrate(
     pieces: list[Steps] = []
     accepted = rejected = 0
     now, dt, carried = float(t0), 1e-5, None
+    ended = "complete"
     for stop in kinks:
         while now < stop:
             times = jnp.asarray(np.array([now, stop, dt, largest_step]))
-            n, missed, content, carried, made, last = _run_piece(model, bank, tolerance, times, state, carried)
-            n, missed, steps = int(n), int(missed), Steps(*made)
-            state = jax.tree.unflatten(kind, last)
+            n, missed, content, carry, made, last = _run_piece(model, bank, tolerance, times, state, carried)
+            n, missed = int(n), int(missed)
+            steps = Steps(*(np.asarray(a)[: n + 1] for a in made))
+            if until is not None and ended == "complete" and (moment := _turns(until, steps)) is not None:
+                stop, ended = moment, "until"
+                if stop < steps.t[-1]:  # the piece once more, to there: its end is a state from which to go on
+                    continue
+            state, carried = jax.tree.unflatten(kind, last), carry
             accepted, rejected = accepted + n, rejected + missed
-            piece = jax.tree.map(lambda a, n=n: np.asarray(a)[1 : n + 1], steps)
             if not pieces:
-                pieces.append(jax.tree.map(lambda a: np.asarray(a)[:1], steps))
+                pieces.append(Steps(*(a[:1] for a in steps)))
+            piece = Steps(*(a[1:] for a in steps))
             pieces.append(piece)
-            reached = float(piece.t[-1]) if n else now
+            reached = float(steps.t[-1])
             why = _failure(bool(content), state, accepted, most_steps)
             tried = n + missed
             if why is None and reached < stop and reached - now < least * tried:
@@ -212,22 +224,51 @@ def integrate(
                 error = SolveError(
                     f"the integration stopped at t = {reached:.6g} s (v = {float(state.v):.3g} m/s): {why}"
                 )
-                error.trajectory = _trajectory(pieces, accepted, rejected, began)
+                error.trajectory = _trajectory(pieces, accepted, rejected, began, "failed")
                 raise error
             if n > 1:
                 dt = float(piece.t[-1] - piece.t[-2])
             now = reached
             if progress is not None:
                 progress(now, piece)
+        if ended == "until":
+            break
         dt = min(dt, 1e-4)
-    return _trajectory(pieces, accepted, rejected, began), state
+    return _trajectory(pieces, accepted, rejected, began, ended), state
 
 
-def _trajectory(pieces: list[Steps], accepted: int, rejected: int, began: float) -> Trajectory:
+def _turns(until: Callable[[Steps], Any], steps: Steps) -> float | None:
+    """Time (s) at which a condition first turns true; None where it does not."""
+
+    def holds(steps: Steps) -> np.ndarray:
+        found = np.asarray(until(steps))
+        if found.dtype != bool or found.shape not in ((), steps.t.shape):
+            what, allowed = "not a truth at each step", "such as  lambda steps: steps.x > 1e-4"
+            raise ArgumentError(what, key="until", value=f"{found.dtype} {found.shape}", allowed=allowed)
+        return found
+
+    true = holds(steps)
+    if not true.any():
+        return None
+    if true.ndim == 0:
+        return float(steps.t[-1])
+    if true[0]:
+        raise ArgumentError("it is true at the start already", key="until", value=f"at {steps.t[0]:g} s")
+    last = int(np.argmax(true))
+    step = Trajectory(Steps(*(a[last - 1 : last + 1] for a in steps)), Stats(1, 0, 0.0, 0.0))
+    low, high = map(float, step.steps.t)
+    for _ in range(ZOOMS):
+        t = np.linspace(low, high, 101)
+        first = 1 + int(np.argmax(np.append(holds(step.at(t))[1:-1], True)))
+        low, high = float(t[first - 1]), float(t[first])
+    return max(high, float(steps.t[0]) + SMALLEST_STEP)
+
+
+def _trajectory(pieces: list[Steps], accepted: int, rejected: int, began: float, ended: str) -> Trajectory:
     steps = Steps(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
     with np.errstate(invalid="ignore", over="ignore"):  # where a number was lost
         error = energy_error(steps)
-    return Trajectory(steps, Stats(accepted, rejected, error, time.perf_counter() - began))
+    return Trajectory(steps, Stats(accepted, rejected, error, time.perf_counter() - began, ended))
 
 
 def _refuse_impossible(model: Model, bank: Bank) -> float:

@@ -52,12 +52,14 @@ class Stats:
         steps, rejected: accepted and rejected steps.
         energy_error: largest imbalance of the energies over the work done by the spring (1).
         seconds: wall time.
+        ended: how: ``"complete"`` at the end that was asked for, ``"until"`` where that condition held, ``"failed"``.
     """
 
     steps: int
     rejected: int
     energy_error: float
     seconds: float
+    ended: str = "complete"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,7 +87,7 @@ class Trajectory(Shown):
         cost = {
             "from": shown(float(s.t[0]), "s"), "to": shown(float(s.t[-1]), "s"), "steps": stats.steps,
             "rejected": stats.rejected, "energy error": f"{stats.energy_error:.1e}",
-            "wall time": shown(stats.seconds, "s", 3),
+            "wall time": shown(stats.seconds, "s", 3), "ended": stats.ended,
         }  # fmt: skip
         told = ("x", "v", "spring_force", "contact_force")
         return [facts(cost), facts({name: ends(getattr(s, name), UNITS[name]) for name in told})]
