@@ -38,7 +38,8 @@ def derived(fit: Fit, function: Callable[[Mapping[str, float]], Any]) -> Derived
     """A quantity that follows from the parameters, with the deviation that they leave to it:
     ``fit.derived(lambda p: p["weakening.drop"] * p["contact.strength"])``.
 
-    To first order: by the gradient (finite differences) and :attr:`stickslip.Fit.covariance`. What is not fitted is exact.
+    To first order: by the gradient (finite differences) and :attr:`stickslip.Fit.covariance`. What is not fitted is
+    exact.
 
     Args:
         fit: whose parameters; called as its method, the fit itself.
