@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 FLAT = 0.3  # standard deviation on the search scale (of a logarithm: 30 %) beyond which a direction is not known
 TIED = 0.95  # correlation beyond which two parameters act as one
+LEVEL = 3.84  # rise of the cost at the ends of a 95 % interval
+FIRST, DOUBLINGS = 3.0, 6  # distance of the first value, in standard deviations, and how far a flat profile is followed
+CLOSER, NEAR = 5, 0.05  # evaluations at most to meet that rise, and how nearly
 _PART = 0.3  # share of a direction's largest weight that makes a parameter part of it
 _SMALL = 0.1  # power below which a factor is left out of a product
 _MEMBER = 0.1  # share of a quantity's axis that is unknown, from which it belongs to what acts together
@@ -245,34 +248,51 @@ def profile(
     std: float,
     bounds: tuple[float, float],
     refit: Callable[[float], float],
-    *,
-    points: int = 7,
-    reach: float = 2.5,
-    least: float = 0.02,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> Profile:
     """Profile likelihood: everything else refitted at values of one parameter around its best one.
+
+    To each side the distance is doubled until the cost has risen by what 95 % allow; there the profile is evaluated
+    again until it is met, and half way.
 
     Args:
         name: of the parameter.
         best, std, bounds: optimum, standard deviation and bounds on the search scale.
         refit: cost of the best fit with the parameter held at a value.
-        points: values, odd.
-        reach: in standard deviations, to either side.
-        least: smallest standard deviation assumed.
-        progress: told how many are done, of how many.
+        progress: told how many values are done.
     """
-    step = max(std, least) * reach
-    z = np.unique(np.clip(best + step * np.linspace(-1.0, 1.0, points), *bounds))
-    cost = []
-    for i, value in enumerate(z):
-        cost.append(refit(float(value)))
-        if progress is not None:
-            progress(i + 1, z.size)
-    rise = np.array(cost) - min(cost)
+    cost: dict[float, float] = {}
+
+    def look(value: float) -> float:
+        at = float(np.clip(value, *bounds))
+        if at not in cost:
+            cost[at] = refit(at)
+            progress(len(cost))
+        return at
+
+    def risen() -> tuple[Array, Array]:
+        z = np.array(sorted(cost))
+        heights = np.array([cost[at] for at in z])
+        return z, heights - heights.min()
+
+    lowest = cost[look(best)]
+    for side in (-1, 1):
+        for k in range(DOUBLINGS):
+            end = look(best + side * FIRST * 2**k * std)
+            if cost[end] - lowest >= LEVEL or end in bounds:
+                break
+        for _ in range(CLOSER):
+            crossing = _crossing(*risen(), side)
+            if not np.isfinite(crossing):
+                break
+            end = look(crossing)
+            if abs(cost[end] - lowest - LEVEL) < NEAR * LEVEL:
+                break
+        look(0.5 * (best + end))
+    z, rise = risen()
     low, high = _crossing(z, rise, -1), _crossing(z, rise, +1)
     if not np.isfinite(low) and not np.isfinite(high):
-        text = f"the profile of {name} is flat within {reach:g} standard deviations: the data do not determine it"
+        text = f"the profile of {name} is flat as far as it was followed: the data do not determine it"
     elif not np.isfinite(low) or not np.isfinite(high):
         text = f"{name} is bounded on one side only"
     else:
@@ -289,14 +309,14 @@ def _ragged(rise: Array, noise: float = 1.0) -> bool:
     return any(bool(np.any(np.maximum.accumulate(side) - side > noise)) for side in (left, right))
 
 
-def _crossing(z: Array, rise: Array, side: int, level: float = 3.84) -> float:
-    """Where the profile passes ``level`` on one side of its lowest point; infinite where it never does."""
+def _crossing(z: Array, rise: Array, side: int) -> float:
+    """Where the profile passes :data:`LEVEL` on one side of its lowest point; infinite where it never does."""
     i = int(np.argmin(rise))
     while 0 <= i + side < z.size:
         a, b = rise[i], rise[i + side]
-        if b >= level:
+        if b >= LEVEL:
             # a parabola is a straight line in the root of the rise
-            share = (np.sqrt(level) - np.sqrt(max(a, 0.0))) / (np.sqrt(b) - np.sqrt(max(a, 0.0)))
+            share = (np.sqrt(LEVEL) - np.sqrt(max(a, 0.0))) / (np.sqrt(b) - np.sqrt(max(a, 0.0)))
             return float(z[i] + share * (z[i + side] - z[i]))
         i += side
     return side * float("inf")

@@ -36,7 +36,7 @@ from .fit_result import fit_result
 from .fit_tables import STRENGTH, correlation_table, error_table, ladder_table, parameter_table, statistics_of
 from .fitted_model import FittedModel
 from .free_cycles import free_run_errors, simulated_cycles
-from .parameters_by_hand import moved, profile, refitted
+from .parameters_by_hand import intervals, moved, profile, refitted
 from .result_base import Savable, Tell, dataset, finish, several
 
 if TYPE_CHECKING:
@@ -363,14 +363,31 @@ class Fit(FittedModel, Savable):
         ``fit.profile("weakening.drop")`` says how far the data know it where its cost is no parabola.
 
         Returns:
-            ``name``, ``unit``, ``value`` (SI), ``rise`` (of the cost, in units of chi-square), ``interval`` (95 %; None
-            for an open end) and ``text``.
+            ``name``, ``unit``, ``value`` (SI), ``rise`` (of the cost, in units of chi-square and halved: what is random
+            is not known better), ``interval`` (95 %; None for an open end) and ``text``.
 
         Raises:
             InputError: no free parameter of that name.
         """
         with reporting(f"profile of {name}", progress) as tell:
             return profile(self, name, tell)
+
+    def intervals(self, names: str | Sequence[str] = (), progress: Tell | None = None) -> pandas.DataFrame:
+        """Intervals of 95 % of parameters by their :meth:`profile` likelihoods, which need not be even.
+
+        Args:
+            names: of the parameters; default all of :attr:`free`.
+            progress: called with a text and the share done (0 to 1); default a bar in a terminal or a notebook.
+
+        Returns:
+            A row for each: ``value``, ``low`` and ``high`` (SI; nan where an end is open), and their distances from the
+            value in its standard deviations, which differ where the cost is no parabola.
+
+        Raises:
+            InputError: no free parameter of that name.
+        """
+        with reporting("intervals", progress) as tell:
+            return intervals(self, several(names), tell)
 
     if TYPE_CHECKING:
         sample, derived = _sample, _derived

@@ -14,8 +14,9 @@ from ..inference.diagnose.search import Rung
 from ..inference.diagnose.search_round import Round
 from ..inference.diagnose.stepwise_selection import Diagnosis as Found
 from ..inference.diagnose.work import Work
+from ..system.progress import part
 from .campaign import Campaign
-from .experiments import Setting, SimulatedExperiment, part, practicable, scenario, simulate_rivals
+from .experiments import Setting, SimulatedExperiment, practicable, scenario, simulate_rivals
 from .fit import Fit
 from .posterior import drawn_points, sample
 from .result_base import Tell

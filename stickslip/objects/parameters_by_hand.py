@@ -15,11 +15,15 @@ from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at
 from ..inference.force.fit import fit as fit_force
 from ..inference.force.profile_deviations import pinned
+from ..system.object_repr import table
+from ..system.progress import part
 from ..system.units import shown, to_si
 from .fit_tables import STRENGTH
 from .result_base import Tell
 
 if TYPE_CHECKING:
+    import pandas
+
     from .fit import Fit
 
 HELD = 1e-6  # width of the prior that holds a parameter, on its search scale
@@ -71,6 +75,21 @@ def profile(fit: Fit, name: str, tell: Tell) -> dict[str, Any]:
         "interval": [low, high],
         "text": f"{found.text}; 95 % interval {low_text} to {high_text}",
     }
+
+
+def intervals(fit: Fit, names: Sequence[str], tell: Tell) -> pandas.DataFrame:
+    """See :meth:`stickslip.Fit.intervals`."""
+    every, rows = names or [f.name for f in fit.free], {}
+    for name in every:
+        _free(fit, name)  # a wrong name is refused before anything is fitted
+    for i, name in enumerate(every):
+        found = profile(fit, name, part(tell, i, len(every)))
+        value, std = fit.values[name], fit.std[name]
+        low, high = (np.nan if v is None else v for v in found["interval"])
+        sides = (low - value) / std, (high - value) / std
+        rows[name] = {"value": value, "low": low, "high": high, "low / std": sides[0], "high / std": sides[1]}
+        rows[name]["unit"] = found["unit"]
+    return table(rows, "parameter")
 
 
 def _free(fit: Fit, name: str) -> tuple[int, Free]:

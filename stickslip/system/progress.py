@@ -74,6 +74,11 @@ def working(title: str) -> Iterator[Tell]:
         yield _lines(title)
 
 
+def part(tell: Tell, number: int, of: int, words: str = "") -> Tell:
+    """Tells the progress of one of so many parts, its number from 0, after ``words``, as that of the whole."""
+    return lambda text, share: tell(f"{words}{text}", (number + share) / of)
+
+
 @contextmanager
 def reporting(title: str, progress: Tell | None) -> Iterator[Tell]:
     """Gives ``progress``, or what :func:`progress_to` says; where there is neither, a bar in a terminal or a notebook.

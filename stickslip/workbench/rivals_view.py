@@ -10,6 +10,7 @@ from ..objects import experiments
 from ..objects.diagnosis import Diagnosis
 from ..objects.experiments import MEASURES, SimulatedExperiment
 from ..physics.effects import catalogue
+from ..system.progress import part
 from ..system.units import to_si
 from .background_work import Show, Tell, background
 from .evidence import LEAST, best_forms
@@ -110,8 +111,8 @@ class Rivals:
             options = experiments.practicable(asked, abs(velocity), block.spring_stiffness, block.mass)
             if not asked.as_measured:
                 options = {"as set above": asked, **options}
-            fits = experiments.rivals(fit, tags, told, experiments.part(tell, 0, 2))
-            return experiments.simulate_rivals(fit, fits, options, experiments.part(tell, 1, 2), show, code)
+            fits = experiments.rivals(fit, tags, told, part(tell, 0, 2))
+            return experiments.simulate_rivals(fit, fits, options, part(tell, 1, 2), show, code)
 
         self._work.do("fitting each of them", make)
 

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.optimize import root_scalar
 
 from stickslip.inference.uncertainty import flat_directions, null_directions, profile, relative
 
@@ -119,6 +120,20 @@ def test_profile_of_a_parabola_gives_its_interval():
     found = profile("k", 2.0, 0.1, (0.0, 5.0), lambda z: 7.0 + ((z - 2.0) / 0.1) ** 2)
     assert found.interval == pytest.approx((2.0 - 1.96 * 0.1, 2.0 + 1.96 * 0.1), rel=1e-3)
     assert "both sides" in found.text
+    assert found.z.size <= 9 and np.abs(found.z - 2.0).max() < 1.0  # near the interval's ends
+
+
+@pytest.mark.parametrize("std", [2e-4, 1e-3, 4e-3])
+def test_an_interval_does_not_depend_on_the_deviation_from_which_it_is_sought(std):
+    """Of a cost that rises faster to one side."""
+
+    def cost(z):
+        e = (z - 2.0) / 1e-3
+        return 2.0 / 0.3**2 * (np.expm1(0.3 * e) - 0.3 * e)
+
+    found = profile("k", 2.0, std, (0.0, 5.0), cost)
+    ends = [root_scalar(lambda z: cost(z) - 3.84, bracket=b).root for b in ((1.99, 2.0), (2.0, 2.01))]
+    assert found.interval == pytest.approx(tuple(ends), abs=1e-4)
 
 
 def test_flat_and_one_sided_profiles_say_so():
@@ -133,7 +148,6 @@ def test_flat_and_one_sided_profiles_say_so():
 
 def test_a_profile_that_falls_again_says_so():
     """Refits that end in different valleys are no profile."""
-    valleys = iter([30.0, 8.0, 20.0, 0.0, 9.0, 25.0, 60.0])
-    found = profile("a.b", 0.0, 1.0, (-9.0, 9.0), lambda value: next(valleys))
+    found = profile("a.b", 0.0, 1.0, (-9.0, 9.0), lambda value: 4.0 * value**2 - 30.0 * (value < -2.5))
     assert "do not follow one optimum" in found.text
     assert "do not follow" not in profile("a.b", 0.0, 1.0, (-9.0, 9.0), lambda value: 4.0 * value**2).text

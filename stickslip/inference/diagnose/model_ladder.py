@@ -190,10 +190,11 @@ def profiled(found: Fit, name: str, tell: Tell) -> Profile:
         name: of one of its free parameters.
         tell: told how many values are done.
     """
+    USUAL = 9  # values
     k = [f.name for f in found.free].index(name)
     std = float(np.sqrt(max(found.covariance[k, k], 0.0)))
     return profile(
         name, float(found.point.z[k]), std, found.free[k].bounds,
         lambda value: held(found, name, value)[1] / DISPERSION,
-        progress=lambda done, of: tell(f"profile of {name}: {done} of {of}", done / of),
+        progress=lambda done: tell(f"profile of {name}: {done} values", min(done / USUAL, 1.0)),
     )  # fmt: skip

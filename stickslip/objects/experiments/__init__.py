@@ -1,6 +1,6 @@
 """What the present model predicts: one run under another drive or rig, a sweep, and rivals in one experiment."""
 
-from .events import MEASURES, Simulated, measured, part, run, simulated, spread, steady_runs
+from .events import MEASURES, Simulated, measured, run, simulated, spread, steady_runs
 from .rival_experiments import SimulatedExperiment, rivals, simulate_rivals, where
 from .setting import Setting, changes, practicable, scenario
 from .sweeps import Swept, sweep
@@ -13,7 +13,6 @@ __all__ = [
     "Swept",
     "changes",
     "measured",
-    "part",
     "practicable",
     "rivals",
     "run",

@@ -37,11 +37,6 @@ class Simulated:
     code: str = ""
 
 
-def part(tell: Tell, number: int, of: int, words: str = "") -> Tell:
-    """Tells the progress of one of so many parts, its number from 0, after ``words``, as that of the whole."""
-    return lambda text, share: tell(f"{words}{text}", (number + share) / of)
-
-
 def run(made: Scenario, tell: Tell | None = None, text: str = "simulating") -> Recording:
     """A scenario, freely integrated; ends where it is cancelled."""
 

@@ -19,10 +19,10 @@ from ...inference.force.scales import of_run
 from ...simulation.conformance import blamed
 from ...simulation.conformance.compile_check import first_line
 from ...simulation.scenario.recording import Recording
-from ...system.progress import Cancelled
+from ...system.progress import Cancelled, part
 from ..fit import Fit
 from ..result_base import Tell
-from .events import MEASURES, part, run, sensed
+from .events import MEASURES, run, sensed
 from .setting import Setting, changed, scenario, settled
 
 READ, CREEP, SWING = "slip as read", "creep in the hold", "swing in the hold"

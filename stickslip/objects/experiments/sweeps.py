@@ -11,10 +11,11 @@ from ...errors import InputError
 from ...simulation.scenario.recording import Recording
 from ...simulation.scenario.schema import SweepTable
 from ...simulation.scenario.series import scenarios_of
+from ...system.progress import part
 from ...system.units import to_si
 from ..fit import Fit
 from ..result_base import Tell
-from .events import Spread, part, run, simulated
+from .events import Spread, run, simulated
 from .setting import Setting, scenario
 
 FEWEST, MOST = 2, 40  # runs of a sweep
