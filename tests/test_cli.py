@@ -621,13 +621,13 @@ def test_broken_entries_of_the_cache_are_removed(tmp_path, capsys):
     ],
 )
 def test_memory_that_runs_out_in_a_library_is_one_message(monkeypatch, capsys, kind, text, words):
-    def fail() -> None:
+    def fail(environment: object) -> None:
         raise type(kind, (RuntimeError,), {})(text)
 
     monkeypatch.setattr(cli, "make_app", fail)
     assert run([]) == 1
     assert words in capsys.readouterr().err
-    monkeypatch.setattr(cli, "make_app", lambda: (_ for _ in ()).throw(RuntimeError("a fault of our own")))
+    monkeypatch.setattr(cli, "make_app", lambda _: (x for x in ()).throw(RuntimeError("a fault of our own")))
     with pytest.raises(RuntimeError):
         run([])
 

@@ -19,6 +19,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError
 from .. import __version__
 from ..errors import ArgumentError, InputError, StickslipError, nearest
 from ..system import process
+from ._environment import Environment
 
 # module and function in it -> what it does, in one line; below it what its own help adds
 COMMANDS = {
@@ -55,22 +56,24 @@ EXAMPLES = {
 
 GROUPS = ("challenge",)  # commands that have commands, and say themselves how their help looks
 EXIT_CODES = "Exit codes: 0 done, 1 failure, 2 bad input, 3 finished but unresolved, 130 interrupted."
+FROM_ENVIRONMENT = "Options may also come from the environment: STICKSLIP_DIAGNOSE_JOBS=4 is diagnose --jobs 4."
 ABOUT = ("--help", "-h", "--version", "-V")
 INTERRUPTED = 130
 OPTIONS = {"effects": "add", "profiles": "profile"}  # those called otherwise than the argument
 
 
-def make_app() -> App:
+def make_app(environment: Environment | None = None) -> App:
     """The command line's application; commands are imported when they are called."""
     app = App(
         name="stickslip",
         help="Creep and stick-slip of a rough contact: simulate it, measure it, identify the missing effect.\n\n"
-        + EXIT_CODES,
+        f"{EXIT_CODES}\n\n{FROM_ENVIRONMENT}",
         version=f"stickslip {__version__}",
         version_flags=ABOUT[2:],
         help_flags=ABOUT[:2],
         help_format="plaintext",  # Markdown takes a third of the time; that of a command is read when it is called
         suppress_keyboard_interrupt=False,
+        config=environment,
     )
     for number, (name, text) in enumerate(COMMANDS.items()):  # listed in the order of one's work
         told = f"{text}\n\nExample: `stickslip {EXAMPLES[name]}`"
@@ -132,16 +135,21 @@ def keep_interrupts() -> None:
 
 def run(arguments: Sequence[str]) -> int:
     """Run a command line and return its exit code; every error is one message on stderr."""
+    environment = Environment()
     try:
         process.begin()
-        result = make_app()(list(arguments), exit_on_error=False, print_error=False, result_action="return_value")
+        result = make_app(environment)(
+            list(arguments), exit_on_error=False, print_error=False, result_action="return_value"
+        )
         sys.stdout.flush()
         return result if isinstance(result, int) else 0
     except CycloptsError as error:
         return _fail(_usage(error))
-    except ArgumentError as error:
-        name = str(error.key)
-        return _fail(error.but(key=f"--{OPTIONS.get(name, name).replace('_', '-')}"))
+    except InputError as error:
+        if isinstance(error, ArgumentError):
+            name = str(error.key)
+            error = error.but(key=f"--{OPTIONS.get(name, name).replace('_', '-')}")
+        return _fail(error.but(key=environment.taken.get(error.key, error.key)))
     except StickslipError as error:
         return _fail(error)
     except KeyboardInterrupt as error:
