@@ -39,6 +39,7 @@ def figures(marked: Sequence[Marked]) -> dict[str, Any]:
         "not_run": states["not run"],
         "by_kind": {kind: _accuracy(cases) for kind, cases in of.items()},
         "effects": _accuracy(hidden),
+        "by_effect": _by_effect(marked),
         "by_circumstance": {name: _circumstance(name, of["nothing"], hidden) for name in CIRCUMSTANCES},
         "by_form": {
             "textbook_form": _accuracy([m for m in of["one"] if not m.effects[0]["own_form"]]),
@@ -68,6 +69,27 @@ def _accuracy(cases: Sequence[Marked]) -> dict[str, Any]:
         "right": rate(m.right for m in cases),
         "class": rate(m.class_right for m in cases),
     }
+
+
+def _by_effect(marked: Sequence[Marked]) -> dict[str, dict[str, Any]]:
+    """Precision and recall of every effect that is hidden or named, of all together, and of the other two answers.
+
+    An effect is named where it is said to be missing; one of a set is not. The support is what the recall is of.
+    """
+    cases = [(m, set(m.answer.named) if m.answer.kind == "missing" else set()) for m in marked]
+    tags = {tag for m, named in cases for tag in (*(m.tags if m.kind != "outside" else ()), *named)}
+    pairs = {tag: [(tag in m.tags, tag in named) for m, named in cases] for tag in sorted(tags)}
+    return {
+        **{tag: _precision(of_tag) for tag, of_tag in pairs.items()},
+        "all effects": _precision([pair for of_tag in pairs.values() for pair in of_tag]),
+        "nothing missing": _precision([(m.kind == "nothing", m.answer.kind == "complete") for m in marked]),
+        "outside the catalogue": _precision([(m.kind == "outside", m.answer.kind == "unknown") for m in marked]),
+    }
+
+
+def _precision(pairs: Sequence[tuple[bool, bool]]) -> dict[str, Any]:
+    """Of pairs of what is so and what was said."""
+    return {"precision": rate(so for so, said in pairs if said), "recall": rate(said for so, said in pairs if so)}
 
 
 def _alarms(nothing: Sequence[Marked]) -> dict[str, Any]:
@@ -102,7 +124,8 @@ def _heldout(cases: Sequence[Marked]) -> dict[str, Any]:
         "base": _quartiles([m.answer.base for m in cases if m.answer.base is not None]),
         "final": _quartiles([m.answer.final for m in known if m.answer.final is not None]),
         "ratio": _quartiles(falls),
-        "within": rate(m.answer.final is not None and m.answer.final <= WITHIN for m in cases),
+        # answers of another method state no errors
+        "within": rate(m.answer.final is not None and m.answer.final <= WITHIN for m in (cases if known else ())),
     }
 
 

@@ -30,10 +30,7 @@ def score_text(score: Mapping[str, Any]) -> str:
     lines = [
         f"Challenge of {s['cases']} cases, seed {s['seed']}",
         f"seal {s['seal']}",
-        f"{s['finished']} diagnosed, {s['failed']} failed, {s['not_run']} not run (both count as wrong)",
-        f"stickslip {s['protocol']['versions'].get('stickslip', '?')}, at most {s['protocol']['max_effects']} effects, "
-        f"candidates: {', '.join(s['protocol']['candidates'] or []) or 'the whole catalogue'}",
-        *_codes(s["protocol"]),
+        *(_own(s) if "answers" in s else _run(s)),
         "",
         *_aims(s["aims"]),
         *_block(
@@ -62,6 +59,10 @@ def score_text(score: Mapping[str, Any]) -> str:
         *_block("One effect", ("exact", "right"), [
             (name.replace("_", " "), [share(row[k]) for k in ("exact", "right")]) for name, row in s["by_form"].items()
         ]),
+        *_block("Effect", ("precision", "recall", "support"), [
+            (name, [share(row["precision"]), share(row["recall"]), str(row["recall"]["of"])])
+            for name, row in s["by_effect"].items()
+        ]),
         *_confusion(s),
         *_confidence(s),
         *_block("Nothing missing, and outside", ("share",), [
@@ -82,6 +83,24 @@ def score_text(score: Mapping[str, Any]) -> str:
         *_wrong(s["list"]),
     ]  # fmt: skip
     return "\n".join(line.rstrip() for line in lines).rstrip() + "\n"
+
+
+def _own(s: Mapping[str, Any]) -> list[str]:
+    """Whose answers these are, if not of the challenge's run."""
+    record = s["answers"]
+    lines = [] if record is None else [f"answers of {record['file']}", f"SHA-256 {record['sha256']}"]
+    return [f"{s['finished']} answered, {s['not_run']} not (these count as wrong)", *lines]
+
+
+def _run(s: Mapping[str, Any]) -> list[str]:
+    """How the cases were run."""
+    p = s["protocol"]
+    return [
+        f"{s['finished']} diagnosed, {s['failed']} failed, {s['not_run']} not run (both count as wrong)",
+        f"stickslip {p['versions'].get('stickslip', '?')}, at most {p['max_effects']} effects, "
+        f"candidates: {', '.join(p['candidates'] or []) or 'the whole catalogue'}",
+        *_codes(p),
+    ]
 
 
 def _codes(protocol: Mapping[str, Any]) -> list[str]:

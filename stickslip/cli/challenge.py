@@ -128,7 +128,9 @@ def seal(folder: Path) -> int:
 
 
 @challenge.command(sort_key=3)
-def score(folder: Path, *, seal: str | None = None, json: Flag = False, force: Flag = False) -> int:
+def score(
+    folder: Path, *, answers: Path | None = None, seal: str | None = None, json: Flag = False, force: Flag = False
+) -> int:
     """Compare the answers with the truth; refuses a folder whose seal does not match.
 
     Writes score.json, score.txt, confusion.png, confusion-by-amplitude.png and amplitude.png into FOLDER/score.
@@ -137,6 +139,9 @@ def score(folder: Path, *, seal: str | None = None, json: Flag = False, force: F
     ----------
     folder:
         Of the challenge.
+    answers:
+        TOML or JSON file with the answers of another method, which are scored in place of the run's into
+        FOLDER/score-NAME, NAME being that of the file.
     seal:
         The seal as it was published when the challenge was made; the score is refused for any other.
     json:
@@ -148,13 +153,13 @@ def score(folder: Path, *, seal: str | None = None, json: Flag = False, force: F
     from ..errors import RunFolderError
     from ..system.runstore import json_text
 
-    out = folder / "score"
+    out = folder / ("score" if answers is None else f"score-{answers.stem}")
     there = {path.name for path in out.iterdir()} if out.is_dir() else {""} if out.exists() else set()
     if there - set(SCORE):
         raise RunFolderError("there is something else under the score's name", file=out, hint="move it away")
     if there and not force:
         raise RunFolderError("there is a score already", file=out, hint="move it away, or replace it with --force")
-    found = score_challenge(folder, expected=seal)
+    found = score_challenge(folder, answers=answers, expected=seal)
     text = _write(out, found)
     print(json_text(found) if json else text, end="")
     return 0 if not found["not_run"] else UNRESOLVED
