@@ -1,6 +1,6 @@
 """The workbench: a campaign and its model in the browser, skins over :mod:`stickslip.objects`.
 
-``stickslip.workbench(campaign)`` shows the same pages in a notebook.
+``stickslip.workbench(campaign)`` shows the same pages in a notebook, ``stickslip.workbench.view(fit)`` one fit.
 """
 
 from __future__ import annotations
@@ -49,6 +49,29 @@ class CallableModule(ModuleType):
             hub = os.environ.get("JUPYTERHUB_SERVICE_PREFIX", "")
             proxy = f"{hub.rstrip('/')}/proxy" if hub else ""
         return Window(Session(campaign=campaign, effect_files=campaign.effect_files), tall, proxy)
+
+    def view(self, fit: Any) -> Any:
+        """Interactive pictures of a fit, as an object of Panel: for a notebook, a dashboard or a page of one's own.
+
+        Force and residual of a cycle, the creep before its onset, the residual of all runs against a variable of
+        choice, and the backbone (not of a model that was set by hand). No server is begun. A notebook shows them after
+        ``panel.extension()``; ``.save("fit.html", resources=bokeh.resources.INLINE)`` writes a page, in which cycle and
+        variable cannot be chosen.
+
+        Args:
+            fit: a :class:`stickslip.Fit`.
+
+        Returns:
+            A ``panel.Column``.
+
+        Raises:
+            ArgumentError: something else than such a fit.
+            InputError: packages that the pages are made with are not installed.
+        """
+        need_pages()
+        from .fit_view import fit_view
+
+        return fit_view(fit)
 
 
 sys.modules[__name__].__class__ = CallableModule

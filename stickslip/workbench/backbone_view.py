@@ -33,7 +33,13 @@ class Backbone:
             legend_label="rough contact: 1 - (1 - u/u_max)^p",
         )  # fmt: skip
         for edge in ("low", "high"):
-            self.figure.line("u", edge, source=self._line, color=theme.soft, line_width=1, line_dash="dotted")
+            dots = {
+                "color": theme.soft,
+                "line_width": 1,
+                "line_dash": "dotted",
+                "name": f"nearest rough lines ({edge})",
+            }
+            self.figure.line("u", edge, source=self._line, **dots)
         self.figure.line(
             "u", "force", source=self._line, color=theme.runs[2], line_width=2, line_dash="dotdash",
             legend_label="nearest rough lines",

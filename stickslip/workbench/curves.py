@@ -29,6 +29,11 @@ def bent(x: np.ndarray) -> np.ndarray:
     return np.asarray(np.arcsinh(x / _knee(x)))
 
 
+def straight(at: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Values at places of the scale on which ``x`` is bent."""
+    return np.asarray(np.sinh(at) * _knee(x))
+
+
 def bent_ticks(x: np.ndarray) -> tuple[list[float], dict[float, str]]:
     """Places and texts of powers of ten on that scale."""
     knee, top = _knee(x), float(np.abs(x).max(initial=0.0))

@@ -43,9 +43,11 @@ class EventView:
     def _make(self, name: str) -> Any:
         theme = look()
         made = figure(name, label(FROM[name], "s"), height=260, output_backend="canvas")
-        made.multi_line("t", "y", source=self._others[name], color=theme.band, line_width=1, line_alpha=0.7)
+        made.multi_line(
+            "t", "y", source=self._others[name], color=theme.band, line_width=1, line_alpha=0.7, name="others"
+        )
         self._own[name].name = f"event {name}"
-        made.line("t", "y", source=self._own[name], color=theme.model, line_width=2.5)
+        made.line("t", "y", source=self._own[name], color=theme.model, line_width=2.5, name="chosen")
         made.xaxis.ticker.desired_num_ticks = 4
         return made
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,7 @@ from bokeh.models import (
     BoxZoomTool,
     ColumnDataSource,
     CrosshairTool,
+    CustomAction,
     CustomJS,
     PanTool,
     ResetTool,
@@ -21,9 +23,19 @@ from bokeh.plotting import figure as bokeh_figure
 from ..show.plots.style import RUNS
 from ..show.plots.style import label as label
 from ..show.plots.style import scaled as unit_of  # noqa: F401
+from .widgets import static
 
 FEW = "canvas"  # what draws some hundred points quickest
 DASHES = ("solid", "dashed", "dotdash", "dotted")  # as many as have no factor in common with the number of colours
+CSV = "Save the curves as CSV, as they are drawn"
+SAVING = static("curves_csv.js")
+SHEET = (
+    "data:image/svg+xml;base64,"
+    + b64encode(
+        b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 24 24" fill="none" stroke="#7b8596" stroke-width="2">'
+        b'<path d="M4 4h16v16H4zM4 10h16M4 15h16M10 4v16"/></svg>'
+    ).decode()
+)  # a sheet with rows and columns
 
 
 @dataclass(frozen=True)
@@ -91,7 +103,11 @@ def figure(title: str = "", x: str = "", y: str = "", height: int = 260, **more:
         x, y: texts of the axes, with units (see :func:`label`).
         height: in pixels.
         more: arguments of ``bokeh.plotting.figure``, such as ``x_range`` to link it with another. For some hundred
-            points ``output_backend="canvas"`` is quicker than WebGL, which has to be copied into the page.
+            points ``output_backend="canvas"`` is quicker than WebGL, which has to be copied into the page. The first of
+            ``tags`` is the text of a horizontal axis that another figure shows.
+
+    Its curves can be saved as CSV. A column ``NAME_value`` of a source has what is saved of a column NAME that is
+    drawn otherwise, such as on a bent scale.
     """
     theme = look()
     more.setdefault("sizing_mode", "stretch_width")
@@ -100,6 +116,7 @@ def figure(title: str = "", x: str = "", y: str = "", height: int = 260, **more:
         title=title, x_axis_label=x, y_axis_label=y, height=height, toolbar_location="above",
         tools=[PanTool(), WheelZoomTool(), BoxZoomTool(), ResetTool(), SaveTool()], active_drag=None, **more,
     )  # fmt: skip
+    made.add_tools(CustomAction(icon=SHEET, description=CSV, callback=CustomJS(args={"figure": made}, code=SAVING)))
     made.toolbar.update(logo=None, autohide=True)
     made.update(
         toolbar_inner=True, background_fill_color=theme.surface, border_fill_color=theme.surface,

@@ -30,7 +30,7 @@ class Ladder:
         self._session = session
         theme = look()
         self._of: Any = None
-        self._data = source(rung=[], fitted=[], unseen=[], step=[], fitted_text=[], unseen_text=[])
+        self._data = source(rung=[], fitted=[], unseen=[], rung_value=[], fitted_text=[], unseen_text=[])
         self.figure = figure(
             "the ladder: error of every model on the way here", "model: what each rung added", "error / floors",
             height=246, output_backend="canvas",
@@ -45,7 +45,7 @@ class Ladder:
             self.figure.scatter("rung", name, source=self._data, color=colour, size=8, marker=mark, legend_label=name)
         self.figure.add_layout(Span(location=1.0, dimension="width", line_color=theme.soft, line_dash="dotted"))
         self.figure.add_tools(
-            HoverTool(tooltips=[("step", "@step"), ("fitted", "@fitted_text"), ("unseen", "@unseen_text")])
+            HoverTool(tooltips=[("step", "@rung_value"), ("fitted", "@fitted_text"), ("unseen", "@unseen_text")])
         )
         self.figure.x_range.range_padding = 0.4
         self.figure.y_range.start = 0.0
@@ -65,7 +65,7 @@ class Ladder:
         steps = [str(s).removeprefix("+ ") for s in shown["step"]]
         self._data.data = {
             "rung": at, "fitted": shown["error"].to_numpy(float), "unseen": shown["unseen error"].to_numpy(float),
-            "step": steps, "fitted_text": _texts(shown, "error", "error std"),
+            "rung_value": steps, "fitted_text": _texts(shown, "error", "error std"),
             "unseen_text": _texts(shown, "unseen error", "unseen std"),
         }  # fmt: skip
         self.figure.xaxis.ticker = FixedTicker(ticks=at)

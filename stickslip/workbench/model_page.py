@@ -22,7 +22,7 @@ from .widgets import Knobs, Message, Words, button, field
 def page(session: Session) -> Any:
     """The page of a session."""
     sliders, buttons = _sliders(session), _buttons(session)
-    cycle = _Cycle(session)
+    cycle = Cycle(session)
     heat = Heat(session)
     free = Free(session)
     left = pn.Column(buttons, sliders, width=350, sizing_mode="fixed", margin=(8, 12, 0, 0))
@@ -81,11 +81,16 @@ def _sliders(session: Session) -> Knobs:
     return part
 
 
-class _Cycle:
-    """One cycle: force with the residual under it, and the creep before the onset."""
+class Cycle:
+    """One cycle: force with the residual under it, and the creep before the onset.
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    Args:
+        session: whose model it is.
+        keys: words on the keys that choose a cycle; "" where none do.
+    """
+
+    def __init__(self, session: Session, keys: str = "   (keys: ← → cycles, ↑ ↓ runs)") -> None:
+        self._session, self._keys = session, keys
         theme = look()
         self._run = field(pn.widgets.Select, "", 180, options=[], margin=(0, 8, 0, 0))
         self._where = Words(margin=(6, 0, 0, 8))
@@ -98,10 +103,11 @@ class _Cycle:
         self._data.name = "cycle"
         self._creep = source(t=[], measured=[], model=[])
 
-        self.force = figure(y="force of the contact", height=270, output_backend=FEW)
+        time = label("time in the cycle", "s")
+        self.force = figure(y="force of the contact", height=270, output_backend=FEW, tags=[time])
         compared(self.force, self._data, self._data, ("measured", "model"), "model")
         self.force.xaxis.major_label_text_font_size = "0px"
-        self.residual = figure(y="measured - model", height=190, x_range=self.force.x_range, output_backend=FEW)
+        self.residual = figure(x=time, y="measured - model", height=190, x_range=self.force.x_range, output_backend=FEW)
         self.residual.varea(
             "t", "low", "high", source=self._data, color=theme.band, fill_alpha=0.35,
             legend_label="two standard deviations of noise and scatter",
@@ -134,7 +140,7 @@ class _Cycle:
         name, event = selected(self._session)
         counts = cycles(self._session)
         self._run.param.update(options=list(counts), value=name)
-        self._where.text = f"cycle {event + 1} of {counts[name]}   (keys: ← → cycles, ↑ ↓ runs)"
+        self._where.text = f"cycle {event + 1} of {counts[name]}{self._keys}"
         part = one_cycle(fit.force, name, event)
         t = part.time.values - part.time.values[0]
         k, force = unit_of(part.measured.values, "N")
@@ -146,7 +152,6 @@ class _Cycle:
         }  # fmt: skip
         self.force.yaxis.axis_label = label("force of the contact", force)
         self.residual.yaxis.axis_label = label("measured - model", small)
-        self.residual.xaxis.axis_label = label("time in the cycle", "s")
         self._draw_creep(fit, part, name)
 
     def _draw_creep(self, fit: Fit, part: Any, name: str) -> None:

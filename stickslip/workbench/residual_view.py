@@ -15,7 +15,7 @@ from ..objects.fit_plots import AGAINST, WIDEST
 from ..show.plots.style import PARTS
 from ..system.units import shown
 from . import phase_period
-from .curves import bent, bent_ticks, smooth
+from .curves import bent, bent_ticks, smooth, straight
 from .evidence import bins, law
 from .figures import figure, label, legend, look, of_run, source, unit_of
 from .phase_period import PHASE
@@ -114,15 +114,22 @@ class Residual:
             k, unit = (1.0, "") if name == "event" else unit_of(x, str(data[name].attrs["units"]))
         x = x * k + (1.0 if name == "event" else 0.0)
         axis, text = (bent(x), unit) if against in BENT else (x, unit)
+
+        def across(at: np.ndarray) -> dict[str, np.ndarray]:
+            return {"x": at, "x_value": straight(at, x) if against in BENT else at}
+
         for run in self._points:
             own = np.flatnonzero((data.run.values == run) & use)
             own = own[np.argsort(x[own], kind="stable")]
             parts = [p for p in np.array_split(own, PARTS) if p.size]
-            self._points[run].data = {"x": axis[own], "y": np.clip(z[own], -1.5 * WIDEST, 1.5 * WIDEST)}
+            within = np.clip(z[own], -1.5 * WIDEST, 1.5 * WIDEST)
+            self._points[run].data = {**across(axis[own]), "y": within, "y_value": z[own]}
             self._medians[run].data = {
-                "x": np.array([np.median(axis[p]) for p in parts]), "y": np.array([np.median(z[p]) for p in parts]),
-            }  # fmt: skip
-        self._smooth.data = dict(zip("xy", smooth(axis[use], z[use]), strict=True))
+                **across(np.array([np.median(axis[p]) for p in parts])),
+                "y": np.array([np.median(z[p]) for p in parts]),
+            }
+        at, middle = smooth(axis[use], z[use])
+        self._smooth.data = {**across(at), "y": middle}
         words = WORDS.get(against, against)
         if period is not None:
             words = f"phase of {words} over {shown(period, str(data[name].attrs['units']), 3)}"
@@ -140,7 +147,7 @@ class Residual:
         else:
             parts = bins(fit, against, period)
             self._law.data = {
-                "x": [float(np.median(axis[p])) for p in parts],
+                **across(np.array([np.median(axis[p]) for p in parts])),
                 "y": [float(np.median(taken[p] / floor[p])) for p in parts],
             }
 

@@ -88,20 +88,21 @@ class Signals:
 
     def _make(self, name: str) -> Any:
         theme = look()
-        made = figure(height=190, output_backend=DRAWN, x_range=self.range, window_axis="x")
+        made = figure(height=190, output_backend=DRAWN, x_range=self.range, window_axis="x", tags=[label("time", "s")])
         made.name = f"signal {name}"
         for tool in made.toolbar.tools[:2]:
             tool.dimensions = "width"
         made.toolbar.active_drag, made.toolbar.active_scroll = made.toolbar.tools[:2]
         self._data[name].name = f"data {name}"
-        made.line("t", "y", source=self._data[name], color=theme.measured, line_width=1.5)
+        made.line("t", "y", source=self._data[name], color=theme.measured, line_width=1.5, name="record")
         if name in self._marks:
             made.scatter(
                 "t", "y", source=self._marks[name], marker="inverted_triangle", size=9, color=theme.accent,
+                name="onsets",
             )  # fmt: skip
             made.scatter(
                 "t", "y", source=self._mark[name], marker="circle", size=15, line_width=2.5,
-                line_color=theme.model, fill_alpha=0.0,
+                line_color=theme.model, fill_alpha=0.0, name="chosen event",
             )  # fmt: skip
         made.min_border_left = LEFT
         made.y_range.range_padding = 0.25  # room for the ring around a mark at the top

@@ -19,6 +19,7 @@ from .simulation_form import SimulationForm, named, needed
 from .slip_tables import event_rows, thinned
 
 LEFT = 76
+TIME = label("time from the start", "s")
 
 
 class SimulatedView:
@@ -33,7 +34,14 @@ class SimulatedView:
         self.figures: dict[str, Any] = {}
         for key in ("x", "gap"):
             linked = {"x_range": self.figures["x"].x_range} if self.figures else {}
-            made = figure(height=230, window_axis="x", output_backend="canvas", **linked)
+            made = figure(
+                x=TIME if key == "gap" else "",
+                height=230,
+                window_axis="x",
+                output_backend="canvas",
+                tags=[TIME],
+                **linked,
+            )
             compared(made, self._measured, self._model, (key, key), "model", width=2)
             made.min_border_left = LEFT
             self.figures[key] = made
@@ -75,7 +83,6 @@ class SimulatedView:
         self._measured.data = thinned(t, x * k, gap * g)
         self.figures["x"].yaxis.axis_label = label("displacement", unit)
         self.figures["gap"].yaxis.axis_label = label("load point - block", small)
-        self.figures["gap"].xaxis.axis_label = label("time from the start", "s")
         if found is None:
             self._model.data = {"t": [], "x": [], "gap": []}
         else:

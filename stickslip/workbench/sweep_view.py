@@ -73,12 +73,12 @@ class SweepView:
             made.x_range = Range1d()
             if key == "recurrence":
                 made.y_range = Range1d()
-            made.line("v", key, source=self._model, color=theme.model, line_width=2, line_dash="dashed")
+            made.line("v", key, source=self._model, color=theme.model, line_width=2, line_dash="dashed", name="model")
             made.scatter(
                 "v", key, source=self._model, color=theme.model, fill_alpha=0.0, line_width=2, size=13, marker="square"
             )
-            made.multi_line("xs", "ys", source=self._bars[key], color=theme.measured, line_width=1.5)
-            made.scatter("v", key, source=self._measured, color=theme.measured, size=9)
+            made.multi_line("xs", "ys", source=self._bars[key], color=theme.measured, line_width=1.5, name="scatter")
+            made.scatter("v", key, source=self._measured, color=theme.measured, size=9, name="measured")
             self.figures[key] = made
         self.signs = Signs()
         self.view = pn.Column(

@@ -243,7 +243,7 @@ def test_what_the_file_states_of_the_rig_is_shown(base):
 
 
 def test_legends_name_what_is_drawn_from_the_first_look_on(session):
-    cycle, ladder = model_page._Cycle(session), ladder_view.Ladder(session)
+    cycle, ladder = model_page.Cycle(session), ladder_view.Ladder(session)
     for figure in (cycle.force, cycle.residual, cycle.creep, ladder.figure):
         (legend,) = figure.legend
         assert [item.visible for item in legend.items] == [True] * len(legend.items), figure.title.text
