@@ -60,7 +60,7 @@ def _sets(found: dict[str, Any]) -> tuple[str, str, str, str]:
         f"{many['ms a set']} ms a set, {many['grown MiB']} MiB more, {many['result MiB']} MiB of which are the result"
     )
     bounded = many["grown MiB"] < 2.0 * many["result MiB"]
-    return "static", "10 000 parameter sets in one call, bounded memory", told, _yes(bounded)
+    return "static", "10 000 parameter sets, bounded memory", told, _yes(bounded)
 
 
 def _runs(found: dict[str, Any]) -> dict[tuple[float, int, int], dict[str, Any]]:

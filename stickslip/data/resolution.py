@@ -59,7 +59,7 @@ def noise_level(values: Array, resolution: float | None = None, windows: int = 4
 
 
 def rounding_of_mean(way: Array, count: float, spread: float) -> Array:
-    """Variance of what rounding to counts adds to the mean of readings over an even way (m^2), shape as ``way``.
+    """Variance of what rounding to counts adds to the mean of readings evenly over a way (m^2), shape as ``way``.
 
     Over whole counts nothing is left, over a part of one as much as a twelfth of its square. Where on the count the way
     begins is not known (Widrow & Kollár, Quantization Noise, 2008, ch. 4 and 9).

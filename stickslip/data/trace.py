@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 SIGNALS = {"displacement": "m", "velocity": "m/s", "spring_force": "N"}
 CHANNELS = {**SIGNALS, "drive_position": "m", "normal_load": "N"}
 MAINS = (50.0, 60.0)  # Hz
+COARSENED = "coarsened"  # what a repair of this kind is called
 ROLES = ("", "train", "held-out")
 SIZES = ("resolution", "noise", "walk", "hum", "spring_stiffness", "minimum_slip")  # of a trace: numbers, not negative
 
@@ -487,8 +488,8 @@ class Trace(Shown, _Rebuilt):
                 samples.
 
         Raises:
-            InputError: the rate is not positive or above that of the record, a unit that cannot be read, or less than
-                two means.
+            InputError: the rate is not positive or above that of the record, a unit that cannot be read, less than two
+                means, or means already.
 
         Examples:
             >>> import stickslip as ss
@@ -505,6 +506,9 @@ class Trace(Shown, _Rebuilt):
         size = round(1.0 / (wanted * step))
         if size == 1:
             return self
+        if any(r.kind == COARSENED for r in self.repairs):
+            what = f"trace '{self.name}' is coarsened already: what rounding leaves of its means is not known any more"
+            raise InputError(what, key="rate", value=rate, hint="coarsen the record itself, at once")
         edges = [0, *np.searchsorted(self.time, self.missing, side="right").tolist(), self.time.size]
         numbers = [(stop - start) // size for start, stop in pairwise(edges)]  # of means between gaps
         if sum(numbers) < 2:
@@ -519,7 +523,7 @@ class Trace(Shown, _Rebuilt):
         noise, alike = self._of_mean(size)
         told = f"counts that noise hardly blurs: means of {size} keep their rounding, which a fit can no longer correct"
         lost, rates = self.time.size - time.size, f"{shown(1.0 / step, 'Hz')} to {shown(1.0 / (size * step), 'Hz')}"
-        note = Repair("coarsened", lost, "all channels", f"means of {size} samples, {rates}")
+        note = Repair(COARSENED, lost, "all channels", f"means of {size} samples, {rates}")
         return self.replace(
             **{name: means(values) for name, values in self.channels.items()}, time=time, noise=noise,
             resolution=None if self.resolution is None else self.resolution / size,
@@ -548,6 +552,8 @@ class Trace(Shown, _Rebuilt):
                 value = np.stack([value.times, value.positions])
             if f.name not in ("name", "repairs", "warnings", "provenance"):
                 found.update(f.name.encode())
+                if f.name in SIZES and value is not None:
+                    value = float(value)
                 found.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
         return found.hexdigest()
 

@@ -13,6 +13,7 @@ FLAT = 0.3  # standard deviation on the search scale (of a logarithm: 30 %) beyo
 TIED = 0.95  # correlation beyond which two parameters act as one
 LEVEL = 3.84  # rise of the cost at the ends of a 95 % interval
 FIRST, DOUBLINGS = 3.0, 6  # distance of the first value, in standard deviations, and how far a flat profile is followed
+AT_BOUND = 0.02  # deviation of a parameter that has none, for it stands at a bound
 CLOSER, NEAR = 5, 0.05  # evaluations at most to meet that rise, and how nearly
 _PART = 0.3  # share of a direction's largest weight that makes a parameter part of it
 _SMALL = 0.1  # power below which a factor is left out of a product
@@ -275,10 +276,10 @@ def profile(
         heights = np.array([cost[at] for at in z])
         return z, heights - heights.min()
 
-    lowest = cost[look(best)]
+    lowest, first = cost[look(best)], FIRST * (std if std > 0.0 else AT_BOUND)
     for side in (-1, 1):
         for k in range(DOUBLINGS):
-            end = look(best + side * FIRST * 2**k * std)
+            end = look(best + side * first * 2**k)
             if cost[end] - lowest >= LEVEL or end in bounds:
                 break
         for _ in range(CLOSER):

@@ -114,7 +114,7 @@ class Campaign(Shown, Mapping[str, Trace]):
         """The run of that name, or the default where there is none."""
         return next((trace for trace in self.traces if trace.name == name), default)
 
-    def only(self, *names: str) -> Campaign:
+    def only(self, *names: str | Sequence[str]) -> Campaign:
         """A campaign of these runs alone, in the order that they have here, with the same rig.
 
         Args:
@@ -131,12 +131,12 @@ class Campaign(Shown, Mapping[str, Trace]):
             >>> campaign.without("holds").names
             ['v050', 'v100', 'v200', 'v400']
         """
-        kept = {self[name].name for name in names}
+        kept = self._named(names)
         if not kept:
             raise InputError("a campaign needs at least one trace", key="names", allowed=", ".join(self.names))
         return self._of(trace for trace in self.traces if trace.name in kept)
 
-    def without(self, *names: str) -> Campaign:
+    def without(self, *names: str | Sequence[str]) -> Campaign:
         """A campaign of all other runs; see :meth:`only`.
 
         Args:
@@ -145,8 +145,13 @@ class Campaign(Shown, Mapping[str, Trace]):
         Raises:
             InputError: no run of that name, or none is left.
         """
-        left = {self[name].name for name in names}
-        return self.only(*(name for name in self.names if name not in left))
+        left = self._named(names)
+        if len(left) == len(self):
+            raise InputError("no run is left", key="names", value=", ".join(self.names), hint="leave out fewer")
+        return self._of(trace for trace in self.traces if trace.name not in left)
+
+    def _named(self, names: Sequence[str | Sequence[str]]) -> set[str]:
+        return {self[name].name for given in names for name in several(given)}
 
     def map(self, change: Callable[[Trace], Trace]) -> Campaign:
         """A campaign of changed runs, with the same rig: ``campaign.map(lambda trace: trace.coarsened("2 kHz"))``.

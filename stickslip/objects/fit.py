@@ -187,7 +187,7 @@ class Fit(FittedModel, Savable):
 
         ``chi-square`` is that of residuals made independent by their covariance, for those of one event go together;
         reduced, it is over points less effective parameters. The sizes are estimated from the same residuals, so that
-        it is near 1 by itself, and tells a wrong model less than :attr:`error` does.
+        it is near 1 by itself, and reveals a wrong model less clearly than :attr:`error` does.
 
         ``AIC`` and ``BIC`` count effective parameters and sizes. More points within an event tell little that is new:
         what counts as an independent datum in ``BIC`` is an event. :func:`stickslip.compare` assumes less.
@@ -373,7 +373,7 @@ class Fit(FittedModel, Savable):
             return profile(self, name, tell)
 
     def intervals(self, names: str | Sequence[str] = (), progress: Tell | None = None) -> pandas.DataFrame:
-        """Intervals of 95 % of parameters by their :meth:`profile` likelihoods, which need not be even.
+        """Intervals of 95 % of parameters by their :meth:`profile` likelihoods, which need not be symmetric.
 
         Args:
             names: of the parameters; default all of :attr:`free`.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
@@ -48,7 +49,9 @@ def _simulated(scenario: Callable[Concatenate[M, P], Scenario]) -> Callable[Conc
         return simulate(scenario(self, *args, **kwargs))
 
     simulate.__name__, simulate.__qualname__ = "simulate", "FittedModel.simulate"
-    simulate.__annotations__["return"] = "xarray.Dataset"
+    simulate.__annotations__ = {**scenario.__annotations__, "return": "xarray.Dataset"}
+    taken = inspect.signature(scenario).replace(return_annotation="xarray.Dataset")
+    simulate.__signature__ = taken  # type: ignore[attr-defined]
     simulate.__doc__ = """Run the model freely: ``fit.simulate(drive="800 um/s")``; arguments as of :meth:`scenario`."""
     return simulate
 

@@ -86,6 +86,7 @@ def intervals(fit: Fit, names: Sequence[str], tell: Tell) -> pandas.DataFrame:
         found = profile(fit, name, part(tell, i, len(every)))
         value, std = fit.values[name], fit.std[name]
         low, high = (np.nan if v is None else v for v in found["interval"])
+        std = std if std > 0.0 else np.nan  # at a bound it has none
         sides = (low - value) / std, (high - value) / std
         rows[name] = {"value": value, "low": low, "high": high, "low / std": sides[0], "high / std": sides[1]}
         rows[name]["unit"] = found["unit"]

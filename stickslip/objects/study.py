@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ArgumentError, InputError, StickslipError
-from ..system import process
+from ..system import process, threads
 from ..system.cluster import cluster
 from ..system.parent_watch import end_with
 from ..system.progress import reporting, silent
@@ -83,6 +83,7 @@ def _fitted(
     if parent is not None:
         end_with(parent)
     process.begin()
+    threads.alone(False)  # campaigns share the processors
     try:
         fit = _loaded(given, files).fit(effects, progress=silent)
     except StickslipError as error:

@@ -195,7 +195,7 @@ def progress_to(tell: Tell | None) -> AbstractContextManager[None]:
     """Within it, long work that is given no ``progress`` of its own tells this function, and shows no bar.
 
     Args:
-        tell: called with what is being done and the share of it that is done (0 to 1; None where that is not known).
+        tell: called with what is being done and the share of it that is done (0 to 1).
             None: nobody is told.
 
     Returns:

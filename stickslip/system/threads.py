@@ -49,8 +49,8 @@ def processor_limit(number: int) -> Iterator[None]:
     Examples:
         ``with ss.processor_limit(2): campaign.diagnose()`` leaves the others to your colleagues.
     """
-    if number < 1:
-        raise ArgumentError("work needs a processor", key="number", value=number, allowed="1 or more")
+    if not isinstance(number, int) or number < 1:
+        raise ArgumentError("work needs a processor", key="number", value=number, allowed="1, 2, 3, ...")
     before = _most.set(number)
     try:
         yield

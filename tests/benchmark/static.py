@@ -193,8 +193,11 @@ def many(sets: int = 10_000, loads: int = 400, hursts: int = 4) -> dict[str, flo
     tau = default_loads(loads)
 
     def curves(exponents: np.ndarray, h: np.ndarray, f: np.ndarray) -> np.ndarray:
-        made = [RoughLines(float(H), 1.0, LENGTH).indentation for H in exponents]
-        return np.concatenate([creep_displacements(static_contact(m.scaled(h), f, FRICTION), tau) for m in made])
+        out = np.empty((exponents.size, h.size, tau.size))
+        for part, exponent in zip(out, exponents, strict=True):
+            lines = RoughLines(float(exponent), 1.0, LENGTH).indentation
+            part[:] = creep_displacements(static_contact(lines.scaled(h), f, FRICTION), tau)
+        return out.reshape(-1, tau.size)
 
     exponents = np.linspace(0.2, 0.8, hursts)
     curves(exponents[:1], h[:1], f[:1])  # one set: all that it loads is there

@@ -8,6 +8,7 @@ import pytest
 from stickslip.errors import InputError
 from stickslip.physics.contact import (
     RoughLines,
+    bank_from_contact,
     creep_curve,
     creep_displacements,
     default_loads,
@@ -172,10 +173,45 @@ def test_bad_input_is_refused(change):
         small(**change)
 
 
-@pytest.mark.parametrize("change", [{"length": 0.0}, {"n_springs": 3}, {"lines": 0}, {"h_rms": [1e-6, 0.0]}], ids=str)
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"length": 0.0},
+        {"n_springs": 3},
+        {"lines": 0},
+        {"lines": 2.5},
+        {"h_rms": "0 um"},
+        {"h_rms": [1e-6, 2e-6]},
+        {"roll_off": -1e-6},
+        {"cut_off": 0.0},
+        {"length": "2 kg"},
+    ],
+    ids=str,
+)
 def test_bad_lines_are_refused(change):
     with pytest.raises(InputError):
         RoughLines(**{**SMALL, **change})
+
+
+def test_lengths_are_text_with_a_unit_too_and_heights_a_list():
+    one = RoughLines(h_rms="2 um", length="10 um", cut_off="0.1 um", **SMALL)
+    same = RoughLines(h_rms=[2e-6] * 6, length=1e-5, cut_off=1e-7, **SMALL)
+    assert np.abs(np.asarray(one.heights - same.heights)).max() < 1e-12 * 2e-6
+    assert np.allclose(same.contact([0.31] * 6).displacement(0.5), one.contact(0.31).displacement(0.5), rtol=1e-12)
+
+
+def test_what_is_no_contact_or_has_unequal_loads_is_refused_with_the_way_out():
+    lines = RoughLines(**SMALL)
+    for make in (creep_curve, bank_from_contact, lambda c: creep_displacements(c, [1.0])):
+        with pytest.raises(InputError, match=r"RoughLines\(H=0\.3\)\.contact\(\)"):
+            make(lines)
+    unequal = lines.contact(np.linspace(0.1, 0.5, 6))
+    with pytest.raises(InputError, match="bank_from_contact takes unequal contacts"):
+        creep_curve(unequal)
+    with pytest.raises(InputError, match=r"shape \(P, 1\)"):
+        creep_displacements(unequal, [1.0])
+    alone = creep_displacements(static_contact(lines.indentation, 0.31, 0.21), [0.5, 1.0])
+    assert np.allclose(alone, [small(tau=np.array([0.5, 1.0])).u], rtol=1e-12)
 
 
 def test_a_curve_shows_its_ends_and_not_its_points():

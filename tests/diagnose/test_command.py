@@ -191,9 +191,9 @@ def test_the_shipped_campaign_is_diagnosed(tmp_path):
 def test_an_interrupted_diagnosis_says_what_is_kept_and_goes_on_from_it(tmp_path, monkeypatch, capsys):
     """The engine keeps two pieces and is stopped there; the second time it is told that they are there."""
 
-    def stopped(*args, store, **kwargs):
+    def stopped(*args):
         for key in ("base", "round1-score-tilt"):
-            store.save(key, {"z": np.arange(3.0)})
+            args[-1].store.save(key, {"z": np.arange(3.0)})
         raise KeyboardInterrupt
 
     monkeypatch.setattr("stickslip.objects.diagnosis.search", stopped)

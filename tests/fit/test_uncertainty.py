@@ -136,6 +136,12 @@ def test_an_interval_does_not_depend_on_the_deviation_from_which_it_is_sought(st
     assert found.interval == pytest.approx(tuple(ends), abs=1e-4)
 
 
+def test_a_parameter_at_its_bound_has_a_profile_to_the_other_side():
+    found = profile("k", 0.0, 0.0, (0.0, 5.0), lambda z: 100.0 * (z + 0.1) ** 2)
+    assert found.interval == (-np.inf, pytest.approx(np.sqrt(0.01 + 0.0384) - 0.1, abs=1e-3))
+    assert "one side" in found.text
+
+
 def test_flat_and_one_sided_profiles_say_so():
     flat = profile("k", 0.0, 1.0, (-9.0, 9.0), lambda z: 3.0)
     assert flat.interval == (-np.inf, np.inf)

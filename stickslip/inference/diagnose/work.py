@@ -5,12 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ...system.progress import Tell
+from ...system.progress import Tell, silent
 from .checkpoints import Store
-
-
-def _silent(text: str, share: float) -> None:
-    """Nobody is told."""
 
 
 def _endless() -> bool:
@@ -29,6 +25,6 @@ class Work:
     """
 
     jobs: int = 1
-    tell: Tell = _silent
+    tell: Tell = silent
     in_time: Callable[[], bool] = _endless
     store: Store | None = None

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import jax
 import numpy as np
 
 from ...errors import InputError
+from ...system.units import to_si
 
 
 def concrete(value: object) -> bool:
     """Whether the value is known now, that is not traced by jit, vmap or a derivative."""
     return not isinstance(value, jax.core.Tracer)
+
+
+def in_metres(value: Any) -> Any:
+    """A length in m from a number, text with a unit, or a list of either; what is traced passes as it is."""
+    if isinstance(value, str):
+        return to_si(value, "m")
+    return np.array([in_metres(one) for one in value]) if isinstance(value, Sequence) else value
 
 
 def check_within(

@@ -12,12 +12,12 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from ...errors import InputError, nearest
+from ...errors import ArgumentError, InputError, nearest
 from ...system.units import ends, shown, shown_with
 from ._ranges import check_within, concrete
 from .indentation import check_saturation
 from .rough_lines import RoughLines
-from .tangential import StaticContact
+from .tangential import StaticContact, checked_contact
 
 Average = Literal["displacement", "force"]
 TimeForm = Literal["exact", "paper"]
@@ -120,7 +120,7 @@ def creep_curve(
     continuous.
 
     Args:
-        contact: lines (n_lines, N) over which one contact is averaged, or a single one (N,) of any profile.
+        contact: lines (n_lines, N) under one normal force, over which is averaged, or a single one (N,) of any profile.
         spring_stiffness, velocity: of the drive, N/m and m/s.
         contacts: how many equal contacts carry the block.
         tau: (T,) loads from 0 to 1; default 400, see `default_loads`.
@@ -136,7 +136,12 @@ def creep_curve(
     loads = default_loads() if tau is None else tau
     check_within("the load", loads, least=0.0, to=1.0, key="tau")
     check_within("the number of contacts", contacts, least=1.0, key="contacts")
-    contact = RoughLines().contact() if contact is None else contact
+    contact = RoughLines().contact() if contact is None else checked_contact(contact)
+    if jnp.ndim(contact.strength) > 0:
+        raise ArgumentError(
+            "lines that are averaged carry the same load", key="contact",
+            value=f"{jnp.size(contact.strength)} loads", hint="ss.bank_from_contact takes unequal contacts",
+        )  # fmt: skip
     tau_out, u, u_max, stiffness, share = _evaluate(contact, jnp.asarray(loads), average)
     if concrete(share) and jnp.any(contact.indentation.gaps > 0.0):  # a flat punch is meant to touch all over
         check_saturation(share, key="contact")
@@ -158,9 +163,18 @@ def creep_displacements(contact: StaticContact, tau: ArrayLike, *, memory: float
 
     Returns:
         (P, T) in m. No check of saturation.
+
+    Raises:
+        InputError: no contact, or sets of another shape.
     """
-    table, loads = contact.indentation, jnp.asarray(tau)
-    sets = np.broadcast_arrays(*map(np.asarray, (table.height, contact.normal_force, contact.friction)))
+    table, loads = checked_contact(contact).indentation, jnp.asarray(tau)
+    given = [np.asarray(a) for a in (table.height, contact.normal_force, contact.friction)]
+    sets = np.broadcast_arrays(*(a.reshape(1, 1) if a.ndim == 0 else a for a in given))
+    if sets[0].ndim != 2 or sets[0].shape[1] != 1:
+        raise ArgumentError(
+            "parameter sets are rows", key="contact", value=", ".join(str(a.shape) for a in given),
+            allowed="height of the table, normal force and friction of shape (P, 1)",
+        )  # fmt: skip
     number = len(sets[0])
     chunk = int(max(1, memory // (80 * table.gaps[..., 0].size * loads.size)))
     out = np.empty((number, loads.size))

@@ -9,8 +9,9 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from ...errors import InputError
 from ...system.units import shown
-from ._ranges import check_within, concrete
+from ._ranges import check_within, concrete, in_metres
 from .elastic import Moduli, equal_bodies
 from .indentation import Indentation, indentation
 from .profiles import Profile, from_heights
@@ -18,13 +19,18 @@ from .roughness import check_line, line_phasors, lines_from_phasors
 from .tangential import StaticContact, check_load, static_contact
 from .touching import touching
 
+NAMED = {
+    "h_rms": "the rms height", "length": "the length of the line", "roll_off": "the roll-off wavelength",
+    "cut_off": "the cut-off wavelength",
+}  # fmt: skip
+
 
 class RoughLines(eqx.Module):
     """Periodic self-affine lines with zero mean and random phases. Defaults: the paper's surface (Grzemba 2014).
 
     Line i of a seed keeps its phases whatever H, the rms height, ``lines`` and ``n_springs`` are (a finer line adds
     short waves to the same long ones), so differences between parameters are not hidden by chance. Differentiable in
-    H, ``h_rms``, ``length``, ``roll_off`` and ``cut_off``.
+    H, ``h_rms``, ``length``, ``roll_off`` and ``cut_off``. Lengths may be text with a unit, such as ``"2.5 um"``.
 
     Fields:
         H: Hurst exponent in (0, 1).
@@ -41,18 +47,23 @@ class RoughLines(eqx.Module):
     """
 
     H: ArrayLike = 0.3
-    h_rms: ArrayLike = 2.46e-6
-    length: ArrayLike = 20e-6
+    h_rms: ArrayLike = eqx.field(default=2.46e-6, converter=in_metres)
+    length: ArrayLike = eqx.field(default=20e-6, converter=in_metres)
     n_springs: int = eqx.field(default=4096, static=True, kw_only=True)
     lines: int = eqx.field(default=100, static=True, kw_only=True)
     seed: int = eqx.field(default=0, static=True, kw_only=True)
-    roll_off: ArrayLike | None = eqx.field(default=None, kw_only=True)
-    cut_off: ArrayLike | None = eqx.field(default=None, kw_only=True)
+    roll_off: ArrayLike | None = eqx.field(default=None, kw_only=True, converter=in_metres)
+    cut_off: ArrayLike | None = eqx.field(default=None, kw_only=True, converter=in_metres)
 
     def __check_init__(self) -> None:
         check_line(self.H, self.lines, self.n_springs)
-        check_within("the rms height", self.h_rms, above=0.0, key="h_rms", unit="m")
-        check_within("the length of the line", self.length, above=0.0, key="line_length", unit="m")
+        given = {"h_rms": self.h_rms, "length": self.length, "roll_off": self.roll_off, "cut_off": self.cut_off}
+        for key, value in given.items():
+            if value is not None:
+                check_within(NAMED[key], value, above=0.0, key=key, unit="m")
+        if jnp.ndim(self.h_rms) > 0 and jnp.shape(self.h_rms) != (self.lines,):
+            counts = f"{jnp.size(self.h_rms)} for {self.lines} lines"
+            raise InputError("rough lines have one rms height, or each its own", key="h_rms", value=counts)
 
     def __repr__(self) -> str:
         given = {"h_rms": self.h_rms, "length": self.length, "roll_off": self.roll_off, "cut_off": self.cut_off}
@@ -92,9 +103,10 @@ class RoughLines(eqx.Module):
         Raises:
             InputError: a value out of its range.
         """
+        normal_force = jnp.asarray(normal_force)
         check_load(normal_force, friction)
         elastic = moduli or equal_bodies()
-        load = jnp.asarray(normal_force) / (elastic.normal * jnp.asarray(self.dx) * jnp.asarray(self.h_rms))
+        load = normal_force / (elastic.normal * jnp.asarray(self.dx) * jnp.asarray(self.h_rms))
         table = touching(Profile(_gaps(self.H, self._phasors, self._waves), self.dx), load)
         return static_contact(table.scaled(self.h_rms), normal_force, friction, elastic)
 

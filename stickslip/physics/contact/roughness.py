@@ -63,12 +63,12 @@ def cut_to_line_factor(H: ArrayLike) -> Array:
     return jnp.exp(0.5 * (0.5 * jnp.log(jnp.pi) + gammaln(H + 1.0) - gammaln(H + 0.5)))
 
 
-def check_line(H: ArrayLike, n_lines: int, n_springs: int) -> None:
+def check_line(H: ArrayLike, lines: int, n_springs: int) -> None:
     """Raise InputError unless H, the number of lines and the number of springs are usable."""
     check_within("the Hurst exponent", H, above=0.0, below=1.0, key="H")
-    if n_lines < 1:
-        raise InputError("no rough line", key="lines", value=n_lines, allowed="1 or more")
-    if n_springs < 4 or n_springs % 2:
+    if not isinstance(lines, int) or lines < 1:
+        raise InputError("no number of rough lines", key="lines", value=lines, allowed="1, 2, 3, ...")
+    if not isinstance(n_springs, int) or n_springs < 4 or n_springs % 2:
         raise InputError(
-            "cannot make a line of that many springs", key="springs", value=n_springs, allowed="even, >= 4"
+            "cannot make a line of that many springs", key="n_springs", value=n_springs, allowed="even, 4 or more"
         )

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from ...errors import ArgumentError
 from ._ranges import check_within
 from .elastic import Moduli, equal_bodies
 from .indentation import Indentation
@@ -86,7 +87,15 @@ def static_contact(
     return StaticContact(table, normal_force, friction, moduli or equal_bodies())
 
 
+def checked_contact(contact: StaticContact) -> StaticContact:
+    """The contact; an error says how to make one of what is none."""
+    if not isinstance(contact, StaticContact):
+        hint = "ss.RoughLines(H=0.3).contact(), or stickslip.physics.contact.static_contact(...) of any profile"
+        raise ArgumentError("not a contact", key="contact", value=contact, hint=hint)
+    return contact
+
+
 def check_load(normal_force: ArrayLike, friction: ArrayLike) -> None:
     """Raise InputError unless normal force (N) and friction coefficient are above zero."""
     check_within("the normal force", normal_force, above=0.0, key="normal_force", unit="N")
-    check_within("the friction coefficient", friction, above=0.0, key="friction_coefficient")
+    check_within("the friction coefficient", friction, above=0.0, key="friction")

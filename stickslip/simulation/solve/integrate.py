@@ -162,9 +162,9 @@ def integrate(
         largest_step: longest step (s).
         most_steps: give up after so many steps.
         progress: called now and then with the time reached (s) and the last piece's steps.
-        until: ends the run early, where it first turns true: whether it is at each of some :class:`Steps`, such as
-            ``lambda steps: steps.x > 1e-4``. What is true within a step only is not seen. One truth for all of them,
-            such as ``lambda steps: time.monotonic() > deadline``, ends the run at the last of them.
+        until: ends the run early, where it first turns true: takes :class:`Steps` and says True or False for each of
+            them, such as ``lambda steps: steps.x > 1e-4``. What is true within a step only is not seen. One answer for
+            all of them, such as ``lambda steps: time.monotonic() > deadline``, ends the run at the last of them.
 
     Returns:
         The trajectory and the state at its end, which is ``t1`` or where ``until`` turned true.
@@ -172,7 +172,7 @@ def integrate(
     Raises:
         InputError: mass, spring, damping, weakening or an element of the contact is outside its range; the end is not
             after the start, the longest step is not positive, the state is that of a model of another form, or
-            ``until`` is true at the start or not a truth at each step.
+            ``until`` is true at the start or does not give True or False for each step.
         SolveError: the steps became too small to get anywhere or a number was lost; says when and what to change, and
             has the motion up to there as its ``trajectory``.
     """
@@ -182,6 +182,9 @@ def integrate(
     least = LEAST_ADVANCE / PIECE * _refuse_impossible(model, bank)
     if not t0 < t1 < np.inf:
         raise InputError("the end of a run must be after its start", key="t1", value=t1, allowed=f"above {t0:g} s")
+    if until is not None and not callable(until):
+        allowed = "a function of Steps, such as  lambda steps: steps.x > 1e-4"
+        raise ArgumentError("no condition", key="until", value=until, allowed=allowed)
     if not largest_step > 0.0:
         raise InputError(
             "the longest step must be positive", key="largest_step", value=largest_step, allowed="above 0 s"
@@ -243,7 +246,7 @@ def _turns(until: Callable[[Steps], Any], steps: Steps) -> float | None:
     def holds(steps: Steps) -> np.ndarray:
         found = np.asarray(until(steps))
         if found.dtype != bool or found.shape not in ((), steps.t.shape):
-            what, allowed = "not a truth at each step", "such as  lambda steps: steps.x > 1e-4"
+            what, allowed = "it must give True or False for each step", "such as  lambda steps: steps.x > 1e-4"
             raise ArgumentError(what, key="until", value=f"{found.dtype} {found.shape}", allowed=allowed)
         return found
 
