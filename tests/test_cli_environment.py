@@ -22,6 +22,13 @@ def test_an_option_of_the_environment_is_as_one_on_the_line(monkeypatch, capsys)
     assert capsys.readouterr().out == on_the_line and on_the_line.count("\n") == 5
 
 
+def test_an_empty_variable_is_not_set(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STICKSLIP_CREEP_OUT", "")
+    assert run(["creep", RIG, "--points", "3"]) == 0
+    assert capsys.readouterr().out.count("\n") == 4 and list(tmp_path.iterdir()) == []
+
+
 def test_the_line_counts_more_than_the_environment(monkeypatch, capsys):
     monkeypatch.setenv("STICKSLIP_CREEP_POINTS", "many")
     assert run(["creep", RIG, "--points", "3"]) == 0
@@ -30,7 +37,7 @@ def test_the_line_counts_more_than_the_environment(monkeypatch, capsys):
 
 WRONG = {
     "no number": ("STICKSLIP_DIAGNOSE_JOBS", "all", ["diagnose", "x.toml"], 'unable to convert "all" into int'),
-    "empty": ("STICKSLIP_DIAGNOSE_JOBS", "", ["diagnose", "x.toml"], 'unable to convert "" into int'),
+    "an assignment": ("STICKSLIP_CREEP_SET", "contact.H=7", ["creep", RIG], "STICKSLIP_CREEP_SET: contact.H: "),
     "out of range": ("STICKSLIP_DIAGNOSE_JOBS", "0", ["diagnose", "x.toml"], "out of range (got 0)\n  allowed: 1"),
     "no unit": ("STICKSLIP_FIT_V_LIM", "9", ["fit", "x.toml"], "the unit is missing (got '9')"),
     "no choice": ("STICKSLIP_FIT_MODEL", "slow", ["fit", "x.toml"], 'Choose from: "static", "inertial"'),

@@ -10,21 +10,25 @@ import pytest
 
 from stickslip.blind.make import make_challenge
 from stickslip.blind.run import run_challenge
-from stickslip.cli import challenge, diagnose, fit, forecast
+from stickslip.blind.score import score_challenge
+from stickslip.cli import challenge, creep, diagnose, fit, forecast
 from stickslip.objects.diagnosis import diagnose as diagnose_function
 from stickslip.objects.fit import fit as fit_function
 from stickslip.objects.forecast import forecast as forecast_function
 from stickslip.objects.static_fit import fit_static
+from stickslip.simulation.scenario import static_creep
 from stickslip.system.units import to_si
 
 TOLD = {"progress", "tell", "note"}  # who is told, in Python only
-CALLED = {"effects": "add", "profiles": "profile"}  # one for each option that is given
+CALLED = {"effects": "add", "profiles": "profile", "expected": "seal"}
 PAIRS = (  # and what only Python has, for other methods and for messages
     (diagnose.diagnose, diagnose_function, set()),
     (forecast.forecast, forecast_function, set()),
     (fit.fit, fit_static, set()),
     (fit.fit, fit_function, {"key"}),
     (challenge.make, make_challenge, {"own"}),
+    (challenge.score, score_challenge, set()),
+    (creep.creep, static_creep, set()),
     (challenge.run, run_challenge, {"diagnosis"}),
 )
 

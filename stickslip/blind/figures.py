@@ -119,13 +119,13 @@ def _heldout(cases: Sequence[Marked]) -> dict[str, Any]:
     """Quartiles of the held-out error before and after, and of their ratio."""
     falls = [m.fall for m in cases if m.fall is not None]
     known = [m for m in cases if m.answer.final is not None]
+    stated = known or not any(m.answered for m in cases)  # another method states no errors
     return {
         "cases": len(falls),
         "base": _quartiles([m.answer.base for m in cases if m.answer.base is not None]),
         "final": _quartiles([m.answer.final for m in known if m.answer.final is not None]),
         "ratio": _quartiles(falls),
-        # answers of another method state no errors
-        "within": rate(m.answer.final is not None and m.answer.final <= WITHIN for m in (cases if known else ())),
+        "within": rate(m.answer.final is not None and m.answer.final <= WITHIN for m in (cases if stated else ())),
     }
 
 

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, ValidationError, create_model, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, create_model, model_validator
 
 from ..data.campaign.fields import faults
 from ..data.campaign.located_errors import readable
 from ..data.campaign.models import Model
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..physics.effects import catalogue
 from ..physics.params import specs
 from ..system.units import to_si
@@ -24,11 +24,25 @@ NOT_GIVEN = Answer("not run", text="not answered")
 
 @faults()
 def _tag(tag: str) -> str:
-    catalogue.get(tag)
+    if tag not in catalogue.tags():
+        raise InputError(f"there is no effect {tag!r}", hint=nearest(tag, catalogue.tags()))
     return tag
 
 
+def _several(tags: Any) -> Any:
+    return (tags,) if isinstance(tags, str) else tags
+
+
+@faults()
+def _size(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise InputError("no amplitude", value=value, allowed='a number in SI, or text with a unit such as "5 mN"')
+    return value
+
+
 Tag = Annotated[str, AfterValidator(_tag)]
+Tags = Annotated[tuple[Tag, ...], BeforeValidator(_several)]
+Size = Annotated[float | str, BeforeValidator(_size)]
 
 
 class Amplitude(Model):
@@ -38,8 +52,8 @@ class Amplitude(Model):
         value, std: it and its standard deviation, SI or text with a unit. form: of the law; default the catalogue's.
     """
 
-    value: float | str
-    std: float | str | None = None
+    value: Size
+    std: Size | None = None
     form: str | None = None
 
 
@@ -54,8 +68,8 @@ class OwnAnswer(Model):
     """
 
     kind: Literal["complete", "missing", "ambiguous", "unknown"]
-    effects: tuple[Tag, ...] = ()
-    set: tuple[Tag, ...] = ()
+    effects: Tags = ()
+    set: Tags = ()
     amplitude: dict[Tag, Amplitude] = {}
     confidence: Annotated[float | None, Field(ge=0.0, le=1.0)] = None
     text: str = ""
@@ -80,19 +94,28 @@ class OwnAnswer(Model):
         parameters, forms = {}, {}
         for tag, found in self.amplitude.items():
             law = catalogue.get(tag)
-            unit, key = specs(law)[law.amplitude].unit, f"{tag}.{law.amplitude}"
-            std = None if found.std is None else to_si(found.std, unit)
+            unit, key, at = specs(law)[law.amplitude].unit, f"{tag}.{law.amplitude}", f"amplitude.{tag}"
+            std = None if found.std is None else _in(unit, found.std, f"{at}.std")
             if std is not None and std < 0.0:
-                raise InputError("a standard deviation is not negative", value=found.std)
-            parameters[key] = {"value": to_si(found.value, unit), "std": std, "unit": unit}
-            form = next(catalogue.forms(law)).get("form") if found.form is None else found.form
-            if form is not None:
-                catalogue.make(tag, form=form)
-                forms[tag] = {"form": form}
+                raise InputError(f"{at}.std: out of range", value=found.std, allowed=f"0 {unit} or more")
+            parameters[key] = {"value": _in(unit, found.value, f"{at}.value"), "std": std, "unit": unit}
+            known = [form["form"] for form in catalogue.forms(law) if "form" in form]
+            if found.form is not None and found.form not in known:
+                allowed = ", ".join(known) or "this law has no forms: leave 'form' out"
+                raise InputError(f"{at}.form: no such form", value=found.form, allowed=allowed)
+            if known:
+                forms[tag] = {"form": found.form or known[0]}
         named = tuple(dict.fromkeys(self.effects))
         return Answer(
             self.kind, named, self.set, parameters=parameters, confidence=self.confidence, text=self.text, forms=forms
         )
+
+
+def _in(unit: str, value: float | str, at: str) -> float:
+    try:
+        return to_si(value, unit)
+    except InputError as error:
+        raise InputError(f"{at}: {error.what}", value=error.value, allowed=error.allowed, hint=error.hint) from None
 
 
 def read_answers(answers: str | Path | Mapping[str, Any], cases: Sequence[str]) -> dict[str, Answer]:
@@ -108,8 +131,14 @@ def read_answers(answers: str | Path | Mapping[str, Any], cases: Sequence[str]) 
     """
     path, text, content = None, "", answers
     if not isinstance(answers, Mapping):
+        if not isinstance(answers, str | Path):
+            raise InputError("no answers", key="answers", value=answers, allowed="a file, or a mapping of mappings")
         path = Path(answers)
         text, content = _read(path)
+    tables = isinstance(content, Mapping) and all(isinstance(own, Mapping | OwnAnswer) for own in content.values())
+    if not tables:
+        hint = '"case-001": {"kind": "complete"}'
+        raise InputError("the answer to each case is a table", file=path, hint=hint)
     fields: dict[str, Any] = dict.fromkeys(cases, (OwnAnswer | None, None))
     model = create_model("Answers", __base__=Model, **fields)
     try:

@@ -149,7 +149,8 @@ def run(arguments: Sequence[str]) -> int:
         if isinstance(error, ArgumentError):
             name = str(error.key)
             error = error.but(key=f"--{OPTIONS.get(name, name).replace('_', '-')}")
-        return _fail(error.but(key=environment.taken.get(error.key, error.key)))
+        taken = environment.taken
+        return _fail(error.but(key=taken.get(error.key, error.key), file=taken.get(str(error.file), error.file)))
     except StickslipError as error:
         return _fail(error)
     except KeyboardInterrupt as error:

@@ -35,10 +35,13 @@ class Environment(Env):
         """
         options = arguments.filter_by(kind=Parameter.KEYWORD_ONLY)
         prefix = f"{PREFIX}{'_'.join(commands).upper()}_"
-        known = [prefix + option.name.strip("-").replace("-", "_").upper() for option in options]
+        variables = {prefix + option.name.strip("-").replace("-", "_").upper(): option for option in options}
+        known = list(variables)
         for name in os.environ:
-            if commands and name.startswith(prefix) and name not in known:
+            if commands and name.startswith(prefix) and name not in variables:
                 what = f"the command '{' '.join(commands)}' has no such option"
                 raise InputError(what, key=name, hint=nearest(name, known))
+        # one that is empty is not set: of a path it would be the present folder
+        options = ArgumentCollection(option for name, option in variables.items() if os.environ.get(name) != "")
         super().__call__(app, commands, options)
         self.taken = {o.name: str(token.keyword) for o in options for token in o.tokens if token.source == self.source}

@@ -175,7 +175,7 @@ class Diagnosis(Savable):
 class DiagnosisPlots:
     """The pictures of a diagnosis, each of which returns its matplotlib figure.
 
-    All of them take ``ax``: axes to draw in, of a figure of one's own, by its ``rcParams``.
+    All of them take ``ax``: axes to draw in, of a figure of one's own; texts, grid and frames are by ``rcParams``.
     """
 
     def __init__(self, found: Diagnosis) -> None:

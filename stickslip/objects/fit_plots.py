@@ -34,7 +34,8 @@ WIDEST = 4.0  # floors that are shown
 class FitPlots:
     """The pictures of a fit, each of which returns its matplotlib figure.
 
-    All but :meth:`browse` take ``ax``: axes to draw in, of a figure of one's own, by its ``rcParams``.
+    All but :meth:`browse` take ``ax``: axes to draw in, of a figure of one's own; texts, grid and frames are by
+    ``rcParams``.
     """
 
     def __init__(self, fit: Fit) -> None:

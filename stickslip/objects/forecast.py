@@ -130,7 +130,7 @@ class Forecast(Savable):
 class ForecastPlots:
     """The pictures of a forecast, each of which returns its matplotlib figure.
 
-    All of them take ``ax``: two axes to draw in, of a figure of one's own, by its ``rcParams``.
+    All of them take ``ax``: two axes to draw in, of a figure of one's own; texts, grid and frames are by ``rcParams``.
     """
 
     def __init__(self, found: Forecast) -> None:

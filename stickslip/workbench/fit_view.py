@@ -26,7 +26,9 @@ def fit_view(fit: Fit) -> pn.Column:
 
     if not isinstance(fit, Fit):
         hint = "campaign.fit() makes one; ss.workbench(campaign) shows a campaign"
-        raise ArgumentError("only a fit of the dynamic model has these pictures", key="fit", value=fit, hint=hint)
+        raise ArgumentError(
+            "only a fit of the dynamic model has these pictures", key="fit", value=type(fit).__name__, hint=hint
+        )
     session = Session(campaign=fit.campaign)
     session.first(fit)
     cycle, residual, said = Cycle(session, keys=""), Residual(session), Words(**WIDE)

@@ -92,8 +92,8 @@ class Residual:
                 more = {**of_run(len(self._points)), "legend_label": name[:24]}
                 self._points[name], self._medians[name] = source(x=[], y=[]), source(x=[], y=[])
                 marks = {"color": more["color"], "legend_label": more["legend_label"]}
-                self.figure.scatter("x", "y", source=self._points[name], size=3, alpha=0.35, **marks)
-                self.figure.line("x", "y", source=self._medians[name], line_width=2.5, **more)
+                self.figure.scatter("x", "y", source=self._points[name], size=3, alpha=0.35, name=name, **marks)
+                self.figure.line("x", "y", source=self._medians[name], line_width=2.5, name=f"{name}, medians", **more)
         self.figure.renderers = [*(r for r in self.figure.renderers if r not in self._curves), *self._curves]
 
     def update(self) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from invented import answer, effect, make
 from test_challenge_score import CASES, RESULTS, of
 
+from stickslip.blind.figures import _heldout
 from stickslip.blind.own_answers import NOT_GIVEN, read_answers
 from stickslip.blind.score import score_challenge
 from stickslip.blind.score_text import score_text
@@ -113,10 +115,24 @@ REFUSED = {
     "no set": ('[a1]\nkind = "ambiguous"', "'ambiguous' needs the effects", "set = ["),
     "too much": ('[a1]\nkind = "complete"\nset = ["tilt"]', "nothing is missing", "leave"),
     "a confidence": ('[a1]\nkind = "complete"\nconfidence = 80', "a1.confidence", "less than or equal to 1"),
-    "a unit": (DRAG + 'viscous-drag = { value = "5 m" }', "the unit 'm' is not one of N", "in N"),
-    "a deviation": (DRAG + "viscous-drag = { value = 5, std = -1 }", "not negative", "-1"),
-    "a form": (DRAG + 'viscous-drag = { value = 5, form = "cubic" }', "no such parameter", "drag, exponent"),
+    "a unit": (
+        DRAG + 'viscous-drag = { value = "5 m" }',
+        "amplitude.viscous-drag.value: the unit 'm' is not one of N",
+        "in N",
+    ),
+    "a deviation": (
+        DRAG + "viscous-drag = { value = 5, std = -1 }",
+        "amplitude.viscous-drag.std: out of range",
+        "0 N or more",
+    ),
+    "a form": (
+        DRAG + 'viscous-drag = { value = 5, form = "cubic" }',
+        "amplitude.viscous-drag.form: no such form",
+        "has no forms",
+    ),
     "what is not named": (DRAG + "tilt = { value = 0.1 }", "the amplitude of 'tilt', which is not named", "add it"),
+    "no size": (DRAG + "viscous-drag = { value = true }", "no amplitude (got True)", "5 mN"),
+    "a word": ('a1 = "complete"', "the answer to each case is a table", "kind"),
     "no TOML": ("a1 complete", "not valid TOML", "line 1"),
 }
 
@@ -130,6 +146,15 @@ def test_what_cannot_be_an_answer_is_told(folder: Path, tmp_path: Path, case: st
         score_challenge(folder, answers=path)
     assert str(caught.value).startswith(str(path))
     assert all(word in str(caught.value) for word in words)
+
+
+def test_a_single_effect_needs_no_list_and_what_is_no_mapping_is_refused(folder: Path) -> None:
+    one, several = (
+        score_challenge(folder, answers={"b1": {"kind": "missing", "effects": e}}) for e in ("wear", ["wear"])
+    )
+    assert one["by_effect"] == several["by_effect"]
+    with pytest.raises(InputError, match="a file, or a mapping of mappings"):
+        score_challenge(folder, answers=[("b1", {"kind": "complete"})])  # type: ignore[arg-type]
 
 
 def test_the_seal_is_checked_as_for_a_run(folder: Path) -> None:
@@ -179,3 +204,11 @@ def test_the_command_keeps_the_score_of_a_file_apart(
     assert found["answers"]["file"] == str(path) and "protocol" not in found
     assert run(["challenge", "score", str(folder), "--answers", str(tmp_path / "other.toml")]) == 2
     assert "the answers cannot be read" in capsys.readouterr().err
+
+
+def test_cases_of_a_run_that_were_not_answered_are_not_as_good_as_the_noise_and_another_method_is_not_judged() -> None:
+    silent = SimpleNamespace(fall=None, answered=False, answer=SimpleNamespace(base=None, final=None))
+    other = SimpleNamespace(fall=None, answered=True, answer=SimpleNamespace(base=None, final=None))
+    good = SimpleNamespace(fall=3.0, answered=True, answer=SimpleNamespace(base=3.0, final=1.0))
+    counted = [of(_heldout(cases)["within"]) for cases in ([silent], [silent, good], [other], [other, silent])]
+    assert counted == [(0, 1), (1, 2), (0, 0), (0, 0)]

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ...errors import ArgumentError
 from ..plots.style import DARK, LIGHT, MIDDLE, figure, label, panels, plain, remark, scaled, styled
 from .figures import series
 
@@ -128,7 +129,12 @@ def candidates_picture(table: pandas.DataFrame, most: int = 15, *, ax: Axes | No
         table: with a row for each effect: ``gain``, ``unseen gain`` and its deviation ``+-``.
         most: rows that are drawn.
         ax: axes to draw in; default a figure of its own.
+
+    Raises:
+        InputError: less than one row.
     """
+    if not isinstance(most, int) or most < 1:
+        raise ArgumentError("out of range", key="most", value=most, allowed="1, 2, 3, ...")
     columns = ["gain", "unseen gain", "+-"]
     rows = table.reindex(columns=columns).dropna(subset="gain").head(most)
     made, (ax,) = panels(ax, width=7.5, height=1.3 + 0.3 * len(rows))

@@ -18,16 +18,15 @@ for (const renderer of figure.renderers.filter((each) => each.visible)) {
   const pairs = { MultiLine: [["xs", "ys", ""]], VArea: [["x", "y1", " (lower)"], ["x", "y2", " (upper)"]] }
   for (const [x, y, end] of pairs[glyph.type] ?? [["x", "y", ""]]) {
     const [across, up] = [glyph[x].field, glyph[y].field]
-    const name = names.get(renderer) ?? renderer.name
+    const name = renderer.name ?? names.get(renderer)
     const key = `${source.id} ${across} ${up}`
     const known = curves.get(key)
     if (known) known.name = name ?? known.name
     else {
       const [xs, ys] = [column(across), column(up)]
-      const flat = glyph.type === "MultiLine"
-      curves.set(key, {
-        name: name, else: up, end,
-        xs: flat ? xs.flatMap((part) => [...part]) : xs, ys: flat ? ys.flatMap((part) => [...part]) : ys,
+      if (glyph.type !== "MultiLine") curves.set(key, { name, else: up, end, xs, ys })
+      else xs.forEach((part, i) => {
+        curves.set(`${key} ${i}`, { name, else: up, end: ` ${i + 1}`, xs: [...part], ys: [...ys[i]] })
       })
     }
   }
