@@ -134,11 +134,20 @@ def test_hum_is_what_means_leave_of_it():
     assert left < 2.8e-9 and coarse.hum == pytest.approx(left, rel=0.03)
 
 
+def test_means_are_not_taken_of_means():
+    """Rounding is alike in all samples of a count: its part of the noise is known of the record only."""
+    t = np.arange(0.0, 1.0, 1e-3)
+    once = Trace("a", t, displacement=t.copy(), noise=3e-9, resolution=8e-9).coarsened("200 Hz")
+    with pytest.raises(InputError, match="coarsened already"):
+        once.coarsened("50 Hz")
+
+
 def test_traces_of_one_digest_have_the_same_numbers():
     t = np.arange(0.0, 1.0, 1e-2)
     trace = Trace("a", t, displacement=t**2, noise=1e-9, drive=Drive.constant(2.0))
     same = pickle.loads(pickle.dumps(trace.replace(name="b", warnings=("odd",))))  # noqa: S301  (bytes of its own)
     assert same.digest == trace.digest
+    assert trace.replace(noise=np.float64(1e-9), walk=0).digest == trace.replace(noise=1e-9, walk=0.0).digest
     others = [
         trace.coarsened(50.0), trace.between(stop=0.5), trace.replace(noise=2e-9), trace.replace(role="held-out"),
         trace.replace(drive=Drive.constant(2.1)), trace.replace(displacement=None, velocity=t**2),

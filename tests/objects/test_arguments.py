@@ -86,6 +86,12 @@ def test_a_fit_takes_a_single_name(campaign):
     assert fit.simulate(drive="0.8 mm/s", events=1).sizes == fit.simulate(change, events=1).sizes
 
 
+def test_scenario_and_simulate_take_the_same_and_return_their_own():
+    scenario, simulate = map(inspect.signature, (ss.Fit.scenario, ss.Fit.simulate))
+    assert scenario.parameters == simulate.parameters
+    assert (scenario.return_annotation, simulate.return_annotation) == ("Scenario", "xarray.Dataset")
+
+
 def test_a_run_is_asked_for_by_one_word_everywhere():
     asked = (
         *(ss.Campaign.levels, ss.Campaign.forecast, ss.Campaign.to_xarray, ss.Fit.simulate_cycles, ss.Fit.scenario),

@@ -57,6 +57,7 @@ def test_a_worker_gets_it_whole(campaign):
 def test_some_of_its_runs_are_a_campaign_with_the_same_rig(campaign):
     some = campaign.only("holds", "v100")
     assert some.names == ["v100", "holds"] == campaign.without("v050", "v200", "v400").names
+    assert campaign.only(["holds", "v100"]).names == campaign.without(["v050", "v200"], "v400").names == some.names
     assert some["v100"] is campaign["v100"] and some.rig is campaign.rig and some.title == campaign.title
     assert some.description.rig_of("holds") == campaign.description.rig_of("holds")
     np.testing.assert_array_equal(some.levels("v100").onset, campaign.levels("v100").onset)
@@ -64,7 +65,7 @@ def test_some_of_its_runs_are_a_campaign_with_the_same_rig(campaign):
         (lambda: campaign.only("v10"), "did you mean 'v100'"),
         (lambda: campaign.without("hold"), "did you mean 'holds'"),
         (lambda: campaign.only(), "at least one"),
-        (lambda: campaign.without(*NAMES), "at least one"),
+        (lambda: campaign.without(*NAMES), "no run is left"),
         (lambda: some["v050"], "there is no trace"),
     ):
         with pytest.raises(InputError, match=said):
