@@ -80,8 +80,8 @@ class FitPlots:
         top.set(ylabel=f"force of the contact / {unit}", title=plain(f"{name}, cycle {number + 1}"))
         top.legend(loc="lower right")
         k, unit = scaled(own.residual.values, "N")
-        floor = 2.0 * own.floor.values * k
-        low.fill_between(t, -floor, floor, color=LIGHT, alpha=0.35, lw=0, label="two standard deviations")
+        band = expected_band(own) * k
+        low.fill_between(t, -band, band, color=LIGHT, alpha=0.35, lw=0, label="two standard deviations")
         low.plot(t, own.residual.values * k, color=MIDDLE, lw=1.0)
         low.set(xlabel="time in the cycle / s", ylabel=f"measured - model / {unit}")
         low.legend(loc="best")
@@ -230,6 +230,15 @@ def one_cycle(data: xarray.Dataset, run: str, event: int) -> xarray.Dataset:
     """The points of one cycle in :attr:`stickslip.Fit.force`, in their order of time."""
     own = np.flatnonzero((data.run.values == run) & (data.event.values == event))
     return data.isel(point=own[np.argsort(data.time.values[own])])
+
+
+def expected_band(cycle: xarray.Dataset) -> np.ndarray:
+    """Two floors at every point of a cycle of :attr:`stickslip.Fit.force` (N), as drawn around zero.
+
+    Points that are left out have the strength of the contact as their floor; they take that of the points beside them.
+    """
+    t, floor, used = cycle.time.values, cycle.floor.values, ~cycle.left_out.values
+    return 2.0 * (np.interp(t, t[used], floor[used]) if used.any() else floor)
 
 
 def balanced(own: xarray.Dataset, spring: float) -> np.ndarray:

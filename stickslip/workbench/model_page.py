@@ -9,7 +9,7 @@ import numpy as np
 import panel as pn
 
 from ..objects.fit import Fit
-from ..objects.fit_plots import balanced, one_cycle
+from ..objects.fit_plots import balanced, expected_band, one_cycle
 from .figures import FEW, compared, crosshair, figure, label, legend, look, source, unit_of
 from .free_panel import Free
 from .heat_view import Heat
@@ -144,8 +144,9 @@ class Cycle:
         part = one_cycle(fit.force, name, event)
         t = part.time.values - part.time.values[0]
         k, force = unit_of(part.measured.values, "N")
-        r, small = unit_of(np.concatenate([part.residual.values, 2 * part.floor.values]), "N")
-        band = 2.0 * part.floor.values * r
+        band = expected_band(part)
+        r, small = unit_of(np.concatenate([part.residual.values, band]), "N")
+        band = band * r
         self._data.data = {
             "t": t, "measured": part.measured.values * k, "model": part.model.values * k,
             "residual": part.residual.values * r, "low": -band, "high": band,

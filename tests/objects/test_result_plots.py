@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from stickslip.errors import InputError
 from stickslip.objects.diagnosis import Diagnosis
-from stickslip.objects.fit_plots import FitPlots
+from stickslip.objects.fit_plots import FitPlots, expected_band
 from stickslip.show.report.fit_figures import candidates_picture
 
 CYCLES = [("slow", 0), ("slow", 1), ("slow", 2), ("fast", 0), ("fast", 2)]  # of the second one cycle has no points
@@ -26,6 +26,7 @@ def plots():
     time = np.arange(size, dtype=float)
     number = np.repeat(np.arange(len(CYCLES)), POINTS)
     data = {name: ("point", np.zeros(size)) for name in ("residual", "floor", "stiffness")}
+    data["left_out"] = ("point", np.zeros(size, bool))
     coords = {
         "run": ("point", np.repeat([run for run, _ in CYCLES], POINTS)),
         "event": ("point", np.repeat([event for _, event in CYCLES], POINTS)),
@@ -119,3 +120,11 @@ def test_without_a_refitted_effect_the_picture_says_so():
     for rows in (table, pd.DataFrame()):
         (text,) = candidates_picture(rows).axes[0].texts
         assert "no effect" in text.get_text()
+
+
+def test_a_point_that_is_left_out_does_not_widen_the_band():
+    t, out = np.arange(5.0), np.arange(5) == 2
+    cycle = xarray.Dataset(
+        {"time": ("point", t), "floor": ("point", np.where(out, 0.3, 1e-3 * (1.0 + t))), "left_out": ("point", out)}
+    )
+    np.testing.assert_allclose(expected_band(cycle), 2e-3 * (1.0 + t))
