@@ -40,7 +40,7 @@ _PUBLIC = {
     "Weakening": "physics.model",
     "LoadPoint": "physics.model",
     "integrate": "simulation.solve",
-    "slip_derivatives": "simulation.solve",
+    "slip_derivatives": "simulation.solve.derivatives",
     "Vibrometer": "physics.sensor",
     "measure": "physics.sensor",
     "keep_compiled": "system.cache",
@@ -95,7 +95,7 @@ if TYPE_CHECKING:  # the same for editors and type checkers
     from .simulation.scenario import static_creep as static_creep
     from .simulation.scenario import steady_sliding as steady_sliding
     from .simulation.solve import integrate as integrate
-    from .simulation.solve import slip_derivatives as slip_derivatives
+    from .simulation.solve.derivatives import slip_derivatives as slip_derivatives
     from .system.cache import keep_compiled as keep_compiled
     from .system.progress import progress_to as progress_to
     from .system.threads import processor_limit as processor_limit

@@ -21,8 +21,9 @@ from jax import Array
 from ..physics.contact.memory import loading_displacement
 from ..physics.effects.base import Motion
 from ..physics.model import Model, State
-from .solve.integrate import _TERM, step_control
-from .solve.stepper import ContactStepper, Tolerance
+from .solve.piece import TERM, step_control
+from .solve.stepper import ContactStepper
+from .solve.tolerance import Tolerance
 
 LARGEST_STEP = 0.01  # s
 MOST_STEPS = 3072  # of one cycle; ordinary stick-slip takes 300 to 1200, a hold a hundred more each second
@@ -138,7 +139,7 @@ def run_cycle(
     """
     args = (model, model.shaped(), y.x, least_slip)
     solution = diffrax.diffeqsolve(
-        _TERM,
+        TERM,
         _CycleStepper(tolerance=tolerance),
         t0,
         limit,

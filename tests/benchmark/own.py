@@ -13,8 +13,9 @@ from jax import Array
 
 from stickslip.physics.contact import Bank, bank_from_backbone, binning_error, default_edges
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
-from stickslip.simulation.solve import ContactStepper, Tolerance, Trajectory, integrate
-from stickslip.simulation.solve.integrate import step_control
+from stickslip.simulation.solve import Tolerance, Trajectory, integrate
+from stickslip.simulation.solve.piece import step_control
+from stickslip.simulation.solve.stepper import ContactStepper
 from tests.solve.rig import tighter
 
 from .case import C_S, D_C, DAMPING, MASS, RATIO, T_H, Answer, Case, on_grid

@@ -12,9 +12,9 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from stickslip.physics.model import State
-from stickslip.simulation.solve import ContactStepper, Tolerance
-from stickslip.simulation.solve.integrate import step_control
-from stickslip.simulation.solve.stepper import D, Increments, _increment
+from stickslip.simulation.solve import Tolerance
+from stickslip.simulation.solve.piece import step_control
+from stickslip.simulation.solve.stepper import ContactStepper, D, Increments, _increment
 
 from .case import Case, leapfrog
 from .measuring import head, keep, last_table, row, timed

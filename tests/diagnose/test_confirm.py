@@ -192,14 +192,14 @@ def test_without_time_nothing_is_run_and_it_is_said(plain):
 def test_finished_pieces_are_taken_up_for_the_same_fit_only(plain, confirmed, monkeypatch):
     data, base = plain
     kept = {}
-    store = SimpleNamespace(load=kept.get, save=kept.__setitem__)
-    first = confirm({BASE: base}, BASE, data, store)
+    work = Work(store=SimpleNamespace(load=kept.get, save=kept.__setitem__))
+    first = confirm({BASE: base}, BASE, data, work)
     monkeypatch.setattr(confirming, "freely", lambda *args: pytest.fail("run again"))
-    again = confirm({BASE: base}, BASE, data, store)
+    again = confirm({BASE: base}, BASE, data, work)
     assert errors(again, again.models[BASE]) == errors(first, first.models[BASE])
     other = replace(base, point=replace(base.point, weights=1.01 * base.point.weights))
     with pytest.raises(pytest.fail.Exception):
-        confirm({BASE: other}, BASE, data, store)
+        confirm({BASE: other}, BASE, data, work)
 
 
 def test_a_record_that_begins_with_a_stretched_spring_is_followed(tmp_path):

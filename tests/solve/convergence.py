@@ -14,7 +14,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from stickslip.physics.contact import Bank
 from stickslip.physics.model import Model, State
-from stickslip.simulation.solve import ContactStepper, Tolerance, integrate
+from stickslip.simulation.solve import Tolerance, integrate
+from stickslip.simulation.solve.stepper import ContactStepper
 
 from . import brute_force
 from .rig import FAR, MASS, Slips, bank, drive, order, rig, slips, tighter

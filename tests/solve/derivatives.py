@@ -13,8 +13,9 @@ import numpy as np
 from jax import Array
 
 from stickslip.physics.model import Block, LoadPoint, Model, State, Weakening
-from stickslip.simulation.solve import ContactStepper, Tolerance
-from stickslip.simulation.solve.integrate import step_control
+from stickslip.simulation.solve import Tolerance
+from stickslip.simulation.solve.piece import step_control
+from stickslip.simulation.solve.stepper import ContactStepper
 
 from .rig import MASS, STRENGTH, U_MAX, P, bank
 

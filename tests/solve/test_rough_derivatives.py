@@ -9,7 +9,7 @@ import pytest
 
 from stickslip.physics.contact import RoughLines, bank_from_contact
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
-from stickslip.simulation.solve import slip_derivatives
+from stickslip.simulation.solve.derivatives import slip_derivatives
 
 from . import brute_force
 from .rig import MASS, tighter

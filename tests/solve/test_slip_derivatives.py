@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import SolveError
-from stickslip.simulation.solve import slip_derivatives
-from stickslip.simulation.solve.derivatives import GRIDS
+from stickslip.simulation.solve.derivatives import GRIDS, slip_derivatives
 
 from .derivatives import BASE, NAMES, build
 from .rig import tighter

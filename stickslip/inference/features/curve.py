@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...simulation.shooting import Track
-from ...simulation.solve.stepper import hermite
+from ...simulation.solve.trajectory import hermite
 
 _GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 4 / 9), (0.5 + 0.15**0.5, 5 / 18))
 

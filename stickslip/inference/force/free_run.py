@@ -20,7 +20,7 @@ from ...physics.contact import Bank
 from ...physics.effects.base import Motion, Sensor
 from ...physics.model import LoadPoint, Model
 from ...simulation.shooting import MOST_STEPS, Cycles, Track, run_cycles
-from ...simulation.solve.stepper import Tolerance
+from ...simulation.solve.tolerance import Tolerance
 from ...system.trace_cache import Program, of_this_package
 from .compiled_force import CommonInput, model_of
 from .composition import PULL, SCALE

@@ -16,8 +16,9 @@ from ...physics.contact import power_law_bank
 from ...physics.effects.base import Effect, Motion
 from ...physics.model import Block, LoadPoint, Model, State, Weakening
 from ...physics.params import specs
-from ..solve import ContactStepper, Increments, Steps, Tolerance
-from ..solve.integrate import observe, step_control
+from ..solve import Steps, Tolerance
+from ..solve.piece import observe, step_control
+from ..solve.stepper import ContactStepper, Increments
 
 ELEMENTS = 24
 DRIVE_TIMES = np.array([0.0, 0.13, 0.3, 1.0])  # s; load to half, hold, load on to the slip

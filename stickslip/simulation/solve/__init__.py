@@ -1,18 +1,10 @@
-"""Integrating the equation of motion with diffrax, the return map inside the step."""
+"""Integrating the equation of motion with diffrax, the return map inside the step.
 
-from .derivatives import Slips, slip_derivatives
+What needs diffrax is in modules of its own (`piece`, `stepper`, `derivatives`), for it takes long to import.
+"""
+
 from .integrate import integrate
-from .stepper import ContactStepper, Increments, Tolerance
+from .tolerance import Tolerance
 from .trajectory import Stats, Steps, Trajectory
 
-__all__ = [
-    "ContactStepper",
-    "Increments",
-    "Slips",
-    "Stats",
-    "Steps",
-    "Tolerance",
-    "Trajectory",
-    "integrate",
-    "slip_derivatives",
-]
+__all__ = ["Stats", "Steps", "Tolerance", "Trajectory", "integrate"]

@@ -25,8 +25,9 @@ from ...errors import SolveError
 from ...physics.contact import Bank
 from ...physics.model import Model, State
 from .integrate import integrate
-from .stepper import ContactStepper, Increments, Step, Tolerance, hermite
-from .trajectory import Trajectory
+from .stepper import ContactStepper, Increments, Step
+from .tolerance import Tolerance
+from .trajectory import Trajectory, hermite
 
 GRIDS = 4  # of shifted steps: more do not lessen the ripple further
 STRETCHED = 8  # steps at the end of a piece that give way

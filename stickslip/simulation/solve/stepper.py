@@ -20,20 +20,19 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
+from jax import Array
 
 from ...physics.contact import Bank
 from ...physics.effects.base import Contact, Motion
 from ...physics.model import Forces, Model, State, Work
+from .tolerance import Tolerance
+from .trajectory import hermite
 
 GAMMA = 2.0 - math.sqrt(2.0)
 D = GAMMA / 2.0  # weight of the implicit end point in both stages
 W = math.sqrt(2.0) / 4.0  # weight of the start and of the first stage in the second
 # embedded third-order weights minus those of the method
 E0, E1, E2 = (1.0 - W) / 3.0 - W, (3.0 * W + 1.0) / 3.0 - W, D / 3.0 - D
-
-STIFFER = 50.0  # times the driving spring: where the contact holds the block, and a slip is over
-TINY = 1e-30
 
 
 class Increments(diffrax.AbstractTerm):
@@ -71,53 +70,6 @@ class HermiteInterpolation(diffrax.AbstractLocalInterpolation):
         x = self.y0.x + hermite(s, h, dx, v0, v1)
         v = 6.0 * s * (1.0 - s) * dx / length + (1.0 - s) * (1.0 - 3.0 * s) * v0 + s * (3.0 * s - 2.0) * v1
         return eqx.tree_at(lambda y: (y.x, y.v), y, (x, v))
-
-
-def hermite(s: Array, h: Array, dx: Array, v0: Array, v1: Array) -> Array:
-    """Displacement since the start of a step at its fraction ``s``, from increment and end velocities (cubic)."""
-    return s * s * (3 - 2 * s) * dx + h * s * (1 - s) * ((1 - s) * v0 - s * v1)
-
-
-class Tolerance(eqx.Module):
-    """What the error of a step is measured against: the scale of the contact, not of the travel.
-
-    Creep moves picometres a step where the contact is stiff; a tolerance relative to the travel sees nothing.
-
-    Attributes:
-        relative: share of the step's own increment and of its velocity.
-        displacement: absolute part (m).
-        velocity: absolute part (m/s).
-        ringing: share of the amplitude with which the block rings on a contact that holds it; zero asks of the ringing
-            what is asked of a slip.
-        inaudible: amplitude of the ringing's velocity (m/s) that need not be resolved; slower creep is all the same.
-    """
-
-    relative: Any = eqx.field(default=1e-4, converter=jnp.asarray)
-    displacement: Any = eqx.field(default=3e-12, converter=jnp.asarray)
-    velocity: Any = eqx.field(default=3e-8, converter=jnp.asarray)
-    ringing: Any = eqx.field(default=0.0, converter=jnp.asarray)
-    inaudible: Any = eqx.field(default=0.0, converter=jnp.asarray)
-
-    def ring(self, v: Array, a0: Array, a1: Array, h: Array, stiffness: Array, driving: Array) -> tuple[Array, Array]:
-        """What ringing adds to the tolerance of a step, for displacement (m) and velocity (m/s).
-
-        Ringing is told from creep, however slow, by acceleration and jerk, and from a slip by the stiffness it rings
-        on. It decays in thousands of steps, and no onset or creep depends on its last digits.
-
-        Args:
-            v: velocity at the end (m/s).
-            a0, a1: accelerations at start and end (m/s^2).
-            h: length of the step (s).
-            stiffness: tangent of all that holds the block, over its mass (1/s^2).
-            driving: that of the driving spring alone.
-        """
-        v, a0, a1, h, stiffness, driving = lax.stop_gradient((v, a0, a1, h, stiffness, driving))
-        square = jnp.maximum(stiffness, driving)
-        held = jnp.clip(1.0 - STIFFER * driving / square, 0.0, 1.0)
-        amplitude = jnp.sqrt(jnp.maximum(a0 * a0, a1 * a1) / square + ((a1 - a0) / (h * square)) ** 2)
-        share = amplitude / (amplitude + jnp.abs(v) + TINY)
-        extra = held * (self.ringing * amplitude + self.inaudible * share)
-        return extra / jnp.sqrt(square), extra
 
 
 class Step(eqx.Module):

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...system.object_repr import Shown, facts
 from ...system.units import ends, shown
-from .stepper import hermite
 
 if TYPE_CHECKING:
     import xarray
@@ -42,6 +41,11 @@ UNITS = {  # of the energies J
     "t": "s", "x": "m", "v": "m/s", "reading": "m", "spring_force": "N", "contact_force": "N", "psi": "1",
     "sliding": "1",
 }  # fmt: skip
+
+
+def hermite(s: Any, h: Any, dx: Any, v0: Any, v1: Any) -> Any:
+    """Displacement since the start of a step at its fraction ``s``, from increment and end velocities (cubic)."""
+    return s * s * (3 - 2 * s) * dx + h * s * (1 - s) * ((1 - s) * v0 - s * v1)
 
 
 @dataclass(frozen=True)
