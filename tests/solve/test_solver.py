@@ -109,7 +109,7 @@ def test_a_condition_is_met_after_more_steps_than_are_compiled_as_one():
 @pytest.mark.parametrize(
     ("until", "said"),
     [
-        (lambda steps: steps.x - 1e-6, r"until: must give True or False for each step.*float64"),
+        (lambda steps: steps.x - 1e-6, r"until: it must give True or False for each step.*float64"),
         (lambda steps: steps.x[1:] > 1e-6, "must give True or False for each step"),
         (lambda steps: steps.x < 1e-6, "true at the start"),
     ],
