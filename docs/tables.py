@@ -1,7 +1,8 @@
 """Tables of the pages, drawn from the files in docs/results.
 
-Every file there is written by a script, with the version that it measured and the date. A page draws its tables from
-them in a code cell: ``tables.solvers(tables.part("performance", "solvers"))``. What has not been measured yet is said.
+What is there has the version that was measured, the date and the command: of most files a script that writes them, of
+some parts one that prints their numbers. A page draws its tables from them in a code cell:
+``tables.solvers(tables.part("performance", "solvers"))``. What has not been measured yet is said.
 """
 
 from __future__ import annotations

@@ -167,9 +167,9 @@ class Fit(FittedModel, Savable):
         """Standard deviation that the uncertainty of what all runs share gives ``residual`` of :attr:`force` (N).
 
         To first order, by the derivatives and the covariance of the fit: parameters, elements of the contact, what is
-        alike in all cycles. An event of its own deviates by ``floor`` besides, so that a prediction is off by
-        ``numpy.hypot(fit.residual_std, fit.force.floor)``. Errors of the reading that are alike in all cycles are part
-        of the difference of measured and model force, so that this is the deviation of neither alone.
+        the same in all cycles. An event of its own deviates by ``floor`` besides, so that a prediction is off by
+        ``numpy.hypot(fit.residual_std, fit.force.floor)``. Errors of the reading that are the same in all cycles are
+        part of the difference of measured and model force, so that this is the deviation of neither alone.
         """
         return residual_deviation(self)
 

@@ -21,7 +21,7 @@ from jax import Array
 from ..physics.contact.memory import loading_displacement
 from ..physics.effects.base import Motion
 from ..physics.model import Model, State
-from .solve.piece import TERM, step_control
+from .solve.by_diffrax import TERM, step_control
 from .solve.stepper import ContactStepper
 from .solve.tolerance import Tolerance
 

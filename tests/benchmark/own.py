@@ -14,7 +14,7 @@ from jax import Array
 from stickslip.physics.contact import Bank, bank_from_backbone, binning_error, default_edges
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
 from stickslip.simulation.solve import Tolerance, Trajectory, integrate
-from stickslip.simulation.solve.piece import step_control
+from stickslip.simulation.solve.by_diffrax import step_control
 from stickslip.simulation.solve.stepper import ContactStepper
 from tests.solve.rig import tighter
 

@@ -13,7 +13,7 @@ from jax import Array, lax
 
 from stickslip.physics.model import State
 from stickslip.simulation.solve import Tolerance
-from stickslip.simulation.solve.piece import step_control
+from stickslip.simulation.solve.by_diffrax import step_control
 from stickslip.simulation.solve.stepper import ContactStepper, D, Increments, _increment
 
 from .case import Case, leapfrog

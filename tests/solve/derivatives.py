@@ -14,7 +14,7 @@ from jax import Array
 
 from stickslip.physics.model import Block, LoadPoint, Model, State, Weakening
 from stickslip.simulation.solve import Tolerance
-from stickslip.simulation.solve.piece import step_control
+from stickslip.simulation.solve.by_diffrax import step_control
 from stickslip.simulation.solve.stepper import ContactStepper
 
 from .rig import MASS, STRENGTH, U_MAX, P, bank

@@ -11,7 +11,7 @@ import pytest
 from stickslip.simulation.scenario.drive import Motion
 from stickslip.simulation.scenario.events import find_events
 from stickslip.simulation.solve import Tolerance, Trajectory, integrate
-from stickslip.simulation.solve.piece import step_control
+from stickslip.simulation.solve.by_diffrax import step_control
 from stickslip.simulation.solve.stepper import ContactStepper
 
 from .rig import STRENGTH, rig, tighter

@@ -18,8 +18,8 @@ from stickslip.physics.effects.catalogue import make
 from stickslip.physics.effects.inertia import AddedMass
 from stickslip.physics.model import LoadPoint
 from stickslip.simulation.solve import Tolerance, integrate
+from stickslip.simulation.solve.by_diffrax import observe, step_control
 from stickslip.simulation.solve.limits import PIECE
-from stickslip.simulation.solve.piece import observe, step_control
 from stickslip.simulation.solve.stepper import ContactStepper
 from stickslip.simulation.solve.trajectory import Steps
 from stickslip.system.trace_cache import Program

@@ -17,7 +17,7 @@ from ...physics.effects.base import Effect, Motion
 from ...physics.model import Block, LoadPoint, Model, State, Weakening
 from ...physics.params import specs
 from ..solve import Steps, Tolerance
-from ..solve.piece import observe, step_control
+from ..solve.by_diffrax import observe, step_control
 from ..solve.stepper import ContactStepper, Increments
 
 ELEMENTS = 24

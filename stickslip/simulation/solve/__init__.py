@@ -1,6 +1,6 @@
 """Integrating the equation of motion with diffrax, the return map inside the step.
 
-What needs diffrax is in modules of its own (`piece`, `stepper`, `derivatives`), for it takes long to import.
+What needs diffrax is in modules of its own (`by_diffrax`, `stepper`, `derivatives`), for it takes long to import.
 """
 
 from .integrate import integrate

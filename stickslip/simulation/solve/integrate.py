@@ -29,13 +29,13 @@ _ARRAY = "an array"  # in the place of an argument's leaf that is traced
 
 @lru_cache(maxsize=64)
 def _program(structure: Any, fixed: tuple, effects: Any) -> Program:
-    """:func:`.piece.take` of arguments of one structure: of their arrays and, with its values, of what is ``fixed``.
+    """:func:`.by_diffrax.take` of arguments of one structure: of their arrays and, by its values, of what is ``fixed``.
 
     Its trace is kept where all effects are this package's own.
     """
 
     def piece(*arrays: Any) -> tuple:
-        from .piece import take  # with diffrax, which nobody waits for where the trace is kept
+        from .by_diffrax import take  # with diffrax, which nobody waits for where the trace is kept
 
         given = iter(arrays)
         return take(*jax.tree.unflatten(structure, [next(given) if f is _ARRAY else f for f in fixed]))
@@ -44,7 +44,7 @@ def _program(structure: Any, fixed: tuple, effects: Any) -> Program:
 
 
 def _run_piece(*args: Any) -> tuple:
-    """:func:`.piece.take`, compiled; as by ``equinox.filter_jit`` what is no array is not traced."""
+    """:func:`.by_diffrax.take`, compiled; as by ``equinox.filter_jit`` what is no array is not traced."""
     leaves, structure = jax.tree.flatten(args)
     fixed = tuple(_ARRAY if eqx.is_array(leaf) else leaf for leaf in leaves)
     arrays = (leaf for leaf, f in zip(leaves, fixed, strict=True) if f is _ARRAY)
