@@ -65,7 +65,7 @@ def simulate(
         - on ``event``: onset, arrest (s), slip (m), peak_velocity (m/s), recurrence (s), creep_before_slip (m);
         - on ``static``: static_displacement (m) and static_time (s) of the first stick without inertia and weakening.
 
-        Attributes: N, L, seeds, versions, steps, rejected, energy_error, how it ended (``"complete"`` or ``"until"``),
+        Attributes: N, L, seeds, versions, steps, rejected, energy_error, ``ended`` (``"complete"`` or ``"until"``),
         facts of the contact, and whether and why the rig slides.
 
     Raises:
