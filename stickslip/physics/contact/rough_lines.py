@@ -57,17 +57,14 @@ class RoughLines(eqx.Module):
 
     def __check_init__(self) -> None:
         check_line(self.H, self.lines, self.n_springs)
-        given = {"h_rms": self.h_rms, "length": self.length, "roll_off": self.roll_off, "cut_off": self.cut_off}
-        for key, value in given.items():
-            if value is not None:
-                check_within(NAMED[key], value, above=0.0, key=key, unit="m")
+        for key, value in self._lengths.items():
+            check_within(NAMED[key], value, above=0.0, key=key, unit="m")
         if jnp.ndim(self.h_rms) > 0 and jnp.shape(self.h_rms) != (self.lines,):
             counts = f"{jnp.size(self.h_rms)} for {self.lines} lines"
             raise InputError("rough lines have one rms height, or each its own", key="h_rms", value=counts)
 
     def __repr__(self) -> str:
-        given = {"h_rms": self.h_rms, "length": self.length, "roll_off": self.roll_off, "cut_off": self.cut_off}
-        known = {key: value for key, value in given.items() if value is not None and np.ndim(value) == 0}
+        known = {key: value for key, value in self._lengths.items() if np.ndim(value) == 0}
         said = [f"{key}={shown(float(np.asarray(v)), 'm') if concrete(v) else 'traced'}" for key, v in known.items()]
         hurst = f"{float(np.asarray(self.H)):g}" if concrete(self.H) else "traced"
         counts = f"n_springs={self.n_springs}, lines={self.lines}, seed={self.seed}"
@@ -109,6 +106,11 @@ class RoughLines(eqx.Module):
         load = normal_force / (elastic.normal * jnp.asarray(self.dx) * jnp.asarray(self.h_rms))
         table = touching(Profile(_gaps(self.H, self._phasors, self._waves), self.dx), load)
         return static_contact(table.scaled(self.h_rms), normal_force, friction, elastic)
+
+    @property
+    def _lengths(self) -> dict[str, ArrayLike]:
+        """What is given in metres."""
+        return {name: value for name in NAMED if (value := getattr(self, name)) is not None}
 
     @property
     def _phasors(self) -> np.ndarray:
