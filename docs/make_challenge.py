@@ -9,18 +9,19 @@ docs/results/sealed.json.
 from __future__ import annotations
 
 import argparse
-import json
-from datetime import date
+import sys
 from pathlib import Path
 
-import stickslip as ss
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
 from stickslip.blind.answers import read_answer
 from stickslip.blind.case_scores import mark
 from stickslip.blind.figures import figures
 from stickslip.blind.score import score_challenge
 from stickslip.blind.seal import RUNS, read_truth
+from tests.kept_results import keep
 
-RESULTS = Path(__file__).parent / "results" / "sealed.json"
 KEPT = ("cases", "by_kind", "false_alarms", "unknown_recall", "amplitude", "by_amplitude", "aims", "confusion")
 LINE = ("kind", "hidden", "answer", "named", "set", "right", "exact", "heldout_base", "heldout_final")
 
@@ -33,14 +34,12 @@ def main() -> None:
     whole = score_challenge(options.folder, expected=options.seal)
     answers = [(case, read_answer(options.folder / RUNS, case["name"])) for case in read_truth(options.folder)["cases"]]
     found = figures([mark(case, answer, 0) for case, answer in answers if answer.kind != "not run"])
-    result = {
-        "version": ss.__version__, "date": date.today().isoformat(),
-        "command": "python docs/make_challenge.py FOLDER --seal DIGEST", "seed": whole["seed"], "seal": whole["seal"],
-        "made": whole["cases"], "failed": whole["failed"], **{key: found[key] for key in KEPT},
-        "list": [{key: line[key] for key in LINE} for line in found["list"]],
-    }  # fmt: skip
-    RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    print(f"{found['cases']} of {whole['cases']} cases in {RESULTS}")
+    keep(
+        "sealed", "python docs/make_challenge.py FOLDER --seal DIGEST", seed=whole["seed"], seal=whole["seal"],
+        made=whole["cases"], failed=whole["failed"], **{key: found[key] for key in KEPT},
+        list=[{key: line[key] for key in LINE} for line in found["list"]],
+    )  # fmt: skip
+    print(f"{found['cases']} of {whole['cases']} cases")
 
 
 if __name__ == "__main__":

@@ -9,25 +9,27 @@ repository. Also writes docs/figures/real-prediction.png.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shutil
+import sys
 import tempfile
 import tomllib
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
 import stickslip as ss
-from stickslip import __version__
 from stickslip.inference.forecast.wander import Wander, covariance
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, MIDDLE, figure, styled
+from tests.kept_results import keep
 
-DOCS = Path(__file__).parent
-SPEEDS = DOCS.parent / "scenarios" / "real" / "paper-slider-speeds.toml"
+DOCS = ROOT / "docs"
+SPEEDS = ROOT / "scenarios" / "real" / "paper-slider-speeds.toml"
 SOFT, STIFF = 168, 1002  # N/m
 VELOCITIES = (1100, 4300)  # um/s
 SETTLED = 3  # slips from the start of a simulation that are not counted
@@ -154,9 +156,7 @@ def main() -> None:
                 "long_waits": long_waits(levels, STIFF, 1e-6 * v),
             }  # fmt: skip
     save(quantiles(found), DOCS / "figures" / "real-prediction.png", dpi=80)
-    head = {"version": __version__, "date": date.today().isoformat(), "command": "python docs/make_prediction.py"}
-    text = json.dumps({**head, "stiffness": STIFF, "from": SOFT, "velocities": found}, indent=1, ensure_ascii=False)
-    (DOCS / "results" / "prediction.json").write_text(text + "\n", encoding="utf-8")
+    keep("prediction", "python docs/make_prediction.py", stiffness=STIFF, velocities=found, **{"from": SOFT})
 
 
 if __name__ == "__main__":

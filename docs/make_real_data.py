@@ -12,14 +12,16 @@ out/real-data.
 from __future__ import annotations
 
 import argparse
-import json
 import os
+import sys
 import tempfile
 from collections.abc import Callable
-from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+DOCS = Path(__file__).resolve().parent
+sys.path.insert(0, str(DOCS.parent))
 
 from real_data.along_the_motion import diagnosed, drill_string
 from real_data.bolted_joint import bolted_joint
@@ -33,9 +35,8 @@ from real_data.surfaces import topographies
 from real_data.unresolved_slips import classroom, fault
 from real_data.wandering import paper_wandering
 
-from stickslip import __version__
+from tests.kept_results import keep
 
-DOCS = Path(__file__).resolve().parent
 DEFAULT = DOCS.parents[1] / "shared" / "data" / "real"
 PARTS: dict[str, Callable[[Path, Path], dict[str, Any]]] = {
     "paper": paper,
@@ -67,16 +68,10 @@ def main() -> None:
     if not data.is_dir():
         raise SystemExit(f"there is no folder {data}; name it, or set STICKSLIP_REAL_DATA")
     (DOCS / "figures").mkdir(exist_ok=True)
-    path = DOCS / "results" / "real_data.json"
     for name in asked.only:
         with tempfile.TemporaryDirectory() as work:
             made = PARTS[name](data, Path(work))
-        head = {"version": __version__, "date": date.today().isoformat()}
-        # part by part, so that what is done is kept
-        found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-        found[name] = {**head, "command": f"python docs/make_real_data.py --only {name}", **made}
-        text = json.dumps({part: found[part] for part in PARTS if part in found}, indent=1, ensure_ascii=False)
-        path.write_text(text + "\n", encoding="utf-8")
+        keep("real_data", f"python docs/make_real_data.py --only {name}", name, **made)
 
 
 if __name__ == "__main__":

@@ -7,11 +7,9 @@ Tables go to docs/results/verification.json, each with version, date and command
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Callable, Sequence
-from datetime import date
 from pathlib import Path
 
 import matplotlib
@@ -26,7 +24,6 @@ sys.path.insert(0, str(ROOT))
 import jax
 import jax.numpy as jnp
 
-from stickslip import __version__
 from stickslip.blind.generator import Surface, make_bank
 from stickslip.physics.contact import (
     RoughLines,
@@ -41,6 +38,7 @@ from stickslip.show.plots.style import logarithmic
 from stickslip.simulation.solve import Tolerance, integrate
 from tests.challenge import test_generator_dynamics as dynamics
 from tests.contact import test_indentation, test_tangential
+from tests.kept_results import keep_table
 from tests.solve import (
     comparison,
     convergence,
@@ -57,7 +55,6 @@ from tests.solve.rig import STRENGTH, order, rig, tighter
 
 FOLDER = ROOT / "docs" / "verification"
 MARKS = ("o-", "s--", "^:", "D-.")  # so that a grey print keeps lines apart
-RESULTS = ROOT / "docs" / "results" / "verification.json"
 TOLERANCES = {"default": 1.0, "default/10": 10.0, "default/100": 100.0, "default/1000": 1000.0}
 DRAW: dict[str, Callable[[], plt.Figure | None]] = {}
 
@@ -70,14 +67,7 @@ def figure(work: Callable[[], plt.Figure | None]) -> Callable[[], plt.Figure | N
 
 def table(part: str, command: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Write a table of the page; its cells are text."""
-    known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
-    known[part] = {
-        "version": __version__, "date": date.today().isoformat(),
-        "command": f"python docs/make_verification.py {command}", "columns": list(columns), "rows": [*map(list, rows)],
-    }  # fmt: skip
-    RESULTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    for row in rows:
-        print(" | ".join(row))
+    keep_table("verification", f"python docs/make_verification.py {command}", part, columns, rows)
 
 
 def short(value: float, digits: int = 2) -> str:

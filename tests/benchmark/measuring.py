@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from datetime import date
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-from stickslip import __version__
+from tests import kept_results
 
-RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results" / "performance.json"
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 SLOWER = 1.5  # times what plain Python became, from which it is said
 _printed: list[list[str]] = []  # the rows of the last table, its head first
@@ -60,29 +57,30 @@ def keep(part: str, only: str, **found: Any) -> None:
 
     What was kept before stays as bare times, under ``earlier``.
     """
-    known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
-    before = known.get(part, {})
+    before = kept_results.kept("performance").get(part, {})
     found = {**found, "yardstick_s": yardstick()}
     for line in slower(before, found):
         print(line, flush=True)
-    known[part] = {
-        "version": __version__,
-        "commit": commit(),
-        "date": date.today().isoformat(),
-        "machine": f"{os.cpu_count()} processors",
-        "command": f"python -m tests.benchmark --only {only}",
+    kept_results.keep(
+        "performance",
+        f"python -m tests.benchmark --only {only}",
+        part,
+        commit=commit(),
+        machine=f"{os.cpu_count()} processors",
         **found,
-        "earlier": [*before.get("earlier", []), *former(before)],
-    }
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        earlier=[*before.get("earlier", []), *former(before)],
+    )
 
 
 def commit() -> str | None:
     """The commit that is measured, with a plus where files were changed since; None without git."""
     try:
         found = subprocess.run(
-            ["git", "describe", "--always", "--dirty=+"], cwd=RESULTS.parent, capture_output=True, text=True, check=True
+            ["git", "describe", "--always", "--dirty=+"],
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            check=True,
         )
     except (OSError, subprocess.CalledProcessError):
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from tests import kept_results
 
 from . import measuring
 from .measuring import slower, times
@@ -50,10 +50,10 @@ def test_what_is_measured_under_another_name_is_said():
 
 
 def test_former_times_stay_when_a_part_is_measured_anew(tmp_path, monkeypatch):
-    monkeypatch.setattr(measuring, "RESULTS", tmp_path / "performance.json")
+    monkeypatch.setattr(kept_results, "RESULTS", tmp_path)
     monkeypatch.setattr(measuring, "yardstick", lambda: 0.2)
     for first in ("2.0", "3.0", "4.0"):
         measuring.keep("part", "part", columns=["way", "processor s"], rows=[["one", first]])
-    kept = json.loads(measuring.RESULTS.read_text())["part"]
+    kept = kept_results.kept("performance")["part"]
     assert [old["times"] for old in kept["earlier"]] == [{"one, processor s": 2.0}, {"one, processor s": 3.0}]
     assert kept["rows"] == [["one", "4.0"]] and times(kept) == {"one, processor s": 4.0}

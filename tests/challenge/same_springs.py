@@ -5,22 +5,18 @@ Each is judged by its own error as well: the generator by half its step, the mod
 
 from __future__ import annotations
 
-import json
-from datetime import date
-from pathlib import Path
 from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
-from stickslip import __version__
 from stickslip.blind.generator import Bank as Springs
 from stickslip.blind.generator import Drive, Rig, draw_setup, make_bank, simulate
 from stickslip.physics.contact import Bank
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
 from stickslip.simulation.solve import Tolerance, integrate
+from tests.kept_results import keep_table
 
-FIGURES = Path(__file__).parents[2] / "docs" / "results" / "figures.json"
 STEP = 2e-5  # s, the generator's as in campaigns
 TIGHT = 1e5  # the model's default tolerance over the one used; its first onset converges with the root of it
 SLIPS = 4
@@ -156,19 +152,11 @@ def main() -> None:
                 sizes = g.onset * 1e6, g.recurrence * 1e6, g.duration * 1e6, g.size * 1e9, g.creep * 1e9
                 cells = ("< 0.001" if size < 1e-3 else f"{float(f'{size:.2g}'):g}" for size in sizes)
                 rows.append([f"{seed}, {velocity * 1e6:g} µm/s", text, *cells])
-                print(" | ".join(rows[-1]), flush=True)
-    known = json.loads(FIGURES.read_text(encoding="utf-8"))
-    known["same springs"] = {
-        "version": __version__,
-        "date": date.today().isoformat(),
-        "command": "python -m tests.challenge.same_springs",
-        "columns": [
-            "rig, velocity", "difference between", "onset, µs", "recurrence, µs", "slip's duration, µs", "slip, nm",
-            "creep, nm",
-        ],
-        "rows": rows,
-    }  # fmt: skip
-    FIGURES.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    columns = [
+        "rig, velocity", "difference between", "onset, µs", "recurrence, µs", "slip's duration, µs", "slip, nm",
+        "creep, nm",
+    ]  # fmt: skip
+    keep_table("figures", "python -m tests.challenge.same_springs", "same springs", columns, rows)
 
 
 if __name__ == "__main__":

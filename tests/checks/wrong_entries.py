@@ -1,6 +1,6 @@
 """How often a wrong entry in a campaign file is noticed, and a right one suspected: what docs/checks.md tabulates.
 
-``python -m tests.checks.wrong_entries FOLDER --number N --seed S --out FILE`` makes N campaigns of the independent
+``python -m tests.checks.wrong_entries FOLDER --number N --seed S`` makes N campaigns of the independent
 simulator, every other one with an effect hidden at ten times its detection, and checks each as it is and with one entry
 wrong of every kind, its run and size drawn. Only the checks run, no diagnosis. What is made stays in the folder.
 """
@@ -13,13 +13,11 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stickslip import __version__
 from stickslip.blind.detection import amplitude, largest_multiple, visible_forms
 from stickslip.blind.generator import make_campaign
 from stickslip.blind.generator.forms import EFFECTS
@@ -27,6 +25,7 @@ from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.checks import Finding, rig_against_motion
 from stickslip.data.segment import segment
 from stickslip.errors import InputError
+from tests.kept_results import keep
 
 HIDDEN = ("sensor-gain", "wear", "position-dependent-friction", "velocity-weakening", "sensor-drift")
 MULTIPLE = 10.0  # of detection, or the largest that is plausible
@@ -163,7 +162,6 @@ def main() -> None:
     parser.add_argument("--number", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=np.inf, help="begin no further file after so long")
-    parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     began, tried = time.monotonic(), []
     for one in campaigns(options.folder, options.number, options.seed):
@@ -172,19 +170,10 @@ def main() -> None:
             print(one, flush=True)
         if time.monotonic() - began > options.seconds:
             break
-    result = {
-        "version": __version__,
-        "date": date.today().isoformat(),
-        "command": f"python -m tests.checks.wrong_entries FOLDER --number {options.number} --seed {options.seed}",
-        "seed": options.seed,
-        "campaigns": len({t.campaign for t in tried}),
-        **shares(tried),
-    }
-    text = json.dumps(result, indent=1)
-    print(text)
-    if options.out:
-        options.out.parent.mkdir(parents=True, exist_ok=True)
-        options.out.write_text(text + "\n", encoding="utf-8")
+    found = {"seed": options.seed, "campaigns": len({t.campaign for t in tried}), **shares(tried)}
+    print(json.dumps(found, indent=1))
+    command = f"python -m tests.checks.wrong_entries FOLDER --number {options.number} --seed {options.seed}"
+    keep("rig_checks", command, **found)
 
 
 if __name__ == "__main__":

@@ -16,13 +16,11 @@ import argparse
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stickslip import __version__
 from stickslip.blind.answers import read_answer
 from stickslip.blind.case_plan import Case, Hidden, case_seed
 from stickslip.blind.case_scores import mark, rate
@@ -34,11 +32,12 @@ from stickslip.blind.seal import RUNS, read_seal, read_truth
 from stickslip.inference.diagnose.decide import DISPERSION
 from stickslip.objects.diagnosis import diagnose_campaign
 from stickslip.physics.effects import catalogue
+from tests.kept_results import keep
 
 IDENTIFIABLE = float(np.log(20.0))  # likelihood ratio of twenty
+NUMBER = 100  # campaigns of a part
 MULTIPLE = 10.0  # of detection, or the largest at which the block slips
 VELOCITIES, HOLDS = (5e-5, 1e-4, 2e-4, 4e-4), (1.0, 5.0)  # m/s, s
-RESULTS = Path(__file__).parents[2] / "docs" / "results" / "development.json"
 PARTS = {"one": "one", "nothing": "nothing", "two": "two", "left-out": "outside", "strong": "one"}
 
 
@@ -116,7 +115,7 @@ def margin(result: dict[str, Any], tag: str) -> float | None:
     return 0.5 * (gains[tag] - max([*rivals, 0.0])) / DISPERSION
 
 
-def tally(folder: Path, part: str, seed: int) -> dict[str, Any]:
+def tally(folder: Path, seed: int) -> dict[str, Any]:
     """The answers so far, with their rates (Wilson's intervals at 95 %)."""
     marked = [mark(truth, read_answer(folder / RUNS, truth["name"])) for truth in read_truth(folder)["cases"]]
     marked = [m for m in marked if m.answer.kind != "not run"]
@@ -126,9 +125,6 @@ def tally(folder: Path, part: str, seed: int) -> dict[str, Any]:
     sizes = [s for m in hidden for s in m.sizes]
     return {
         "seed": seed,
-        "version": __version__,
-        "date": date.today().isoformat(),
-        "command": f"python -m tests.diagnose.development FOLDER {part} --seed {seed}",
         "rates": {
             "exact": rate(m.exact for m in marked),
             "right": rate(m.right for m in marked),
@@ -177,12 +173,6 @@ def table(found: dict[str, Any]) -> str:
     return "\n".join(rows)
 
 
-def keep(part: str, found: dict[str, Any]) -> None:
-    """Write a part among the results that the page draws from."""
-    known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
-    RESULTS.write_text(json.dumps({**known, part: found}, indent=1) + "\n", encoding="utf-8")
-
-
 def tell(p: Progress) -> None:
     """One line for a finished case."""
     print(
@@ -195,7 +185,7 @@ def measure(
     folder: Path,
     part: str,
     seed: int,
-    number: int = 100,
+    number: int = NUMBER,
     workers: int | None = None,
     only: Sequence[int] | None = None,
 ) -> dict[str, Any]:
@@ -212,7 +202,7 @@ def measure(
         diagnosis = LeftOut({case["name"]: case["effects"][0]["tag"] for case in read_truth(folder)["cases"]})
     names = None if only is None else [f"case-{i:03d}" for i in only]
     run_challenge(folder, workers=workers, only=names, diagnosis=diagnosis, tell=tell)
-    return tally(folder, part, seed)
+    return tally(folder, seed)
 
 
 def main() -> None:
@@ -221,7 +211,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("part", choices=PARTS)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--number", type=int, default=100)
+    parser.add_argument("--number", type=int, default=NUMBER)
     parser.add_argument("--workers", type=int)
     parser.add_argument("--only", type=int, nargs="+", help="numbers of campaigns, from 1")
     options = parser.parse_args()
@@ -229,7 +219,11 @@ def main() -> None:
     print(table(found))
     for name, r in found["rates"].items():
         print(f"{name}: {r['count']} of {r['of']}" + (f" ({r['low']:.0%} to {r['high']:.0%})" if r["of"] else ""))
-    keep(options.part, found)
+    given = ["--seed", options.seed]
+    given += ["--number", options.number] if options.number != NUMBER else []
+    given += ["--only", *options.only] if options.only else []
+    command = " ".join(["python -m tests.diagnose.development FOLDER", options.part, *map(str, given)])
+    keep("development", command, options.part, **found)
 
 
 if __name__ == "__main__":

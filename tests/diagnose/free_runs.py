@@ -6,13 +6,10 @@ through events that their fits have not seen, and writes the table to ``docs/res
 
 from __future__ import annotations
 
-import json
 import tempfile
-from datetime import date
 from pathlib import Path
 from typing import Any
 
-from stickslip import __version__
 from stickslip.inference.diagnose.final_comparison import settled
 from stickslip.inference.diagnose.free_errors import errors
 from stickslip.inference.diagnose.free_simulation import confirm
@@ -23,9 +20,9 @@ from stickslip.inference.force.signatures import Explained
 from stickslip.physics.effects import catalogue
 from stickslip.system import cache
 from tests.force.conftest import Case, made, seen
+from tests.kept_results import keep_table
 
-RESULTS = Path(__file__).parents[2] / "docs" / "results" / "figures.json"
-PART, AGEING = "free runs", "contact-ageing"
+AGEING = "contact-ageing"
 COLUMNS = [
     "campaign of the independent simulator, two runs of four slips", "model",
     "error of recurrence", "the same in scatters",
@@ -68,12 +65,7 @@ def main() -> None:
                 "contact ageing at ten times its detection limit", at / "aged", 11, (seen(AGEING, "logarithm", 10.0),)
             ),
         ]
-    known = json.loads(RESULTS.read_text(encoding="utf-8"))
-    known[PART] = {
-        "version": __version__, "date": date.today().isoformat(), "command": "python -m tests.diagnose.free_runs",
-        "columns": COLUMNS, "rows": found,
-    }  # fmt: skip
-    RESULTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    keep_table("figures", "python -m tests.diagnose.free_runs", "free runs", COLUMNS, found)
 
 
 if __name__ == "__main__":

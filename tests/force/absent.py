@@ -10,13 +10,9 @@ where these are right. Writes docs/results/absent.json.
 from __future__ import annotations
 
 import argparse
-import json
-from datetime import date
-from pathlib import Path
 
 import numpy as np
 
-import stickslip as ss
 from stickslip.data.segment import segment
 from stickslip.inference.diagnose.prepare import prepare
 from stickslip.inference.force.candidates import every_form, try_effect
@@ -24,8 +20,8 @@ from stickslip.inference.force.fit import fit_base
 from stickslip.inference.force.signatures import Explained
 from stickslip.system import process
 from tests.force.counted_motions import COUNT, NOISE, Moved, moved, read
+from tests.kept_results import keep
 
-RESULTS = Path(__file__).parents[2] / "docs" / "results" / "absent.json"
 SPEEDS = ((5e-5, 14.0), (1e-4, 7.5), (2e-4, 4.0), (4e-4, 2.2))  # m/s, s
 SENSORS = {"counts": (NOISE, COUNT), "counts, more noise": (3.5e-9, COUNT), "no counts": (2.6e-9, 0.0)}  # m
 TAGS = (
@@ -63,10 +59,8 @@ def main() -> None:
             row[name], row[f"{name}, most"] = float(values.mean()), float(values.max())
         print(name, {tag: round(row[name], 1) for tag, row in rows.items()}, flush=True)
     command = f"python -m tests.force.absent --number {options.number}"
-    head = {"version": ss.__version__, "date": date.today().isoformat(), "command": command}
     sensors = {name: {"noise": noise, "count": count} for name, (noise, count) in SENSORS.items()}
-    result = {**head, "readings": options.number, "sensors": sensors, "effects": rows}
-    RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    keep("absent", command, readings=options.number, sensors=sensors, effects=rows)
 
 
 if __name__ == "__main__":

@@ -10,15 +10,12 @@ from __future__ import annotations
 
 import argparse
 import json
-from datetime import date
-from pathlib import Path
 
 import numpy as np
 
-import stickslip as ss
 from tests.force.counted_motions import COUNT, NOISE, Moved, moved, read
+from tests.kept_results import keep
 
-RESULTS = Path(__file__).parents[2] / "docs" / "results" / "offsets.json"
 SPEEDS = ((1e-4, 7.5), (2e-4, 4.0))  # m/s, s
 TOLERANCE, SILENT = 1e-5, 1e-12  # of the solver; m
 
@@ -59,9 +56,8 @@ def main() -> None:
             "error": float(shares.std(ddof=1) / np.sqrt(len(noisy))),
             "in deviations": float(deviations.mean()),
         }
-    head = {"version": ss.__version__, "date": date.today().isoformat(), "command": "python -m tests.force.offsets"}
-    found = {**head, "readings": len(noisy), "noise": NOISE, "count": COUNT, "parameters": rows}
-    RESULTS.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    command = "python -m tests.force.offsets"
+    keep("offsets", command, readings=len(noisy), noise=NOISE, count=COUNT, parameters=rows)
     print(json.dumps(rows, indent=1))
 
 

@@ -14,9 +14,7 @@ so that what the fit assumes of them beforehand does not matter; the strength an
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +27,7 @@ from stickslip.blind.generator import Run, make_campaign
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, figure, styled
 from tests.kept_cases import each
+from tests.kept_results import keep
 
 ROOT = Path(__file__).parents[2]
 RUNS = (Run("v100", 1e-4, 5), Run("v400", 4e-4, 5))
@@ -120,14 +119,8 @@ def main() -> None:
         cases.append(case)
         print(name, case["trust"], {k: v["rank"] for k, v in case["parameters"].items()}, flush=True)
     found = tally(cases)
-    head = {
-        "version": ss.__version__,
-        "date": date.today().isoformat(),
-        "command": f"python -m tests.force.ranks FOLDER --number {len(cases)}",
-    }
-    rows = {"campaigns": len(cases), "draws": THINNED, "seed": SEED, "parameters": found}
-    path = ROOT / "docs" / "results" / "posterior.json"
-    path.write_text(json.dumps({**head, **rows}, indent=1) + "\n", encoding="utf-8")
+    command = f"python -m tests.force.ranks FOLDER --number {len(cases)}"
+    keep("posterior", command, campaigns=len(cases), draws=THINNED, seed=SEED, parameters=found)
     save(picture(found), ROOT / "docs" / "figures" / "posterior-ranks.png", dpi=90)
     for name, row in found.items():
         print(name, {k: v for k, v in row.items() if k != "ranks"})

@@ -9,9 +9,7 @@ docs/figures/forecast-calibration.png, for docs/forecast.md.
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +25,7 @@ from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, RUNS, figure, styled
 from stickslip.simulation.scenario import load_scenario
 from tests.kept_cases import each
+from tests.kept_results import keep
 
 from .synthetic import prepare
 
@@ -124,13 +123,8 @@ def main() -> None:
         names = [f"{form} {draw}" for draw in range(DRAW, DRAW + options.draws)]
         rows[form] = tally([found for _, found in each(options.folder, names, one)])
         print(form, rows[form], flush=True)
-    head = {
-        "version": ss.__version__,
-        "date": date.today().isoformat(),
-        "command": f"python -m tests.forecast.simulated FOLDER --draws {options.draws}",
-    }
-    text = json.dumps({**head, "size": SIZE, "seconds": SECONDS, "train": TRAIN, "records": rows}, indent=1)
-    (ROOT / "docs" / "results" / "calibration.json").write_text(text + "\n", encoding="utf-8")
+    command = f"python -m tests.forecast.simulated FOLDER --draws {options.draws}"
+    keep("calibration", command, size=SIZE, seconds=SECONDS, train=TRAIN, records=rows)
     save(picture(rows), ROOT / "docs" / "figures" / "forecast-calibration.png", dpi=90)
 
 

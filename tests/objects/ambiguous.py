@@ -12,8 +12,6 @@ Writes docs/results/ambiguous.json.
 from __future__ import annotations
 
 import argparse
-import json
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +28,8 @@ from stickslip.objects.experiments.setting import settled
 from stickslip.physics.effects import catalogue
 from tests.diagnose.development import hidden, visible
 from tests.kept_cases import each
+from tests.kept_results import keep
 
-RESULTS = Path(__file__).parents[2] / "docs" / "results" / "ambiguous.json"
 RUNS = (Run("v100", 1e-4, 4), Run("v200", 2e-4, 4))
 MULTIPLE = 3.0  # of detection in a whole campaign
 SEED = 7100
@@ -123,14 +121,7 @@ def main() -> None:
     for number, case in each(options.folder, numbers, lambda number: one(options.folder, int(number))):
         cases.append(case)
         print(number, case, flush=True)
-    found = {
-        "version": ss.__version__,
-        "date": date.today().isoformat(),
-        "command": f"python -m tests.objects.ambiguous FOLDER --number {len(cases)}",
-        **tally(cases),
-        "cases": cases,
-    }
-    RESULTS.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    keep("ambiguous", f"python -m tests.objects.ambiguous FOLDER --number {len(cases)}", **tally(cases), cases=cases)
     print(tally(cases))
 
 

@@ -8,7 +8,6 @@ shipped campaign in Chromium without a screen, and switches on the effect that p
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
@@ -16,15 +15,13 @@ import sys
 import tempfile
 import time
 import venv
-from datetime import date
 from pathlib import Path
 
-from stickslip import __version__
+from tests.kept_results import keep_table
 
 from .browser import ROOT, Browser, Served
 from .speed import browser as chromium
 
-RESULTS = ROOT / "docs" / "results" / "workbench_minutes.json"
 AIM = 180.0  # s
 
 
@@ -105,14 +102,10 @@ def main() -> None:
         finally:
             seen.close()
     whole = sum(seconds for _, seconds in stages)
-    found = {
-        "version": __version__, "date": date.today().isoformat(), "command": "python -m tests.workbench.minutes",
-        "machine": f"{os.cpu_count()} processors", "columns": ["what", "measured", "target"],
-        "rows": [*([what, f"{seconds:.0f} s", ""] for what, seconds in stages),
-                 ["from pip install to the first fall of the error", f"{whole:.0f} s", f"{AIM:.0f} s"]],
-    }  # fmt: skip
-    RESULTS.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    print(json.dumps(found["rows"], indent=1))
+    rows = [[what, f"{seconds:.0f} s", ""] for what, seconds in stages]
+    rows.append(["from pip install to the first fall of the error", f"{whole:.0f} s", f"{AIM:.0f} s"])
+    columns, machine = ["what", "measured", "target"], f"{os.cpu_count()} processors"
+    keep_table("workbench_minutes", "python -m tests.workbench.minutes", None, columns, rows, machine=machine)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ nothing else.
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import statistics
@@ -16,20 +15,17 @@ import tempfile
 import threading
 import time
 from contextlib import suppress
-from datetime import date
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import stickslip as ss
-from stickslip import __version__
 from stickslip.blind.generator import Run, make_campaign
+from tests.kept_results import keep_table
 
 from .browser import DEEP, ROOT, Browser, Served
 from .conftest import SCENARIO
 
-RESULTS = Path(__file__).parents[2] / "docs" / "results" / "workbench.json"
 SLIDERS = ("weakening.drop", "contact.strength", "weakening.slip_distance", "rig.damping")
 MOVES, APART = 10, 0.6  # of each slider, and s between two
 SAMPLES = 1_000_000
@@ -213,13 +209,10 @@ def main() -> None:
             "",
         ],
     ]
-    found: dict[str, Any] = {
-        "version": __version__, "date": date.today().isoformat(), "command": "python -m tests.workbench.speed",
-        "machine": f"{os.cpu_count()} processors, Chromium without a screen and without a graphics card",
-        "columns": ["what", "measured", "target"], "rows": rows,
-    }  # fmt: skip
-    RESULTS.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    print(json.dumps(rows, indent=1))
+    machine = f"{os.cpu_count()} processors, Chromium without a screen and without a graphics card"
+    keep_table(
+        "workbench", "python -m tests.workbench.speed", None, ["what", "measured", "target"], rows, machine=machine
+    )
 
 
 if __name__ == "__main__":
