@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -27,9 +27,11 @@ import jax.numpy as jnp
 from stickslip.blind.generator import Surface, make_bank
 from stickslip.physics.contact import (
     RoughLines,
+    equal_bodies,
     flat_punch,
     indentation,
     power_law,
+    power_law_bank,
     reload_displacement,
     sphere,
     static_contact,
@@ -37,7 +39,8 @@ from stickslip.physics.contact import (
 from stickslip.show.plots.style import logarithmic
 from stickslip.simulation.solve import Tolerance, integrate
 from tests.challenge import test_generator_dynamics as dynamics
-from tests.contact import test_indentation, test_tangential
+from tests.contact import test_hysteresis, test_indentation, test_memory, test_tangential
+from tests.effects import rate_and_state_errors
 from tests.kept_results import keep_table
 from tests.solve import (
     comparison,
@@ -111,13 +114,10 @@ def contact() -> plt.Figure:
         left.plot(few, np.asarray(made.force(few * made.u_max) / made.strength), mark[0], ms=4, label=name)
     left.set(xlabel="u / u_max", ylabel="force / full friction", title="Springs; lines: closed forms")
     left.legend()
-    widths = np.linspace(1.2, 1.25, 11)
-    errors = [np.mean([test_tangential.sphere_error(n, a) for a in widths]) for n in (200, 2000)]
-    print("sphere: largest departure with 200 and 2000 springs", errors, "ratio", errors[0] / errors[1])
     hursts = np.array([0.1, 0.2, 0.3, 0.5, 0.7, 0.9])
+    exponents = {}
     for n, lines, mark in ((4096, 100, "o"), (65536, 40, "s")):
-        force, stiffness = np.array([test_indentation.exponents(H, n, lines) for H in hursts]).T
-        print(f"N = {n}: exponents of force {force.round(2)}, of stiffness {stiffness.round(3)}")
+        exponents[n] = force, stiffness = np.array([test_indentation.exponents(H, n, lines) for H in hursts]).T
         middle.plot(hursts, force, mark + "-", label=f"force by depth, N = {n}")
         middle.plot(hursts, stiffness, mark + "--", label=f"stiffness by force, N = {n}")
     fine = np.linspace(0.15, 0.95, 100)
@@ -130,12 +130,85 @@ def contact() -> plt.Figure:
         made = RoughLines(H, 2.86e-6, length).contact(load, friction)
         u = np.asarray(made.displacement(tau[:, None]).mean(axis=1) / made.u_max.mean())
         right.plot(u, tau, mark[1:], label=f"H = {H:g}")
-    loads = (0.03, 0.1, 0.31, 1.0)
-    print("w(0.5) by H", {H: test_tangential.mean_w(H, 2.86e-6, 0.31, 0.5) for H in (0.1, 0.5, 0.9)})
-    print("w(0.5) by load", {f: test_tangential.mean_w(0.3, 2.46e-6, f, 0.5, 16384, 400) for f in loads})
     right.set(xlabel="u / u_max", ylabel="force / full friction", title="Mean of 100 lines, N = 4096")
     right.legend()
+    table("contact", "contact", ["statement", "required", "obtained"], contact_rows(hursts, exponents))
     return fig
+
+
+def contact_rows(
+    hursts: np.ndarray, exponents: dict[int, tuple[np.ndarray, np.ndarray]]
+) -> Iterable[tuple[str, str, str]]:
+    """Statements on the contact: what is required, and what is obtained; exponents are by number of springs."""
+    steel, at = equal_bodies(), {float(H): i for i, H in enumerate(hursts)}
+    normal, tangential = float(steel.normal) / 1e9, float(steel.tangential) / 1e9
+    numbers = f"{normal:.2f} GPa, {tangential:.2f} GPa, {normal / tangential:.5f}"
+    yield "E\\*, G\\* and their ratio for steel on steel: 115.38 GPa, 95.02 GPa, 1.21429", "1e-4", numbers
+    worst = max(test_tangential.closed_form_error(profile) for profile in test_tangential.profiles().values())
+    sums = "closed form F_t(u) = μ [F_n(d) - F_n(d - G\\* u/(μ E\\*))] against the sum over springs, seven profiles"
+    yield sums, "1e-12", short(worst)
+    powers = ", ".join(short(test_tangential.power_law_error(*power)) for power in test_tangential.POWERS)
+    yield "profiles of the form x^n, n = 0.3, 1, 2, 8, against 1 - (1 - w)^((n+1)/n)", "1e-5", powers
+    coarse, fine = (
+        np.mean([test_tangential.sphere_error(n, a) for a in np.linspace(1.2, 1.25, 11)]) for n in (200, 2000)
+    )
+    sphere_told = f"{coarse / fine:.0f} ({short(coarse)}, {short(fine)})"
+    yield "sphere against Cattaneo and Mindlin: error with 200 over that with 2000 springs", "100 ± 20", sphere_told
+    force, stiffness = exponents[65536][0], exponents[4096][1]
+    shown = ", ".join(f"{force[at[H]]:.2f} ({(H + 1) / H:.3g})" for H in (0.5, 0.7, 0.9))
+    yield "exponent of F_n against d at H = 0.5, 0.7, 0.9, N = 65536: (H + 1)/H", "0.15", shown
+    small = f"{exponents[4096][0][at[0.2]]:.2f} (N = 4096), {force[at[0.2]]:.2f} (65536)"
+    yield "exponent of F_n against d at H = 0.2: far below (H + 1)/H = 6, rises with N", "no agreement", small
+    known = "exponent of stiffness against load at H = 0.1, 0.2, 0.3, 0.5, 0.7, 0.9: 0.80, 0.77, 0.73, 0.65, 0.59, 0.54"
+    yield known, "0.05", ", ".join(f"{x:.2f}" for x in stiffness)
+    half = [test_tangential.mean_w(H, 2.86e-6, 0.31, 0.5) for H in (0.1, 0.5, 0.9)]
+    halves = ", ".join(f"{w:.3f}" for w in half)
+    yield "w at half of full friction grows with H: 0.152, 0.218, 0.281 at H = 0.1, 0.5, 0.9", "0.01", halves
+    loads = [test_tangential.mean_w(0.3, 2.46e-6, f, 0.5, 16384, 400) for f in (0.03, 0.1, 0.31, 1.0)]
+    constant = "w at half of full friction does not depend on the load from 0.03 to 1 N (H = 0.3, N = 16384, 400 lines)"
+    yield constant, "0.01", f"{min(loads):.3f} ... {max(loads):.3f}"
+    springs = test_hysteresis.rough_springs()
+    walks = [test_hysteresis.walk_error(springs, seed, s) for seed in range(8) for s in test_hysteresis.SCALES]
+    masing = f"{short(test_hysteresis.masing_error(springs))}, {short(max(walks))}"
+    yield f"Masing's rules, and turning points on random walks, {springs.k.size} springs", "1e-12", masing
+    bank = power_law_bank(test_memory.F_S, test_memory.U_MAX, test_memory.P, n=1000)
+    off = np.array([
+        [x / y - 1.0 for x, y in zip(test_memory.after_slip(bank, ratio)[1:3], known, strict=True)]
+        for ratio, _, *known, _ in test_memory.TABLE
+    ])  # fmt: skip
+    yield "rebound and creep left after an undamped slip, four drops of friction", "2 %", percent(np.abs(off).max())
+
+
+@figure
+def rate_and_state() -> None:
+    laws = rate_and_state_errors.LAWS
+    of_law = {law: list(_rate_and_state(law)) for law in laws}
+    about = (
+        ("friction after velocity steps: a decade up, one down, two down", "its change in that step", "1e-8"),
+        ("steady sliding: change with velocity, -(b - a) F ln((v₂ + v\\*)/(v₁ + v\\*))", "itself", "1e-8"),
+        ("slide-hold-slide (1 s, 10 s): spring's force at any time", "its change by the holds", "1e-4"),
+        ("slide-hold-slide: by how much the longer hold's peak is higher", "itself", "1e-5"),
+        ("stick-slip: onset of each burst, at 20, 100 and 400 µm/s", "time between bursts", "1e-5"),
+        ("stick-slip: displacement while slower than 20 µm/s", "slip of a burst", "1e-5"),
+        ("stick-slip: force at any time, also in bursts", "its change", "1e-4"),
+    )
+    rows = [[*words, *(short(of_law[law][i]) for law in laws)] for i, words in enumerate(about)]
+    columns = ["error of", "relative to", "required", *(f"{law} law" for law in laws)]
+    table("rate and state", "rate_and_state", columns, rows)
+    grown = {law: rate_and_state_errors.growth_beside_the_critical_stiffness(law) for law in laws}
+    rows = [
+        [f"{stability:g}", f"{round(of[0][1].real, 6) + 0.0:.6f}", *(f"{found.real:.6f}" for found, _ in of)]
+        for stability, *of in zip(rate_and_state_errors.STABILITIES, *grown.values(), strict=True)
+    ]
+    columns = ["spring over the critical one", "linearised equations", *(f"{law} law" for law in laws)]
+    table("growth", "rate_and_state", columns, rows)
+
+
+def _rate_and_state(law: str) -> Iterable[float]:
+    yield rate_and_state_errors.velocity_steps(law)[0]
+    yield rate_and_state_errors.steady_sliding(law)
+    yield from rate_and_state_errors.slide_hold_slide(law)[:2]
+    yield from rate_and_state_errors.stick_slip(law)[:3]
 
 
 @figure

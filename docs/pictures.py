@@ -38,7 +38,7 @@ def noticed(found: dict[str, Any]) -> Figure:
 def damaged(found: dict[str, Any]) -> Figure:
     """What became of damaged files (part ``damaged files`` of ``robustness.json``)."""
     count = {what: int(number.replace(" ", "")) for what, number in found["rows"]}
-    parts = [("refused", DARK), ("read", MIDDLE), (next(k for k in count if k.startswith("not counted")), LIGHT)]
+    parts = [("refused", DARK), ("read", MIDDLE), (next(k for k in count if k.startswith("crashed")), LIGHT)]
     lost = next(k for k in count if k.startswith("neither"))
     made, axes = figure(width=7.0, height=2.0)
     ax, left = axes[0, 0], 0

@@ -33,10 +33,15 @@ class Springs:
         return np.minimum(self.k * np.asarray(u)[..., None], self.cap).sum(axis=-1)
 
 
+def rough_springs():
+    """The touching springs of four rough lines."""
+    table = RoughLines(n_springs=16384, lines=4, seed=1).indentation
+    return Springs(spring_bank(static_contact(table, 0.31, 0.21)))
+
+
 @pytest.fixture(scope="module")
 def rough():
-    table = RoughLines(n_springs=16384, lines=4, seed=1).indentation
-    springs = Springs(spring_bank(static_contact(table, 0.31, 0.21)))
+    springs = rough_springs()
     assert springs.k.size > 4000
     return springs
 
@@ -47,16 +52,22 @@ def fresh(springs):
     return new, Hysteresis(springs.virgin)
 
 
-def test_masing(rough):
-    springs, _ = fresh(rough)
+def masing_error(rough):
+    """Largest departure of loops from twice the virgin curve, over full friction."""
+    errors = []
     for u_a in (0.2e-6, 0.6e-6, 2e-6):
         springs, _ = fresh(rough)
         f_a = springs.move_to(u_a)
         for u in np.linspace(u_a, -u_a, 20)[1:]:
-            assert springs.move_to(u) == pytest.approx(f_a - 2 * rough.virgin((u_a - u) / 2), abs=1e-12 * F_S)
+            errors.append(springs.move_to(u) - (f_a - 2 * rough.virgin((u_a - u) / 2)))
         f_b = springs.f.sum()
         for u in np.linspace(-u_a, u_a, 20)[1:]:
-            assert springs.move_to(u) == pytest.approx(f_b + 2 * rough.virgin((u + u_a) / 2), abs=1e-12 * F_S)
+            errors.append(springs.move_to(u) - (f_b + 2 * rough.virgin((u + u_a) / 2)))
+    return np.abs(errors).max() / F_S
+
+
+def test_masing(rough):
+    assert masing_error(rough) < 1e-12
 
 
 def test_return_point_memory(rough):
@@ -72,15 +83,24 @@ def test_return_point_memory(rough):
         assert wandering.move_to(0.75e-6) == pytest.approx(beyond, abs=1e-12 * F_S)
 
 
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("scale", [0.3, 1.0, 3.0])
-def test_turning_points_equal_springs_on_random_walks(rough, seed, scale):
+SCALES = (0.3, 1.0, 3.0)  # of random walks
+
+
+def walk_error(rough, seed, scale):
+    """Largest difference of turning points and springs on a random walk, over full friction."""
     rng = np.random.default_rng(seed)
     springs, stack = fresh(rough)
-    u = 0.0
+    u, errors = 0.0, []
     for _ in range(60):
         u = rng.choice([rng.normal() * scale * 0.5e-6, u + rng.normal() * 3e-8, -u])
-        assert stack.move_to(u) == pytest.approx(springs.move_to(u), abs=1e-12 * F_S)
+        errors.append(stack.move_to(u) - springs.move_to(u))
+    return np.abs(errors).max() / F_S
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("scale", SCALES)
+def test_turning_points_equal_springs_on_random_walks(rough, seed, scale):
+    assert walk_error(rough, seed, scale) < 1e-12
 
 
 def test_closed_loops_are_forgotten():

@@ -16,6 +16,7 @@ from stickslip.physics.contact import (
 )
 
 F_S, U_MAX, P = 0.2604, 1e-6, 3.2
+# ratio of kinetic to static friction; share of full friction left, rebound and creep left (nm), virgin over this creep
 TABLE = [(0.95, 0.90, 16, 36, 21), (0.90, 0.80, 32, 83, 9.2), (0.85, 0.70, 48, 134, 5.7), (0.70, 0.40, 102, 298, 2.6)]
 
 
@@ -24,16 +25,21 @@ def bank():
     return power_law_bank(F_S, U_MAX, P, n=1000)
 
 
+def after_slip(bank, ratio):
+    """Share of full friction, rebound, creep left and creep of a virgin contact (nm) after an undamped slip."""
+    state = arrest(bank, ratio)
+    creep = [float(reload_displacement(bank, f, 0.99 * F_S)) for f in (state.element_force, 0 * state.element_force)]
+    return float(state.force) / F_S, *(1e9 * u for u in (float(state.rebound), *creep))
+
+
 @pytest.mark.parametrize("ratio, force, rebound, creep, factor", TABLE)
 def test_residual_state(bank, ratio, force, rebound, creep, factor):
     """Displacements to 2 %; factors to the digits they are known with."""
-    state = arrest(bank, ratio)
-    virgin = float(reload_displacement(bank, 0 * state.element_force, 0.99 * F_S))
-    available = float(reload_displacement(bank, state.element_force, 0.99 * F_S))
-    assert float(state.force) == pytest.approx(force * F_S, rel=1e-9)
-    assert float(state.rebound) == pytest.approx(rebound * 1e-9, rel=0.02)
-    assert available == pytest.approx(creep * 1e-9, rel=0.02)
-    assert virgin == pytest.approx(763e-9, rel=0.02)
+    left, back, available, virgin = after_slip(bank, ratio)
+    assert left == pytest.approx(force, rel=1e-9)
+    assert back == pytest.approx(rebound, rel=0.02)
+    assert available == pytest.approx(creep, rel=0.02)
+    assert virgin == pytest.approx(763, rel=0.02)
     assert float(f"{virgin / available:.2g}") == factor
 
 

@@ -1,6 +1,7 @@
 """Fuzzing of everything that reads a file: mutations of valid files, and random bytes.
 
-Only the program's own errors may come out. ``python -m tests.robust.fuzz --number 100000`` prints what else did. Input
+Only the program's own errors may come out. ``python -m tests.robust.fuzz --number 100000`` prints what else did, and
+writes docs/results/robustness.json. Input
 ``n`` of a seed is always the same: ``--first n --number 1 --keep FOLDER`` keeps it. With ``--commands`` what is refused
 goes through a command of the program as well, which must end with 2, in words, and leave no file; of what can be read
 every fiftieth is inspected to the end.
@@ -33,12 +34,15 @@ from typing import Any
 
 import numpy as np
 
+from tests.kept_results import keep_table
+
 from .seeds import beside, seeds, tables
 
 PATIENCE = 10  # s of processor time for one input; the slowest valid one takes a tenth of a second
 MEMORY = 6 << 30  # bytes of address space of a child
 CHUNK = 2000  # inputs of a child
 MOST_CRASHES = 200
+GUARDED = "crashed the library that reads them, refused by the guard"
 
 _ODD = [
     b"", b"0", b"-1", b"1e999", b"-1e999", b"nan", b"inf", b"1e-320", b"9" * 40, b"2147483648", b"-9223372036854775809",
@@ -231,7 +235,7 @@ def try_command(folder: Path, arguments: list[str], refused: bool) -> str:
 
 
 def child(seed: int, first: int, number: int, state: Path, guarded: bool, commands: bool) -> None:
-    """Try inputs one after the other; every outcome is one line of JSON on stdout."""
+    """Try inputs one after the other; every outcome is a line of JSON on stdout, so that a crash loses no other."""
     import resource
 
     from stickslip.data.readers import guarded_reading
@@ -239,13 +243,12 @@ def child(seed: int, first: int, number: int, state: Path, guarded: bool, comman
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     guarded_reading.ENABLED, guarded_reading.PATIENCE = guarded, 4.0
-    counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))
         for n in range(first, first + number):
             state.write_text(str(n))
             outcome, what = try_one(Path(folder), *inputs(seed, n))
-            counts[outcome] += 1
+            counts = Counter([outcome])
             if commands and (outcome == "refused" or (outcome == "read" and n % 50 == 0)):
                 name = inputs(seed, n)[0]
                 arguments = command_of(name, n // 2)
@@ -257,7 +260,7 @@ def child(seed: int, first: int, number: int, state: Path, guarded: bool, comman
                     outcome = "fault" if what else outcome
             if outcome == "fault":
                 print(json.dumps({"input": n, "what": what}), flush=True)
-    print(json.dumps(dict(counts)), flush=True)
+            print(json.dumps(dict(counts)), flush=True)
 
 
 def _child(
@@ -303,10 +306,9 @@ def campaign(
                 n += size
             else:
                 at = int(state.read_text())
-                counts["before a crash"] += at - n
                 n, crashes = at + 1, crashes + 1
                 code, again = _child(seed, at, 1, state, True, Counter(), faults, commands)
-                counts["crash" if code else "crash stopped by the guard"] += 1
+                counts["crash" if code else GUARDED] += 1
                 if code:
                     faults.setdefault(f"the process ended with {code}: {words} {again}", []).append(at)
             tell(
@@ -339,7 +341,24 @@ def main() -> int:
     for what, where in sorted(found["faults"].items(), key=lambda item: -len(item[1])):
         print(f"{len(where)} x {what}\n    inputs {where[:6]}")
     print(f"{found['inputs']} inputs, seed {found['seed']}: {found['counts']}")
+    if not options.first:
+        command = f"python -m tests.robust.fuzz --number {found['inputs']} --seed {options.seed}"
+        command += " --commands" * options.commands
+        keep_table("robustness", command, "damaged files", ["what", "number"], table(found), seed=options.seed)
     return 1 if found["faults"] else 0
+
+
+def table(found: dict[str, Any]) -> list[list[str]]:
+    """What became of the inputs, and the commands that were run on them."""
+    counts = found["counts"]
+    through = {what.partition(" ")[2]: n for what, n in counts.items() if what.startswith("through ")}
+    numbers = {
+        "damaged files": found["inputs"],
+        **{what: counts.get(what, 0) for what in ("refused", "read", GUARDED)},
+        "commands run on them": sum(through.values()), **dict(sorted(through.items(), key=lambda item: -item[1])),
+        "neither read nor refused with a message": sum(len(where) for where in found["faults"].values()),
+    }  # fmt: skip
+    return [[what, f"{number:,}".replace(",", " ")] for what, number in numbers.items()]
 
 
 if __name__ == "__main__":
