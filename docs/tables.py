@@ -1,7 +1,7 @@
 """Tables of the pages, drawn from the files in docs/results.
 
-What is there has the version that was measured, the date and the command: of most files a script that writes them, of
-some parts one that prints their numbers. A page draws its tables from them in a code cell:
+Every part has the version that was measured, the date, and the command of the script that writes it (by
+``tests/kept_results.py``). A page draws its tables from them in a code cell:
 ``tables.solvers(tables.part("performance", "solvers"))``. What has not been measured yet is said.
 """
 
@@ -13,6 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from scipy.stats import binomtest
+
+from stickslip.blind.detection import detection
+from stickslip.blind.generator import CATALOGUED, EFFECTS
 
 RESULTS = Path(__file__).resolve().parent / "results"
 MISSING = "*Not measured yet.*"
@@ -238,6 +241,18 @@ def experiments(found: dict[str, Any]) -> str:
         f"Experiments that were made: {', '.join(dict.fromkeys(c['experiment'] for c in sets if 'left' in c))}."
     )
     return f"{told}\n\n{table(['hidden', 'others in the set', 'proposed experiment', 'named with its run'], rows)}"
+
+
+def largest_multiples(below: float = 10.0) -> str:
+    """Effects of the challenge that do not reach a multiple of their detection limit in some form."""
+    rows = []
+    for tag, effect in EFFECTS.items():
+        most = {form.name: effect.high / detection(effect, form.name) for form in effect.forms}
+        if min(most.values()) < below:
+            outside = "" if tag in CATALOGUED else " (outside the catalogue)"
+            forms = ", ".join(f"{name} {multiple:.2g}" for name, multiple in most.items())
+            rows.append((min(most.values()), [f"`{tag}`{outside}", forms]))
+    return table(["effect", "largest multiple, by form"], [row for _, row in sorted(rows)])
 
 
 # --- performance ------------------------------------------------------------------------------------------------------

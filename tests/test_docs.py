@@ -189,9 +189,17 @@ def test_pages_hold_no_dates_and_commits(path: Path) -> None:
 def test_results_say_their_version_date_and_command(path: Path) -> None:
     found = json.loads(path.read_text(encoding="utf-8"))
     for part in [found] if "version" in found else found.values():
-        for kept in [part] if "date" in part else part["rows"]:
-            former = part["version"].startswith("of ")  # what it measured is gone
-            assert part["version"] and kept["date"] and (former or kept["command"])
+        assert part["version"] and part["date"]
+        assert _script(part["command"]).is_file(), part["command"]
+
+
+def _script(command: str) -> Path:
+    """The file that a command of python runs."""
+    _, first, *more = command.split()
+    if first != "-m":
+        return ROOT / first
+    module = ROOT.joinpath(*more[0].split("."))
+    return module / "__main__.py" if module.is_dir() else module.with_suffix(".py")
 
 
 def test_targets_are_computed_from_the_kept_figures(tables: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:

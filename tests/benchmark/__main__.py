@@ -1,4 +1,4 @@
-"""Measure static curve, solvers at equal accuracy, cost against size, Jacobian, batches, workbench: tables and results.
+"""Measure static curve, solvers at equal accuracy, cost against size, many runs, inference, workbench.
 
 The tables are printed; docs/results/performance.json, from which docs/performance.md draws them, is written as well.
 """
@@ -18,7 +18,7 @@ from .measuring import head, keep, last_table, row, timed
 
 ROOT = Path(__file__).resolve().parents[2]
 SIZES = ("springs", "drive", "holds", "events")
-_LAST = ("jacobian", "batches", "many", "writing", "command-line", "workbench")
+_LAST = ("jacobian", "batches", "many", "writing", "command-line", "inspect", "fits", "diagnosis", "workbench")
 PARTS = ("static", "solvers", "step", "sizes", *SIZES, *_LAST)
 FACTOR = 3.0  # of tolerance, accurate enough at 256 springs (table of solvers)
 
@@ -122,6 +122,12 @@ def main() -> None:
         many.writing(small)
     if only in (None, "command-line"):
         command_line(small)
+    if only in (None, "inspect", "fits", "diagnosis"):
+        from . import inference
+
+        for part, measure in inference.PARTS.items():
+            if only in (None, part):
+                measure(small)
     if only in (None, "workbench"):
         from . import workbench
 
