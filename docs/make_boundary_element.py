@@ -1,4 +1,4 @@
-"""The rough line against a boundary-element solution of the surface: ``docs/paper/boundary_element.json`` and picture.
+"""The rough line against a boundary-element solution of the surface: ``docs/results/boundary_element.json``, picture.
 
     pip install tamaas        # nothing else of this repository needs it
     python docs/make_boundary_element.py
@@ -20,11 +20,15 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
 from stickslip.physics.contact import Moduli, RoughLines, static_contact
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, MIDDLE, figure, logarithmic, styled
+from tests.kept_results import keep, kept
 
-OUT = Path(__file__).resolve().parent / "paper"
+OUT = ROOT / "docs" / "paper"
 N = 256
 SURFACES, LINES = 8, 200
 HURST = (0.3, 0.5, 0.7, 0.9)
@@ -133,7 +137,7 @@ def draw(found: dict[str, Any]) -> Figure:
 
 def main() -> None:
     if sys.argv[1:] == ["--draw"]:
-        known = json.loads((OUT / "boundary_element.json").read_text(encoding="utf-8"))
+        known = kept("boundary_element")
         save(draw(known["by_hurst"]), OUT / "boundary_element.png")
         return
     import tamaas as tm
@@ -144,16 +148,10 @@ def main() -> None:
     print("Hertz", ratio)
     found = compare()
     save(draw(found), OUT / "boundary_element.png")
-    facts = {
-        "N": N,
-        "surfaces": SURFACES,
-        "lines": LINES,
-        "paper_force": PAPER,
-        "hertz": ratio,
-        "tamaas": tm.__version__,
-    }
-    text = json.dumps({**facts, "forces": FORCES.tolist(), "by_hurst": found}, indent=1)
-    (OUT / "boundary_element.json").write_text(text + "\n", encoding="utf-8")
+    keep(
+        "boundary_element", "python docs/make_boundary_element.py", N=N, surfaces=SURFACES, lines=LINES,
+        paper_force=PAPER, hertz=ratio, tamaas=tm.__version__, forces=FORCES.tolist(), by_hurst=found,
+    )  # fmt: skip
     print(f"{time.perf_counter() - began:.0f} s")
 
 

@@ -1,4 +1,4 @@
-"""Reproduce Grzemba 2014: figures and ``docs/paper/paper.json``, from which docs/paper.md takes every number.
+"""Reproduce Grzemba 2014: figures and ``docs/results/paper.json``, from which docs/paper.md takes every number.
 
     python docs/make_paper.py
 
@@ -10,9 +10,9 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import sys
 import tempfile
 import time
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,9 @@ import xarray
 from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
-from stickslip import __version__
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
 from stickslip.cli import run as command
 from stickslip.data.campaign import Rig
 from stickslip.data.campaign.template import campaign_text
@@ -37,8 +39,8 @@ from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, figure, logarithmic, styled
 from stickslip.simulation.scenario import load_scenario, simulate, static_creep
 from stickslip.simulation.scenario.load import Scenario
+from tests.kept_results import keep
 
-ROOT = Path(__file__).resolve().parents[1]
 RIGS = ROOT / "scenarios" / "grzemba2014"
 OUT = ROOT / "docs" / "paper"
 PROCESSES = 27
@@ -426,18 +428,12 @@ def static_part(result: dict[str, Any], rig: StaticRig) -> dict[str, Any]:
 def main() -> None:
     OUT.mkdir(exist_ok=True)
     began = time.perf_counter()
-    result: dict[str, Any] = {
-        "version": __version__,
-        "date": date.today().isoformat(),
-        "paper": PAPER,
-        "v_lim_um_s": V_LIM * 1e6,
-    }
+    result: dict[str, Any] = {"paper": PAPER, "v_lim_um_s": V_LIM * 1e6}
     for part in (fig2, fig4, fig5, alignment, realisations, statistics, weakening, extended):
         start = time.perf_counter()
         result[part.__name__] = part()
         print(f"{part.__name__}: {time.perf_counter() - start:.1f} s")
-    text = json.dumps(rounded(result), indent=1) + "\n"
-    (OUT / "paper.json").write_text(text, encoding="utf-8")
+    keep("paper", "python docs/make_paper.py", **rounded(result))
     print(f"{time.perf_counter() - began:.0f} s")
 
 

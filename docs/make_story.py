@@ -3,15 +3,14 @@
     python docs/make_story.py [out/demo]        # the story, its caption, and the terminal's last words
     python docs/make_story.py --simulations     # the simulated pictures in docs/images
 
-The first writes docs/images/story.png, story.json and diagnosis.txt, and puts the caption between the ``story``
-marks of README.md.
+The first writes docs/images/story.png and diagnosis.txt, docs/results/story.json, and puts the caption between the
+``story`` marks of README.md.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
-import json
 import re
 import shutil
 import sys
@@ -28,6 +27,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
 import stickslip as ss
 from stickslip.cli import diagnose as terminal
 from stickslip.cli import run as command
@@ -38,8 +40,8 @@ from stickslip.inference.fit.static_table import StaticRig, static_table, virtua
 from stickslip.show.plots import save
 from stickslip.show.plots.style import DARK, LIGHT, MIDDLE, styled
 from stickslip.system.runstore import read_result
+from tests.kept_results import keep
 
-ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images"
 RUN = 0  # the run whose trace is shown
 SHOWN = 9  # candidates, at most
@@ -336,7 +338,7 @@ def main(folder: Path) -> None:
         creep = first_creep(ROOT / result["inputs"][0]["file"])
         save(story(data, result, creep), IMAGES / "story.png")
     found = facts(result, creep, folder)
-    (IMAGES / "story.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    keep("story", "python docs/make_story.py", **found)
     (IMAGES / "diagnosis.txt").write_text(last_words(result), encoding="utf-8")
     put_caption(caption(found))
     print(caption(found))

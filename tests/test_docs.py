@@ -144,7 +144,7 @@ def test_every_page_is_in_a_table_of_contents() -> None:
 
 
 def test_the_readme_tells_of_the_run_in_its_picture() -> None:
-    story = json.loads((DOCS / "images" / "story.json").read_text(encoding="utf-8"))
+    story = json.loads((DOCS / "results" / "story.json").read_text(encoding="utf-8"))
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     shown = " ".join(re.search(r"<!-- story -->(.*?)<!-- /story -->", text, re.DOTALL)[1].split())  # type: ignore[index]
     assert f"version {story['version']}, {story['date']}" in shown
@@ -325,7 +325,7 @@ def test_the_papers_rigs_load(path: Path) -> None:
 
 def test_the_papers_page_has_its_numbers() -> None:
     assert {path.stem for path in RIGS} == {"fig2", "fig4", "fig5", "statistics"}
-    found = json.loads((DOCS / "paper" / "paper.json").read_text())
+    found = json.loads((DOCS / "results" / "paper.json").read_text())
     rows = found["statistics"]["table"]
     assert all(row["processes"] == 27 for row in rows)
     states = {(row["contacts"], row["state"], row["procedure"]) for row in rows}
