@@ -176,7 +176,7 @@ def _empty(tag: str, chosen: str) -> dict[str, Any]:
     others = list(catalogue.confused(tag)) if cls is not None else []
     return {
         "tag": tag, "form": tag, "words": words, "share": 0.0, "gain": "", "unseen": "", "amplitude": "",
-        "alike": f"similar to {', '.join(others[:3])}" if others else "", "picture": [], "on": False,
+        "similar": f"similar to {', '.join(others[:3])}" if others else "", "picture": [], "on": False,
         "chosen": tag == chosen,
     }  # fmt: skip
 

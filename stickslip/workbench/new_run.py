@@ -261,7 +261,7 @@ def run_name(name: str) -> str:
     """A name for a run's file.
 
     Raises:
-        InputError: it would be taken for a campaign.
+        InputError: it is the name of a campaign file.
     """
     if Path(name).suffix.lower() == _TOML:
         raise InputError("a run is a file of measurements", key="file", value=name, hint="give it another ending")

@@ -155,7 +155,7 @@ class Catalogue(Spoken):
     """Effects by their evidence, each with its signature, what it gains, and a switch.
 
     Attributes:
-        rows: tables with ``tag``, ``words``, ``share`` (0 to 1), ``gain``, ``unseen``, ``amplitude``, ``alike``,
+        rows: tables with ``tag``, ``words``, ``share`` (0 to 1), ``gain``, ``unseen``, ``amplitude``, ``similar``,
             ``picture`` (two lists of points, 0 to 1), ``on`` and ``chosen``.
         closed: whether none can be switched at present.
     """

@@ -315,7 +315,7 @@ def test_the_catalogue_has_its_rows(base, promises):
     assert made[0]["tag"] == "contact-ageing"
     assert [r["tag"] for r in made if r["chosen"]] == ["drive-ripple"]
     assert made[0]["share"] == 1.0 and all(0.0 <= r["share"] <= 1.0 for r in made)
-    assert "±" in made[0]["amplitude"] and "similar to" in made[0]["alike"]
+    assert "±" in made[0]["amplitude"] and "similar to" in made[0]["similar"]
     assert all(0.0 <= y <= 1.0 for curve in made[0]["picture"] for _, y in curve)
 
 

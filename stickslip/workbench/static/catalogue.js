@@ -20,7 +20,7 @@ export function render({ model }) {
       line.dataset.tag = row.tag
       const name = part("div", "tag", line)
       part("b", "", name, row.tag)
-      if (row.alike) part("span", "words", name, row.alike)
+      if (row.similar) part("span", "words", name, row.similar)
       const evidence = part("div", "evidence", line)
       evidence.title = EVIDENCE
       const bar = part("div", "strength", evidence)
