@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .checks.spring_force import alike, common_gain, gain_is_wrong, stick_gain
+from .checks.spring_force import common_gain, gain_is_wrong, gains_agree, stick_gain
 from .prescribed import prescribed
 from .readers.repair import from_load_point
 from .segment import Segmentation, block_motion, segment
@@ -27,7 +27,7 @@ def true_gains(traces: Sequence[Trace], found: Sequence[Segmentation]) -> tuple[
     told = [gain for gain in gains.values() if gain is not None]
     if not told:
         return list(found), []
-    common = common_gain(told) if alike(told) else None
+    common = common_gain(told) if gains_agree(told) else None
     out, wrong = list(found), {}
     for i, trace in enumerate(traces):
         gain, stated = gains[i] if common is None else common, trace.spring_stiffness

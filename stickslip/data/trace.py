@@ -520,8 +520,10 @@ class Trace(Shown, _Rebuilt):
 
         time = means(self.time)
         last = np.unique(np.cumsum(numbers)) - 1
-        noise, alike = self._of_mean(size)
-        told = f"counts that noise hardly blurs: means of {size} keep their rounding, which a fit can no longer correct"
+        noise, rounded = self._noise_of_mean(size)
+        warning = (
+            f"counts that noise hardly blurs: means of {size} keep their rounding, which a fit can no longer correct"
+        )
         lost, rates = self.time.size - time.size, f"{shown(1.0 / step, 'Hz')} to {shown(1.0 / (size * step), 'Hz')}"
         note = Repair(COARSENED, lost, "all channels", f"means of {size} samples, {rates}")
         return self.replace(
@@ -529,18 +531,18 @@ class Trace(Shown, _Rebuilt):
             resolution=None if self.resolution is None else self.resolution / size,
             hum=self.hum * max(abs(float(np.sinc(f * size * step))) for f in MAINS),
             missing=tuple(time[last[(last >= 0) & (last < time.size - 1)]].tolist()),
-            repairs=(*self.repairs, note), warnings=(*self.warnings, *([told] if alike else [])),
+            repairs=(*self.repairs, note), warnings=(*self.warnings, *([warning] if rounded else [])),
         )  # fmt: skip
 
-    def _of_mean(self, size: int) -> tuple[float | None, bool]:
-        """Noise of the mean of so many samples, and whether most of it is rounding, which errs alike in all of them."""
+    def _noise_of_mean(self, size: int) -> tuple[float | None, bool]:
+        """Noise of the mean of so many samples, and whether most of it is rounding, an error common to all of them."""
         if self.noise is None:
             return None, False
-        whole, alike, count = self.noise**2, 0.0, self.resolution
+        whole, rounding, count = self.noise**2, 0.0, self.resolution
         if count:
             spread = math.sqrt(max(whole - count**2 / 12.0, 0.0))
-            alike = min(float(rounding_of_mean(np.zeros(()), count, spread)), whole)
-        return math.sqrt((whole - alike) / size + alike), 2.0 * alike > whole
+            rounding = min(float(rounding_of_mean(np.zeros(()), count, spread)), whole)
+        return math.sqrt((whole - rounding) / size + rounding), 2.0 * rounding > whole
 
     @cached_property
     def digest(self) -> str:

@@ -111,7 +111,7 @@ def test_no_mean_reaches_over_a_gap():
 
 @pytest.mark.parametrize("blur", [0.0, 0.2, 0.35, 0.8])  # of a count
 def test_the_noise_of_means_is_that_of_counted_readings(blur):
-    """Without noise all counts of a mean err alike; noise of half a count makes them err by themselves."""
+    """Without noise all counts of a mean have the same error; noise of half a count makes their errors independent."""
     count, size, rng = 8e-9, 25, np.random.default_rng(5)
     truth = np.repeat(rng.random(4000), size) + np.repeat(np.arange(4000), size)
     x = count * np.round(truth + blur * rng.standard_normal(truth.size))
@@ -135,7 +135,7 @@ def test_hum_is_what_means_leave_of_it():
 
 
 def test_means_are_not_taken_of_means():
-    """Rounding is alike in all samples of a count: its part of the noise is known of the record only."""
+    """Rounding is the same in all samples of a count: its part of the noise is known of the record only."""
     t = np.arange(0.0, 1.0, 1e-3)
     once = Trace("a", t, displacement=t.copy(), noise=3e-9, resolution=8e-9).coarsened("200 Hz")
     with pytest.raises(InputError, match="coarsened already"):

@@ -122,7 +122,7 @@ def test_a_missing_file_names_the_nearest_one(tmp_path):
     (tmp_path / "sphere.toml").write_text("")
     with pytest.raises(InputError, match=r"did you mean 'sphere\.toml'"):
         load_scenario(tmp_path / "spere.toml")
-    with pytest.raises(InputError, match="stickslip new scenario FILE"):  # all such files end alike
+    with pytest.raises(InputError, match="stickslip new scenario FILE"):  # all such files have one ending
         load_scenario(tmp_path / "rig.toml")
 
 
@@ -221,7 +221,7 @@ def test_the_template_is_a_valid_scenario(tmp_path):
     assert scenario.file.sensor is not None
 
 
-def test_python_dictionaries_are_checked_alike():
+def test_python_dictionaries_are_checked_as_files_are():
     with pytest.raises(InputError, match="did you mean 'mass'"):
         make_scenario(rig(block__mas=1))
     assert make_scenario(rig()).changed(drive__velocity="1 mm/s").file.drive.velocity == pytest.approx(1e-3)

@@ -15,7 +15,7 @@ Kind = Literal["campaign", "scenario"]
 
 _MOST_BYTES = 10_000_000
 _SHOWN = 8  # files in a hint
-_ALIKE = 0.5  # of two names that one may have been meant by the other
+_SIMILAR = 0.5  # ratio from which one name may have been meant by another
 _COMMANDS = {"campaign": "inspect, fit and diagnose", "scenario": "simulate and creep"}
 
 
@@ -65,9 +65,9 @@ def _kind(content: dict[str, Any]) -> Kind | None:
 
 
 def _instead(path: Path, kind: str) -> str:
-    """What was meant by a name that is not there: all such files end alike, so the ending says nothing."""
+    """What was meant by a name that is not there: all such files have one ending, which says nothing."""
     beside = sorted(path.parent.glob("*.toml")) if path.parent.is_dir() else []
-    close = [p.name for p in beside if difflib.SequenceMatcher(None, p.stem, path.stem).ratio() >= _ALIKE]
+    close = [p.name for p in beside if difflib.SequenceMatcher(None, p.stem, path.stem).ratio() >= _SIMILAR]
     if close:
         return nearest(path.name, close)
     new = f"stickslip new {kind} FILE writes one to start from"

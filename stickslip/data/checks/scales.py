@@ -23,7 +23,7 @@ LEAST = 0.01  # smaller differences between runs are not spoken of
 COMMON = 0.04  # an error of scale that all runs share, up to which it may be a sensor's gain or wear
 IMPOSSIBLE = 30.0  # factor beyond which nothing can be made of block and drive together
 _SIZE, _TIME = 0.015, 0.015  # to which slips of the same rig are as large and as long at all velocities (relative)
-_ALIKE = 4.0  # difference of squared deviations up to which two explanations are both told
+_DELTA_CHI2 = 4.0  # up to which two explanations are both given
 _CLOCK = 0.004  # standard deviation of a clock found from the pieces of a drive
 _VELOCITY, _SCALE, _CLOCKED = "drive velocity", "scale", "time"
 
@@ -46,7 +46,9 @@ def scale_findings(campaign: Campaign, traces: Sequence[Trace], travels: Sequenc
     common = _common([known[i] for i in agreed], len(traces))
     for i, (trace, seen) in enumerate(known):
         rig = campaign.rig_of(trace.name)
-        others = [t for j, (o, t) in enumerate(known) if j in agreed and j != i and _same(rig, campaign.rig_of(o.name))]
+        others = [
+            t for j, (o, t) in enumerate(known) if j in agreed and j != i and _same_rig(rig, campaign.rig_of(o.name))
+        ]
         if i in off:
             out.append(_one(trace, seen, 1.0 if common else centre, off[i], others))
         if seen.clock is not None and abs(seen.clock - 1.0) > CHANCE * _clock_std(seen):
@@ -54,8 +56,8 @@ def scale_findings(campaign: Campaign, traces: Sequence[Trace], travels: Sequenc
     return [*out, *common]
 
 
-def _same(a: Rig, b: Rig) -> bool:
-    """Whether slips of two runs should be alike."""
+def _same_rig(a: Rig, b: Rig) -> bool:
+    """Whether two runs should have the same slips."""
     names = ("mass", "spring_stiffness", "contacts", "normal_force", "friction_coefficient")
     return all(getattr(a, name) == getattr(b, name) for name in names)
 
@@ -72,8 +74,8 @@ def _apart(seen: Sequence[Travel]) -> tuple[dict[int, float], list[int]]:
             variance = float(np.mean([o.std**2 for o in others]))
             middle = float(np.median(slopes))
             spread = (1.4826 * float(np.median(np.abs(slopes - middle)))) ** 2
-            unlike = seen[i].unlike(float(np.median([o.trend for o in others])))
-            std = float(np.sqrt(seen[i].std ** 2 + unlike**2 + max(spread, variance / len(others))))
+            drifting = seen[i].trend_std(float(np.median([o.trend for o in others])))
+            std = float(np.sqrt(seen[i].std ** 2 + drifting**2 + max(spread, variance / len(others))))
             away = seen[i].slope - middle
             if abs(away) > max(LEAST, CHANCE * std):
                 # of two runs nobody knows which is wrong but by the file itself
@@ -89,8 +91,8 @@ def _apart(seen: Sequence[Travel]) -> tuple[dict[int, float], list[int]]:
 def _common(agreed: Sequence[tuple[Trace, Travel]], runs: int) -> list[Finding]:
     """The finding on a factor that all runs which agree share, if it is more than a sensor's gain may be."""
     slopes = np.array([seen.slope for _, seen in agreed])
-    # allowances are alike in all runs: their mean is no better known
-    allowed = np.mean([s.allowance**2 + s.unlike(0.0) ** 2 for _, s in agreed])
+    # the allowances are common to all runs: their mean is no better known
+    allowed = np.mean([s.allowance**2 + s.trend_std(0.0) ** 2 for _, s in agreed])
     std = float(np.sqrt(allowed + np.mean([s.scatter**2 for _, s in agreed]) / slopes.size))
     factor = float(np.median(slopes))
     if abs(factor - 1.0) < max(COMMON, CHANCE * std):
@@ -128,7 +130,7 @@ def _parting(where: str, seen: Travel) -> str:
 
 
 def _clock_std(seen: Travel) -> float:
-    return float(np.sqrt(seen.std**2 + seen.unlike(0.0) ** 2 + _CLOCK**2))
+    return float(np.sqrt(seen.std**2 + seen.trend_std(0.0) ** 2 + _CLOCK**2))
 
 
 def _clock(trace: Trace, seen: Travel) -> Finding:
@@ -187,11 +189,11 @@ def _explained(seen: Travel, factor: float, others: Sequence[Travel]) -> tuple[l
         for k, (large, long) in wanted.items()
     }
     order = sorted(every, key=lambda k: away[k])
-    likely = [k for k in order if away[k] < away[order[0]] + _ALIKE]
+    likely = [k for k in order if away[k] < away[order[0]] + _DELTA_CHI2]
     return likely, f"Its slips are {size:.2f} times as large and last {lasts:.2f} times as long as theirs."
 
 
-def _against(seen: Travel, others: Sequence[Travel], name: str, alike: float) -> tuple[float, float]:
+def _against(seen: Travel, others: Sequence[Travel], name: str, scatter: float) -> tuple[float, float]:
     """A property of a run's slips over that which the other runs let expect, and the deviation of its logarithm.
 
     Where the others have several velocities, it is followed along the velocity and along its logarithm.
@@ -208,8 +210,8 @@ def _against(seen: Travel, others: Sequence[Travel], name: str, alike: float) ->
         expected = float(np.mean([e for e, _ in either]))
         std = float(np.hypot(max(s for _, s in either), abs(either[0][0] - either[1][0])))
     else:
-        expected, std = float(np.mean(y)), float(np.ptp(y)) if y.size > 1 else 2.0 * alike
-    return float(np.exp(np.log(value) - expected)), float(np.hypot(std, alike))
+        expected, std = float(np.mean(y)), float(np.ptp(y)) if y.size > 1 else 2.0 * scatter
+    return float(np.exp(np.log(value) - expected)), float(np.hypot(std, scatter))
 
 
 def _line(x: Array, y: Array) -> tuple[float, float]:

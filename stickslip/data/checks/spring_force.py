@@ -53,7 +53,7 @@ def common_gain(gains: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {"value": mean, "std": float(np.sqrt(max(off, 1.0) / weights.sum())), "sticks": sticks}
 
 
-def alike(gains: Sequence[Mapping[str, float]]) -> bool:
+def gains_agree(gains: Sequence[Mapping[str, float]]) -> bool:
     """Whether gains of runs differ by no more than their errors let expect of one sensor."""
     from scipy.stats import chi2
 

@@ -57,10 +57,10 @@ class Travel:
 
     @property
     def std(self) -> float:
-        """Standard deviation of the slope where all slips are alike."""
+        """Standard deviation of the slope where all slips are equal."""
         return float(np.hypot(self.scatter, self.allowance))
 
-    def unlike(self, trend: float) -> float:
+    def trend_std(self, trend: float) -> float:
         """Standard deviation of the slope from friction whose level changes, where that of others has a ``trend``."""
         return DEEP * abs(self.trend - trend)
 

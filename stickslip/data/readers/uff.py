@@ -209,7 +209,7 @@ def _sensible(table: np.ndarray) -> bool:
     size = np.abs(table["re"][table["re"] != 0].astype(float))
     if not _sane(table["re"]) or size.size == 0:
         return False
-    # pieces of two numbers taken for one have exponents all over the place
+    # pieces of two numbers read as one have exponents all over the place
     if np.diff(np.log10(np.percentile(size, [5, 95])))[0] > 20.0:
         return False
     return "x" not in (table.dtype.names or ()) or bool(np.mean(np.diff(table["x"].astype(float)) > 0) > 0.9)

@@ -1,4 +1,4 @@
-"""Events of a trace: onset, slip, arrest, and the phases between, by one estimator for data and model alike."""
+"""Events of a trace: onset, slip, arrest, and the phases between, by one estimator for both data and model."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def loading_rate(time: Array, force: Array, noise: float, drive: Drive | None = 
 
     The upper quartile of the slopes of the commoner sign. Slopes are between means over blocks long enough for their
     noise to be an eighth of the usual slope. Where these slopes scatter too much to speak of a build-up (steady
-    sliding, velocity steps, loops) it is the steepest, so that fluctuations of the force are not taken for motion.
+    sliding, velocity steps, loops) it is the steepest, so that fluctuations of the force do not count as motion.
     """
     size = 4
     along = time if drive is None else drive.position(time)

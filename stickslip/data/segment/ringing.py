@@ -32,7 +32,7 @@ class Ringing:
     Attributes:
         frequency: Hz.
         amplitude: one period after the arrest, m.
-        law: a key of LAWS, "unclear" where two describe it alike, or "" where it does not fall far enough to tell.
+        law: a key of LAWS, "unclear" where two describe it as well, or "" where it does not fall far enough to tell.
         decay_time: in which the amplitude falls by a factor e at first, whatever the law, s; NaN where there is no law.
     """
 
@@ -48,7 +48,7 @@ def ringing(
     """Ring-downs of all events, their common frequency (Hz), their usual law, and why there is none ("" if there is).
 
     The frequency is where the power after the arrests most exceeds that later in the sticks (so that hum of the mains
-    and ripple of the drive are not taken for it), among those with at least four samples a period.
+    and ripple of the drive do not count), among those with at least four samples a period.
 
     Args:
         duration: usual length of a slip (s), the unit of the window.
