@@ -43,11 +43,11 @@ def _dense(one, other, run):
     forces, parts = [], []
     for fit in (one, other):
         point = replace(fit.point, events=np.zeros((problem.events, 4)), phases=np.zeros((0, 1)))
-        own = problem.usual[problem.alike :]  # the level of this run, and its hum
-        point = replace(point, common=np.concatenate([fit.point.common[: problem.alike], np.zeros(own.size)]))
+        own = problem.usual[problem.systematics :]  # the level of this run, and its hum
+        point = replace(point, common=np.concatenate([fit.point.common[: problem.systematics], np.zeros(own.size)]))
         slopes = problem.evaluate(point)
         forces.append(slopes)
-        shared = a + k + problem.alike
+        shared = a + k + problem.systematics
         covariance = np.zeros((slopes.shared.shape[1],) * 2)
         covariance[:shared, :shared] = fit.covariance[:shared, :shared]
         covariance[shared:, shared:] = np.diag(own**2)
@@ -126,5 +126,5 @@ def test_information_of_an_experiment():
     """Nothing where models predict the same, all where they differ much, a bit for two by a coin's toss."""
     assert information(np.zeros((3, 3))) == pytest.approx(0.0, abs=1e-12)
     assert information(1e3 * (1.0 - np.eye(3))) == pytest.approx(np.log(3.0))
-    apart = np.array([[0.0, 1e3, 0.0], [1e3, 0.0, 1e3], [0.0, 1e3, 0.0]])  # the first and the last are alike
+    apart = np.array([[0.0, 1e3, 0.0], [1e3, 0.0, 1e3], [0.0, 1e3, 0.0]])  # the first and the last are equal
     assert information(apart) == pytest.approx(np.log(3.0) - 2.0 / 3.0 * np.log(2.0))

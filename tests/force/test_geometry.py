@@ -52,8 +52,8 @@ def measured(force: Callable[[np.ndarray], np.ndarray], seed: int, band: float =
     play = np.vstack([np.minimum(u[:, None] / nodes, 1.0), np.full(NODES, 30.0)])
     weights, _ = nnls(play, np.append(f, 30.0 * strength), maxiter=50 * NODES)
     curve = np.minimum(nodes[:, None] / nodes, 1.0) @ weights
-    alike = np.exp(-0.5 * (np.log(nodes[:, None] / nodes) / 0.3) ** 2) + 0.01 * np.eye(NODES)
-    covariance = band**2 * np.outer(curve, curve) * alike
+    correlation = np.exp(-0.5 * (np.log(nodes[:, None] / nodes) / 0.3) ** 2) + 0.01 * np.eye(NODES)
+    covariance = band**2 * np.outer(curve, curve) * correlation
     error = np.linalg.cholesky(covariance + 1e-30 * np.eye(NODES)) @ np.random.default_rng(seed).standard_normal(NODES)
     return Backbone(nodes, np.maximum.accumulate(curve + error), np.sqrt(np.diag(covariance)), covariance)
 
@@ -164,10 +164,10 @@ def test_the_covariance_of_logarithms_is_that_of_curves_drawn_anew():
 
 def test_an_error_common_to_all_forces_is_none_of_the_shape():
     curve = measured(independent(3), 3)
-    alike = Backbone(curve.displacement, curve.force, 0.01 * curve.force, 1e-4 * np.outer(curve.force, curve.force))
+    common = Backbone(curve.displacement, curve.force, 0.01 * curve.force, 1e-4 * np.outer(curve.force, curve.force))
     exact = Backbone(curve.displacement, curve.force, 0 * curve.std, 0 * curve.covariance)
     tau = np.linspace(0.1, 0.9, 9)
-    (_, covariance), (_, sag) = (in_logarithms(c, tau) for c in (alike, exact))
+    (_, covariance), (_, sag) = (in_logarithms(c, tau) for c in (common, exact))
     assert np.abs(covariance - sag).max() < 1e-12
 
 
@@ -236,7 +236,7 @@ def test_an_effect_of_ten_deviations_is_told_where_the_roughness_is_known_and_on
     assert "not stated" in section(unknown)["laws"][0]["text"]
 
 
-def test_effects_alike_are_a_set():
+def test_indistinguishable_effects_are_a_set():
     """A flank as of a smooth sphere and asperities that all yield: both bring the last elements nearer to the first."""
     lines = bank_from_contact(RoughLines(HURST, HEIGHT, lines=CONTACTS, seed=200).contact(LOAD, FRICTION), 400)
     known = laws(measured(of_bank(make("curvature", share=1.0).reshape(lines)), 1), **STATED)

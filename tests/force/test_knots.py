@@ -204,7 +204,7 @@ def test_samples_and_other_events_are_not_made_to_go_on():
     assert np.all(np.diff(found[5:]) >= 0.0)
 
 
-def test_samples_that_count_alike_are_one_group():
+def test_samples_of_equal_weights_are_one_group():
     """What a group holds is what its samples would by themselves, and neighbours that differ anywhere are apart."""
     rng = np.random.default_rng(2)
     groups = np.repeat(np.arange(5), [3, 1, 4, 2, 2])

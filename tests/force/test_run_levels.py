@@ -23,11 +23,11 @@ def fits(small):
 
 
 def test_a_run_that_is_stronger_has_a_level_of_its_own(fits):
-    before, after = (f.point.common[f.problem.alike :][:2] for f in fits)
+    before, after = (f.point.common[f.problem.systematics :][:2] for f in fits)
     assert np.diff(after - before)[0] == pytest.approx(SHIFT, rel=0.1)
 
 
-def test_events_are_as_alike_as_before(fits):
+def test_events_scatter_no_more_than_before(fits):
     """Without levels the scatter of the strength is what the runs differ by, and each event pays for it."""
     before, after = (f.scatter.named()["strength"] for f in fits)
     assert after < 2.0 * before < SHIFT
@@ -39,7 +39,7 @@ def test_levels_are_what_they_say(small):
     problem, point = small.problem, small.point
     slopes = problem.evaluate(point)
     for r in range(len(problem.runs)):
-        column = problem.alike + r
+        column = problem.systematics + r
         common = point.common.copy()
         common[column] = 1e-6
         moved = problem.forces(type(point)(point.z, point.phases, point.weights, point.events, common))

@@ -90,7 +90,7 @@ def margins(
 
 
 def information(margins: Array) -> float:
-    """Expected information about which of some models is true, beforehand alike likely (nat), from :func:`margins`.
+    """Expected information about which of some models is true, equally likely beforehand (nat), from :func:`margins`.
 
     At most the logarithm of their number, where the experiment decides.
     """
@@ -126,11 +126,11 @@ def _along(fit: Fit, run: Knots, changed: Changed, turn: float, drawn: Sequence[
     )  # fmt: skip
     phases = known.phases
     own = np.array([[0.0 if f.name == PULL else turn / float(f.scale)] for f in phases]).reshape(len(phases), 1)
-    alike = problem.alike
+    systematics = problem.systematics
     events = np.zeros((problem.events, fit.point.events.shape[1]))
 
     def here(there: Point) -> Point:
-        common = np.concatenate([there.common[:alike], np.zeros(problem.usual.size - alike)])
+        common = np.concatenate([there.common[:systematics], np.zeros(problem.usual.size - systematics)])
         return Point(there.z + heavier, own, changed.load * there.weights, events, common)
 
     point = here(fit.point)
@@ -161,8 +161,8 @@ def _deviations(fit: Fit, problem: Problem, load: float, drawn: bool) -> Array:
     """
     a, k = fit.point.z.size, fit.point.weights.size
     there, here = fit.point.phases.size, len(problem.composition.phases)
-    alike = problem.alike
-    known = np.concatenate([np.arange(a), a + there + np.arange(k + alike)])
+    systematics = problem.systematics
+    known = np.concatenate([np.arange(a), a + there + np.arange(k + systematics)])
     part = fit.covariance[np.ix_(known, known)]
     if drawn:
         sd = np.sqrt(np.maximum(np.diag(part), 1e-300))
@@ -172,12 +172,12 @@ def _deviations(fit: Fit, problem: Problem, load: float, drawn: bool) -> Array:
         part = left * sd[:, None] * sd
     scale = np.sqrt(np.maximum(np.diag(part), 1e-300))  # metres beside newtons
     values, vectors = np.linalg.eigh(part / scale[:, None] / scale)
-    told = np.concatenate([np.arange(a), a + here + np.arange(k + alike)])
+    told = np.concatenate([np.arange(a), a + here + np.arange(k + systematics)])
     total = a + here + k + problem.usual.size
     own = np.setdiff1d(np.arange(total), told)
     out = np.zeros((total, known.size + own.size))
     out[np.ix_(told, np.arange(known.size))] = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     out[a + here : a + here + k] *= load
     usual = [0.0 if f.name == PULL else np.pi / np.sqrt(3.0) / float(f.scale) for f in problem.composition.phases]
-    out[own, known.size + np.arange(own.size)] = np.concatenate([usual, problem.usual[alike:]])
+    out[own, known.size + np.arange(own.size)] = np.concatenate([usual, problem.usual[systematics:]])
     return out

@@ -151,8 +151,8 @@ def diagnose(
         elif done.doubt is not None:
             wrong = (*wrong, slips_finding(done.base, done.doubt.fit))
             tied = done.close and as_well(done.doubt, done.close[0])
-            alike = tuple(j.tag for j in done.close) if tied else ()
-            verdict = Verdict("ambiguous" if tied else "unknown", tuple(search.named), alike)
+            indistinguishable = tuple(j.tag for j in done.close) if tied else ()
+            verdict = Verdict("ambiguous" if tied else "unknown", tuple(search.named), indistinguishable)
         elif not done.close or not in_time():
             verdict = _end(search.named, done)
         else:
@@ -187,19 +187,19 @@ def leading(ladder: Sequence[Rung], named: Mapping[str, Round]) -> dict[Parts, F
 def _end(named: Mapping[str, Round], last: Round) -> Verdict:
     """Nothing more is seen: what that means."""
     taken, sets = tuple(named), [r.close for r in named.values() if len(r.close) > 1]
-    alike = tuple(dict.fromkeys(j.tag for c in sets for j in c))
+    indistinguishable = tuple(dict.fromkeys(j.tag for c in sets for j in c))
     structure = None
     found = structures(last.base, Explained(last.base), DISPERSION)
     explained = sum(r.close[0].gain for r in named.values())
     if found and found[0].chance < STRUCTURED and found[0].fall > LEFT * explained and not last.close:
         structure = found[0]
     if structure is not None or last.beyond is not None:
-        return Verdict("unknown", taken, alike, structure, beyond=last.beyond)
+        return Verdict("unknown", taken, indistinguishable, structure, beyond=last.beyond)
     misfit = max(last.base.scatter.unexpected().items(), key=lambda phase: phase[1], default=None)
     if misfit is not None and not last.close:
-        return Verdict("unknown", taken, alike, misfit=misfit)
+        return Verdict("unknown", taken, indistinguishable, misfit=misfit)
     if sets:
-        return Verdict("ambiguous", taken, tuple(dict.fromkeys([*taken, *alike])))
+        return Verdict("ambiguous", taken, tuple(dict.fromkeys([*taken, *indistinguishable])))
     return Verdict("missing" if taken else "complete", taken, taken)
 
 

@@ -289,8 +289,8 @@ def verdict_text(d: Diagnosis) -> str:
         found = " ".join(finding.sentence for finding in d.wrong)
         if not any(done.candidates for done in d.rounds):
             return f"{found} Correct this first: no effect is tried, because it would only compensate the wrong entry."
-        alike = f" These data cannot distinguish this from {' or '.join(v.set)}." if v.set else ""
-        return f"{found} No effect predicts unseen runs better than that.{alike}"
+        ambiguity = f" These data cannot distinguish this from {' or '.join(v.set)}." if v.set else ""
+        return f"{found} No effect predicts unseen runs better than that.{ambiguity}"
     before, after = (error(r.unseen, d) for r in (base, last) if r.unseen is not None)
     parts = [] if d.level is None else [d.level.text]
     if d.named:

@@ -182,9 +182,9 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     # a parabola through the promise: what is left of it where the amplitude may not go all the way
     share = np.where(sizes != 0.0, inside / np.where(sizes != 0.0, sizes, 1.0), 0.0)
     falls = falls * (1.0 - (1.0 - share) ** 2)
-    unlike = _unlike(apart, falls)
+    distinct = _distinct(apart, falls)
     starts: list[Start] = []
-    for i, times in ((unlike[0], 1.0), *((i, LARGE) for i in unlike if falls[i] > PROMISING)):
+    for i, times in ((distinct[0], 1.0), *((i, LARGE) for i in distinct if falls[i] > PROMISING)):
         size, least = times * float(inside[i]), 0.3 * float(errors[i])  # at the null itself inner parameters do nothing
         if abs(size) < least:
             size = least if size >= 0.0 and spec.upper > null else -least
@@ -194,8 +194,8 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
         values = {**members[i], effect.amplitude: null + part * size}
         if values not in [s.values for s in starts]:
             starts.append(Start(values, point, None, float(errors[i])))
-    if falls[unlike[0]] <= PROMISING:  # nothing small is seen of it, which says nothing of a large one
-        first = unlike[0]
+    if falls[distinct[0]] <= PROMISING:  # nothing small is seen of it, which says nothing of a large one
+        first = distinct[0]
         for bound in (spec.lower, spec.upper):
             if bound != null:
                 values = {**members[first], effect.amplitude: null + FAR * (bound - null)}
@@ -210,8 +210,8 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     )  # fmt: skip
 
 
-def _unlike(apart: Array, falls: Array) -> list[int]:
-    """Members that promise most, each unlike the ones before it in what it does to the residuals."""
+def _distinct(apart: Array, falls: Array) -> list[int]:
+    """Members that promise most, each distinct from the ones before it in what it does to the residuals."""
     unit = apart / (np.sqrt((apart**2).sum(axis=0)) + 1e-300)
     chosen: list[int] = []
     for i in np.argsort(-falls).tolist():
@@ -239,7 +239,7 @@ def _begun(base: Fit, effect: Effect, start: Start) -> Fit:
     """The model refitted with an effect in a few evaluations.
 
     It is given sizes of its own of what is random: those of the base are as large as the lack of the effect makes them,
-    and under them ends of a search that differ much look alike. Events may not differ more than in the base.
+    and under them ends of a search that differ much look the same. Events may not differ more than in the base.
     """
     problem, free = with_start(base.problem, effect, start.values)
     bound = replace(base, scatter=base.scatter.within(base.scatter))

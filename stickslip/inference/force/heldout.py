@@ -163,7 +163,7 @@ def points(fit: Fit, left_out: list[NDArray[np.intp]]) -> list[Point]:
     counts the step is far, and the valley is bent. So it is gone as far as it lowers the cost of the other events, and
     a few steps of a fit follow.
     """
-    alike, out = np.zeros_like(fit.point.events), []
+    equal_events, out = np.zeros_like(fit.point.events), []
     for part in left_out:
         hidden = np.where(np.isin(fit.problem.of, part), fit.known.strength**2, 0.0)  # which takes their weight
         apart = replace(fit, known=replace(fit.known, dropped=np.maximum(fit.known.dropped, fit.blocks(hidden))))
@@ -171,5 +171,5 @@ def points(fit: Fit, left_out: list[NDArray[np.intp]]) -> list[Point]:
         change, _, _ = system.step()
         ways = [moved(fit.point, share * change, system.events_after(share * change)) for share in SHARES]
         start = min(ways, key=lambda point: system.objective(point, fit.problem.forces(point)))
-        out.append(replace(refit(fit.problem, start, apart, STEPS).point, events=alike))
+        out.append(replace(refit(fit.problem, start, apart, STEPS).point, events=equal_events))
     return out

@@ -59,7 +59,7 @@ class Knots:
         of: event of the points.
         rate, acceleration: of the reading at the points, under the test function (m/s, m/s2).
         reading: samples, and what an error of theirs does at knots and points.
-        place: coordinate along which misfits are alike, one unit apart little (1).
+        place: coordinate along which misfits are correlated, over a length of the order of one (1).
         elapsed: time since the arrest before, or the start (s).
         lasting: time of every event from the arrest before, or the start, to its own (s), shape (E,).
         noise: standard deviation of one sample (m).
@@ -350,8 +350,8 @@ class _Pieces:
         d, x, v = (inserted.joined(y, own) for y, own in ((d, inserted.between(d)), (x, inserted.x), (v, inserted.v)))
         knot_t = inserted.joined(knot_t, inserted.between(knot_t))
         event = event[inserted.source]
-        louder = self._louder(t.size, slope, noise, count, 1.0 / rate)
-        told = Reading.of(samples, inserted.rows(reading), moving[0], moving[1], louder)
+        inflation = self._inflation(t.size, slope, noise, count, 1.0 / rate)
+        told = Reading.of(samples, inserted.rows(reading), moving[0], moving[1], inflation)
         knots_made = Knots(
             trace.name, knot_t, x, v, d, event, _arrests(knot_t, events, times), mean, (smooth[0], smooth[1]),
             made["at"], phase, of, made["rate"], made["acceleration"], told,
@@ -362,8 +362,8 @@ class _Pieces:
         )  # fmt: skip
         return selected(knots_made, keep)
 
-    def _louder(self, size: int, v: Array, noise: float, count: float, step: float) -> Array:
-        """Variance of every sample's noise over that of one by itself: within a window rounding errs alike, (N,)."""
+    def _inflation(self, size: int, v: Array, noise: float, count: float, step: float) -> Array:
+        """Factor on the variance of every sample by rounding, an error common to its window, shape (N,)."""
         out = np.ones(size)
         if not count > 0.0:
             return out
@@ -431,7 +431,7 @@ def bow(t: Array, width: Array, breaks: Array) -> csr_array:
 def _between(t: Array, moments: Array) -> tuple[Index, Array]:
     """Indices of the four knots around some moments, and their weights in the cubic through them, shape (4, ...) both.
 
-    A chord would be off by a twelfth of the second difference, alike wherever friction is lost with slip.
+    A chord would be off by a twelfth of the second difference, always the same way where friction is lost with slip.
     """
     moments = np.clip(moments, t[0], t[-1])
     nodes = np.clip(np.searchsorted(t, moments) - 2, 0, t.size - 4) + np.arange(4).reshape(4, *[1] * moments.ndim)

@@ -134,10 +134,10 @@ def prior_rows(problem: Problem, point: Point) -> tuple[Array, Array]:
     bent = k / (BEND * whole) * (second @ point.weights)
     bend = np.zeros((k - 2, size))
     bend[:, a + b : a + b + k] = k / (BEND * whole) * second - bent[:, None] / whole
-    alike = np.zeros((c, size))
-    alike[:, a + b + k :] = np.diag(1.0 / problem.usual)
+    common = np.zeros((c, size))
+    common[:, a + b + k :] = np.diag(1.0 / problem.usual)
     return (
-        np.vstack([*rows, bend, alike]),
+        np.vstack([*rows, bend, common]),
         np.concatenate([target, bent, point.common / problem.usual]),
     )
 

@@ -56,12 +56,13 @@ class Problem:
     """All runs of a campaign under one composition.
 
     What is found with the model besides its parameters, each about as large as ``usual``, shape (c,): errors of the
-    position that ``alike`` hats along the cycle give to all cycles, a level for each run, by which the logarithm of its
-    strength is another, what is left of the hum, and jumps of the reading before some events (:meth:`with_jumps`).
-    Those that were found before and taken off the motion are ``errors`` (m), shape (n,) of every run; what they do to
-    the residuals is added again as ``offset`` (N), shape (p,), so that no evidence is lost (:meth:`adjusted`). Another
-    spring or mass leaves it as it is: residuals grow as errors of the reading do, not as forces. What a level of the
-    caps does within events ``beyond`` first order (N), shape (p,), is added as well (:mod:`.level_within_events`).
+    position that are systematic, the same in all cycles (coefficients of ``systematics`` hats along the cycle), a level
+    for each run, by which the logarithm of its strength is another, what is left of the hum, and jumps of the reading
+    before some events (:meth:`with_jumps`). Those that were found before and taken off the motion are ``errors`` (m),
+    shape (n,) of every run; what they do to the residuals is added again as ``offset`` (N), shape (p,), so that no
+    evidence is lost (:meth:`adjusted`). Another spring or mass leaves it as it is: residuals grow as errors of the
+    reading do, not as forces. What a level of the caps does within events ``beyond`` first order (N), shape (p,), is
+    added as well (:mod:`.level_within_events`).
 
     ``blocks`` puts what is known at points side by side by event.
     """
@@ -89,14 +90,14 @@ class Problem:
         self._own = tuple(_own(k, room, most) for k in runs)
         virgin = np.isin(self.of, [f for f, k in zip(first[:-1], runs, strict=True) if k.virgin])
         hats = _hats(self.place)
-        # quantisation and filters leave about as much alike in all cycles as the noise of one sample is
+        # quantisation and filters leave a systematic error about as large as the noise of one sample
         systematic = max(float(np.median([k.noise for k in runs])), 1e-12)
-        alike = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
+        self._hats = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
         self.hums = np.array([r for r, k in enumerate(runs) if k.hum.any()], int)
         at_points = np.concatenate([k.mean @ (k.reading.displacement @ k.hum) for k in runs])
-        self.alike, self._hats, self._hums = alike.shape[1], alike, self._by_run(at_points)
+        self.systematics, self._hums = self._hats.shape[1], self._by_run(at_points)
         self.usual = np.concatenate(
-            [np.full(self.alike, systematic), np.full(len(runs), LEVEL), np.ones(2 * self.hums.size)]
+            [np.full(self.systematics, systematic), np.full(len(runs), LEVEL), np.ones(2 * self.hums.size)]
         )
         walks = np.array([k.walk for k in runs])
         self.walk = float(np.exp(np.log(walks).mean())) if (walks > 0.0).all() else 0.0  # as stated, m/s^0.5
@@ -201,7 +202,7 @@ class Problem:
         """The same with errors of the displacement taken off the motion that drives the model.
 
         Derivatives along a motion with noise go with its errors, and so do the residuals: parameters found from both
-        are off alike however long the record. What the errors do to the residuals stays in them, but for the part that
+        are biased however long the record. What the errors do to the residuals stays in them, but for the part that
         is even in the errors: in the mean noise makes a path longer and a contact weaker, whatever its sign.
 
         Args:

@@ -17,7 +17,7 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Reading:
-    """Samples of a run, those together that count alike wherever they count: the samples of a window.
+    """Samples of a run, grouped where they have the same weights everywhere: the samples of a window.
 
     A record of 150 000 samples has some 5 000 such groups, and its covariance is found from those.
 
@@ -41,20 +41,21 @@ class Reading:
     @classmethod
     def of(
         cls, samples: Array, displacement: csr_array, rate: csr_array, acceleration: csr_array,
-        louder: Array | None = None,
+        inflation: Array | None = None,
     ) -> Reading:  # fmt: skip
         """From matrices with a column for each sample.
 
-        Errors that are alike in a window make the variance of each of its samples ``louder``, shape (N,).
+        Args:
+            inflation: factor on the variance of each sample by errors common to its window, shape (N,).
         """
         every = csc_array(vstack([displacement, rate, acceleration]))
         every.sort_indices()
-        begins = ~_as_before(every)
+        begins = ~_repeats(every)
         first = np.flatnonzero(begins)
         group = np.cumsum(begins) - 1
         at_knots, rate, acceleration = (csr_array(m[:, first]) for m in (displacement, rate, acceleration))
         count = np.bincount(group).astype(float)
-        return cls(samples, group, at_knots, rate, acceleration, count, np.bincount(group, louder).astype(float))
+        return cls(samples, group, at_knots, rate, acceleration, count, np.bincount(group, inflation).astype(float))
 
     def sums(self, values: Array) -> Array:
         """Sums over each group, shape (g, ...), of a value for each sample, shape (N, ...)."""
@@ -77,15 +78,15 @@ class Reading:
         return replace(self, rate=self.rate[index], acceleration=self.acceleration[index])
 
 
-def _as_before(matrix: csc_array) -> NDArray[np.bool_]:
+def _repeats(matrix: csc_array) -> NDArray[np.bool_]:
     """Whether a column is the same as the one before it."""
     counts = np.diff(matrix.indptr)
-    alike = np.append(False, counts[1:] == counts[:-1])
+    equal = np.append(False, counts[1:] == counts[:-1])
     back = np.arange(matrix.nnz) - np.repeat(counts, counts)  # the same entry of the column before
-    own = np.repeat(alike, counts)
+    own = np.repeat(equal, counts)
     differs = np.zeros(matrix.nnz, bool)
     for entries in (matrix.indices, matrix.data):
         differs[own] |= entries[own] != entries[back[own]]
     column = np.repeat(np.arange(counts.size), counts)
-    alike[column[differs]] = False
-    return np.asarray(alike)
+    equal[column[differs]] = False
+    return np.asarray(equal)

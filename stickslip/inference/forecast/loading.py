@@ -105,9 +105,9 @@ class Curves:
         whole = np.maximum(gone + self.travel, 1e-9 * self.travel[-1])  # of the stick that would end there
         out = np.empty_like(self.missing)
         for j, (row, length) in enumerate(zip(self.missing, self.length, strict=True)):
-            alike = np.interp(asked, self.travel, row) if more else row
-            grown = whole / length * np.interp(asked / whole * length, self.travel, row)
-            out[j] = alike + self.growth * (grown - alike)
+            unscaled = np.interp(asked, self.travel, row) if more else row
+            scaled = whole / length * np.interp(asked / whole * length, self.travel, row)
+            out[j] = unscaled + self.growth * (scaled - unscaled)
         return out
 
     def seen(self, risen: float, gone: float, missing: Array) -> Array:
@@ -149,9 +149,9 @@ class Curves:
     def _of_length(self, i: int, whole: float, more: float = 0.0) -> Array:
         """Curve of stick ``i`` for a stick of a given length."""
         asked, length = self.travel + more, self.length[i]
-        alike = np.interp(asked, self.travel, self.missing[i])
-        grown = whole / length * np.interp(asked / whole * length, self.travel, self.missing[i])
-        return alike + self.growth * (grown - alike)
+        unscaled = np.interp(asked, self.travel, self.missing[i])
+        scaled = whole / length * np.interp(asked / whole * length, self.travel, self.missing[i])
+        return unscaled + self.growth * (scaled - unscaled)
 
 
 def _grid(length: Array, turned: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> Array:
