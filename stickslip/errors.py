@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-_TIED = 0.1  # spellings hardly less alike than the closest are named with it
+_TIED = 0.1  # spellings hardly less similar than the closest are named with it
 
 
 class StickslipError(Exception):

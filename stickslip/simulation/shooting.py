@@ -180,7 +180,7 @@ def _share(new: Array, old: Array) -> Array:
 
 def _in_stick(model: Model, pull: Array) -> Array:
     """Forces (N) of the elements of a contact that rests under a ``pull`` (N) at full strength, some time after an
-    arrest: there each was at its weakened cap; since then all were moved alike."""
+    arrest: there each was at its weakened cap; since then all were moved by one distance."""
     bank = model.shaped()
     left = bank.strength * model.weakening.ratio
     load = pull - jnp.sum(left)

@@ -94,7 +94,7 @@ def test_factors_of_a_vibration_are_its_strongest_sine(form: str) -> None:
 
 
 @pytest.mark.parametrize("form", ["quadratic", "cubic"])
-def test_nonlinear_springs_of_the_same_form_pull_alike(form: str) -> None:
+def test_nonlinear_springs_of_the_same_form_pull_equally(form: str) -> None:
     eff, rig, stretch = hidden("nonlinear-spring", form, 0.01), Rig().vector(), 3e-4
     known = factor("nonlinear-spring", form, form)
     assert known is not None

@@ -1,6 +1,6 @@
 """Without a hidden effect and on the same springs the generator moves as the package's model does.
 
-The two share no law and no solver, so only their discretisations may tell them apart: the tolerance of every figure is
+The two share no law and no solver, so they differ by their discretisations only: the tolerance of every figure is
 twice what halving the generator's step changes (it is of second order) and what ten times the solver's tolerance
 changes.
 """

@@ -185,7 +185,7 @@ def test_a_bank_needs_elements():
 
 
 def test_a_bank_refuses_elements_without_a_strength():
-    """One strength for all would be taken for that of each, and the total would be one element's."""
+    """One strength for all would be read as that of each, and the total would be one element's."""
     with pytest.raises(InputError, match=r"bank: every element .*\(\(3,\), \(1,\)\)"):
         Bank(jnp.ones(3), jnp.ones(1))
     lanes = jax.vmap(lambda k: Bank(k, 1e-6 * k).total_strength)(jnp.ones((5, 3)))  # traced banks are as before

@@ -412,7 +412,7 @@ def test_hardness_limits_the_deepest():
     assert float(shaped.threshold[-1] / raised[0]) == pytest.approx(float(BANK.threshold.max()) / 3, rel=1e-3)
 
 
-def test_adhesion_loads_every_length_alike():
+def test_adhesion_loads_every_length_equally():
     shaped = Adhesion(attraction=0.1).reshape(BANK)
     assert float(shaped.total_strength) == pytest.approx(1.1 * STRENGTH, rel=1e-12)
     raised = shaped.threshold - BANK.threshold

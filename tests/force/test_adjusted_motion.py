@@ -82,7 +82,7 @@ def test_what_errors_do_to_residuals_stays_in_them_but_for_what_is_even(fits):
 
 
 def test_a_damping_of_the_contact_that_is_not_there_is_not_seen(fits):
-    """Noise in the motion that drives the model dissipates, alike in every reading."""
+    """Noise in the motion that drives the model dissipates, by as much in every reading."""
     effect = ContactDamping()
 
     def seen(found):

@@ -38,7 +38,7 @@ TRUE = {
 
 
 def events(short: bool = False) -> Known:
-    """Cycles alike: stick, nucleation, slip, ring-down; ``short`` leaves places empty."""
+    """Equal cycles: stick, nucleation, slip, ring-down; ``short`` leaves places empty."""
     rng = np.random.default_rng(1)
     phase = np.repeat(np.arange(4), POINTS // 4)
     tangent = np.interp(np.arange(POINTS), [0, 24, 36, 47], [1e6, 1e5, 0.0, 8e5])

@@ -83,7 +83,7 @@ def test_a_block_in_nucleation_is_as_fast_as_it_is():
 
 
 @pytest.mark.parametrize("part", [0.0, 0.4])
-def test_at_an_arrest_nothing_is_off_alike_every_time(part):
+def test_at_an_arrest_nothing_is_biased(part):
     """A contact that slid holds from there on: one function over the arrest is off by a third of a sample's noise."""
     samples, amplitude, at = 19.0, 2e-8, 1000
     i = np.arange(2000) - at - part
@@ -106,7 +106,7 @@ def test_at_an_arrest_nothing_is_off_alike_every_time(part):
 
 @pytest.mark.parametrize("part", [0.0, 0.25, 0.9])
 def test_a_bent_motion_passes(part):
-    """A cubic before an arrest, and a ringing after it, alike there up to the acceleration."""
+    """A cubic before an arrest, and a ringing after it, equal there up to the acceleration."""
     samples, at = 18.04, 1000.0 + part
     i = np.arange(2000) - at
     turn = 2.0 * np.pi / samples

@@ -1,4 +1,4 @@
-"""An interruption ends long work at once; nothing half done is left or taken for a result."""
+"""An interruption ends long work at once; nothing half done is left or read as a result."""
 
 from __future__ import annotations
 

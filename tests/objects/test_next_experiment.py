@@ -1,4 +1,4 @@
-"""Effects that a campaign cannot tell apart, and the experiment that would."""
+"""Effects that a campaign cannot distinguish, and the experiment that would."""
 
 from __future__ import annotations
 

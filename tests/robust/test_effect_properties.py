@@ -21,7 +21,7 @@ EFFECTS = tuple(catalogue.get(tag)() for tag in catalogue.tags())
 
 @st.composite
 def several(draw) -> dict[int, dict[str, float]]:
-    """Index of the effect -> its parameters; near the null and over the whole range alike."""
+    """Index of the effect -> its parameters; both near the null and over the whole range."""
     chosen = draw(st.lists(st.integers(0, len(EFFECTS) - 1), min_size=1, max_size=3, unique=True))
     values = {}
     for index in chosen:

@@ -1,6 +1,6 @@
 """What is compared of a free simulation, event by event, and how far events scatter in it by themselves.
 
-The measures are features of a cycle (:mod:`stickslip.inference.features`), of data and model alike.
+The measures are features of a cycle (:mod:`stickslip.inference.features`), of both data and model.
 
 *How far they scatter by themselves.* In squares, of the sizes that the fit of the force found:
 

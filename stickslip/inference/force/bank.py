@@ -2,7 +2,7 @@
 
 A bank of Jenkins elements is a chord of the backbone between one yield displacement and the next. Spaced evenly in the
 logarithm over all that a contact might do, a dozen of forty carry nearly everything, and the chord is off by some
-thousandths of the strength, alike in every first loading. A chord's error falls with the third root of the curvature
+thousandths of the strength, the same in every first loading. A chord's error falls with the third root of the curvature
 as the density of its nodes (de Boor 1973), and the curvature of a backbone is its distribution of strength.
 """
 

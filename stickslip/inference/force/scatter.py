@@ -1,4 +1,4 @@
-"""What is random: noise of the sensor, events that differ, and misfit that is alike from point to point.
+"""What is random: noise of the sensor, events that differ, and misfit that is correlated from point to point.
 
 But for a walk of the sensor and a level of the strength that wanders, which go on from event to event
 (:mod:`.linked_events`), residuals of one event belong together and those of two events do not. The covariance of an
@@ -92,7 +92,7 @@ class Scatter:
         """The same where events may not differ more than in another, and their level follows what it does there.
 
         A law that is added to a model explains a part of how events differ under it, or nothing of that. Where a model
-        describes the forces within events badly, a wrong law may describe them better and leave events less alike.
+        describes the forces within events badly, a wrong law may describe them better and leave events more scatter.
         """
         own = np.append(self.sizes[: len(NAMES)], other.sizes[len(NAMES) :])
         level = other.sizes[_LEVEL:_LENGTH] if other.follows else [np.inf]
@@ -231,7 +231,7 @@ class Known:
 
     @cached_property
     def shifts(self) -> tuple[Array, Array]:
-        """Covariance (N^2) by errors of the position of 1 m, alike where near, and by a bridge of 1 m/s^0.5."""
+        """Covariance (N^2) by errors of the position of 1 m, correlated where near, and by a bridge of 1 m/s^0.5."""
         moved, over = np.where(self.there, self.spring + self.tangent, 0.0), self._over
         pairs = moved[:, :, None] * moved[:, None, :]
         least = np.minimum(over[:, :, None], over[:, None, :])

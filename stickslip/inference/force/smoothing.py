@@ -105,12 +105,12 @@ def smoothed(x: Array, noise: float, rate: float, times: Scales, arrests: Array)
     At every sample a cubic and a ringing that grows or decays, over two of its periods (where none is heard, a cubic
     alone). A parabola would give the same displacement and, in a nucleation, a velocity that is a third too large. On
     top of them what a polynomial of the fourth degree over half a period adds, shrunk by as much as noise adds to it in
-    squares. The noise of one sample, taken for motion, would be a path that weakens the contact and makes it young; a
+    squares. The noise of one sample, followed as motion, would be a path that weakens the contact and makes it young; a
     ringing that is smoothed away would be a force of the contact, which is stiff.
 
     Around an arrest there are two such functions, one before and one after it, with the same displacement, velocity and
     acceleration at the arrest: there a contact that slid begins to hold, and the force on the block has a kink. One
-    function over it would be off alike at every arrest, by a third of the noise of a sample.
+    function over it would be biased at every arrest, by a third of the noise of a sample.
 
     Args:
         x: samples (m), shape (N,).

@@ -1,4 +1,4 @@
-"""A model freely integrated, and the means and scatter of slips, measured and simulated alike."""
+"""A model freely integrated, and the means and scatter of slips, both measured and simulated."""
 
 from __future__ import annotations
 

@@ -4,8 +4,9 @@ The error of a step depends on where in it the block arrests or begins to slip. 
 against the steps (by seconds per unit of its logarithm) turns that ripple, however small, into a slope: the exact
 derivative of a discrete solution then says nothing about the curve the solution follows. So the steps are tied to the
 motion. Each cycle is cut where the spring has reached a fixed share of full strength, late in the stick, and where the
-block all but rests; the first steps after a cut have fixed lengths, the last few are stretched alike so that the next
-cut is met. What the parameters move is then the cuts, by the implicit function theorem, and hardly any step's error.
+block all but rests; the first steps after a cut have fixed lengths, the last few are stretched by one factor so that
+the next cut is met. What the parameters move is then the cuts, by the implicit function theorem, and hardly any step's
+error.
 
 What is left is a ripple: where in a step an element begins to slide. It is a function of the place in the step, so the
 mean over a few grids, each shifted by the same share of its steps, is all but free of it.
