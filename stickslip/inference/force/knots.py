@@ -145,8 +145,8 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
         followed, speed, smoother = smoothed(x, noise, rate, times, arrests)
     phi, first, second = kernels(times.half, rate)
     h = phi.size // 2
-    pieces = _Pieces(step)
-    pieces.start(t, x, d)
+    builder = _KnotBuilder(step)
+    builder.start(t, x, d)
     edge = 1
     stretches: list[tuple[int, int]] = []  # from the last sample that is followed to the first that is again
     n = t.size
@@ -154,23 +154,23 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     for e, event in enumerate(events):
         begin, end = fast(events, e, times, rate, n, t, h)
         begin = max(passing(begin, event.i_onset - 2 * h, raw, count, h), edge + 1)
-        pieces.windows(apart(edges_of(edge, begin, event.i_onset, breaks), raw, step, breaks), e, t, x, d)
+        builder.windows(apart(edges_of(edge, begin, event.i_onset, breaks), raw, step, breaks), e, t, x, d)
         if end <= begin:
             continue
         onset = min(max(event.i_onset, begin), end)
-        pieces.windows(hasty(begin, onset, steady, noise, rate, h), e, t, x, d, speed)
-        pieces.samples(thin(onset, end, event, times, rate, h), t, followed, speed, d, events, e)
-        pieces.compare(begin + h, end - h, h, t, x, event, e, times, (phi, first, second), noise)
+        builder.windows(hasty(begin, onset, steady, noise, rate, h), e, t, x, d, speed)
+        builder.samples(thin(onset, end, event, times, rate, h), t, followed, speed, d, events, e)
+        builder.compare(begin + h, end - h, h, t, x, event, e, times, (phi, first, second), noise)
         if edge > 1:
             stretches.append((edge - 1, begin))
         edge = end
     if n - edge > 4 * h:
         last = len(events)
-        pieces.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, speed)
+        builder.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, speed)
     if edge > 1:
         stretches.append((edge - 1, n))
     later = later_turns(t, x, stretches, times.ring, noise)
-    return pieces.made(trace, t, x, (phi, first, second), events, noise, times, smoother, count, later)
+    return builder.build(trace, t, x, (phi, first, second), events, noise, times, smoother, count, later)
 
 
 def unrounded(
@@ -189,8 +189,8 @@ def unrounded(
     return out
 
 
-class _Pieces:
-    """Knots and points as they are made."""
+class _KnotBuilder:
+    """Collects knots and points, event by event."""
 
     def __init__(self, step: float) -> None:
         self.step = step
@@ -272,7 +272,7 @@ class _Pieces:
             }
         )  # fmt: skip
 
-    def made(
+    def build(
         self, trace: Trace, t: Array, samples: Array, weights: tuple[Array, Array, Array], events: tuple[Event, ...],
         noise: float, times: Scales, smoother: Smoother, count: float, later: Turns,
     ) -> Knots:  # fmt: skip
