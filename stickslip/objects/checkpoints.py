@@ -1,4 +1,4 @@
-"""Finished pieces of a diagnosis in its run folder, of the same data and the same code."""
+"""Finished parts of long work in its run folder, of the same data and the same code."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .result_base import write_arrays
 
 
 def code_digest(effect_files: Sequence[str | Path] = ()) -> str:
-    """Digest of the package's own modules and of effects from elsewhere: pieces made by other code are not taken up.
+    """Digest of the package's own modules and of effects from elsewhere: parts made by other code are not taken up.
 
     Of an installed package it has the version, and the modules that define the effects (which may be under work).
     """
@@ -30,22 +30,22 @@ def code_digest(effect_files: Sequence[str | Path] = ()) -> str:
     return digest.hexdigest()
 
 
-class Pieces:
-    """Finished pieces in the run folder, one file each, written aside and renamed."""
+class FinishedParts:
+    """Finished parts of long work in the run folder, one file each, written aside and renamed."""
 
     def __init__(self, run: Run, inputs: str) -> None:
-        # a digest: each of many pieces has one, and the text may be longer than a piece
+        # a digest: each of many parts has one, and the text may be longer than a part
         self._run, self._inputs = run, hashlib.sha256(inputs.encode()).hexdigest()
 
     def _path(self, key: str) -> Path:
         return self._run.path(f"pieces/{key}.npz")
 
     def ready(self) -> int:
-        """How many finished pieces of the same inputs there are."""
+        """How many finished parts of the same inputs there are."""
         return sum(self.load(path.stem) is not None for path in self._path("any").parent.glob("*.npz"))
 
     def load(self, key: str) -> Mapping[str, np.ndarray] | None:
-        """A finished piece of the same inputs, or None."""
+        """A finished part of the same inputs, or None."""
         path = self._path(key)
         if not path.is_file():
             return None
@@ -56,6 +56,6 @@ class Pieces:
             return None
         return arrays if str(arrays.pop("inputs", "")) == self._inputs else None
 
-    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
-        """Keep a finished piece."""
-        write_arrays(self._path(key), {"inputs": np.array(self._inputs), **piece})
+    def save(self, key: str, part: Mapping[str, np.ndarray]) -> None:
+        """Keep a finished part."""
+        write_arrays(self._path(key), {"inputs": np.array(self._inputs), **part})

@@ -26,7 +26,7 @@ from ..system.progress import reporting
 from ..system.runstore import Run, json_text, open_run, refuse_existing, versions
 from ..system.threads import processors
 from .campaign import Campaign, load_campaign
-from .checkpoints import Pieces, code_digest
+from .checkpoints import FinishedParts, code_digest
 from .data_abilities import abilities
 from .fit import Fit
 from .next_experiment import next_experiment, rows, sampled_experiments
@@ -290,7 +290,7 @@ def diagnose(
                 "code": code_digest(campaign.effect_files),
             }
         )
-        pieces = Pieces(run, key)
+        pieces = FinishedParts(run, key)
         try:
             made = found(pieces, pieces.ready(), tell)
         except KeyboardInterrupt:

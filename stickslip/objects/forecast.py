@@ -31,7 +31,7 @@ from ..inference.forecast.wander import Wander
 from ..system.object_repr import facts, table
 from ..system.progress import reporting
 from ..system.runstore import json_text, open_run, versions
-from .checkpoints import Pieces, code_digest
+from .checkpoints import FinishedParts, code_digest
 from .kept_forecast import Kept
 from .result_base import Savable, Tell, dataset, finish, head
 from .wander import most_slips
@@ -182,7 +182,7 @@ def forecast(
         # what was forecast of another run, or from another part of it, is of no use
         asked = {"run": campaign.names[number], "train": train}
         key = {"inputs": campaign.inputs(), **asked, "versions": versions(), "code": code_digest()}
-        pieces = Pieces(folder, json_text(key))
+        pieces = FinishedParts(folder, json_text(key))
         if ready := pieces.ready():
             tell(f"resuming from {ready} finished parts", 0.0)
         try:

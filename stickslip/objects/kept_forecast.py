@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inference.forecast.predict import Compared
 from ..inference.forecast.rolling import Rolled
 from ..inference.forecast.wander import Component, Wander
-from .checkpoints import Pieces
+from .checkpoints import FinishedParts
 
 Arrays = Mapping[str, np.ndarray]
 
@@ -25,7 +25,7 @@ class Kept:
         pieces: of the run folder; None: nothing is kept.
     """
 
-    def __init__(self, pieces: Pieces | None = None) -> None:
+    def __init__(self, pieces: FinishedParts | None = None) -> None:
         self._pieces = pieces
 
     def law(self, components: Sequence[Component], make: Callable[[], Compared]) -> Compared:

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import StickslipError
 from ..simulation.scenario import Scenario
 from ..system.runstore import Run, json_text
-from .checkpoints import Pieces
+from .checkpoints import FinishedParts
 from .sweep import one_by_one, what_runs_depend_on
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class KeptRuns(Sequence["xarray.Dataset"]):
         StickslipError: when a run is asked for that is no longer there, or damaged.
     """
 
-    def __init__(self, pieces: Pieces, keys: Sequence[str]) -> None:
+    def __init__(self, pieces: FinishedParts, keys: Sequence[str]) -> None:
         self._pieces, self._keys = pieces, tuple(keys)
 
     def __len__(self) -> int:
@@ -75,7 +75,7 @@ def runs_of_series(
     keys = [hashlib.sha256(json_text([key, value]).encode()).hexdigest()[:16] for value, _ in members]
     inputs = what_runs_depend_on(scenario, scenarios, ())
     inputs["scenario"] = {name: table for name, table in scenario.content.items() if name != "sweep"}
-    pieces = None if run is None else Pieces(run, json_text(inputs))
+    pieces = None if run is None else FinishedParts(run, json_text(inputs))
     ready = set() if pieces is None else {n for n, name in enumerate(keys) if pieces.load(name) is not None}
     if run is not None:
         for path in run.folder.glob("pieces/*"):  # of other inputs

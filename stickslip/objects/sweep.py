@@ -24,7 +24,7 @@ from ..system.parent_watch import end_with
 from ..system.progress import reporting, silent
 from ..system.runstore import json_text, open_run, versions
 from ..system.threads import processors
-from .checkpoints import Pieces, code_digest
+from .checkpoints import FinishedParts, code_digest
 from .result_base import Tell
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def sweep(
         reporting("sweeping", progress) as tell,
         open_run(out, force=force, resume=True) if out else nullcontext() as run,
     ):
-        pieces = None if run is None else Pieces(run, json_text(what_runs_depend_on(loaded, members, rows)))
+        pieces = None if run is None else FinishedParts(run, json_text(what_runs_depend_on(loaded, members, rows)))
         found = {key: kept for key in chunks if pieces is not None and (kept := pieces.load(key)) is not None}
         try:
             for key, made in _made({k: c for k, c in chunks.items() if k not in found}, scheduler, workers):

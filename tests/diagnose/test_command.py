@@ -10,7 +10,7 @@ import pytest
 from stickslip.cli import run
 from stickslip.cli.diagnose import _print, _teller
 from stickslip.errors import InputError
-from stickslip.objects.checkpoints import Pieces
+from stickslip.objects.checkpoints import FinishedParts
 from stickslip.objects.diagnosis import diagnose_campaign
 from stickslip.physics.effects import catalogue
 from stickslip.system.runstore import open_run
@@ -140,15 +140,15 @@ def test_the_shipped_campaign_is_what_a_diagnosis_asks_for():
 def test_a_piece_is_kept_and_only_for_the_same_inputs(tmp_path):
     with open_run(tmp_path / "run") as folder:
         piece = {"z": np.arange(3.0), "head": np.array("text")}
-        Pieces(folder, "inputs 1").save("base", piece)
-        again = Pieces(folder, "inputs 1").load("base")
+        FinishedParts(folder, "inputs 1").save("base", piece)
+        again = FinishedParts(folder, "inputs 1").load("base")
         assert again is not None
         np.testing.assert_array_equal(again["z"], piece["z"])
         assert str(again["head"]) == "text"
-        assert Pieces(folder, "inputs 2").load("base") is None
-        assert Pieces(folder, "inputs 1").load("other") is None
+        assert FinishedParts(folder, "inputs 2").load("base") is None
+        assert FinishedParts(folder, "inputs 1").load("other") is None
         (folder.folder / "pieces" / "base.npz").write_bytes(b"half written")
-        assert Pieces(folder, "inputs 1").load("base") is None
+        assert FinishedParts(folder, "inputs 1").load("base") is None
 
 
 def test_the_terminal_says_every_step_of_the_ladder_and_every_experiment(tmp_path, capsys):

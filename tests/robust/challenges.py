@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.blind.seal import CASES, TRUTH, make_seal
-from stickslip.objects.checkpoints import Pieces
+from stickslip.objects.checkpoints import FinishedParts
 from stickslip.system.runstore import file_record, open_run
 
 
@@ -38,7 +38,7 @@ def piecewise(campaign: Path, out: Path) -> None:
     """Eight pieces of a tenth of a second, each kept; the result depends on all of them."""
     seed = int.from_bytes(out.name.encode(), "little") % 2**32
     with open_run(out, resume=True) as run:
-        store, total = Pieces(run, "inputs"), np.zeros(1000)
+        store, total = FinishedParts(run, "inputs"), np.zeros(1000)
         for n in range(8):
             kept = store.load(f"piece{n}")
             if kept is None:

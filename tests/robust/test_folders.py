@@ -449,8 +449,8 @@ def test_a_disk_that_fills_while_pieces_are_kept(tmp_path):
     """What was kept before stays, is whole, and is gone on from."""
     program = (
         "import sys, numpy as np\nfrom stickslip.system.runstore import open_run\n"
-        "from stickslip.objects.checkpoints import Pieces\n"
-        "with open_run(sys.argv[1], resume=True) as run:\n  store = Pieces(run, 'i')\n  kept = 0\n"
+        "from stickslip.objects.checkpoints import FinishedParts\n"
+        "with open_run(sys.argv[1], resume=True) as run:\n  store = FinishedParts(run, 'i')\n  kept = 0\n"
         "  for n in range(6):\n    if store.load(f'p{n}') is None:\n"
         "      store.save(f'p{n}', {'z': np.arange(10_000.0 * (n + 1))})\n    else: kept += 1\n"
         "  run.json({'kept': kept})\n"

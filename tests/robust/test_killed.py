@@ -30,9 +30,9 @@ PIECEWISE = """
 import sys, time
 import numpy as np
 from stickslip.system.runstore import open_run
-from stickslip.objects.checkpoints import Pieces
+from stickslip.objects.checkpoints import FinishedParts
 with open_run(sys.argv[1], resume=True, force="--force" in sys.argv) as run:
-    store, total = Pieces(run, "inputs"), np.zeros(40_000)
+    store, total = FinishedParts(run, "inputs"), np.zeros(40_000)
     for n in range(12):
         kept = store.load(f"piece{n}")
         if kept is None:

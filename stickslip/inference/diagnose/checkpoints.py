@@ -1,4 +1,4 @@
-"""Finished pieces of a diagnosis as plain arrays, so that an interrupted one goes on from files that hold data only."""
+"""Finished parts of a diagnosis as plain arrays, so that an interrupted one goes on from files that hold data only."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _FACTS = ("tag", "form", "promise", "note", "members", "visible", "start")
 
 
 class Store(Protocol):
-    """Where finished pieces are kept."""
+    """Where finished parts are kept."""
 
     def load(self, key: str) -> Mapping[str, np.ndarray] | None:
-        """A finished piece, or None."""
+        """A finished part, or None."""
 
-    def save(self, key: str, piece: Mapping[str, np.ndarray]) -> None:
-        """Keep a finished piece."""
+    def save(self, key: str, part: Mapping[str, np.ndarray]) -> None:
+        """Keep a finished part."""
 
 
 def kept(store: Store | None, key: str, problem: Problem, make: Callable[[], Fit]) -> Fit:
