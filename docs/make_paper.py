@@ -27,8 +27,9 @@ sys.path.insert(0, str(ROOT))
 from stickslip.cli import run as command
 from stickslip.data.campaign import Rig
 from stickslip.data.campaign.template import campaign_text
+from stickslip.data.drive import Drive
 from stickslip.data.segment import segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.inference.fit.creep_process import V_LIM, CreepProcess, creep_processes
 from stickslip.inference.fit.static import CreepFit, StaticFit, fit_static
 from stickslip.inference.fit.static_table import StaticRig, static_table, virtual_curve

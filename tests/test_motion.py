@@ -12,8 +12,9 @@ from stickslip.data.campaign import load_campaign, load_traces
 from stickslip.data.checks import rig_against_motion
 from stickslip.data.checks.slip_time import at_odds, slip_time
 from stickslip.data.displacements import true_gains, with_displacements
+from stickslip.data.drive import Drive
 from stickslip.data.segment import segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.objects import diagnosis
 from stickslip.objects.diagnosis import diagnose_campaign
 

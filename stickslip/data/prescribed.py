@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from .drive import Drive
 from .segment import Segmentation
-from .trace import Drive, Trace
+from .trace import Trace
 
 
 def prescribed(trace: Trace, found: Segmentation) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+MAINS = (50.0, 60.0)  # Hz
 TERMS = 8  # of the Fourier series of rounding, as many as noise of a tenth of a count leaves
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
-from ..data.trace import Drive
+from ..data.drive import Drive
 from ..errors import InputError, RunFolderError, nearest
 from ..inference.fit.equations import solved
 from ..inference.fit.serialised import Driven, Fitted, constant_drive, pieces_drive

@@ -7,8 +7,9 @@ import pytest
 
 from stickslip.data.checks.sign import sign_findings
 from stickslip.data.checks.travel import travel
+from stickslip.data.drive import Drive
 from stickslip.data.segment import segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 
 SLIP, LAST = 45e-6, 0.03  # m, s
 

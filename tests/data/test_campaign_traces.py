@@ -9,8 +9,9 @@ import scipy.io
 
 from stickslip.cli import run as command
 from stickslip.data.campaign import campaign_text, load_campaign, load_traces
+from stickslip.data.drive import Drive
 from stickslip.data.segment import segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 
 TIME = 'time = { column = "time", unit = "s" }\n'
 X = 'displacement = { column = "x", unit = "um" }\n'

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from stickslip.data.drive import Drive
 from stickslip.data.segment import event_shapes, segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.inference.features import measurement
 from stickslip.inference.features.layout import LEVELS
 from stickslip.inference.features.measurement import measure

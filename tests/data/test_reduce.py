@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from stickslip.data.drive import Drive
 from stickslip.data.segment import reduce_trace, segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from tests.data.long_record import INSPECT, LONG, long_record, numbers
 
 LSB = 7.91e-9

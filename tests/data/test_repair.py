@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from stickslip.data.drive import Drive
 from stickslip.data.readers.repair import (
     correct_clock,
     despike,
@@ -14,7 +15,7 @@ from stickslip.data.readers.repair import (
     unwrap,
 )
 from stickslip.data.resolution import estimate_resolution, noise_level
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.errors import InputError
 
 LSB = 7.91e-9

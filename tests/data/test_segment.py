@@ -5,8 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from stickslip.data.drive import Drive
 from stickslip.data.segment import PHASES, block_motion, choose_settings, segment, segment_motion, velocity
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.errors import InputError
 
 LSB = 7.91e-9

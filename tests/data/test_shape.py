@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from stickslip.data.drive import Drive
 from stickslip.data.segment import LEVELS, crept, event_shapes, segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 
 DECAY = {
     "exponential": lambda t, fold: np.exp(-t / fold),

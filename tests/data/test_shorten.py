@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stickslip.data.drive import Drive
 from stickslip.data.first_cycles import first_cycles, shares
 from stickslip.data.segment import segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 
 
 @pytest.mark.parametrize(

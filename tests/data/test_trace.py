@@ -4,7 +4,9 @@ import pickle
 import numpy as np
 import pytest
 
-from stickslip.data.trace import Drive, Provenance, Trace
+from stickslip.data.drive import Drive
+from stickslip.data.provenance import Provenance
+from stickslip.data.trace import Trace
 from stickslip.errors import InputError
 
 

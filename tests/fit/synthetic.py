@@ -5,8 +5,9 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 
+from stickslip.data.drive import Drive
 from stickslip.data.segment import segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.inference.features.measurement import Measurement, measure
 from stickslip.inference.fit.composition import Composition
 from stickslip.inference.fit.parameters import Free

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.drive import Drive
+from stickslip.data.trace import Trace
 from stickslip.inference.diagnose.model_record import _driven
 from stickslip.inference.fit.serialised import Fitted, from_record, record
 from stickslip.system.runstore import json_text

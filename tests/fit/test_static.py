@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from stickslip.data.drive import Drive
 from stickslip.data.segment import segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.errors import InputError
 from stickslip.inference.fit.creep_process import CreepProcess, creep_processes
 from stickslip.inference.fit.normalised import Ramp, break_away, fit_ramps

@@ -6,8 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from stickslip.data.drive import Drive
 from stickslip.data.segment import segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.objects.data_abilities import _slow_noise, abilities
 
 

@@ -6,8 +6,9 @@ import xarray
 
 from stickslip.cli import run
 from stickslip.cli.show import quantity
+from stickslip.data.drive import Drive
 from stickslip.data.segment import segment
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.show.plots.style import scaled
 from stickslip.show.report import trace_pieces
 from stickslip.show.report.figures import trace_picture

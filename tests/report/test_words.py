@@ -5,9 +5,10 @@ import pytest
 
 from stickslip.data.checks.spring_force import common_gain, force_findings, gain_is_wrong, stick_gain
 from stickslip.data.displacements import true_gains
+from stickslip.data.drive import Drive
 from stickslip.data.segment import segment
 from stickslip.data.segment.stick_ripple import stick_ripple, stick_spectrum
-from stickslip.data.trace import Drive, Trace
+from stickslip.data.trace import Trace
 from stickslip.objects.data_abilities import abilities
 from stickslip.show.report.describe import describe_trace
 from stickslip.show.report.ripple_text import ripple_text

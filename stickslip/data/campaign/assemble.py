@@ -13,9 +13,12 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...system.runstore import file_record
 from ...system.units import factor_to_si
+from ..channels import SIGNALS
+from ..drive import Drive
+from ..provenance import Provenance, Repair
 from ..readers import Columns, read_columns, repair
 from ..resolution import estimate_resolution, noise_level
-from ..trace import SIGNALS, Drive, Provenance, Repair, Trace
+from ..trace import Trace
 from .load import Campaign, trace_file
 from .models import CHANNELS, Channel, TimeColumn, TraceEntry
 from .plausible import check_size, check_travel, doubtful_resolution

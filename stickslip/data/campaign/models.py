@@ -10,7 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationIn
 
 from ...errors import InputError
 from ...system.units import factor_to_si, to_si
-from ..trace import SIGNALS
+from ..channels import SIGNALS
 from .fields import Unmeasured, faults, quantity
 
 Measured = float | Unmeasured

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..drive import Drive
 from ..segment import block_motion, segment
-from ..trace import Drive, Trace
+from ..trace import Trace
 from .finding import Finding
 from .travel import travel
 

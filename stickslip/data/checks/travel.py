@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..drive import Drive
 from ..segment import Event, Segmentation, block_motion
-from ..trace import Drive, Trace
+from ..trace import Trace
 
 Array = NDArray[np.float64]
 FEWEST = 3  # slips that make a slope with an error

@@ -9,7 +9,10 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...system.units import shown
-from ..trace import CHANNELS, Drive, Repair, Trace
+from ..channels import CHANNELS
+from ..drive import Drive
+from ..provenance import Repair
+from ..trace import Trace
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...system.units import shown, to_si
+from ..drive import Drive
 from ..resolution import noise_level
-from ..trace import Drive, Trace
+from ..trace import Trace
 from .choose_settings import choose_settings
 from .downsampling import reduce_trace, thin
 from .event_shape import LEVELS, Shape, Shapes, crept, event_shapes

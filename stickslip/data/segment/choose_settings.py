@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..trace import Drive
+from ..drive import Drive
 from .kinematics import half_window, velocity, velocity_noise
 from .records import Settings
 

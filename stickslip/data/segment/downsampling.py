@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..trace import Repair, Trace
+from ..provenance import Repair
+from ..trace import Trace
 from .records import Segmentation
 
 Array = NDArray[np.float64]

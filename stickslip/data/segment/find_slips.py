@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...system.units import shown
-from ..trace import Drive
+from ..drive import Drive
 from .kinematics import position_at
 from .records import Dropped, Event, Settings
 

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..trace import Drive, Trace
+from ..drive import Drive
+from ..trace import Trace
 
 Array = NDArray[np.float64]
 _CHUNK = 1 << 14

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..trace import Drive
+from ..drive import Drive
 from .find_slips import half_of
 from .kinematics import velocity_noise
 from .records import Event, Phase, Settings

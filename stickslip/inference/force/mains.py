@@ -15,8 +15,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ...data.resolution import MAINS
 from ...data.segment import Segmentation
-from ...data.trace import MAINS, Trace
+from ...data.trace import Trace
 from .sampling import even
 
 Array = NDArray[np.float64]

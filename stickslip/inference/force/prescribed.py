@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, eye_array
 
 from ...data.campaign import Rig
+from ...data.drive import Drive
 from ...data.resolution import estimate_resolution, noise_level
-from ...data.trace import Drive, Trace
+from ...data.trace import Trace
 from ...physics.effects import catalogue
 from ..fit.parameters import Free, vector
 from .composition import BESIDE, PULL, Composition

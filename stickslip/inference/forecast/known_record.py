@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...data.checks.spring_force import gain_is_wrong, stick_gain
+from ...data.drive import Drive
 from ...data.resolution import estimate_resolution, noise_level
 from ...data.segment import Event, Segmentation, Settings, block_motion, position_at, segment, velocity
 from ...data.segment.find_slips import directions, half_of, pick
 from ...data.segment.kinematics import loading_rate
-from ...data.trace import Drive, Trace
+from ...data.trace import Trace
 from ...errors import InputError
 from .levels import Scale, level_arrays, scale_of
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ...data.drive import Drive
 from ...data.segment import Segmentation, crept, segment
-from ...data.trace import Drive, Trace
+from ...data.trace import Trace
 from ...simulation.scenario import Scenario
 from ...simulation.scenario.recording import Recording
 from ...simulation.scenario.simulation import record

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ...data.channels import SIGNALS
 from ...data.segment import Event, Segmentation, block_motion, reduce_trace, thin
-from ...data.trace import SIGNALS, Trace
+from ...data.trace import Trace
 from .describe import describe_trace
 
 OVERVIEW, ZOOM = 3000, 1500

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...data.drive import Drive
 from ...data.readers import read_columns
-from ...data.trace import Drive
 from ...errors import InputError
 from ...system.units import factor_to_si
 from .schema import DriveTable
