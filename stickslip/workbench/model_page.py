@@ -10,9 +10,9 @@ import panel as pn
 
 from ..objects.fit import Fit
 from ..objects.fit_plots import balanced, expected_band, one_cycle
+from .error_map import ErrorMap
 from .figures import FEW, compared, crosshair, figure, label, legend, look, source, unit_of
 from .free_panel import Free
-from .heat_view import Heat
 from .parameter_sliders import Knob, given, knobs, rows
 from .selection import choose, cycles, selected
 from .session import Session, watch
@@ -23,10 +23,10 @@ def page(session: Session) -> Any:
     """The page of a session."""
     sliders, buttons = _sliders(session), _buttons(session)
     cycle = Cycle(session)
-    heat = Heat(session)
+    error_map = ErrorMap(session)
     free = Free(session)
     left = pn.Column(buttons, sliders, width=350, sizing_mode="fixed", margin=(8, 12, 0, 0))
-    below = pn.Row(pn.Column(cycle.creep, free.figure, free.words), pn.Column(heat.kind, heat.figure))
+    below = pn.Row(pn.Column(cycle.creep, free.figure, free.words), pn.Column(error_map.kind, error_map.figure))
     return pn.Row(left, pn.Column(cycle.chooser, cycle.force, cycle.residual, below, margin=(8, 0, 0, 0)))
 
 

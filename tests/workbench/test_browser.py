@@ -45,14 +45,16 @@ def browser(served):
 
 def test_the_failing_phase_is_seen_and_a_click_shows_its_worst_cycle(browser):
     browser.tab("Model")
-    browser.wait(lambda: browser.js("const m = named('heat'); return m && m.data.error.length"))
-    errors = browser.js("const d = named('heat').data; return [...d.error].map((e, i) => [e, d.phase[i], d.run[i]])")
+    browser.wait(lambda: browser.js("const m = named('error map'); return m && m.data.error.length"))
+    errors = browser.js(
+        "const d = named('error map').data; return [...d.error].map((e, i) => [e, d.phase[i], d.run[i]])"
+    )
     worst = max((e for e in errors if e[2] == "all" and e[1] != "all"), key=lambda e: e[0])
     assert worst[1] == "nucleation" and worst[0] > 1.5
     before = browser.js("return [...named('cycle').data.t].length")
     browser.js(
         """
-        const figure = named('heat figure')
+        const figure = named('error map figure')
         const [i, j] = [figure.x_range.factors.indexOf('holds'), figure.y_range.factors.indexOf('nucleation')]
         const tap = new (Bokeh.require('core/bokeh_events').Tap)(0, 0, i + 0.5, j + 0.5, {})
         figure.trigger_event(tap)

@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from stickslip.workbench.error_map import colour
 from stickslip.workbench.figures import DARK, DASHES, LIGHT
-from stickslip.workbench.heat_view import heat
 
 # Machado, Oliveira and Fernandes (2009), IEEE Trans. Vis. Comput. Graph. 15, 1291: on linear sRGB, severity 1
 SEEN = {
@@ -53,8 +53,8 @@ def test_curves_can_be_told_apart_by_the_colour_blind(theme, eye):
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
 @pytest.mark.parametrize("eye", SEEN)
 def test_better_as_good_and_worse_differ_in_the_heat_map(theme, eye, monkeypatch):
-    monkeypatch.setattr("stickslip.workbench.heat_view.look", lambda: theme)
-    colours = [heat(value, 4.0) for value in (0.0, 1.0, 4.0)]
+    monkeypatch.setattr("stickslip.workbench.error_map.look", lambda: theme)
+    colours = [colour(value, 4.0) for value in (0.0, 1.0, 4.0)]
     assert min(apart(a, b, np.asarray(SEEN[eye])) for a, b in combinations(colours, 2)) > 2.0 * LEAST
 
 

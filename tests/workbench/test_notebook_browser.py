@@ -36,7 +36,7 @@ def test_the_output_of_a_cell_holds_the_pages(campaign, base, monkeypatch, tmp_p
             assert tuple(browser.text(".bk-tab").splitlines()) == PAGES
             browser.idle()
             browser.tab("Model")
-            browser.wait(lambda: browser.js("const m = named('heat'); return m && m.data.error.length"), 60)
+            browser.wait(lambda: browser.js("const m = named('error map'); return m && m.data.error.length"), 60)
             error = f"{base.error:.3f}"[:4]
             assert error in browser.text(".errors")
             browser.redraw("weakening.drop", 0.7)  # the socket is let through

@@ -23,7 +23,7 @@ from stickslip.workbench import (
     app,
     backbone_view,
     curves,
-    heat_view,
+    error_map,
     history_text,
     keep_page,
     ladder_view,
@@ -145,7 +145,7 @@ def test_errors_and_the_law_of_the_backbone_have_their_deviations(session, base)
     assert all(text in ladder.table.object for text in errors)
     hover = [ladder._data.data[name][-1] for name in ("fitted_text", "unseen_text")]
     assert hover == [shown_with(base.error, base.error_std), shown_with(base.unseen_error, base.unseen_error_std)]
-    texts = heat_view.Heat(session)._data.data["text"]
+    texts = error_map.ErrorMap(session)._data.data["text"]
     assert f"{base.error:.2f}\n±{base.error_std:.2f}" in texts and sum("±" in t for t in texts) > 0.8 * len(texts)
     law = base.backbone.attrs
     told = backbone_view.Backbone(session).words.text
@@ -253,7 +253,7 @@ def test_legends_name_what_is_drawn_from_the_first_look_on(session):
 
 
 def test_an_error_of_five_floors_is_seen_beside_one_of_sixty():
-    blue = [int(heat_view.heat(value, 60.0)[5:], 16) for value in (1.0, 5.0, 60.0)]
+    blue = [int(error_map.colour(value, 60.0)[5:], 16) for value in (1.0, 5.0, 60.0)]
     assert blue[0] - blue[1] > 0.3 * (blue[0] - blue[2]) > 0
 
 

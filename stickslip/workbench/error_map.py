@@ -19,7 +19,7 @@ NOW = "as it stands"
 WORST = 2.0  # floors at which the map is at its darkest, at least
 
 
-class Heat:
+class ErrorMap:
     """Error by phase of the cycle and run, the slowest first; a click selects the worst cycle there."""
 
     def __init__(self, session: Session) -> None:
@@ -29,7 +29,7 @@ class Heat:
             margin=(0, 0, 0, 70),
         )  # fmt: skip
         self._data = source(run=[], phase=[], error=[], std=[], text=[], colour=[], ink=[])
-        self._data.name = "heat"
+        self._data.name = "error map"
         self.figure = figure("error in floors; a click shows the worst cycle", "run, velocity of its drive",
                              "phase of the cycle", height=284, x_range=["all"], y_range=["all"],
                              output_backend=FEW)  # fmt: skip
@@ -41,7 +41,7 @@ class Heat:
         self.figure.add_tools(
             HoverTool(tooltips=[("run", "@run"), ("phase", "@phase"), ("error", "@error{0.000} ± @std{0.000} floors")])
         )
-        self.figure.name = "heat figure"
+        self.figure.name = "error map figure"
         self.figure.grid.grid_line_color = None
         self.figure.xaxis.major_label_orientation = 0.6
         self._labels = CustomJSTickFormatter(args={"labels": {}}, code="return labels[tick] || tick")
@@ -79,7 +79,7 @@ class Heat:
             self.figure.x_range.factors, self.figure.y_range.factors = runs, phases
         values, deviations = (t.loc[phases, runs].to_numpy(float).ravel() for t in (table, spread))
         top = max(float(np.nanmax(values)), WORST)
-        colours = [heat(v, top) for v in values]
+        colours = [colour(v, top) for v in values]
         self._data.data = {
             "run": runs * len(phases), "phase": [p for p in phases for _ in runs], "error": values.tolist(),
             "std": deviations.tolist(), "text": [cell(v, s) for v, s in zip(values, deviations, strict=True)],
@@ -100,7 +100,7 @@ def cell(value: float, std: float) -> str:
     return f"{value:.2f}\n±{std:.2f}" if np.isfinite(std) else f"{value:.2f}"
 
 
-def heat(value: float, top: float) -> str:
+def colour(value: float, top: float) -> str:
     """Colour of an error: 1 is as good as the data allow, ``top`` the worst; by factors, so that 5 among 60 is seen."""
     theme = look()
     if not np.isfinite(value):
