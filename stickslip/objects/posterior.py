@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..inference.fit.parameters import to_si
 from ..inference.force.point import Point
-from ..inference.force.posterior import Walked, walked
+from ..inference.force.posterior import PosteriorDensity, posterior_density
 from ..system.extras import need
 from ..system.progress import reporting
 from .fit_tables import STRENGTH
@@ -60,21 +60,21 @@ def sample(
     import nutpie
     from nutpie.compiled_pyfunc import from_pyfunc
 
-    way, names = walked(fit.force_fit), [f.name for f in fit.free]
+    density, names = posterior_density(fit.force_fit), [f.name for f in fit.free]
     done, drawn, total = itertools.count(1), SimpleQueue[int](), chains * (draws + tune)
 
     def expand(x: np.ndarray) -> dict[str, Any]:
         drawn.put(next(done))
-        return _expanded(way, names, x)
+        return _expanded(density, names, x)
 
     model = from_pyfunc(
-        way.size,
-        lambda: lambda x, **_: way.at(np.asarray(x))[1:],
+        density.size,
+        lambda: lambda x, **_: density.at(np.asarray(x))[1:],
         lambda *_: lambda x, **__: expand(np.asarray(x)),
         [np.dtype(np.float64)] * (len(names) + 1),
         [()] * (len(names) + 1),
         [*names, STRENGTH],
-        make_initial_point_fn=lambda s: 0.5 * np.random.default_rng(s).standard_normal(way.size),
+        make_initial_point_fn=lambda s: 0.5 * np.random.default_rng(s).standard_normal(density.size),
     )
     sampler: Any = nutpie.sample(
         model, draws=draws, tune=tune, chains=chains, cores=chains, seed=seed, progress_bar=False, save_warmup=False,
@@ -103,15 +103,15 @@ def sample(
 
 def drawn_points(fit: Fit, found: Any) -> list[Point]:
     """The draws of :func:`sample` as points of the fit's model, what was not drawn at its best."""
-    way, posterior = walked(fit.force_fit), found.posterior
+    density, posterior = posterior_density(fit.force_fit), found.posterior
     values = np.stack([posterior[f.name].values.ravel() for f in fit.free], axis=1)
-    return [way.best(np.array([f.inward(v) for f, v in zip(fit.free, row, strict=True)])) for row in values]
+    return [density.best(np.array([f.inward(v) for f, v in zip(fit.free, row, strict=True)])) for row in values]
 
 
-def _expanded(way: Walked, names: list[str], x: np.ndarray) -> dict[str, Any]:
+def _expanded(density: PosteriorDensity, names: list[str], x: np.ndarray) -> dict[str, Any]:
     """The parameters (SI) at whitened coordinates."""
-    point, _, _ = way.at(x)
-    values = to_si(way.fit.problem.composition.shared, point.z)
+    point, _, _ = density.at(x)
+    values = to_si(density.fit.problem.composition.shared, point.z)
     return {**{name: np.asarray(values[name]) for name in names}, STRENGTH: np.asarray(point.weights.sum())}
 
 

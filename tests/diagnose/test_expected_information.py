@@ -13,7 +13,7 @@ from stickslip.inference.diagnose.decide import DISPERSION
 from stickslip.inference.diagnose.expected_information import KNOWN, Changed, information, margins
 from stickslip.inference.force import problem as problem_module
 from stickslip.inference.force.noise import by_reading, known_of
-from stickslip.inference.force.posterior import walked
+from stickslip.inference.force.posterior import posterior_density
 from stickslip.inference.force.problem import Problem
 from stickslip.inference.force.whitening import Whitening
 
@@ -94,7 +94,7 @@ def test_draws_of_the_gaussian_say_what_the_gaussian_says(base):
     run, rng = pair[0].problem.runs[1], np.random.default_rng(0)
 
     def told(draws, spread):
-        ways = [walked(fit) for fit in pair]
+        ways = [posterior_density(fit) for fit in pair]
         drawn = [[way.at(spread * x)[0] for x in rng.standard_normal((draws, way.size))] for way in ways]
         return margins(pair, [run, run], drawn=drawn)[0, 1]
 

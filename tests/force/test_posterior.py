@@ -8,7 +8,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.inference.force.descent import SETTLED
-from stickslip.inference.force.posterior import walked
+from stickslip.inference.force.posterior import posterior_density
 
 pytestmark = pytest.mark.slow
 
@@ -23,7 +23,7 @@ def aged():
 @pytest.fixture(scope="module")
 def way(aged):
     """Counted in the deviations of the derivatives, without what profiles add to them."""
-    return walked(replace(aged.force_fit, valleys=()))
+    return posterior_density(replace(aged.force_fit, valleys=()))
 
 
 def test_the_gradient_is_that_of_the_density(way):

@@ -65,7 +65,7 @@ class Normal:
 
 def drawn(monkeypatch, density: Normal, tell, draws: int = 50):
     pytest.importorskip("nutpie")
-    monkeypatch.setattr(posterior, "walked", lambda _: density)
+    monkeypatch.setattr(posterior, "posterior_density", lambda _: density)
     monkeypatch.setattr(posterior, "_expanded", lambda way, names, x: {posterior.STRENGTH: np.asarray(x[0])})
     fit = SimpleNamespace(force_fit=None, free=[], campaign=SimpleNamespace(title="none"), parts=[])
     return posterior.sample(fit, draws, 10, 2, 0, tell)

@@ -20,7 +20,7 @@ from .whitening import WithEvents
 
 
 @dataclass(frozen=True)
-class Walked:
+class PosteriorDensity:
     """Where a sampler may go.
 
     Attributes:
@@ -87,7 +87,7 @@ class Walked:
         return np.asarray(found.x * scale)
 
 
-def walked(fit: Fit) -> Walked:
+def posterior_density(fit: Fit) -> PosteriorDensity:
     """The posterior around an optimum; a parameter that stands at a bound may leave it by what its prior allows."""
     a = len(fit.free)
     part = fit.covariance[:a, :a].copy()
@@ -95,4 +95,4 @@ def walked(fit: Fit) -> Walked:
         if part[i, i] <= 0.0:
             low, high = f.bounds
             part[i, i] = min(f.width, 0.1 * (high - low)) ** 2
-    return Walked(fit, np.asarray(np.linalg.cholesky(part)), fit.white)
+    return PosteriorDensity(fit, np.asarray(np.linalg.cholesky(part)), fit.white)
