@@ -174,7 +174,7 @@ def test_a_simulation_that_fails_is_a_note(plain, monkeypatch):
     def broken(*args):
         raise RuntimeError("no such law")
 
-    monkeypatch.setattr(confirming, "freely", broken)
+    monkeypatch.setattr(confirming, "simulate_freely", broken)
     c = confirm({BASE: base}, BASE, data)
     assert c.models == {}
     assert "no such law" in c.notes[0]
@@ -194,7 +194,7 @@ def test_finished_pieces_are_taken_up_for_the_same_fit_only(plain, confirmed, mo
     kept = {}
     work = Work(store=SimpleNamespace(load=kept.get, save=kept.__setitem__))
     first = confirm({BASE: base}, BASE, data, work)
-    monkeypatch.setattr(confirming, "freely", lambda *args: pytest.fail("run again"))
+    monkeypatch.setattr(confirming, "simulate_freely", lambda *args: pytest.fail("run again"))
     again = confirm({BASE: base}, BASE, data, work)
     assert errors(again, again.models[BASE]) == errors(first, first.models[BASE])
     other = replace(base, point=replace(base.point, weights=1.01 * base.point.weights))

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .free_measures import Array, Measures, measures
-from .free_simulation import Confirmation, Freely
+from .free_simulation import Confirmation, FreeSimulation
 
 ERRORS = 2.0  # standard errors by which a free prediction must be worse to contradict
 COUNTED = ("recurrence", "slip", "creep")  # the whole cycle says little beyond its recurrence
 
 
-def predicted(c: Confirmation, model: Freely) -> Measures:
+def predicted(c: Confirmation, model: FreeSimulation) -> Measures:
     """The model's measures; a slip that is missed counts as none after the time that was waited."""
     m = c.measurement
     assert m is not None
@@ -28,7 +28,7 @@ def predicted(c: Confirmation, model: Freely) -> Measures:
     return Measures(out.recurrence, out.cycle, np.where(model.missed, 0.0, out.slip), out.creep)
 
 
-def deviations(c: Confirmation, model: Freely) -> dict[str, Array]:
+def deviations(c: Confirmation, model: FreeSimulation) -> dict[str, Array]:
     """Errors of every event in units of the scatter, by measure, shape (R, n); nan where there is none."""
     assert c.data is not None and c.scatter is not None
     made = predicted(c, model)
@@ -37,7 +37,7 @@ def deviations(c: Confirmation, model: Freely) -> dict[str, Array]:
     return out
 
 
-def errors(c: Confirmation, model: Freely) -> dict[str, Any]:
+def errors(c: Confirmation, model: FreeSimulation) -> dict[str, Any]:
     """The model's errors as plain numbers, for all runs and (``by_run``) for each."""
     m = c.measurement
     assert m is not None
@@ -46,7 +46,7 @@ def errors(c: Confirmation, model: Freely) -> dict[str, Any]:
     return out
 
 
-def _errors(c: Confirmation, model: Freely, runs: NDArray[np.bool_]) -> dict[str, Any]:
+def _errors(c: Confirmation, model: FreeSimulation, runs: NDArray[np.bool_]) -> dict[str, Any]:
     assert c.measurement is not None and c.data is not None
     made, data = predicted(c, model), c.data
     units = None if c.scatter is None else deviations(c, model)
@@ -89,7 +89,7 @@ def contradiction(force: tuple[float, float], free: tuple[Array, Array]) -> tupl
     return (total, error) if total > ERRORS * error and total > 0.0 else None
 
 
-def summed(c: Confirmation, model: Freely) -> Array:
+def summed(c: Confirmation, model: FreeSimulation) -> Array:
     """Errors of every event in units of the scatter, summed over the measures, shape (R n,); nan where none."""
     each = np.stack([deviations(c, model)[k] for k in COUNTED])
     with_any = np.isfinite(each).any(axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 from ...data.segment import thin
 from .free_errors import contradiction, predicted, summed
 from .free_measures import Array
-from .free_simulation import Confirmation, Freely, Parts
+from .free_simulation import Confirmation, FreeSimulation, Parts
 from .prepare import Prepared
 
 POINTS = 4000  # of a picture's line
@@ -101,7 +101,7 @@ def free_variables(c: Confirmation, prepared: Prepared, base: Parts, last: Parts
     return out
 
 
-def _joined(model: Freely, r: int) -> tuple[list[Array], list[Array]]:
+def _joined(model: FreeSimulation, r: int) -> tuple[list[Array], list[Array]]:
     """Times and readings of every cycle of a run, each without its padding and ended by nan, so that lines break."""
     times, readings = [], []
     for t, y in zip(model.times[r], model.readings[r], strict=True):

@@ -33,7 +33,7 @@ FOLLOWED = (
 
 
 @dataclass(frozen=True)
-class Freely:
+class FreeSimulation:
     """One model run freely, every cycle predicted from a fit without it. R runs, n cycles.
 
     Attributes:
@@ -68,7 +68,7 @@ class Confirmation:
     measurement: Measurement | None = None
     data: Measures | None = None
     scatter: Measures | None = None
-    models: Mapping[Parts, Freely] = field(default_factory=dict)
+    models: Mapping[Parts, FreeSimulation] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
@@ -87,7 +87,7 @@ def confirm(fits: Mapping[Parts, Fit], last: Parts, prepared: Prepared, work: Wo
     if prepared.prescribed:
         return Confirmation(notes=(FOLLOWED,))
     names = [k.name for k in prepared.runs]
-    found: dict[Parts, Freely] = {}
+    found: dict[Parts, FreeSimulation] = {}
     unit, notes = None, []
     try:
         m = prepared.measurement
@@ -95,14 +95,16 @@ def confirm(fits: Mapping[Parts, Fit], last: Parts, prepared: Prepared, work: Wo
         return Confirmation(notes=(f"no free simulation: {_line(error)}",))
     runs = [names.index(name) for name in m.names]
     # two models are compared event by event only if both are left out in the same way
-    apart = any(len(folds(fit)) != len(names) for fit in fits.values())
+    by_halves = any(len(folds(fit)) != len(names) for fit in fits.values())
     for done, (parts, fit) in enumerate(fits.items()):
         if not work.in_time():
             notes.append(f"the time limit came before the free simulation of the model {_named(parts)}")
             continue
         work.tell(f"free simulation of {_named(parts)}", done / len(fits))
         try:
-            found[parts] = _kept(work.store, _key("free", parts, fit), Freely, partial(freely, m, fit, runs, apart))
+            found[parts] = _kept(
+                work.store, _key("free", parts, fit), FreeSimulation, partial(simulate_freely, m, fit, runs, by_halves)
+            )
             if parts == last:
                 key = _key("scatter", parts, fit)
                 unit = _kept(work.store, key, Measures, partial(scatter, m, fit, runs))
@@ -114,17 +116,17 @@ def confirm(fits: Mapping[Parts, Fit], last: Parts, prepared: Prepared, work: Wo
     return Confirmation(m, measured(m, np.array(ends)), unit, found, tuple(notes))
 
 
-def freely(m: Measurement, fit: Fit, runs: Sequence[int], apart: bool) -> Freely:
+def simulate_freely(m: Measurement, fit: Fit, runs: Sequence[int], by_halves: bool) -> FreeSimulation:
     """A model through all runs, each cycle with the parameters of a fit that has not seen it.
 
     Args:
         m: the measurement.
         fit: of the model.
         runs: number in the problem of each run of the measurement.
-        apart: whether runs are left out by halves.
+        by_halves: whether runs are left out by halves.
     """
     problem = fit.problem
-    left_out = halves(fit) if apart else folds(fit)
+    left_out = halves(fit) if by_halves else folds(fit)
     shape = np.shape(m.cycles.start)
     used = np.asarray(m.cycles.used)
     features, arrests = np.array(m.values), np.zeros(shape)
@@ -150,7 +152,7 @@ def freely(m: Measurement, fit: Fit, runs: Sequence[int], apart: bool) -> Freely
     times, readings = np.full((*shape, longest), np.nan), np.full((*shape, longest), np.nan)
     for at, (t, y) in tracks.items():
         times[at], readings[at] = (np.pad(a, (0, longest - a.size), mode="edge") for a in (t, y))
-    return Freely(features, arrests, missed, broken, times, readings)
+    return FreeSimulation(features, arrests, missed, broken, times, readings)
 
 
 def _named(parts: Parts) -> str:
