@@ -41,7 +41,7 @@ def scale_findings(campaign: Campaign, traces: Sequence[Trace], travels: Sequenc
         known.append((trace, seen))
     if not known:
         return out
-    off, agreed = _apart([seen for _, seen in known])
+    off, agreed = _outliers([seen for _, seen in known])
     centre = float(np.median([known[i][1].slope for i in agreed]))
     common = _common([known[i] for i in agreed], len(traces))
     for i, (trace, seen) in enumerate(known):
@@ -62,7 +62,7 @@ def _same_rig(a: Rig, b: Rig) -> bool:
     return all(getattr(a, name) == getattr(b, name) for name in names)
 
 
-def _apart(seen: Sequence[Travel]) -> tuple[dict[int, float], list[int]]:
+def _outliers(seen: Sequence[Travel]) -> tuple[dict[int, float], list[int]]:
     """Runs whose slope differs from the others' beyond its error, with that error; and the runs that agree."""
     off: dict[int, float] = {}
     agreed = list(range(len(seen)))
@@ -101,7 +101,7 @@ def _common(agreed: Sequence[tuple[Trace, Travel]], runs: int) -> list[Finding]:
     where = _listed([t.name for t, _ in agreed])
     trace, seen = agreed[0]
     pair = (
-        _parting(where, seen)
+        _diverging(where, seen)
         if len(agreed) == 1
         else f"{where}: over whole cycles the block moves {factor:.3f} (+-{std:.3f}) times as far as the drive is "
         "stated to, and the spring would stretch without limit"
@@ -118,11 +118,11 @@ def _common(agreed: Sequence[tuple[Trace, Travel]], runs: int) -> list[Finding]:
 
 def _impossible(trace: Trace, seen: Travel) -> Finding:
     what = f"{_VELOCITY} or {trace.leading} {_SCALE} or {_CLOCKED}"
-    text = _parting(trace.name, seen)
+    text = _diverging(trace.name, seen)
     return Finding(what, trace.name, 1.0, seen.slope, seen.std, "1", text, impossible=True)
 
 
-def _parting(where: str, seen: Travel) -> str:
+def _diverging(where: str, seen: Travel) -> str:
     block, drive = shown(seen.block, "m/s", 3), shown(seen.drive, "m/s", 3)
     return (
         f"{where}: from slip to slip the block moves {block}, the drive {drive}; the spring would stretch without limit"
