@@ -12,7 +12,7 @@ from stickslip.blind.generator import Run
 from stickslip.blind.generator.rigs import draw_setup
 from stickslip.blind.generator.sensor import SILENT
 from stickslip.inference.force.fit import fit
-from stickslip.inference.force.mains import Hum, heard, hum
+from stickslip.inference.force.mains import Hum, detect_hum, hum
 from stickslip.inference.force.problem import Problem
 
 from .conftest import made
@@ -51,10 +51,10 @@ def runs_of(case):
 
 
 def test_it_is_heard_where_it_is_and_nowhere_else(cases):
-    told = heard(runs_of(cases[SIZE]), cases[SIZE].times.slip)
+    told = detect_hum(runs_of(cases[SIZE]), cases[SIZE].times.slip)
     assert told.frequency == 50.0
     assert told.amplitude == pytest.approx(SIZE, rel=0.03)
-    assert heard(runs_of(cases[0.0]), cases[0.0].times.slip) == Hum()
+    assert detect_hum(runs_of(cases[0.0]), cases[0.0].times.slip) == Hum()
 
 
 def test_it_is_told(cases, tmp_path_factory):
@@ -77,7 +77,7 @@ def test_it_is_taken_off_to_a_hundredth_where_sticks_are_long(cases, frequency):
 
 def test_what_is_stated_is_looked_for_where_none_is_heard(short):
     case = short[SIZE]
-    told = heard(runs_of(case), case.times.slip)
+    told = detect_hum(runs_of(case), case.times.slip)
     assert (told.frequency, told.amplitude) == (50.0, pytest.approx(SIZE))
     for trace, found in runs_of(case):
         assert not hum(trace.time, trace.displacement, trace, found, case.times.slip, case.times.hum).any()

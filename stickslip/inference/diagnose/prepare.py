@@ -31,7 +31,7 @@ from ..force.stated_spring import SPRING
 FEWEST = 2  # slips of a run that takes part
 MOST_EVENTS = 200  # that a fit sees: its memory and time grow with them
 MOST_CYCLES = 40  # of a run, that are run freely
-UNHEARD = "no ring-down is detected after the slips, so the contact's stiffness is known from the creep alone"
+NO_RINGING = "no ring-down is detected after the slips, so the contact's stiffness is known from the creep alone"
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def prepare(
     kept, segments = tuple(t for t, _ in used), tuple(s for _, s in used)
     period = ringing(kept, segments)
     if period is None:
-        dropped.append(UNHEARD)
+        dropped.append(NO_RINGING)
     rate = min(t.sampling_rate for t in kept)
     times = scales(used, period, rate)
     if times.hum.frequency:

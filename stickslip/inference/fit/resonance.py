@@ -1,4 +1,4 @@
-"""The contact's resonance, heard in the ringing after the arrests."""
+"""The contact's resonance, detected in the ringing after the arrests."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...data.trace import Trace
 
 Array = NDArray[np.float64]
 SKIPPED = 1e-3  # s after an arrest that are no ringing yet
-LONG = 0.03  # s listened to after an arrest
+LONG = 0.03  # s after an arrest in which ringing is sought
 SHORT = (0.015, 0.008)  # s, where the ringing may have died before the long window is half over
 LOWEST = 60.0  # Hz
 PERIODS = 3.0  # a short window must hold, so that a slow motion is no ringing
@@ -31,14 +31,16 @@ def ringing(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> f
     louder. None where the sampling is too slow or nothing rings: no peak stands out of its spectrum and of the spectrum
     later in the sticks further than noise would once in a hundred records.
     """
-    heard = _heard(traces, segmentations, LONG)
-    if heard is None:
-        others = [h for h in (_heard(traces, segmentations, length) for length in SHORT) if h is not None]
-        heard = max(others, key=lambda h: h[1], default=None)
-    return None if heard is None else 1.0 / heard[0]
+    detected = _detected(traces, segmentations, LONG)
+    if detected is None:
+        others = [h for h in (_detected(traces, segmentations, length) for length in SHORT) if h is not None]
+        detected = max(others, key=lambda h: h[1], default=None)
+    return None if detected is None else 1.0 / detected[0]
 
 
-def _heard(traces: Sequence[Trace], segmentations: Sequence[Segmentation], length: float) -> tuple[float, float] | None:
+def _detected(
+    traces: Sequence[Trace], segmentations: Sequence[Segmentation], length: float
+) -> tuple[float, float] | None:
     """Frequency (Hz) of what rings within ``length`` s after the arrests, and how far above the limit it is."""
     rates = [t.sampling_rate for t, s in zip(traces, segmentations, strict=True) if t.displacement is not None]
     pieces: dict[int, list[tuple[Array, list[Array]]]] = {}

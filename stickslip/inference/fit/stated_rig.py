@@ -17,7 +17,7 @@ FALLBACK_PERIOD = 1.0 / FALLBACK_FREQUENCY
 
 
 def ring_period(traces: Sequence[Trace], segmentations: Sequence[Segmentation]) -> float:
-    """Period (s) of the contact's resonance: that of the ringing, or 2 ms where none is heard."""
+    """Period (s) of the contact's resonance: that of the ringing, or 2 ms where none is detected."""
     return ringing(traces, segmentations) or FALLBACK_PERIOD
 
 

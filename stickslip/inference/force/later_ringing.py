@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 PART = 3  # periods of which an amplitude is told
-HEARD = 3.0  # deviations by which it stands out
+DETECTED = 3.0  # deviations by which it stands out
 LAST = 0.05  # of the amplitude where the samples end, down to which the ringing goes on
 
 
@@ -62,7 +62,7 @@ def later_turns(t: Array, x: Array, stretches: Sequence[tuple[int, int]], period
     """Where the block goes on to turn in stretches that are not followed.
 
     Amplitude, phase and mean are those of a wave in the last periods that are followed. How the ringing dies away is
-    measured in all stretches of a run together, so that it is heard below the noise of one: while elements slide at
+    measured in all stretches of a run together, so that it is detected below the noise of one: while elements slide at
     every swing, it is no exponential.
 
     Args:
@@ -82,13 +82,13 @@ def later_turns(t: Array, x: Array, stretches: Sequence[tuple[int, int]], period
     error = noise**2 * float((solve[3:] ** 2).sum())  # of an amplitude's square
     fits = np.array([solve @ x[end + 1 - size : end + 1] for end, _ in stretches])
     amplitude = np.hypot(fits[:, 3], fits[:, 4])
-    heard = np.flatnonzero(amplitude > HEARD * np.sqrt(error))
-    if not heard.size:
+    detected = np.flatnonzero(amplitude > DETECTED * np.sqrt(error))
+    if not detected.size:
         return none
-    course = _course(x, [stretches[i] for i in heard], solve, amplitude[heard] ** 2 - error, error)
+    course = _course(x, [stretches[i] for i in detected], solve, amplitude[detected] ** 2 - error, error)
     middles = PART * period * (np.arange(course.size) - 0.5)
     parts = []
-    for i in heard:
+    for i in detected:
         end, again = stretches[i]
         phase = float(np.arctan2(-fits[i, 4], fits[i, 3]))
         room = min(middles[-1], t[min(again, t.size - 1)] - t[end])
@@ -99,7 +99,7 @@ def later_turns(t: Array, x: Array, stretches: Sequence[tuple[int, int]], period
 
 
 def _course(x: Array, stretches: Sequence[tuple[int, int]], solve: Array, first: Array, error: float) -> Array:
-    """Amplitudes after the last samples in parts, over that in them, as long as they are heard; begins with 1.
+    """Amplitudes after the last samples in parts, over that in them, as long as they are detected; begins with 1.
 
     Args:
         x: readings (m), shape (N,).
@@ -114,7 +114,7 @@ def _course(x: Array, stretches: Sequence[tuple[int, int]], solve: Array, first:
         there = [k for k, (end, again) in enumerate(stretches) if end + low + size <= min(again, x.size)]
         squares = np.array([((solve[3:] @ x[stretches[k][0] + low :][:size]) ** 2).sum() for k in there])
         loud = float((squares - error).sum())
-        if not there or loud < HEARD * error * np.sqrt(len(there)):
+        if not there or loud < DETECTED * error * np.sqrt(len(there)):
             break
         out.append(min(float(np.sqrt(loud / first[there].sum())), out[-1]))
         if out[-1] < LAST:

@@ -36,7 +36,7 @@ class Hum:
     """Hum of the sensor in a campaign.
 
     Attributes:
-        frequency: of the mains (Hz), 0 where none is heard and none stated.
+        frequency: of the mains (Hz), 0 where none is detected and none stated.
         amplitude: usual one of a run (m).
     """
 
@@ -48,7 +48,7 @@ class Hum:
         return self.amplitude / np.sqrt(2.0) * _basis(t, self.frequency)
 
 
-def heard(runs: Sequence[tuple[Trace, Segmentation]], slip: float) -> Hum:
+def detect_hum(runs: Sequence[tuple[Trace, Segmentation]], slip: float) -> Hum:
     """The hum that some of the runs tell, or else what is stated of it.
 
     Args:
@@ -71,7 +71,7 @@ def hum(t: Array, x: Array, trace: Trace, found: Segmentation, slip: float, main
         t, x: time (s), in even steps, and displacement (m), shape (n,).
         trace, found: the run and its slips.
         slip: usual duration of one (s).
-        mains: what is heard in the campaign.
+        mains: what is detected in the campaign.
     """
     if not mains.frequency:
         return np.zeros_like(x)

@@ -10,7 +10,7 @@ import numpy as np
 from ...data.segment import Segmentation
 from ...data.trace import Trace
 from .kernels import kernels
-from .mains import Hum, heard
+from .mains import Hum, detect_hum
 
 HALF = 3.0  # samples, the least half-width of the test function
 COARSE = 0.15  # of a slip, the largest half-width that still resolves its inertia
@@ -23,7 +23,7 @@ class Scales:
 
     Attributes:
         half: half-width of the test function (s).
-        ring: period of the ringing after an arrest (s); 0 where none is heard.
+        ring: period of the ringing after an arrest (s); 0 where none is detected.
         slip: usual duration of a slip (s).
         hum: of the sensor.
     """
@@ -35,10 +35,10 @@ class Scales:
 
 
 def scales(runs: Sequence[tuple[Trace, Segmentation]], ring: float | None, rate: float) -> Scales:
-    """The times of a campaign: medians over its slips, and the period of the ringing (s) where one is heard."""
+    """The times of a campaign: medians over its slips, and the period of the ringing (s) where one is detected."""
     slip = float(np.median([e.duration for _, s in runs for e in s.events]))
     half = min(ring, slip / 8.0) if ring else slip / 12.0
-    return Scales(max(half, HALF / rate), ring or 0.0, slip, heard(runs, slip))
+    return Scales(max(half, HALF / rate), ring or 0.0, slip, detect_hum(runs, slip))
 
 
 def of_run(times: Scales, trace: Trace, found: Segmentation) -> Scales:

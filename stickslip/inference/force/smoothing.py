@@ -102,7 +102,7 @@ def _squares(slow: Array, fast: Array, gain: Array) -> Array:
 def smoothed(x: Array, noise: float, rate: float, times: Scales, arrests: Array) -> tuple[Array, Array, Smoother]:
     """Displacement and velocity where every sample counts, and how the former is made of the samples.
 
-    At every sample a cubic and a ringing that grows or decays, over two of its periods (where none is heard, a cubic
+    At every sample a cubic and a ringing that grows or decays, over two of its periods (where none is detected, a cubic
     alone). A parabola would give the same displacement and, in a nucleation, a velocity that is a third too large. On
     top of them what a polynomial of the fourth degree over half a period adds, shrunk by as much as noise adds to it in
     squares. The noise of one sample, followed as motion, would be a path that weakens the contact and makes it young; a
