@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inference.diagnose.decide import standard_error
 from ..inference.force.errors import of_all, sums
 from ..inference.force.fit import deviations
-from ..inference.force.heldout import apart, folds, halves, unseen
+from ..inference.force.heldout import folds, halves, heldout_residual, unseen
 from ..system.object_repr import table
 from .fit import Fit
 
@@ -63,7 +63,7 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
     for share, name in zip(shares, order, strict=True):
         fit, worse = fits[name].force_fit, costs[name] - costs[order[0]]
         error, std = of_all(sums(best, fit.marginal, floor))
-        unseen_error, unseen_std = of_all(sums(best, apart(fit), floor))
+        unseen_error, unseen_std = of_all(sums(best, heldout_residual(fit), floor))
         rows[name] = {
             "model": " + ".join(fits[name].parts), "error": error, "error std": std, "unseen error": unseen_error,
             "unseen std": unseen_std, "weight": share, "behind": float(worse.sum()), "+-": standard_error(worse),

@@ -20,7 +20,7 @@ from ..inference.force.backbone import backbone, power_law
 from ..inference.force.errors import Sums, deviation, error, sums
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import deviations
-from ..inference.force.heldout import apart
+from ..inference.force.heldout import heldout_residual
 from ..inference.force.residual import coordinates
 from ..inference.uncertainty import TIED
 from ..physics.effects import catalogue
@@ -434,7 +434,7 @@ class Fit(FittedModel, Savable):
     @cached_property
     def _unseen(self) -> np.ndarray:
         """Residual force on runs that are left out (N), shape (p,)."""
-        return apart(self.force_fit)
+        return heldout_residual(self.force_fit)
 
     @cached_property
     def _floor(self) -> np.ndarray:

@@ -18,7 +18,7 @@ from ..inference.force.candidates import with_start
 from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import at
 from ..inference.force.fit_arrays import fit_arrays, fit_of
-from ..inference.force.heldout import apart
+from ..inference.force.heldout import heldout_residual
 from ..inference.force.problem import Problem
 from ..inference.force.stated_spring import SPRING, with_free_spring
 from ..physics.effects import catalogue
@@ -80,7 +80,7 @@ def unpacked(campaign: Campaign, kept: Mapping[str, Any], load: Callable[[str], 
         found = fit_of(problem, load(row["arrays"]))
         if not ladder:
             ladder.append(Rung(("static",), None, static_residual(found), None, None))
-        residual = apart(found)
+        residual = heldout_residual(found)
         ladder.append(Rung(tuple(row["model"]), row["added"], found.marginal, residual, found, row["removed"]))
     moved = None
     if kept["moved"]:

@@ -87,7 +87,7 @@ def test_a_damping_of_the_contact_that_is_not_there_is_not_seen(fits):
 
     def seen(found):
         explained = Explained(found)
-        _, value, std = explained.singly(explained.apart(signatures(found, effect, [{}]).T))
+        _, value, std = explained.singly(explained.orthogonal(signatures(found, effect, [{}]).T))
         return float(value[0] / std[0])
 
     before, after = (np.mean([seen(pair[i]) for pair in fits]) for i in range(2))

@@ -20,7 +20,7 @@ def test_the_gain_of_a_force_in_unseen_runs_is_predicted(base):
     """Residuals that are nothing but the column: runs say the same of its size, and all of the cost falls."""
     explained = Explained(base)
     column = base.slopes.tangent[:, None] * np.sin(np.arange(base.problem.at.size) / 50.0)[:, None]
-    explained.rest = explained.apart(column)[:, 0]
+    explained.rest = explained.orthogonal(column)[:, 0]
     by_event = (explained.events(explained.rest) ** 2).sum(axis=1)
     assert explained.unseen(column, folds(base)) == pytest.approx(by_event, rel=1e-6)
     assert by_event.sum() == pytest.approx(explained.gain(column)[0], rel=0.02)  # the rest lies along the priors
@@ -36,8 +36,8 @@ def test_a_column_without_a_force_loses_what_its_guess_costs(base):
         noise = rng.standard_normal(rows)
         explained.rest = noise - explained.basis @ (explained.basis.T @ noise)
         column = rng.standard_normal((base.problem.at.size, 1)) * base.slopes.tangent[:, None]
-        apart = explained.events(explained.apart(column)[:, 0])
-        norms = np.array([(apart[part] ** 2).sum() for part in left_out])
+        orthogonal = explained.events(explained.orthogonal(column)[:, 0])
+        norms = np.array([(orthogonal[part] ** 2).sum() for part in left_out])
         lost.append(-explained.unseen(column, left_out).sum())
         wanted.append((norms / (norms.sum() - norms)).sum())
     error = np.std(np.array(lost) - np.array(wanted)) / np.sqrt(len(lost))

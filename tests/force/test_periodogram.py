@@ -34,7 +34,7 @@ def wave(base, frequency, phases):
 def laid_over(base, force):
     """The residuals of a fit with a force taken off the model's."""
     explained = Explained(base)
-    explained.rest = explained.rest - explained.apart(force[:, None])[:, 0]
+    explained.rest = explained.rest - explained.orthogonal(force[:, None])[:, 0]
     return explained
 
 

@@ -41,7 +41,7 @@ def test_a_model_that_makes_room_stays_near_its_optimum(base, tag, size):
     effect = cls(**next(iter(catalogue.forms(cls))))
     null = float(getattr(effect, effect.amplitude))
     (column,) = _columns(base, effect, [{}])
-    left = Explained(base).apart(size * column[:, None])
+    left = Explained(base).orthogonal(size * column[:, None])
     point, share = base.yielding(size * column)
     assert share == 1.0
     problem, free = with_start(base.problem, effect, {effect.amplitude: null + size})

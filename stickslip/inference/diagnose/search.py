@@ -10,7 +10,7 @@ from ...physics.effects import catalogue
 from ...system.progress import Tell
 from ...system.units import shown
 from ..force.fit import Fit, fit
-from ..force.heldout import apart
+from ..force.heldout import heldout_residual
 from ..force.linearised import Array
 from ..force.point import Point
 from ..force.problem import Problem
@@ -32,8 +32,8 @@ class Rung:
     Attributes:
         model: tags of its parts. added: the last of them, None where the ladder begins.
         residual: of the force with all events equal, on the runs it was fitted to (N), shape (p,).
-        unseen: the same of runs left out (:func:`..force.heldout.apart`); None for the static model, which has no fit
-            of its own.
+        unseen: the same of runs left out (:func:`..force.heldout.heldout_residual`); None for the static model, which
+            has no fit of its own.
         fit: None for the static model.
         removed: an effect that is not needed any more with those that came after it.
     """
@@ -48,7 +48,7 @@ class Rung:
     @classmethod
     def of(cls, model: tuple[str, ...], added: str | None, found: Fit, removed: str | None = None) -> Rung:
         """Of a fit."""
-        return cls(model, added, found.marginal, apart(found), found, removed)
+        return cls(model, added, found.marginal, heldout_residual(found), found, removed)
 
 
 class Search:

@@ -16,7 +16,7 @@ from ..fit.serialised import KEY, Fitted, record
 from ..force.composition import PULL
 from ..force.errors import of_all, sums
 from ..force.fit import Fit
-from ..force.heldout import apart
+from ..force.heldout import heldout_residual
 from ..force.jumps import jumps
 from ..force.knots import PHASES
 from ..force.linearised import Array
@@ -184,7 +184,7 @@ def _ranked(j: Judged, done: Round, rung: Rung, d: Diagnosis) -> dict[str, Any]:
         "gain": j.gain,
         "chance": j.chance,
         "train_error": error(fit.marginal, d),
-        "heldout_error": error(apart(fit), d),
+        "heldout_error": error(heldout_residual(fit), d),
         "heldout_gain": total / max(abs(j.gain), 1e-300) if j.gain > 1.0 else 0.0,
         "heldout_gain_std": j.error / max(abs(j.gain), 1e-300) if j.gain > 1.0 else 0.0,
         "heldout_cost": total,

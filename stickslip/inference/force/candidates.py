@@ -174,15 +174,15 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     if not usable.any():
         return Candidate(effect.tag, form, 0.0, None, "it has no effect on this motion")
     members = [m for m, ok in zip(members, usable, strict=True) if ok]
-    apart = explained.apart(columns[usable].T)
-    falls, sizes, errors = explained.singly(apart)
+    orthogonal = explained.orthogonal(columns[usable].T)
+    falls, sizes, errors = explained.singly(orthogonal)
     spec = specs(effect)[effect.amplitude]
     null = spec.null or 0.0
     inside = np.clip(sizes, spec.lower - null, spec.upper - null)
     # a parabola through the promise: what is left of it where the amplitude may not go all the way
     share = np.where(sizes != 0.0, inside / np.where(sizes != 0.0, sizes, 1.0), 0.0)
     falls = falls * (1.0 - (1.0 - share) ** 2)
-    distinct = _distinct(apart, falls)
+    distinct = _distinct(orthogonal, falls)
     starts: list[Start] = []
     for i, times in ((distinct[0], 1.0), *((i, LARGE) for i in distinct if falls[i] > PROMISING)):
         size, least = times * float(inside[i]), 0.3 * float(errors[i])  # at the null itself inner parameters do nothing
@@ -210,9 +210,9 @@ def _plain(base: Fit, explained: Explained, effect: Effect, form: dict[str, str]
     )  # fmt: skip
 
 
-def _distinct(apart: Array, falls: Array) -> list[int]:
+def _distinct(orthogonal: Array, falls: Array) -> list[int]:
     """Members that promise most, each distinct from the ones before it in what it does to the residuals."""
-    unit = apart / (np.sqrt((apart**2).sum(axis=0)) + 1e-300)
+    unit = orthogonal / (np.sqrt((orthogonal**2).sum(axis=0)) + 1e-300)
     chosen: list[int] = []
     for i in np.argsort(-falls).tolist():
         if all(abs(float(unit[:, i] @ unit[:, j])) < SIMILAR for j in chosen):
@@ -301,5 +301,5 @@ def _periodic(base: Fit, explained: Explained, effect: Any, form: dict[str, str]
     start = {effect.periodic[0]: wave.value, effect.amplitude: share * amplitude}
     found = adapted(_begun(base, effect, Start(start, point, wave.phases)))
     # in the mean over runs and phases a wave is seen as each of its two parts is
-    seen = explained.singly(explained.apart(wave.columns.T))[2]
+    seen = explained.singly(explained.orthogonal(wave.columns.T))[2]
     return Candidate(effect.tag, form, wave.fall, found, "", wave.tried, 5.0 * float(np.mean(seen)), start)

@@ -57,7 +57,7 @@ def promise(base: Fit, explained: Explained, tag: str, form: dict[str, str]) -> 
     if not usable.any():
         return nothing
     columns = columns[usable]
-    falls, sizes, errors = explained.singly(explained.apart(columns.T))
+    falls, sizes, errors = explained.singly(explained.orthogonal(columns.T))
     null = spec.null or 0.0
     inside = np.clip(sizes, spec.lower - null, spec.upper - null)
     share = np.where(sizes != 0.0, inside / np.where(sizes != 0.0, sizes, 1.0), 0.0)
@@ -82,7 +82,7 @@ def _wave(base: Fit, explained: Explained, nothing: Promise, effect: Any) -> Pro
     if wave is None or wave.fall <= 0.0:
         return nothing
     force = -wave.amplitude * wave.column(base.problem.run)
-    error = float(np.mean(explained.singly(explained.apart(wave.columns.T))[2]))
+    error = float(np.mean(explained.singly(explained.orthogonal(wave.columns.T))[2]))
     force = explained.left(force[:, None])[:, 0]
     unseen, std = _unseen(base, explained, by_run(base, wave.columns), halves(base))
     return replace(

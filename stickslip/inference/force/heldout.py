@@ -127,7 +127,7 @@ def unseen(fit: Fit, left_out: list[NDArray[np.intp]] | None = None) -> Unseen:
     return Unseen(cost, residual, spread)
 
 
-def apart(fit: Fit) -> Array:
+def heldout_residual(fit: Fit) -> Array:
     """Residual force of runs left out, events equal (N), shape (p,), to be seen over the floor.
 
     It is as much smaller as the deviation of the prediction is larger than the floor: where only one run tells a
@@ -166,10 +166,12 @@ def points(fit: Fit, left_out: list[NDArray[np.intp]]) -> list[Point]:
     equal_events, out = np.zeros_like(fit.point.events), []
     for part in left_out:
         hidden = np.where(np.isin(fit.problem.of, part), fit.known.strength**2, 0.0)  # which takes their weight
-        apart = replace(fit, known=replace(fit.known, dropped=np.maximum(fit.known.dropped, fit.blocks(hidden))))
-        system = Linearised(fit.problem, fit.point, fit.slopes, fit.scatter, Whitening(fit.scatter.sizes, apart.known))
+        reduced = replace(fit, known=replace(fit.known, dropped=np.maximum(fit.known.dropped, fit.blocks(hidden))))
+        system = Linearised(
+            fit.problem, fit.point, fit.slopes, fit.scatter, Whitening(fit.scatter.sizes, reduced.known)
+        )
         change, _, _ = system.step()
         ways = [moved(fit.point, share * change, system.events_after(share * change)) for share in SHARES]
         start = min(ways, key=lambda point: system.objective(point, fit.problem.forces(point)))
-        out.append(replace(refit(fit.problem, start, apart, STEPS).point, events=equal_events))
+        out.append(replace(refit(fit.problem, start, reduced, STEPS).point, events=equal_events))
     return out

@@ -96,7 +96,7 @@ def _wave(base: Fit, explained: Explained, value: float, pair: Array, tried: int
     """The wave of one period; a run that hardly sees it has a phase, and says little of the amplitude."""
     sizes = explained.gain(by_run(base, pair))[1]
     wave = Wave(value, 0.0, sizes[0::2], sizes[1::2], 0.0, pair, tried)
-    (fall,), (size,), (error,) = explained.singly(explained.apart(wave.column(base.problem.run)[:, None]))
+    (fall,), (size,), (error,) = explained.singly(explained.orthogonal(wave.column(base.problem.run)[:, None]))
     return replace(wave, fall=float(fall), amplitude=max(float(size), LEAST * float(error)))
 
 

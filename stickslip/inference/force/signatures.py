@@ -68,7 +68,7 @@ def _at_points(problem: Problem, fit: Fit, found: Sequence[Sequence[Array]], sen
     for run, (q, shift, mass) in zip(problem.runs, found, strict=True):
         n, s = run.t.size, slice(p, p + run.at.size)
         moved = (run.mean @ q[:, :n].T).T - mass[:, None] * run.acceleration
-        if sensed or run.made_with is not None:
+        if sensed or run.force_scale is not None:
             first, second = run.smooth
             moved = moved - values["rig.mass"] * (second @ shift[:, :n].T).T
             moved = moved - values["rig.damping"] * (first @ shift[:, :n].T).T
@@ -128,11 +128,11 @@ class Explained:
         return self.fit.white(self.fit.blocks(columns))
 
     def events(self, rows: Array) -> Array:
-        """Rows of :meth:`apart` without those of the priors, by event, shape (E, n, ...)."""
+        """Rows of :meth:`orthogonal` without those of the priors, by event, shape (E, n, ...)."""
         events = self.fit.problem.events
         return rows[: rows.shape[0] - self.extra].reshape(events, -1, *rows.shape[1:])
 
-    def apart(self, columns: Array) -> Array:
+    def orthogonal(self, columns: Array) -> Array:
         """Columns (p, m) whitened and freed of what the model can do itself."""
         white = np.vstack([self._white(columns), np.zeros((self.extra, columns.shape[1]))])
         return white - self.basis @ (self.basis.T @ white)
@@ -153,15 +153,15 @@ class Explained:
 
     def gain(self, columns: Array) -> tuple[float, Array]:
         """Fall of the cost (chi-square) with the columns, and their coefficients."""
-        apart = self.apart(columns)
-        scale = np.sqrt((apart**2).sum(axis=0)) + 1e-300
-        found, *_ = np.linalg.lstsq(apart / scale, -self.rest, rcond=1e-8)
-        left = self.rest + (apart / scale) @ found
+        orthogonal = self.orthogonal(columns)
+        scale = np.sqrt((orthogonal**2).sum(axis=0)) + 1e-300
+        found, *_ = np.linalg.lstsq(orthogonal / scale, -self.rest, rcond=1e-8)
+        left = self.rest + (orthogonal / scale) @ found
         return float((self.rest**2).sum() - (left**2).sum()), found / scale
 
     def unseen(self, columns: Array, left_out: Sequence[NDArray[np.intp]]) -> Array:
         """Fall of each event's cost with the columns (p, m), their coefficients from the other folds, shape (E,)."""
-        rows, rest = self.events(self.apart(columns)), self.events(self.rest)
+        rows, rest = self.events(self.orthogonal(columns)), self.events(self.rest)
         each, upon = np.einsum("enp,enq->epq", rows, rows), np.einsum("enp,en->ep", rows, rest)
         out = np.zeros(len(rows))
         for part in left_out:
@@ -170,8 +170,8 @@ class Explained:
             out[part] = -(2.0 * upon[part] @ found + np.einsum("epq,p,q->e", each[part], found, found))
         return out
 
-    def singly(self, apart: Array) -> tuple[Array, Array, Array]:
-        """The same for each column of :meth:`apart` by itself: falls, coefficients, their deviations, each (m,)."""
-        norm = (apart**2).sum(axis=0) + 1e-300
-        projected = apart.T @ self.rest
+    def singly(self, orthogonal: Array) -> tuple[Array, Array, Array]:
+        """The same for each column of :meth:`orthogonal` by itself: falls, coefficients, deviations, each (m,)."""
+        norm = (orthogonal**2).sum(axis=0) + 1e-300
+        projected = orthogonal.T @ self.rest
         return projected**2 / norm, -projected / norm, norm**-0.5
