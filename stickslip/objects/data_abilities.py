@@ -101,7 +101,7 @@ def _events(pairs: Pairs, slipping: Pairs) -> Verdict:
 
 
 def _slow_noise(pairs: Pairs, slipping: Pairs) -> Verdict:
-    """A reading that wanders looks like creep; only a record of the block at rest tells the two apart."""
+    """A reading that wanders looks like creep; only a record of the block at rest distinguishes the two."""
     measured = [t for t, _ in slipping if t.displacement is not None]
     stated = [t for t in measured if t.walk or t.hum]
     silent = [t.name for t in measured if not (t.walk or t.hum)]
