@@ -48,7 +48,7 @@ def test_the_block_is_where_the_model_s_spring_has_the_measured_force(name):
     drive = np.asarray(slips.way.drive)
     shown = drive.copy()
     shown[:n] -= GAIN * slips.steps.spring_force / (1.04 * stiffness)
-    way = slips.way._replace(x=shown, made_with=1.04)
+    way = slips.way._replace(x=shown, force_scale=1.04)
     assert np.abs(shown[:n] - slips.steps.x).max() > 1e-6
     found = jax.jit(of_block)(slips.model, way, GAIN)
     np.testing.assert_allclose(found.x[:n], slips.steps.x, atol=1e-12)
@@ -61,7 +61,7 @@ def test_a_sensor_of_the_force_sees_the_elongation():
     t, drive, stretch = slips.way.t, np.asarray(slips.way.drive), slips.steps.spring_force / stiffness
     shown = drive.copy()
     shown[:n] -= 1.03 * stretch
-    way = slips.way._replace(x=shown, v=np.gradient(shown, t), made_with=1.0)
+    way = slips.way._replace(x=shown, v=np.gradient(shown, t), force_scale=1.0)
     gain = solver_motion.with_effects(slips.model, EFFECTS["sensor"][:1])
     np.testing.assert_allclose(jax.jit(of_block)(gain, way, 1.0).x[:n], slips.steps.x, atol=1e-10)
     # of an elongation that grows evenly a low-pass shows what it was a time constant before
@@ -69,7 +69,7 @@ def test_a_sensor_of_the_force_sees_the_elongation():
     even = np.linspace(0.0, 0.1, solver_motion.KNOTS)
     late = solver_motion.with_effects(slips.model, EFFECTS["sensor"][1:])
     way = slips.way._replace(
-        t=even, drive=v * even, x=v * even - v * (even - tau), v=np.zeros_like(even), made_with=1.0
+        t=even, drive=v * even, x=v * even - v * (even - tau), v=np.zeros_like(even), force_scale=1.0
     )
     np.testing.assert_allclose(jax.jit(of_block)(late, way, 1.0).x[1:-1], 0.0, atol=1e-12)
 

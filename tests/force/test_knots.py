@@ -12,7 +12,7 @@ from stickslip.inference.force.kernels import kernels
 from stickslip.inference.force.knots import CREEP, _between, bow, knots
 from stickslip.inference.force.reading import Reading
 from stickslip.inference.force.smoothing import onward
-from stickslip.inference.force.windows import passing
+from stickslip.inference.force.windows import start_of_motion
 
 RATE = 1e4
 
@@ -224,8 +224,8 @@ def test_the_fast_part_begins_where_a_count_is_passed_in_half_a_test_function(co
     """A velocity that grows evenly from rest: passed from where it is a count in so many samples."""
     h, gain = 20, 1e-13  # m a sample, per sample
     x = 0.5 * gain * np.arange(6000.0) ** 2
-    begin = passing(100, 5000, count * np.round(x / count), count, h)
+    begin = start_of_motion(100, 5000, count * np.round(x / count), count, h)
     assert begin == pytest.approx(count / h / gain, rel=0.15)
-    assert passing(100, 5000, x, 0.0, h) == 100  # a sensor without counts
-    assert passing(3000, 5000, x, count, h) == max(3000, begin) or begin > 3000
-    assert passing(5000, 4990, x, count, h) == 5000
+    assert start_of_motion(100, 5000, x, 0.0, h) == 100  # a sensor without counts
+    assert start_of_motion(3000, 5000, x, count, h) == max(3000, begin) or begin > 3000
+    assert start_of_motion(5000, 4990, x, count, h) == 5000

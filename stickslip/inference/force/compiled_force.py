@@ -97,9 +97,9 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
             seen, ahead = jax.jvp(before, (way.v,), (jnp.ones_like(way.v),))
             delay = jnp.sum(ahead.x) / way.x.size  # a reading that is late is taken ahead by its rate
         # how much what is sensed changes where the reading does
-        steps = jnp.diff(way.x if way.made_with is None else way.x - way.drive)
+        steps = jnp.diff(way.x if way.force_scale is None else way.x - way.drive)
         gain = 1.0 + jnp.sum(steps * jnp.diff(seen.x - way.x)) / jnp.sum(steps**2)
-        if way.made_with is not None:
+        if way.force_scale is not None:
             seen = of_spring_force(model, seen, values[SCALE])
         shift = seen.x - way.x
         held = along(model, of_events(seen, event, run.own.of), knots)
@@ -107,8 +107,8 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
         steep = jax.vmap(jax.grad(model.pull))(led - seen.x)
         # what a reading counts for: by the force of the spring, and by the displacement
         creeps, moves = gain * steep, gain * jnp.ones_like(steep)
-        if way.made_with is not None:
-            told = gain * way.made_with / values[SCALE] * model.block.spring_stiffness  # the force itself is read
+        if way.force_scale is not None:
+            told = gain * way.force_scale / values[SCALE] * model.block.spring_stiffness  # the force itself is read
             creeps, moves = told * jnp.ones_like(steep), told / steep
         return (
             (held.pull + way.force + held.body - held.contact, shift, model.mass(), steep, creeps, moves, delay),

@@ -37,7 +37,7 @@ class Way(NamedTuple):
         force: that was measured to pull the block where no spring does (N).
         bend: of the path from the knot before (m), see :class:`~stickslip.physics.effects.base.Motion`; None where
             knots lie so close to each arrest that straight paths do.
-        made_with: measured over true force of the spring with which ``x`` was made of it (1); None where it was
+        force_scale: measured over true force of the spring with which ``x`` was made of it (1); None where it was
             measured.
     """
 
@@ -52,7 +52,7 @@ class Way(NamedTuple):
     load: Any
     force: Any
     bend: Any = None
-    made_with: Any = None
+    force_scale: Any = None
 
 
 class Held(NamedTuple):
@@ -159,7 +159,7 @@ def of_block(model: Model, way: Way, scale: Array, knots: Array | int | None = N
     Arguments as of :func:`undone` and :func:`of_spring_force`.
     """
     way = as_sensed(model, way, knots)
-    return way if way.made_with is None else of_spring_force(model, way, scale)
+    return way if way.force_scale is None else of_spring_force(model, way, scale)
 
 
 def as_sensed(model: Model, way: Way, knots: Array | int | None = None) -> Way:
@@ -168,7 +168,7 @@ def as_sensed(model: Model, way: Way, knots: Array | int | None = None) -> Way:
         return way
     # the measured force, near enough for a sensor that sees it
     force = model.block.spring_stiffness * (way.drive - way.x) + way.force
-    if way.made_with is None:
+    if way.force_scale is None:
         return undone(model, way, force, knots)
     speed = slope(way.drive, way.t)
     way = undone(model, way._replace(x=way.x - way.drive, v=way.v - speed), force, knots)
@@ -209,7 +209,7 @@ def of_spring_force(model: Model, way: Way, scale: Array) -> Way:
         way: its displacement made of the force as it was measured.
         scale: measured over true force (1).
     """
-    stretch = way.made_with / scale * (way.drive - way.x)  # of a linear spring
+    stretch = way.force_scale / scale * (way.drive - way.x)  # of a linear spring
     force = model.block.spring_stiffness * stretch
     pull = jax.vmap(jax.value_and_grad(model.pull))
     for _ in range(NEWTON):

@@ -52,11 +52,11 @@ def run_freely(problem: Problem, point: Point, run: int, cycles: Cycles, events:
     c = problem.composition
     turns = {f.name: np.float64(float(f.scale) * point.phases[j, run]) for j, f in enumerate(c.phases)}
     values = {**{n: np.float64(v) for n, v in problem.values(point).items()}, **turns}
-    own, made_with = problem.runs[run].stiffness, problem.runs[run].made_with
+    own, force_scale = problem.runs[run].stiffness, problem.runs[run].force_scale
     program = _program(tuple(values), jax.tree.structure(c.effects))
     found: Track = program(
         values, problem.common_input(point), np.float64(np.nan if own is None else own),
-        None if made_with is None else np.float64(made_with),
+        None if force_scale is None else np.float64(force_scale),
         np.zeros((np.size(cycles.start), 4)) if events is None else events,
         cycles, FINE,
     )  # fmt: skip
@@ -86,7 +86,7 @@ class _FromLoadPoint(Sensor):
 @lru_cache(maxsize=64)
 def _program(names: tuple[str, ...], structure: Any) -> Program:
     def one_run(
-        values: dict[str, Any], common: CommonInput, own: Any, made_with: Any, events: Any, cycles: Cycles,
+        values: dict[str, Any], common: CommonInput, own: Any, force_scale: Any, events: Any, cycles: Cycles,
         tolerance: Tolerance,
     ) -> Track:  # fmt: skip
         effects = jax.tree.unflatten(structure, common.effects)
@@ -103,9 +103,9 @@ def _program(names: tuple[str, ...], structure: Any) -> Program:
             if PULL in values:
                 begun = jnp.where(cycles.virgin, 0.0, values[PULL] / model.block.spring_stiffness)
             model = eqx.tree_at(lambda m: m.load_point, model, LoadPoint(nodes[0], nodes[1], begun))
-            if made_with is None:
+            if force_scale is None:
                 return model
-            shown = model.block.spring_stiffness * made_with / values[SCALE]
+            shown = model.block.spring_stiffness * force_scale / values[SCALE]
             chain = (_Elongation(model, shown), *model.effects, _FromLoadPoint(model))
             return eqx.tree_at(lambda m: m.effects, model, chain)
 

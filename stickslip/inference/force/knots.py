@@ -27,7 +27,7 @@ from .reading import Reading
 from .sampling import even
 from .scales import Scales
 from .smoothing import Smoother, crept, onward, smoothed, unsteady
-from .windows import apart, edges_of, fast, hasty, passing, thin
+from .windows import fast_samples, joined_windows, knot_samples, nucleation_windows, start_of_motion, window_edges
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -73,7 +73,7 @@ class Knots:
             (m), shape (g, 2).
         walk: random walk of the reading where it is stated (m/s^0.5), else zero.
         step: between samples (s).
-        made_with: measured over true force of the spring with which a displacement was made that was
+        force_scale: measured over true force of the spring with which a displacement was made that was
             not measured (1).
     """
 
@@ -105,7 +105,7 @@ class Knots:
     hum: Array
     walk: float = 0.0
     step: float = 0.0
-    made_with: float | None = None
+    force_scale: float | None = None
 
     @property
     def prescribed(self) -> bool:
@@ -152,21 +152,21 @@ def knots(trace: Trace, found: Segmentation, times: Scales, extra: Array | None 
     n = t.size
     events = found.events
     for e, event in enumerate(events):
-        begin, end = fast(events, e, times, rate, n, t, h)
-        begin = max(passing(begin, event.i_onset - 2 * h, raw, count, h), edge + 1)
-        builder.windows(apart(edges_of(edge, begin, event.i_onset, breaks), raw, step, breaks), e, t, x, d)
+        begin, end = fast_samples(events, e, times, rate, n, t, h)
+        begin = max(start_of_motion(begin, event.i_onset - 2 * h, raw, count, h), edge + 1)
+        builder.windows(joined_windows(window_edges(edge, begin, event.i_onset, breaks), raw, step, breaks), e, t, x, d)
         if end <= begin:
             continue
         onset = min(max(event.i_onset, begin), end)
-        builder.windows(hasty(begin, onset, steady, noise, rate, h), e, t, x, d, speed)
-        builder.samples(thin(onset, end, event, times, rate, h), t, followed, speed, d, events, e)
+        builder.windows(nucleation_windows(begin, onset, steady, noise, rate, h), e, t, x, d, speed)
+        builder.samples(knot_samples(onset, end, event, times, rate, h), t, followed, speed, d, events, e)
         builder.compare(begin + h, end - h, h, t, x, event, e, times, (phi, first, second), noise)
         if edge > 1:
             stretches.append((edge - 1, begin))
         edge = end
     if n - edge > 4 * h:
         last = len(events)
-        builder.windows(apart(edges_of(edge, n, n, breaks), raw, step, breaks), last, t, x, d, speed)
+        builder.windows(joined_windows(window_edges(edge, n, n, breaks), raw, step, breaks), last, t, x, d, speed)
     if edge > 1:
         stretches.append((edge - 1, n))
     later = later_turns(t, x, stretches, times.ring, noise)

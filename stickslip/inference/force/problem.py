@@ -93,11 +93,11 @@ class Problem:
         # quantisation and filters leave a systematic error about as large as the noise of one sample
         systematic = max(float(np.median([k.noise for k in runs])), 1e-12)
         self._hats = np.hstack([hats * ~virgin[:, None], hats * virgin[:, None]])
-        self.hums = np.array([r for r, k in enumerate(runs) if k.hum.any()], int)
+        self.runs_with_hum = np.array([r for r, k in enumerate(runs) if k.hum.any()], int)
         at_points = np.concatenate([k.mean @ (k.reading.displacement @ k.hum) for k in runs])
         self.systematics, self._hums = self._hats.shape[1], self._by_run(at_points)
         self.usual = np.concatenate(
-            [np.full(self.systematics, systematic), np.full(len(runs), LEVEL), np.ones(2 * self.hums.size)]
+            [np.full(self.systematics, systematic), np.full(len(runs), LEVEL), np.ones(2 * self.runs_with_hum.size)]
         )
         walks = np.array([k.walk for k in runs])
         self.walk = float(np.exp(np.log(walks).mean())) if (walks > 0.0).all() else 0.0  # as stated, m/s^0.5
@@ -154,7 +154,7 @@ class Problem:
 
     def _by_run(self, both: Array) -> Array:
         """Sine and cosine, shape (p, 2), apart for every run with hum, shape (p, 2 h)."""
-        own = self.run[:, None] == self.hums
+        own = self.run[:, None] == self.runs_with_hum
         return np.asarray((own[:, :, None] * both[:, None, :]).reshape(self.run.size, -1))
 
     def with_composition(self, composition: Composition) -> Problem:
@@ -329,7 +329,7 @@ class Problem:
             rate, acceleration = run.rate, run.acceleration
             mean, (first, second) = run.mean, run.smooth
             way = mean @ (run.x - run.x[0])
-            sensed = shown or run.made_with is not None
+            sensed = shown or run.force_scale is not None
             if sensed:
                 rate, acceleration = rate + first @ shift[:n], acceleration + second @ shift[:n]
                 way = way + mean @ shift[:n]
@@ -444,7 +444,7 @@ def _padded(k: Knots, n: int, load: float | None) -> Way:
     return Way(
         grown(k.t, 1e-3), grown(k.x), np.concatenate([k.v, np.zeros(n - k.v.size)]), grown(k.drive),
         np.ones(n), np.ones(n), np.zeros(1), np.zeros(n, int), np.ones(n) if load is None else grown(k.load / load),
-        grown(k.force), made_with=None if k.made_with is None else np.float64(k.made_with),
+        grown(k.force), force_scale=None if k.force_scale is None else np.float64(k.force_scale),
     )  # fmt: skip
 
 

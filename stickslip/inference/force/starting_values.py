@@ -106,7 +106,7 @@ def begin(
         free.append(
             log("rig.mass", "kg", mass, mass_width, lightest or mass / 10, heaviest or mass * 10, "mass of the block")
         )
-    made = np.array([k.made_with for k in runs if k.made_with is not None])
+    made = np.array([k.force_scale for k in runs if k.force_scale is not None])
     if made.size:
         scale = float(np.exp(np.mean(np.log(made))))
         free.append(
@@ -124,7 +124,7 @@ def begin(
     yields = reach * np.geomspace(*REACH, elements)
     runs = [replace(k, stiffness=None) if k.stiffness == stiffness else k for k in runs]  # one spring for all of them
     if made.size:  # what one run was set right by more than another stays
-        runs = [k if k.made_with is None else replace(k, made_with=scale) for k in runs]
+        runs = [k if k.force_scale is None else replace(k, force_scale=scale) for k in runs]
     composition = Composition(mass, yields, tuple(free), fixed, (), (nominal, width_nominal))
     problem = Problem(composition, runs)
     flat = np.full(elements, strength / elements)

@@ -17,7 +17,9 @@ SHARE = 0.25  # of a stick that the samples of either end may take
 HASTE = 5.0  # noise levels that the block moves in a window of the nucleation
 
 
-def fast(events: tuple[Event, ...], e: int, times: Scales, rate: float, n: int, t: Array, h: int) -> tuple[int, int]:
+def fast_samples(
+    events: tuple[Event, ...], e: int, times: Scales, rate: float, n: int, t: Array, h: int
+) -> tuple[int, int]:
     """First and last sample around an event that are followed one by one."""
     event = events[e]
     before = event.t_onset - (events[e - 1].t_arrest if e else t[0])
@@ -30,7 +32,7 @@ def fast(events: tuple[Event, ...], e: int, times: Scales, rate: float, n: int, 
     return max(int(begin), 0), min(int(end), n)
 
 
-def passing(low: int, high: int, x: Array, count: float, h: int) -> int:
+def start_of_motion(low: int, high: int, x: Array, count: float, h: int) -> int:
     """First sample from which the block passes a count of the sensor (m) within half a test function (samples).
 
     Before, what rounding adds goes with the position as slowly as what is sought.
@@ -43,7 +45,7 @@ def passing(low: int, high: int, x: Array, count: float, h: int) -> int:
     return low + int(slow[-1]) + 1 if slow.size else low
 
 
-def edges_of(low: int, high: int, onset: int, breaks: Index) -> Index:
+def window_edges(low: int, high: int, onset: int, breaks: Index) -> Index:
     """Edges of the windows between two samples, some evenly and some towards the onset, none shorter than two."""
     if high - low < 4:
         return np.array([low, high])
@@ -59,7 +61,7 @@ def edges_of(low: int, high: int, onset: int, breaks: Index) -> Index:
     return np.array(keep)
 
 
-def apart(edges: Index, x: Array, step: float, breaks: Index) -> Index:
+def joined_windows(edges: Index, x: Array, step: float, breaks: Index) -> Index:
     """Windows joined until the block moves by ``step`` (m) from one to the next: less is the sensor's count.
 
     The mean over a reading that stands still says nothing of where within the count the block is. The drive's
@@ -81,7 +83,7 @@ def apart(edges: Index, x: Array, step: float, breaks: Index) -> Index:
     return np.array(kept)
 
 
-def hasty(low: int, high: int, speed: Array, noise: float, rate: float, h: int) -> Index:
+def nucleation_windows(low: int, high: int, speed: Array, noise: float, rate: float, h: int) -> Index:
     """Edges of the windows of the nucleation: so long that the block's way in one stands out of the noise of its mean.
 
     A reading that goes back by a nanometre of noise unloads every element, as no block in nucleation does.
@@ -95,7 +97,7 @@ def hasty(low: int, high: int, speed: Array, noise: float, rate: float, h: int) 
     return np.array(edges[::-1])
 
 
-def thin(begin: int, end: int, event: Event, times: Scales, rate: float, h: int) -> Index:
+def knot_samples(begin: int, end: int, event: Event, times: Scales, rate: float, h: int) -> Index:
     """Samples that become knots: all where it rings, some of the slip."""
     fine = max(1, round(times.ring * rate / 24.0)) if times.ring else 1
     coarse = max(fine, h // 6, 1)
