@@ -17,7 +17,7 @@ pytestmark = [
     pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver"),
     pytest.mark.slow,
 ]
-CAUGHT = 1.0  # floors: the error on unseen runs with the hidden effect in the model
+CAUGHT = 1.1  # floors: one, and two of its deviations: the error on unseen runs with the hidden effect in the model
 QUICK = 300.0  # ms in which the quickest of some moves is drawn on a machine that does other things too; the aim: 100
 PAUSE = 0.3  # s between two moves
 
