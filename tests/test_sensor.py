@@ -219,9 +219,11 @@ def test_texts_with_units_are_read_as_those_of_a_scenario_file():
 
 
 def test_a_vibrometer_shows_what_was_chosen():
-    assert repr(Vibrometer(drift=-1e-9, dither=True)) == "Vibrometer(drift=-1e-09, dither=True)"
-    chosen = Vibrometer(clears=(0.5,), white=2e-12)
-    assert eval(repr(chosen)) == chosen  # noqa: S307
+    assert repr(Vibrometer()) == "Vibrometer(resolution=7.91 nm)"
+    said = repr(Vibrometer(drift=-1e-9, dither=True, low_pass="0.1 ms", gain=0.01))
+    assert said == "Vibrometer(resolution=7.91 nm, gain=0.01, low_pass=100 µs, drift=-1 nm/s, dither=True)"
+    chosen = Vibrometer(resolution=0.0, clears=(0.5,), white=2e-12)
+    assert repr(chosen) == "Vibrometer(resolution=0 m, clears=(0.5,), white=2 pm/Hz**0.5)"
 
 
 @pytest.mark.parametrize("times", [[0.0, 0.1, 0.5, 0.6], [0.5, 0.1], [0.0, np.nan, 0.2], [1.0, 1.0]])

@@ -10,6 +10,8 @@ import numpy as np
 from scipy.optimize import approx_fprime
 
 from ..errors import InputError, nearest
+from ..system.object_repr import quantity
+from ..system.units import shown_with
 
 if TYPE_CHECKING:
     from .fit import Fit
@@ -27,6 +29,11 @@ class Derived(NamedTuple):
 
     value: Any
     std: Any
+
+    def __repr__(self) -> str:
+        if isinstance(self.value, float) and isinstance(self.std, float):
+            return f"Derived({shown_with(self.value, self.std)})"
+        return f"Derived(shape={np.shape(self.value)}, value={quantity(self.value)}, std={quantity(self.std)})"
 
 
 class _Values(dict[str, float]):

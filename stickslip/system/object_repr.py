@@ -7,6 +7,10 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from .units import ends, shown
+
 if TYPE_CHECKING:
     import pandas
 
@@ -35,6 +39,20 @@ def table(rows: Mapping[str, Mapping[str, Any]], index: str) -> pandas.DataFrame
 
     found = pandas.DataFrame.from_dict({k: dict(v) for k, v in rows.items()}, orient="index")
     return found.rename_axis(index)
+
+
+def quantity(value: Any, unit: str = "1") -> str:
+    """A number with its unit, of an array the least and the largest; ``traced`` where jit or a derivative passes."""
+    import jax
+
+    if isinstance(value, jax.core.Tracer):
+        return "traced"
+    if not isinstance(value, (int, float, np.ndarray, np.number, jax.Array)):
+        return repr(value)
+    found = np.asarray(value, float)
+    if not found.size:
+        return "none"
+    return ends(found, unit) if found.ndim else shown(float(found), unit)
 
 
 def facts(values: Mapping[str, Any]) -> str:

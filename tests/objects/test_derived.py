@@ -70,3 +70,10 @@ def test_a_function_that_cannot_be_used_is_refused_in_words(function, said):
 def test_an_error_of_the_function_itself_is_its_own():
     with pytest.raises(KeyError, match="own"):
         derived(fit(), lambda p: {}["own"])
+
+
+def test_a_derived_quantity_shows_its_deviation_and_an_array_its_ends():
+    assert repr(derived(fit(), lambda p: p["rig.mass"] ** 0 * p["weakening.drop"])) == "Derived(0.2500 ± 0.0020)"
+    assert repr(derived(fit(), lambda p: p["rig.mass"])) == "Derived(0.0894)"
+    many = derived(fit(), lambda p: p["weakening.drop"] * np.array([[1.0, 2.0], [3.0, 4.0]]))
+    assert repr(many) == "Derived(shape=(2, 2), value=0.25 to 1, std=0.002 to 0.008)"

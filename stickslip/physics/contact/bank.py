@@ -15,6 +15,8 @@ from jax.typing import ArrayLike
 
 from ...errors import InputError
 from ...system import jax_settings  # noqa: F401  (before the first array)
+from ...system.object_repr import quantity
+from ._ranges import concrete
 
 Backbone = Callable[[Array], Array]
 
@@ -37,6 +39,18 @@ class Bank(eqx.Module):
         given = jnp.shape(self.stiffness), jnp.shape(self.strength)
         if given[0] != given[1]:
             raise InputError("every element of a bank has a stiffness and a strength", key="bank", value=given)
+
+    def __repr__(self) -> str:
+        own = self.stiffness, self.strength
+        if not all(isinstance(a, np.ndarray | Array) and concrete(a) and np.size(a) for a in own):
+            return f"Bank(stiffness={eqx.tree_pformat(own[0])}, strength={eqx.tree_pformat(own[1])})"
+        k, f = map(np.atleast_1d, map(np.asarray, own))
+        told = {
+            "total_stiffness": quantity(k.sum(axis=-1), "N/m"),
+            "total_strength": quantity(f.sum(axis=-1), "N"),
+            "threshold": quantity(f[k > 0.0] / k[k > 0.0], "m"),
+        }
+        return f"Bank({k.shape[-1]} elements, {', '.join(f'{name}={text}' for name, text in told.items())})"
 
     @property
     def threshold(self) -> Array:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ...errors import InputError
+from ...system.object_repr import quantity
 from ...system.units import to_si
 from .noise import flicker_noise, random_walk, white_noise
 
@@ -94,9 +95,11 @@ class Vibrometer:
             raise InputError("a counter needs a resolution", key="sensor.resolution", allowed="above 0 m")
 
     def __repr__(self) -> str:
-        """What is not as by default."""
-        own = (f"{f.name}={getattr(self, f.name)!r}" for f in fields(self) if getattr(self, f.name) != f.default)
-        return f"{type(self).__name__}({', '.join(own)})"
+        """The resolution, and what is not as by default."""
+        own = {f.name: value for f in fields(self) if (value := getattr(self, f.name)) != f.default}
+        said = {"resolution": self.resolution, **own}
+        text = (f"{name}={quantity(v, _UNITS[name]) if name in _UNITS else repr(v)}" for name, v in said.items())
+        return f"{type(self).__name__}({', '.join(text)})"
 
     @property
     def wrap(self) -> float | None:
