@@ -17,6 +17,7 @@ from jax import Array
 
 from ..errors import InputError
 from .contact import Bank
+from .contact._ranges import in_si
 from .effects.base import (
     BodyForce,
     Contact,
@@ -78,8 +79,8 @@ class LoadPoint(eqx.Module):
     """Piecewise linear displacement of the load point; beyond the last node it goes on at the last velocity.
 
     Attributes:
-        times: nodes (s), shape (n,), increasing, n >= 2.
-        positions: displacement at the nodes (m), shape (n,).
+        times: nodes (s, or texts with a unit), shape (n,), increasing, n >= 2.
+        positions: displacement at the nodes (m, or texts with a unit), shape (n,).
         stretch: elongation of the spring that a record begins with (m); effects on the drive do not see it.
 
     Raises:
@@ -87,8 +88,8 @@ class LoadPoint(eqx.Module):
             not checked.
     """
 
-    times: Array = eqx.field(converter=jnp.asarray)
-    positions: Array = eqx.field(converter=jnp.asarray)
+    times: Array = eqx.field(converter=lambda times: jnp.asarray(in_si(times, "s", key="load_point.times")))
+    positions: Array = eqx.field(converter=lambda places: jnp.asarray(in_si(places, "m", key="load_point.positions")))
     stretch: Any = 0.0
 
     def __check_init__(self) -> None:

@@ -1,5 +1,6 @@
 """Creep curves: averages, virtual time, sweeps equal to loops, derivatives, speed of the end."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,10 +16,12 @@ from stickslip.physics.contact import (
     equal_bodies,
     from_heights,
     indentation,
+    power_law_bank,
     sphere,
     static_contact,
     virtual_time,
 )
+from stickslip.physics.model import LoadPoint
 
 L = 20e-6
 SMALL = {"lines": 6, "n_springs": 512}
@@ -218,7 +221,72 @@ def test_a_curve_shows_its_ends_and_not_its_points():
     curve = creep_curve(RoughLines(lines=2, n_springs=64).contact())
     text = repr(curve)
     assert len(text) < 250 and "400 points; u: 0 m to " in text and "force: 0 N to 260.4 mN" in text
+    assert "260.4 mN (of all contacts)" in text and "kN/m (of one contact)" in text
     assert "n_springs: 64" in text and f"{1e9 * float(curve.u[-1]):.4g} nm" in text
     seen = []
     jax.jit(lambda c: seen.append(repr(c)) or c.u)(curve)
     assert seen == ["CreepCurve(400 points, traced)"]
+
+
+def test_text_with_a_unit_is_the_same_as_its_number_in_si():
+    lines, same = RoughLines(H="0.3", h_rms="2 um", **SMALL), RoughLines(0.3, 2e-6, **SMALL)
+    text = creep_curve(
+        lines.contact("310 mN", "0.21", equal_bodies("210 GPa")), spring_stiffness="1 N/mm", velocity="50 um/s"
+    )
+    number = creep_curve(same.contact(0.31, 0.21, equal_bodies(210e9)), spring_stiffness=1000.0, velocity=5e-5)
+    assert all(np.array_equal(a, b) for a, b in zip(text, number, strict=True))
+    several = same.contact(["310 mN", "0.4 N", *[0.3] * (same.lines - 2)])
+    np.testing.assert_allclose(several.normal_force, [0.31, 0.4, *[0.3] * (same.lines - 2)], rtol=1e-15)
+    point = static_contact(indentation(sphere("0.1 mm", 64, "3 mm")), "300 mN", 0.2)
+    assert float(point.strength) == pytest.approx(0.06, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: RoughLines(**SMALL).contact(normal_force="310 mm"), "normal_force: the unit 'mm' is not one of N"),
+        (lambda: RoughLines(**SMALL).contact(normal_force="310"), "normal_force: the unit is missing"),
+        (lambda: RoughLines(**SMALL).contact(normal_force="-3 mN"), "normal_force: the normal force is out of range"),
+        (lambda: creep_curve(spring_stiffness="1 kg"), "spring_stiffness: the unit 'kg' is not one of N/m"),
+        (lambda: RoughLines(roll_off="2 s"), "roll_off: the unit 's' is not one of m"),
+        (lambda: equal_bodies("210"), "youngs_modulus: the unit is missing"),
+        (lambda: power_law_bank("0.26 N", "0 um", 2.0), "u_max: u_max is out of range"),
+        (lambda: LoadPoint(["0 s", "1 s"], ["0 m", "5 kg"]), "load_point.positions: the unit 'kg' is not one of m"),
+    ],
+)
+def test_a_text_that_cannot_be_a_quantity_is_named_with_its_argument(make, said):
+    with pytest.raises(InputError, match=f"^{said}"):
+        make()
+
+
+def test_traced_quantities_pass():
+    """Checks of ranges and units leave what jit, a derivative or vmap goes through as it is."""
+
+    def reach(force):
+        return RoughLines(n_springs=64, lines=2).contact(force, 0.21).u_max.mean() * force
+
+    value, slope = jax.value_and_grad(reach)(jnp.asarray(0.31))
+    assert float(jax.jit(reach)(0.31)) == pytest.approx(float(value), rel=1e-9) and np.isfinite(slope)
+    strengths = jax.vmap(lambda f: power_law_bank(f, "1 um", 2.0).total_strength)(jnp.array([0.1, 0.2]))
+    np.testing.assert_allclose(strengths, [0.1, 0.2], rtol=1e-9)
+
+
+def test_contacts_and_banks_show_sizes_with_units_and_no_arrays():
+    contact = RoughLines(lines=3, n_springs=64).contact("310 mN")
+    moduli = "Moduli(normal=115.4 GPa, tangential=95.02 GPa)"
+    said = f"StaticContact(normal_force=310 mN, friction=0.21, moduli={moduli}, lines=3, n_springs=64)"
+    bank = power_law_bank("0.26 N", "1 um", 2.0)
+    text = "Bank(128 elements, total_stiffness=518.6 kN/m, total_strength=260 mN, threshold=5.217 nm to 1 µm)"
+    assert (repr(contact), repr(bank), repr(contact.moduli)) == (said, text, moduli)
+    assert "h_rms=1 µm to 2 µm" in repr(RoughLines(h_rms=[1e-6, 2e-6], lines=2))
+    seen = []
+    jax.jit(lambda *parts: seen.extend(map(repr, parts)))(contact, bank)
+    moduli = "Moduli(normal=traced, tangential=traced)"
+    assert seen == [
+        f"StaticContact(normal_force=traced, friction=traced, moduli={moduli}, lines=3, n_springs=64)",
+        "Bank(stiffness=f64[128], strength=f64[128])",
+    ]
+    jax.jit(lambda x: seen.append(repr(contact) + repr(bank)) or x)(1.0)  # known, though within what is traced
+    assert seen[-1] == said + text
+    for part in eqx.partition((contact, bank), lambda leaf: False):
+        assert "StaticContact" in repr(part)

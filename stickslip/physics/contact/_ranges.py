@@ -1,4 +1,4 @@
-"""Range checks that let traced values pass, so that checked functions can still be jitted and differentiated."""
+"""Quantities as a person writes them, and their ranges; traced values pass, to be jitted and differentiated."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from ...errors import InputError
@@ -17,16 +18,16 @@ def concrete(value: object) -> bool:
     return not isinstance(value, jax.core.Tracer)
 
 
-def in_metres(value: Any) -> Any:
-    """A length in m from a number, text with a unit, or a list of either; what is traced passes as it is."""
+def in_si(value: Any, unit: str, *, key: str | None = None) -> Any:
+    """A quantity in SI from a number, text with a unit, or a list of either; what is traced passes as it is."""
     if isinstance(value, str):
-        return to_si(value, "m")
-    return np.array([in_metres(one) for one in value]) if isinstance(value, Sequence) else value
+        return to_si(value, unit, key=key)
+    return jnp.asarray([in_si(one, unit, key=key) for one in value]) if isinstance(value, Sequence) else value
 
 
 def check_within(
     what: str,
-    value: object,
+    value: Any,
     *,
     above: float | None = None,
     least: float | None = None,
@@ -35,21 +36,24 @@ def check_within(
     key: str | None = None,
     unit: str = "",
     hint: str | None = None,
-) -> None:
-    """Raise unless every entry is finite and inside the range: ``above``/``below`` exclude their bound, the others not.
+) -> Any:
+    """The quantity in SI (see `in_si`), every entry finite and inside the range.
+
+    ``above`` and ``below`` exclude their bound, the others not. What is traced is not checked.
 
     Raises:
-        InputError: names the first entry outside and the range.
+        InputError: names the first entry outside and the range, or says why a text cannot be read.
     """
+    value = in_si(value, unit or "1", key=key)
     if not concrete(value):
-        return
+        return value
     entries = np.ravel(np.asarray(value, dtype=float))
     good = np.isfinite(entries)
     for bound, ok in ((above, np.greater), (least, np.greater_equal), (below, np.less), (to, np.less_equal)):
         if bound is not None:
             good &= ok(entries, bound)
     if good.all():
-        return
+        return value
     limits = [("above ", above), ("at least ", least), ("below ", below), ("at most ", to)]
     allowed = ", ".join(f"{word}{bound:g}" for word, bound in limits if bound is not None)
     raise InputError(

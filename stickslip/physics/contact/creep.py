@@ -54,30 +54,32 @@ class CreepCurve(NamedTuple):
         reach = shown_with(float(self.u_max), float(self.u_max_spread), "m")
         return (
             f"CreepCurve({self.tau.size} points; u: {ends(self.u, 'm')}; t: {ends(self.t, 's')}; "
-            f"force: {ends(self.force, 'N')}; u_max: {reach}; stiffness: {shown(float(self.stiffness), 'N/m')}; "
+            f"force: {ends(self.force, 'N')} (of all contacts); u_max: {reach}; "
+            f"stiffness: {shown(float(self.stiffness), 'N/m')} (of one contact); "
             f"contact_share: {float(self.contact_share):.3g}; n_springs: {self.n_springs})"
         )
 
 
 def virtual_time(
-    force: ArrayLike, u: ArrayLike, spring_stiffness: ArrayLike, velocity: ArrayLike, form: TimeForm = "exact"
-) -> Array:
+    force: ArrayLike, u: ArrayLike, spring_stiffness: ArrayLike | str, velocity: ArrayLike | str,
+    form: TimeForm = "exact",
+) -> Array:  # fmt: skip
     """Time in s at which a spring pulled at constant velocity has reached ``force`` (N) on the block, inertia left out.
 
     Args:
         force: tangential force on the block (of all its contacts), N.
         u: displacement of the block, m.
-        spring_stiffness: c_s of the driving spring, N/m.
-        velocity: v0 of the drive, m/s.
+        spring_stiffness, velocity: c_s of the driving spring and v0 of the drive, N/m and m/s or text with a unit.
         form: "exact" F/c_s + u = v0 t; "paper" F = c_s v0 t (Grzemba 2014, eq. 6), which leaves the block's own
             motion out.
     """
     if form not in ("exact", "paper"):
         raise InputError("unknown form of virtual time", value=form, hint=nearest(str(form), ("exact", "paper")))
-    check_within("the stiffness of the driving spring", spring_stiffness, above=0.0, key="spring_stiffness", unit="N/m")
-    check_within("the drive velocity", velocity, above=0.0, key="velocity", unit="m/s")
-    pulled = jnp.asarray(force) / spring_stiffness
-    return (pulled + jnp.asarray(u) if form == "exact" else pulled) / velocity
+    spring = "the stiffness of the driving spring"
+    c_s = check_within(spring, spring_stiffness, above=0.0, key="spring_stiffness", unit="N/m")
+    v0 = check_within("the drive velocity", velocity, above=0.0, key="velocity", unit="m/s")
+    pulled = jnp.asarray(force) / c_s
+    return (pulled + jnp.asarray(u) if form == "exact" else pulled) / v0
 
 
 def default_loads(n: int = 400) -> np.ndarray:
@@ -107,8 +109,8 @@ def line_average(contact: StaticContact, tau: ArrayLike, average: Average = "dis
 def creep_curve(
     contact: StaticContact | None = None,
     *,
-    spring_stiffness: ArrayLike = 1000.0,
-    velocity: ArrayLike = 5e-5,
+    spring_stiffness: ArrayLike | str = 1000.0,
+    velocity: ArrayLike | str = 5e-5,
     contacts: int = 4,
     tau: ArrayLike | None = None,
     average: Average = "displacement",
@@ -121,7 +123,7 @@ def creep_curve(
 
     Args:
         contact: lines (n_lines, N) under one normal force, over which is averaged, or a single one (N,) of any profile.
-        spring_stiffness, velocity: of the drive, N/m and m/s.
+        spring_stiffness, velocity: of the drive, N/m and m/s or text with a unit.
         contacts: how many equal contacts carry the block.
         tau: (T,) loads from 0 to 1; default 400, see `default_loads`.
         average: "displacement" at the same load or "force" at the same displacement, see `line_average`.
@@ -133,8 +135,7 @@ def creep_curve(
     Warns:
         SaturationWarning: lines in contact over more than half of their length.
     """
-    loads = default_loads() if tau is None else tau
-    check_within("the load", loads, least=0.0, to=1.0, key="tau")
+    loads = check_within("the load", default_loads() if tau is None else tau, least=0.0, to=1.0, key="tau")
     check_within("the number of contacts", contacts, least=1.0, key="contacts")
     contact = RoughLines().contact() if contact is None else checked_contact(contact)
     if jnp.ndim(contact.strength) > 0:

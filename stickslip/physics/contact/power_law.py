@@ -8,6 +8,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from ...errors import InputError
+from ._ranges import check_within
 from .bank import Backbone, Bank, bank_from_backbone, default_edges
 
 
@@ -57,17 +58,23 @@ def mixture(backbone: Backbone, spread: ArrayLike, contacts: int) -> tuple[Backb
 
 
 def power_law_bank(
-    strength: ArrayLike, u_max: ArrayLike, p: ArrayLike, spread: ArrayLike = 0.0, contacts: int = 4, n: int = 128
-) -> Bank:
+    strength: ArrayLike | str, u_max: ArrayLike | str, p: ArrayLike, spread: ArrayLike = 0.0, contacts: int = 4,
+    n: int = 128,
+) -> Bank:  # fmt: skip
     """Bank of n elements on the power-law backbone, of one contact or of a mixture of unequal ones.
 
     Args:
-        strength: full friction force of all contacts together, N.
-        u_max: displacement at which the last element of the typical contact slides, m.
+        strength: full friction force of all contacts together, N or text with a unit.
+        u_max: displacement at which the last element of the typical contact slides, m or text with a unit.
         p: exponent of the backbone, above 1.
         spread: rms of ln(u_max) over the contacts (see `mixture`).
         contacts: number of contacts the spread is over; without effect while ``spread`` is zero.
         n: number of elements, whatever the number of contacts.
+
+    Raises:
+        InputError: strength or u_max is not above zero, or no number of contacts or elements.
     """
-    mixed, stretch = mixture(lambda u: power_law_backbone(u, u_max, strength, p), spread, contacts)
-    return bank_from_backbone(mixed, u_max * stretch, default_edges(n))
+    full = check_within("the strength", strength, above=0.0, key="strength", unit="N")
+    end = check_within("u_max", u_max, above=0.0, key="u_max", unit="m")
+    mixed, stretch = mixture(lambda u: power_law_backbone(u, end, full, p), spread, contacts)
+    return bank_from_backbone(mixed, end * stretch, default_edges(n))

@@ -27,26 +27,26 @@ def from_heights(heights: ArrayLike, dx: ArrayLike) -> Profile:
     return Profile(jnp.asarray(jnp.max(heights, axis=-1, keepdims=True) - heights), dx)
 
 
-def power_law(half_width: float, n_springs: int, exponent: ArrayLike, coefficient: ArrayLike) -> Profile:
+def power_law(half_width: float | str, n_springs: int, exponent: ArrayLike, coefficient: ArrayLike) -> Profile:
     """Gap coefficient * abs(x)^exponent on abs(x) < half_width. F_n grows as depth^((exponent + 1)/exponent)."""
-    check_within("the exponent of the profile", exponent, above=0.0, key="exponent")
+    exponent = check_within("the exponent of the profile", exponent, above=0.0, key="exponent")
     x, dx = _grid(half_width, n_springs)
     return Profile(jnp.asarray(coefficient * jnp.abs(x) ** exponent), dx)
 
 
-def sphere(half_width: float, n_springs: int, radius: ArrayLike) -> Profile:
+def sphere(half_width: float | str, n_springs: int, radius: ArrayLike | str) -> Profile:
     """Gap x^2/R, the line that is equivalent to the paraboloid z = r^2/(2R) (method of dimensionality reduction)."""
-    check_within("the radius", radius, above=0.0, key="radius", unit="m")
-    return power_law(half_width, n_springs, 2.0, 1.0 / radius)
+    R = check_within("the radius", radius, above=0.0, key="radius", unit="m")
+    return power_law(half_width, n_springs, 2.0, 1.0 / R)
 
 
-def cone(half_width: float, n_springs: int, slope: ArrayLike) -> Profile:
+def cone(half_width: float | str, n_springs: int, slope: ArrayLike) -> Profile:
     """Gap (pi/2) slope abs(x), the line that is equivalent to the cone z = slope * r."""
-    check_within("the slope of the cone", slope, above=0.0, key="slope")
+    slope = check_within("the slope of the cone", slope, above=0.0, key="slope")
     return power_law(half_width, n_springs, 1.0, 0.5 * np.pi * slope)
 
 
-def flat_punch(half_width: float, n_springs: int) -> Profile:
+def flat_punch(half_width: float | str, n_springs: int) -> Profile:
     """No gap anywhere: all springs touch at once and slide at once."""
     x, dx = _grid(half_width, n_springs)
     return Profile(jnp.zeros_like(x), dx)
@@ -60,7 +60,7 @@ def add_curvature(heights: ArrayLike, dx: ArrayLike, curvature: ArrayLike) -> Ar
 
 
 def heights_from_scan(
-    position: ArrayLike | None, height: ArrayLike, *, spacing: float | None = None, n_springs: int | None = None
+    position: ArrayLike | None, height: ArrayLike, *, spacing: float | str | None = None, n_springs: int | None = None
 ) -> tuple[np.ndarray, float]:
     """A measured scan, made even in spacing and freed of its linear trend.
 
@@ -85,8 +85,7 @@ def heights_from_scan(
     if position is None:
         if spacing is None:
             raise InputError("heights without positions need a spacing", key="spacing", allowed="a length above zero")
-        check_within("the spacing", spacing, above=0.0, key="spacing", unit="m")
-        x = spacing * np.arange(z.size)
+        x = check_within("the spacing", spacing, above=0.0, key="spacing", unit="m") * np.arange(z.size)
     else:
         x = np.asarray(position, dtype=float)
     if x.shape != z.shape:
@@ -106,10 +105,10 @@ def heights_from_scan(
     return z - level - slope * (even - even.mean()), float(even[1] - even[0])
 
 
-def _grid(half_width: float, n_springs: int) -> tuple[Array, float]:
+def _grid(half_width: float | str, n_springs: int) -> tuple[Array, float]:
     """Springs in the middle of equal cells (the midpoint rule is why integrals converge with order 2)."""
-    check_within("the half width", half_width, above=0.0, key="half_width", unit="m")
+    half = check_within("the half width", half_width, above=0.0, key="half_width", unit="m")
     if n_springs < 1:
         raise InputError("a profile needs springs", key="springs", value=n_springs, allowed="1 or more")
-    dx = 2.0 * half_width / n_springs
-    return (jnp.arange(n_springs) + 0.5) * dx - half_width, dx
+    dx = 2.0 * half / n_springs
+    return (jnp.arange(n_springs) + 0.5) * dx - half, dx

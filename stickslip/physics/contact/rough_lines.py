@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -10,19 +12,25 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from ...errors import InputError
-from ...system.units import shown
-from ._ranges import check_within, concrete, in_metres
+from ...system.object_repr import quantity
+from ._ranges import check_within
 from .elastic import Moduli, equal_bodies
 from .indentation import Indentation, indentation
 from .profiles import Profile, from_heights
 from .roughness import check_line, line_phasors, lines_from_phasors
-from .tangential import StaticContact, check_load, static_contact
+from .tangential import StaticContact, checked_load, static_contact
 from .touching import touching
 
-NAMED = {
-    "h_rms": "the rms height", "length": "the length of the line", "roll_off": "the roll-off wavelength",
-    "cut_off": "the cut-off wavelength",
-}  # fmt: skip
+LENGTHS = ("h_rms", "length", "roll_off", "cut_off")
+
+
+def _checked(what: str, key: str, default: float | None, unit: str = "m", below: float | None = None) -> Any:
+    """A field above zero, from a number or text with a unit; None where it is left out."""
+
+    def read(value: Any) -> Any:
+        return None if value is None else check_within(what, value, above=0.0, below=below, key=key, unit=unit)
+
+    return eqx.field(default=default, converter=read, kw_only=default is None)
 
 
 class RoughLines(eqx.Module):
@@ -46,29 +54,25 @@ class RoughLines(eqx.Module):
         InputError: a value out of its range.
     """
 
-    H: ArrayLike = 0.3
-    h_rms: ArrayLike = eqx.field(default=2.46e-6, converter=in_metres)
-    length: ArrayLike = eqx.field(default=20e-6, converter=in_metres)
+    H: ArrayLike = _checked("the Hurst exponent", "H", 0.3, unit="", below=1.0)
+    h_rms: ArrayLike = _checked("the rms height", "h_rms", 2.46e-6)
+    length: ArrayLike = _checked("the length of the line", "length", 20e-6)
     n_springs: int = eqx.field(default=4096, static=True, kw_only=True)
     lines: int = eqx.field(default=100, static=True, kw_only=True)
     seed: int = eqx.field(default=0, static=True, kw_only=True)
-    roll_off: ArrayLike | None = eqx.field(default=None, kw_only=True, converter=in_metres)
-    cut_off: ArrayLike | None = eqx.field(default=None, kw_only=True, converter=in_metres)
+    roll_off: ArrayLike | None = _checked("the roll-off wavelength", "roll_off", None)
+    cut_off: ArrayLike | None = _checked("the cut-off wavelength", "cut_off", None)
 
     def __check_init__(self) -> None:
-        check_line(self.H, self.lines, self.n_springs)
-        for key, value in self._lengths.items():
-            check_within(NAMED[key], value, above=0.0, key=key, unit="m")
+        check_line(self.lines, self.n_springs)
         if jnp.ndim(self.h_rms) > 0 and jnp.shape(self.h_rms) != (self.lines,):
             counts = f"{jnp.size(self.h_rms)} for {self.lines} lines"
             raise InputError("rough lines have one rms height, or each its own", key="h_rms", value=counts)
 
     def __repr__(self) -> str:
-        known = {key: value for key, value in self._lengths.items() if np.ndim(value) == 0}
-        said = [f"{key}={shown(float(np.asarray(v)), 'm') if concrete(v) else 'traced'}" for key, v in known.items()]
-        hurst = f"{float(np.asarray(self.H)):g}" if concrete(self.H) else "traced"
+        said = [f"{key}={quantity(value, 'm')}" for key, value in self._lengths.items()]
         counts = f"n_springs={self.n_springs}, lines={self.lines}, seed={self.seed}"
-        return f"RoughLines(H={hurst}, {', '.join(said)}, {counts})"
+        return f"RoughLines(H={quantity(self.H)}, {', '.join(said)}, {counts})"
 
     @property
     def dx(self) -> ArrayLike:
@@ -86,31 +90,30 @@ class RoughLines(eqx.Module):
         return _table(self.H, self._phasors, self.dx, self._waves).scaled(self.h_rms)
 
     def contact(
-        self, normal_force: ArrayLike = 0.31, friction: ArrayLike = 0.21, moduli: Moduli | None = None
+        self, normal_force: ArrayLike | str = 0.31, friction: ArrayLike = 0.21, moduli: Moduli | None = None
     ) -> StaticContact:
         """Contacts of these lines, pressed and pulled, each with a line of its own.
 
         Springs that this load leaves out of contact are not in its table (see `touching`).
 
         Args:
-            normal_force: of one contact, N; or (lines,) for unequal ones.
+            normal_force: of one contact, N or text with a unit; or (lines,) for unequal ones.
             friction: Coulomb friction coefficient.
             moduli: E* and G*; default steel on steel.
 
         Raises:
             InputError: a value out of its range.
         """
-        normal_force = jnp.asarray(normal_force)
-        check_load(normal_force, friction)
-        elastic = moduli or equal_bodies()
-        load = normal_force / (elastic.normal * jnp.asarray(self.dx) * jnp.asarray(self.h_rms))
+        force, friction = checked_load(normal_force, friction)
+        force, elastic = jnp.asarray(force), moduli or equal_bodies()
+        load = force / (elastic.normal * jnp.asarray(self.dx) * jnp.asarray(self.h_rms))
         table = touching(Profile(_gaps(self.H, self._phasors, self._waves), self.dx), load)
-        return static_contact(table.scaled(self.h_rms), normal_force, friction, elastic)
+        return static_contact(table.scaled(self.h_rms), force, friction, elastic)
 
     @property
     def _lengths(self) -> dict[str, ArrayLike]:
         """What is given in metres."""
-        return {name: value for name in NAMED if (value := getattr(self, name)) is not None}
+        return {name: value for name in LENGTHS if (value := getattr(self, name)) is not None}
 
     @property
     def _phasors(self) -> np.ndarray:

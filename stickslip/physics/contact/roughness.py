@@ -63,9 +63,8 @@ def cut_to_line_factor(H: ArrayLike) -> Array:
     return jnp.exp(0.5 * (0.5 * jnp.log(jnp.pi) + gammaln(H + 1.0) - gammaln(H + 0.5)))
 
 
-def check_line(H: ArrayLike, lines: int, n_springs: int) -> None:
-    """Raise InputError unless H, the number of lines and the number of springs are usable."""
-    check_within("the Hurst exponent", H, above=0.0, below=1.0, key="H")
+def check_line(lines: int, n_springs: int) -> None:
+    """Raise InputError unless the number of lines and the number of springs are usable."""
     if not isinstance(lines, int) or lines < 1:
         raise InputError("no number of rough lines", key="lines", value=lines, allowed="1, 2, 3, ...")
     if not isinstance(n_springs, int) or n_springs < 4 or n_springs % 2:

@@ -6,12 +6,16 @@ term is the normal force at which only the part that still sticks would touch.
 
 from __future__ import annotations
 
+import math
+
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
 from ...errors import ArgumentError
+from ...system.object_repr import quantity
 from ._ranges import check_within
 from .elastic import Moduli, equal_bodies
 from .indentation import Indentation
@@ -33,6 +37,14 @@ class StaticContact(eqx.Module):
     normal_force: ArrayLike
     friction: ArrayLike
     moduli: Moduli
+
+    def __repr__(self) -> str:
+        gaps = np.shape(self.indentation.gaps)
+        lines, springs = math.prod(gaps[:-1]), self.indentation.springs or math.prod(gaps[-1:])
+        return (
+            f"StaticContact(normal_force={quantity(self.normal_force, 'N')}, friction={quantity(self.friction)}, "
+            f"moduli={self.moduli!r}, lines={lines}, n_springs={springs})"
+        )
 
     @property
     def depth(self) -> Array:
@@ -80,11 +92,10 @@ class StaticContact(eqx.Module):
 
 
 def static_contact(
-    table: Indentation, normal_force: ArrayLike, friction: ArrayLike, moduli: Moduli | None = None
+    table: Indentation, normal_force: ArrayLike | str, friction: ArrayLike, moduli: Moduli | None = None
 ) -> StaticContact:
-    """`StaticContact` after a check of the ranges; default moduli: steel on steel."""
-    check_load(normal_force, friction)
-    return StaticContact(table, normal_force, friction, moduli or equal_bodies())
+    """`StaticContact` after a check of the ranges; a force may be text with a unit; default moduli: steel on steel."""
+    return StaticContact(table, *checked_load(normal_force, friction), moduli or equal_bodies())
 
 
 def checked_contact(contact: StaticContact) -> StaticContact:
@@ -95,7 +106,7 @@ def checked_contact(contact: StaticContact) -> StaticContact:
     return contact
 
 
-def check_load(normal_force: ArrayLike, friction: ArrayLike) -> None:
-    """Raise InputError unless normal force (N) and friction coefficient are above zero."""
-    check_within("the normal force", normal_force, above=0.0, key="normal_force", unit="N")
-    check_within("the friction coefficient", friction, above=0.0, key="friction")
+def checked_load(normal_force: ArrayLike | str, friction: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
+    """Normal force (N) and friction coefficient; InputError unless both are above zero."""
+    load = check_within("the normal force", normal_force, above=0.0, key="normal_force", unit="N")
+    return load, check_within("the friction coefficient", friction, above=0.0, key="friction")
