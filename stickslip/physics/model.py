@@ -33,10 +33,10 @@ from .effects.base import (
     Stiffness,
     Threshold,
 )
-from .params import Parametrised, parameter
+from .params import Parametrised, Ranged, parameter
 
 
-class Block(Parametrised):
+class Block(Ranged):
     """The moving body and the spring that pulls it."""
 
     mass: Array = parameter(0.0894, unit="kg", lower=1e-9, upper=1e6, doc="mass of the block", symbol="m")
@@ -48,7 +48,7 @@ class Block(Parametrised):
     )
 
 
-class Weakening(Parametrised):
+class Weakening(Ranged):
     """Lagged weakening of all caps by slip, healing by rest; Coulomb's constant friction in the limit v -> 0."""
 
     ratio: Array = parameter(

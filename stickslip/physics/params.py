@@ -87,9 +87,15 @@ class Parametrised(eqx.Module):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
+        bases = filter(dataclasses.is_dataclass, reversed(cls.__mro__[1:]))
+        inherited = {f.name: f for base in bases for f in dataclasses.fields(base)}
+        again = {name: f for name, f in inherited.items() if "spec" in f.metadata and name not in vars(cls)}
+        for name, field in again.items():  # of its own, for a field knows the name of one class
+            setattr(cls, name, _field(field.metadata["spec"]))
+        cls.__annotations__ = inspect.get_annotations(cls) | {name: field.type for name, field in again.items()}
         for name, made in vars(cls).items():  # fields, of which equinox has not made a data class yet
             if isinstance(made, dataclasses.Field) and "spec" in made.metadata:
-                made.metadata["converter"].key = f"{getattr(cls, 'tag', '') or cls.__name__}.{name}"
+                made.metadata["converter"].key = f"{vars(cls).get('tag') or cls.__name__}.{name}"
 
     def __repr__(self) -> str:
         known = specs(self)
@@ -98,8 +104,15 @@ class Parametrised(eqx.Module):
         return f"{type(self).__name__}({', '.join(text)})"
 
 
+class Ranged(Parametrised):
+    """What is refused where it is made if a value is outside its range, as :func:`check` does."""
+
+    def __check_init__(self) -> None:
+        check(self, where=type(self).__name__.lower())
+
+
 def _said(value: Any, unit: str) -> str:
-    if isinstance(value, Parametrised | tuple):
+    if isinstance(value, eqx.Module | tuple):
         return repr(value)
     number = isinstance(value, (float, np.ndarray, jax.Array)) and not isinstance(value, jax.core.Tracer)
     return shown(float(value), unit) if number and np.ndim(value) == 0 else eqx.tree_pformat(value)
@@ -121,6 +134,10 @@ class _Converter:
         return value
 
 
+def _field(spec: Spec) -> Any:
+    return eqx.field(default=spec.default, converter=_Converter(spec.unit), metadata={"spec": spec})
+
+
 def _described(spec: Callable[P, Spec]) -> Callable[P, Any]:
     def parameter(*args: P.args, **kwargs: P.kwargs) -> Any:
         """A field of a physical class: a 64-bit float with its :class:`Spec`, whose arguments it takes.
@@ -128,8 +145,7 @@ def _described(spec: Callable[P, Spec]) -> Callable[P, Any]:
         Where the class is made, the value is a number in SI or text with a unit; an `InputError` names the parameter if
         that cannot be read.
         """
-        known = spec(*args, **kwargs)
-        return eqx.field(default=known.default, converter=_Converter(known.unit), metadata={"spec": known})
+        return _field(spec(*args, **kwargs))
 
     taken = inspect.signature(spec).replace(return_annotation=Any)
     parameter.__signature__ = taken  # type: ignore[attr-defined]

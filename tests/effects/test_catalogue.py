@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from stickslip.physics.contact import power_law_bank
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.equations import of_model, of_tags
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
+from stickslip.physics.params import specs
 from stickslip.simulation.conformance import check_effect
 from stickslip.simulation.solve import integrate
 
@@ -58,7 +60,7 @@ def test_laws_show_their_values_with_units() -> None:
     model = Model(
         Block(), power_law_bank(0.26, 1e-6, 3.6, n=24), Weakening(), LoadPoint(jnp.arange(2.0), jnp.ones(2)), (effect,)
     )
-    assert repr(Block()) in repr(model) and text in repr(model) and "stiffness=f64[24]" in repr(model)
+    assert repr(Block()) in repr(model) and text in repr(model) and "Bank(24 elements, total_stiffness=" in repr(model)
     lanes = repr(Block(mass=jnp.ones(3)))  # as within vmap, and where it is traced
     assert "mass=f64[3]" in lanes and "damping=10 N s/m" in lanes
     seen: list[str] = []
@@ -275,3 +277,54 @@ def test_parameters_that_can_vanish_are_counted_with_those_of_a_base() -> None:
         pitch: Array = parameter(null=0.0, unit="1", lower=-1.0, upper=1.0, doc="another")
 
     assert (Loud.amplitude, Alone.amplitude, Shrill.amplitude) == ("size", "size", "")
+
+
+def test_a_class_of_ones_own_is_named_by_its_own_name_where_its_parameters_are_inherited() -> None:
+    ageing = catalogue.get("contact-ageing")
+
+    class Slower(ageing):  # type: ignore[misc, valid-type]
+        tag = "slower-ageing"
+
+    class Nameless(ageing):  # type: ignore[misc, valid-type]
+        size: Array = parameter(1.0, unit="m", lower=0.0, upper=2.0, doc="a length")
+
+    class Sled(Block):
+        pass
+
+    for make, said in (
+        (lambda: Slower(onset_time="3 kg"), r"slower-ageing\.onset_time"),
+        (lambda: Nameless(rate="2 s"), r"Nameless\.rate"),
+        (lambda: Nameless(size="2 s"), r"Nameless\.size"),
+        (lambda: Sled(mass="3 s"), r"Sled\.mass"),
+        (lambda: ageing(rate="2 s"), r"contact-ageing\.rate"),
+        (lambda: Block(mass="3 s"), r"Block\.mass"),
+    ):
+        with pytest.raises(InputError, match=f"^{said}: "):
+            make()
+    assert list(specs(Slower)) == list(specs(ageing)) and list(specs(Nameless)) == [*specs(ageing), "size"]
+    assert float(Slower("0.02").rate) == 0.02 and Slower.amplitude == "rate"
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Block(mass="-89 g"), r"(?s)^block\.mass: mass of the block is outside.*-0\.089.*allowed: 1e-09"),
+        (lambda: Block(mass=float("nan")), r"^block\.mass"),
+        (lambda: Block(spring_stiffness=0.0), r"^block\.spring_stiffness"),
+        (lambda: Block(damping=jnp.asarray(-1.0)), r"^block\.damping"),
+        (lambda: replace(Block(), damping="-1 N s/m"), r"^block\.damping"),
+        (lambda: Weakening(slip_distance=np.array([1e-6, -1e-6])), r"^weakening\.slip_distance"),
+        (lambda: type("Sled", (Block,), {})(mass=-1.0), r"^sled\.mass"),
+    ],
+)
+def test_what_cannot_be_is_refused_where_it_is_made(make: Callable[[], object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        make()
+
+
+def test_what_is_traced_is_not_refused_where_it_is_made() -> None:
+    def made(mass: Array) -> Array:
+        return Block(mass=mass).mass
+
+    assert float(jax.jit(made)(-1.0)) == -1.0 and float(jax.grad(made)(-1.0)) == 1.0
+    np.testing.assert_array_equal(jax.vmap(made)(jnp.array([-1.0, 2.0])), [-1.0, 2.0])
