@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from html import escape
 
-from ..errors import StickslipError
+from ..errors import ArgumentError, StickslipError
 
 PATIENCE = 1.0  # s before anything is shown
 LEAST = 0.05  # share of a stage that tells how long the rest takes
@@ -85,7 +85,7 @@ def reporting(title: str, progress: Tell | None) -> Iterator[Tell]:
 
     Work that can be ended from elsewhere, as in the workbench, shows its progress there.
     """
-    progress = _told.get() if progress is None else progress
+    progress = _told.get() if progress is None else _function(progress, "progress")
     if progress is not None:
         yield progress
     elif _asked.get() is None and (_in_notebook() or sys.stderr.isatty()):
@@ -93,6 +93,14 @@ def reporting(title: str, progress: Tell | None) -> Iterator[Tell]:
             yield tell
     else:
         yield silent
+
+
+def _function(tell: Tell, key: str) -> Tell:
+    """What is to be told; an error where that cannot be called."""
+    if not callable(tell):
+        allowed = "a function of a text and the share done (0 to 1), or None"
+        raise ArgumentError("progress is told to a function", key=key, value=tell, allowed=allowed)
+    return tell
 
 
 def _in_notebook() -> bool:
@@ -201,12 +209,15 @@ def progress_to(tell: Tell | None) -> AbstractContextManager[None]:
     Returns:
         What a ``with`` takes; what was before holds again after it. Other threads are not affected.
 
+    Raises:
+        ArgumentError: no function.
+
     Examples:
         >>> import stickslip as ss
         >>> with ss.progress_to(None):
         ...     campaign = ss.load_example()
     """
-    return _within(_told, silent if tell is None else tell)
+    return _within(_told, silent if tell is None else _function(tell, "tell"))
 
 
 def cancellable(asked: Callable[[], bool]) -> AbstractContextManager[None]:

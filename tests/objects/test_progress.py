@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import stickslip as ss
+from stickslip.errors import ArgumentError
 from stickslip.simulation.scenario.demonstration import RIG
 from stickslip.system import progress
 from stickslip.system.progress import cancellable, portion, reporting
@@ -122,3 +123,21 @@ print(seen)
     shown, said = page.cells[0].outputs
     assert shown.data["text/html"] == ""  # taken away
     assert "&lt;work&gt;" in said.text and 'value="0.750"' in said.text and "another" in said.text
+
+
+def test_who_cannot_be_told_is_refused_in_words():
+    with pytest.raises(ArgumentError, match=r"(?s)^tell: progress is told to a function \(got 'x'\).*or None"):
+        ss.progress_to("x")
+    with pytest.raises(ArgumentError, match=r"^progress: .*'x'"):
+        ss.load_campaign(SHIPPED, progress="x")
+
+
+@pytest.mark.parametrize(
+    ("drive", "until"), [(RIG["drive"], lambda steps: steps.x > 1e-7), ({"velocity": 2e-4, "events": 1}, None)]
+)
+def test_the_share_ends_at_one_however_a_run_ends(drive, until):
+    heard = []
+    scenario = ss.make_scenario({**RIG, "drive": drive})
+    ended = ss.simulate(scenario, lambda text, share: heard.append(share), until=until)
+    assert ended.attrs["ended"] == ("complete" if until is None else "until")
+    assert heard == sorted(heard) and heard[-1] == 1.0

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import inspect
+import math
+import re
 from dataclasses import replace
 
 import diffrax
@@ -109,6 +112,7 @@ def test_a_condition_is_met_after_more_steps_than_are_compiled_as_one():
 @pytest.mark.parametrize(
     ("until", "said"),
     [
+        (lambda steps: steps.y > 0.0, r"(?s)until: steps have no field 'y'.*x \(m\).*stored \(J\)"),
         (lambda steps: steps.x - 1e-6, r"until: it must give True or False for each step.*float64"),
         (lambda steps: steps.x[1:] > 1e-6, "must give True or False for each step"),
         (lambda steps: steps.x < 1e-6, "true at the start"),
@@ -309,3 +313,13 @@ def test_a_trajectory_says_what_it_is_and_has_units(first_event):
     assert found.attrs["energy_error"] == first_event.stats.energy_error
     later = first_event.to_xarray([5.0, 99.0])
     assert later.x[0] == first_event.at(np.array([5.0])).x[0] and later.x[1] == s.x[-1]  # beyond its end: the end
+
+
+def test_an_attribute_that_a_condition_lacks_of_something_else_is_its_own_error():
+    with pytest.raises(AttributeError, match="nothing"):
+        integrate(rig(), 1.0, until=lambda steps: math.nothing > steps.x)
+
+
+def test_the_fields_of_steps_are_told_with_their_units():
+    told = inspect.getdoc(Steps)
+    assert all(re.search(rf"\b{name}\b.*:", told) for name in Steps._fields)

@@ -120,8 +120,10 @@ def _run(
         parts.append(part)
         now = float(part.steps.t[-1])
         count = len(find_slips(_joined(parts), setup.motion, setup.contact.strength))
+        over = part.stats.ended == "until" or (wanted is not None and count >= wanted)
+        last = now if over else last
         report(now, part.steps)
-        if part.stats.ended == "until" or (wanted is not None and count >= wanted):
+        if over:
             break
     whole = _joined(parts)
     return whole, find_events(whole, setup.motion, setup.contact.strength), now

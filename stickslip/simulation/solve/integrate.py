@@ -19,7 +19,7 @@ from ...physics.params import check
 from ...system.trace_cache import Program, of_this_package
 from .limits import PIECE, SMALLEST_STEP
 from .tolerance import Tolerance
-from .trajectory import Stats, Steps, Trajectory, energy_error
+from .trajectory import UNITS, Stats, Steps, Trajectory, energy_error
 
 LEAST_ADVANCE = 4e-2  # of the contact's period in PIECE steps; the tightest tolerance takes a hundred times as much
 ZOOMS = 3  # into a hundredth of a step each, to find where a condition turns true
@@ -86,7 +86,7 @@ def integrate(
     Raises:
         InputError: mass, spring, damping, weakening or an element of the contact is outside its range; the end is not
             after the start, the longest step is not positive, the state is that of a model of another form, or
-            ``until`` is true at the start or does not give True or False for each step.
+            ``until`` is true at the start, asks for what steps do not have, or does not give True or False for each.
         SolveError: the steps became too small to get anywhere or a number was lost; says when and what to change, and
             has the motion up to there as its ``trajectory``.
     """
@@ -158,7 +158,14 @@ def _turns(until: Callable[[Steps], Any], steps: Steps) -> float | None:
     """Time (s) at which a condition first turns true; None where it does not."""
 
     def holds(steps: Steps) -> np.ndarray:
-        found = np.asarray(until(steps))
+        try:
+            found = np.asarray(until(steps))
+        except AttributeError as error:
+            if not isinstance(error.obj, Steps):
+                raise
+            fields = ", ".join(f"{name} ({UNITS.get(name, 'J')})" for name in Steps._fields)
+            what = f"steps have no field '{error.name}'"
+            raise ArgumentError(what, key="until", allowed=fields) from None
         if found.dtype != bool or found.shape not in ((), steps.t.shape):
             what, allowed = "it must give True or False for each step", "such as  lambda steps: steps.x > 1e-4"
             raise ArgumentError(what, key="until", value=f"{found.dtype} {found.shape}", allowed=allowed)

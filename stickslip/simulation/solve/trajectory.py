@@ -18,8 +18,16 @@ if TYPE_CHECKING:
 class Steps(NamedTuple):
     """Accepted steps, the start included; every field has shape (n,).
 
-    Units: s, m, m/s, m, N, N, 1, 1, and J for the energies (done by the spring; lost in friction; lost in viscous
-    damping; given by effects; stored, kinetic energy included).
+    Attributes:
+        t: time (s).
+        x, v: displacement (m) and velocity (m/s) of the block.
+        reading: displacement that the sensor shows (m).
+        spring_force, contact_force: pull of the driving spring, force of all contacts that holds the block back (N).
+        psi: weakening state, 1 rested ... 0 fully weakened.
+        sliding: share of the contact's strength that slides (1).
+        spring_work, friction_work, viscous_work, body_work: energy since the start (J) done by the spring, lost in
+            friction, lost in viscous damping, given by effects.
+        stored: energy in motion and in the elements (J).
     """
 
     t: Any
