@@ -72,7 +72,7 @@ class Campaign(Shown, Mapping[str, Trace]):
             InputError: no trace, two of one name, a key or value of the rig that cannot be used.
         """
         if not traces:
-            raise InputError("a campaign needs at least one trace")
+            raise InputError("a campaign needs at least one run", key="traces", hint="ss.Trace.from_arrays makes one")
         _load_effects(effect_files)
         described = files.described([t.name for t in traces], rig or {}, title)
         own = [_with_spring(t, described) for t in traces]
@@ -108,7 +108,7 @@ class Campaign(Shown, Mapping[str, Trace]):
             return found
         hint = nearest(name, self.names) if isinstance(name, str) else "by number: campaign.traces[0]"
         allowed = None if isinstance(name, str) else ", ".join(self.names)
-        raise InputError(f"there is no trace {name!r}", file=self._file, allowed=allowed, hint=hint)
+        raise InputError(f"there is no run {name!r}", file=self._file, allowed=allowed, hint=hint)
 
     def get(self, name: str, default: Any = None) -> Any:
         """The run of that name, or the default where there is none."""
@@ -133,7 +133,7 @@ class Campaign(Shown, Mapping[str, Trace]):
         """
         kept = self._named(names)
         if not kept:
-            raise InputError("a campaign needs at least one trace", key="names", allowed=", ".join(self.names))
+            raise InputError("a campaign needs at least one run", key="names", allowed=", ".join(self.names))
         return self._of(trace for trace in self.traces if trace.name in kept)
 
     def without(self, *names: str | Sequence[str]) -> Campaign:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, nearest
+from ..errors import ArgumentError, InputError, nearest
 from ..inference.forecast.coordinate_text import steps, told
 from ..inference.forecast.known_record import Past
 from ..inference.forecast.levels import levels, wandering
@@ -173,7 +173,7 @@ def forecast(
     """
     number = _chosen(campaign, run)
     if at is not None and not at >= 0.0:
-        raise InputError("a moment before the stick begins", key="at", value=at, allowed="0 or more")
+        raise ArgumentError("a moment before the stick begins", key="at", value=at, allowed="0 or more")
     if out is None:
         with reporting("forecasting", progress) as tell:
             return _forecast(campaign, number, train, at, Kept(), tell)
@@ -242,7 +242,7 @@ def _chosen(campaign: Campaign, run: str | None) -> int:
     if run is None:
         return most_slips(campaign)
     if run not in campaign.names:
-        raise InputError(f"there is no trace '{run}'", key="run", hint=nearest(run, campaign.names))
+        raise ArgumentError(f"there is no run '{run}'", key="run", hint=nearest(run, campaign.names))
     return campaign.names.index(run)
 
 

@@ -17,7 +17,7 @@ from scipy.stats import norm, t, truncnorm
 import stickslip as ss
 from stickslip.cli import run
 from stickslip.data.trace import Trace
-from stickslip.errors import InputError
+from stickslip.errors import ArgumentError, InputError
 from stickslip.inference.forecast.known_record import Past
 from stickslip.inference.forecast.predict import (
     MEMBERS,
@@ -407,15 +407,20 @@ def test_parts_of_another_forecast_are_not_taken_up(tmp_path):
     [
         (["--train", "1.5"], "between 0 and 1"),
         (["--train", "0.01"], "slips in the part for training"),
+        (["--train", "0.999"], "no slip after the part for training is left"),
         (["--at", "-1"], "before the stick begins"),
         (["--at", "50"], "no slip after the part for training is left"),
         (["--run", "sow"], "did you mean 'saw'"),
     ],
 )
-def test_bad_input_is_told_in_words(tmp_path, capsys, options, said):
-    path = write(tmp_path, record(60, 7))
+def test_bad_input_is_told_in_words_by_its_option_and_in_python_by_its_argument(tmp_path, capsys, options, said):
+    path, (option, value) = write(tmp_path, record(60, 7)), options
     assert run(["forecast", path, *options]) == 2
-    assert said in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert said in told and f"{option}: " in told
+    name = option.removeprefix("--")
+    with pytest.raises(ArgumentError, match=rf"(?s)(^|: ){name}: .*{said}"):
+        ss.load_campaign(path).forecast(**{name: value if name == "run" else float(value)})
 
 
 def test_too_few_slips_are_told(tmp_path, capsys):

@@ -80,7 +80,7 @@ def test_what_cannot_be_told_is_said(trace):
 def test_a_campaign_gives_levels(trace):
     campaign = ss.Campaign.from_traces([trace])
     assert campaign.levels().sizes == levels(trace, segment(trace)).sizes
-    with pytest.raises(InputError, match="no trace 'other'"):
+    with pytest.raises(InputError, match="no run 'other'"):
         campaign.levels("other")
 
 

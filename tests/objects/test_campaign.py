@@ -64,9 +64,9 @@ def test_some_of_its_runs_are_a_campaign_with_the_same_rig(campaign):
     for make, said in (
         (lambda: campaign.only("v10"), "did you mean 'v100'"),
         (lambda: campaign.without("hold"), "did you mean 'holds'"),
-        (lambda: campaign.only(), "at least one"),
+        (lambda: campaign.only(), "at least one run"),
         (lambda: campaign.without(*NAMES), "no run is left"),
-        (lambda: some["v050"], "there is no trace"),
+        (lambda: some["v050"], "there is no run 'v050'"),
     ):
         with pytest.raises(InputError, match=said):
             make()

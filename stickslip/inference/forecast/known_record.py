@@ -15,7 +15,7 @@ from ...data.segment import Event, Segmentation, Settings, block_motion, positio
 from ...data.segment.find_slips import directions, half_of, pick
 from ...data.segment.kinematics import loading_rate
 from ...data.trace import Trace
-from ...errors import InputError
+from ...errors import ArgumentError, InputError
 from .levels import Scale, level_arrays, scale_of
 
 Array = NDArray[np.float64]
@@ -52,8 +52,8 @@ class Past:
             InputError: a share that leaves nothing of either part, or neither load point nor force is known.
         """
         if not 0.0 < share < 1.0:
-            raise InputError("the part for training must leave something to forecast", key="train", value=share,
-                             allowed="between 0 and 1")  # fmt: skip
+            raise ArgumentError("the part for training must leave something to forecast", key="train", value=share,
+                                allowed="between 0 and 1")  # fmt: skip
         split = float(trace.time[0] + share * (trace.time[-1] - trace.time[0]))
         train = _until(trace, split)
         learned = segment(train)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import ArgumentError
 from .known_record import Past
 from .loading import Curves, after_turn
 from .wander import ARREST, FEWEST, KEYS, ONSET, Component, Coordinate, Filter, Nearby, Wander, fit
@@ -302,12 +302,12 @@ def training_slips(past: Past) -> int:
     """How many slips are over within the part for training.
 
     Raises:
-        InputError: too few.
+        ArgumentError: too few.
     """
     number = int(np.sum(past.known <= past.split))
     if number < FEWEST:
-        raise InputError(
-            f"trace '{past.trace.name}' has {number} slips in the part for training", allowed=f"{FEWEST} or more",
-            hint="a longer record, a larger share for training, or a smaller 'minimum_slip'",
+        raise ArgumentError(
+            f"trace '{past.trace.name}' has {number} slips in the part for training", key="train",
+            allowed=f"{FEWEST} or more", hint="a larger share, a longer record, or a smaller 'minimum_slip'",
         )  # fmt: skip
     return number

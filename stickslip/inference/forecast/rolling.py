@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import ArgumentError, InputError
 from ...system.progress import Tell
 from .known_record import Past
 from .predict import METHODS, Compared, Forecaster, training_slips
@@ -109,7 +109,7 @@ def roll(past: Past, law: Wander, at: float | None = None, progress: Tell | None
     A moment within a slip, or in a stick whose slip the record does not hold, is left out.
 
     Raises:
-        InputError: no moment is left.
+        ArgumentError: no moment is left.
     """
     forecaster = Forecaster(past, law, rise)
     onsets, time = past.arrays["time_onset"], past.trace.time
@@ -136,9 +136,10 @@ def roll(past: Past, law: Wander, at: float | None = None, progress: Tell | None
         if progress is not None:
             progress(f"forecasts of {past.trace.name}", n / wanted.size)
     if not kept:
-        raise InputError(
+        raise ArgumentError(
             f"trace '{past.trace.name}': no slip after the part for training is left to be forecast",
-            hint="a smaller share for training, or an earlier moment (at)",
-        )
+            key="train" if at is None else "at", value=at,
+            hint="a smaller share for training" if at is None else "an earlier moment, or a smaller share for training",
+        )  # fmt: skip
     samples, slips, truth = zip(*kept, strict=True)
     return Rolled(np.array(samples), np.array(slips), np.array(truth), members)
