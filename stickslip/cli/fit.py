@@ -152,7 +152,8 @@ def _text(result: dict[str, Any], out: Path | None) -> str:
             ]
             for step in ladder
         ]
-        lines += ["", show.table(["model", "error", "on unseen runs", *phases], rows)]
+        lines += ["", "Errors in floors of the last model (1: as good as noise and scatter allow)"]
+        lines += [show.table(["model", "error", "on unseen runs", *phases], rows)]
         lines += [*_gains_of_effects(result["gains"]), *result["caution"]]
     if result.get("parameters"):
         rows = [

@@ -33,7 +33,15 @@ from ..system.runstore import Run
 from .fit_arrays import backbone_curve, contact_force, parameter_covariance, residual_deviation, rough_lines
 from .fit_plots import FitPlots
 from .fit_result import fit_result
-from .fit_tables import STRENGTH, correlation_table, error_table, ladder_table, parameter_table, statistics_of
+from .fit_tables import (
+    STRENGTH,
+    correlation_table,
+    error_table,
+    ladder_table,
+    origins,
+    parameter_table,
+    statistics_of,
+)
 from .fitted_model import FittedModel
 from .free_cycles import free_run_errors, simulated_cycles
 from .parameters_by_hand import intervals, moved, profile, refitted
@@ -46,6 +54,11 @@ if TYPE_CHECKING:
     from .campaign import Campaign
     from .derived import derived as _derived
     from .posterior import sample as _sample
+
+FLOOR = (
+    "Errors are in floors of this model: 1 is as good as noise and its own scatter allow, of which a wrong model has "
+    "more. Models are compared in floors of one of them: ladder, ss.compare."
+)
 
 
 class Fit(FittedModel, Savable):
@@ -179,9 +192,10 @@ class Fit(FittedModel, Savable):
 
         Those of several fits are a table, ``pandas.DataFrame({"base": base.statistics, "aged": aged.statistics})``.
 
-        ``points`` are those in use, of so many ``events``. ``parameters`` are the free ones of :attr:`parameters`;
-        ``effective parameters`` are all that the data determine, elements of the contact included, priors taken off;
-        ``sizes`` of noise, misfit and scatter are estimated besides. ``evaluations`` of the model led to the last one.
+        ``points`` are those in use, of so many ``events``. ``free parameters`` are the fitted ones of
+        :attr:`parameters`, where others are given or measured; ``effective parameters`` are all that the data
+        determine, elements of the contact included, priors taken off; ``sizes`` of noise, misfit and scatter are
+        estimated besides. ``evaluations`` of the model led to the last one.
         ``cost`` is -2 log-likelihood and priors. The likelihood lacks log(2 pi) for each point; an outlier stays in it,
         with the strength of the contact as its deviation.
 
@@ -450,19 +464,17 @@ class Fit(FittedModel, Savable):
         finish(run, self)
 
     def _parts(self) -> list[Any]:
+        unseen = f"{self.unseen_error:.3g}" if np.isfinite(self.unseen_error) else "none, with one event only"
         what = {
             "campaign": self.campaign.title,
             "model": " + ".join(self.parts),
-            "error": f"{self.error:.3g} floors",
-            "on unseen runs": f"{self.unseen_error:.3g}"
-            if np.isfinite(self.unseen_error)
-            else "none, with one event only",
+            "error": f"{self.error:.3g} floors of this model on fitted runs, {unseen} on unseen runs",
             "parameters": "set by hand" if self.by_hand else None,
         }
         rows = self.correlations.itertuples(index=False)
         tied = ", ".join(f"{one} and {other} ({r:.2f})" for one, other, r in rows if abs(r) > TIED)
-        table = self.parameters[["value", "std", "unit"]]
-        return [facts(what), table, *([f"determined only together: {tied}"] if tied else []), self.errors]
+        table = self.parameters[["value", "std", "unit"]].assign(origin=origins(self.parameters))
+        return [facts(what), FLOOR, table, *([f"determined only together: {tied}"] if tied else []), self.errors]
 
 
 @contextmanager

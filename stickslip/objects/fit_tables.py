@@ -46,6 +46,11 @@ def parameter_table(fit: Fit) -> pandas.DataFrame:
     return table(rows, "parameter")
 
 
+def origins(parameters: pandas.DataFrame) -> pandas.Series:
+    """Of what was made by :func:`parameter_table`: whether each was given, measured or fitted."""
+    return parameters.prior.where(parameters.prior.isin(["given", "measured"]), "fitted")
+
+
 def correlation_table(fit: Fit) -> pandas.DataFrame:
     """See :attr:`stickslip.Fit.correlations`."""
     names, covariance = fit.covariance.parameter.values.tolist(), fit.covariance.values
@@ -67,7 +72,7 @@ def statistics_of(fit: Fit) -> pandas.Series:
     rows = {
         "points": points,
         "events": events,
-        "parameters": len(fit.free),
+        "free parameters": len(fit.free),
         "effective parameters": number,
         "sizes": found.scatter.sizes.size,
         "evaluations": found.evaluations,
@@ -78,7 +83,7 @@ def statistics_of(fit: Fit) -> pandas.Series:
         "AIC": unlikely + 2.0 * counted,
         "BIC": unlikely + np.log(events) * counted,
     }
-    return pandas.Series(rows, name="value", dtype=float).rename_axis("statistic")
+    return pandas.Series(rows, name="value", dtype=object).rename_axis("statistic")  # counts remain whole numbers
 
 
 def error_table(fit: ForceFit, found: Sums, measure: Callable[[np.ndarray, np.ndarray], float]) -> pandas.DataFrame:

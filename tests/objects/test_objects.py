@@ -117,7 +117,7 @@ def test_statistics_are_those_of_independent_residuals_and_determined_parameters
     data, found, told = base.force, base.force_fit, base.statistics
     assert told["points"] == (~data.left_out).sum()
     assert told["events"] == len(set(zip(data.run.values.tolist(), data.event.values.tolist(), strict=True)))
-    assert told["parameters"] == len(base.free) and told["evaluations"] == found.evaluations
+    assert told["free parameters"] == len(base.free) and told["evaluations"] == found.evaluations
     # the events' own as they are found, not marginalised
     squares = found._system.plain.squares(found.blocks(found.residual), found.point.events)
     assert told["chi-square"] == pytest.approx(squares, rel=1e-4)
@@ -132,9 +132,21 @@ def test_statistics_are_those_of_independent_residuals_and_determined_parameters
     assert told["AIC"] == pytest.approx(told["-2 log-likelihood"] + 2.0 * counted)
     assert told["BIC"] == pytest.approx(told["-2 log-likelihood"] + np.log(told["events"]) * counted)
     better = aged.statistics - told
-    assert better["parameters"] == 4 and better["AIC"] < better["BIC"] < -1000.0
+    assert better["free parameters"] == 4 and better["AIC"] < better["BIC"] < -1000.0
     off = aged.with_values({"weakening.drop": 1.02 * aged.values["weakening.drop"]}).statistics
     assert 0.8 < aged.statistics["reduced chi-square"] < 1.2 and off["reduced chi-square"] > 2.0
+
+
+def test_a_printed_fit_says_in_whose_floors_its_error_is_and_which_parameters_were_fitted(base, aged):
+    """The same base has an error of 1.3 of its own floors, and of 2.8 of those of a better model."""
+    for text in (repr(base), base._repr_html_()):
+        assert f"error: {base.error:.3g} floors of this model on fitted runs, {base.unseen_error:.3g} on unseen" in text
+        assert "Models are compared in floors of one of them: ladder, ss.compare" in text
+        assert text.count("fitted") == 1 + len(base.free) and "given" in text and "measured" in text
+    assert aged.ladder["error"].iloc[1] > 1.5 * base.error
+    whole = ["points", "events", "free parameters", "sizes", "evaluations"]
+    assert all(isinstance(base.statistics[name], int) for name in whole)
+    assert repr(base.statistics[["free parameters"]]).splitlines()[1].endswith(f" {len(base.free)}")
 
 
 def test_a_fit_comes_back_from_where_a_hand_left_it(base):
