@@ -16,7 +16,7 @@ from .free_panel import Free
 from .parameter_sliders import Knob, given, knobs, rows
 from .selection import choose, cycles, selected
 from .session import Session, watch
-from .widgets import Knobs, Message, Words, button, field
+from .widgets import NATURAL, Knobs, Message, Words, button, field
 
 
 def page(session: Session) -> Any:
@@ -25,7 +25,7 @@ def page(session: Session) -> Any:
     cycle = Cycle(session)
     error_map = ErrorMap(session)
     free = Free(session)
-    left = pn.Column(buttons, sliders, width=350, sizing_mode="fixed", margin=(8, 12, 0, 0))
+    left = pn.Column(buttons, sliders, width=350, margin=(8, 12, 0, 0))
     below = pn.Row(pn.Column(cycle.creep, free.figure, free.words), pn.Column(error_map.kind, error_map.figure))
     return pn.Row(left, pn.Column(cycle.chooser, cycle.force, cycle.residual, below, margin=(8, 0, 0, 0)))
 
@@ -46,7 +46,7 @@ def _buttons(session: Session) -> Any:
         found["Base"].disabled = session.at <= 0
 
     watch(session, ["steps", "at", "busy", "campaign"], update, now=True)
-    return pn.Row(*found.values(), sizing_mode="fixed")
+    return pn.Row(*found.values(), **NATURAL)
 
 
 def _sliders(session: Session) -> Knobs:

@@ -18,7 +18,7 @@ from .file_names import new_place
 from .new_run import CHANNELS, FOLDER, NONE, VELOCITY, Choice, add, create, entry_text, guess, look
 from .page_parts import Table, head, progress
 from .session import Session, watch
-from .widgets import Words, button, field
+from .widgets import NATURAL, Words, button, field
 
 LARGEST = 500  # MB of a file
 ROWS = 3  # of the file that are shown
@@ -118,13 +118,12 @@ class Form:
         self.add = button("Add the run", self.send, 140, margin=(12, 0))
         self.said = Words()
         self._first = Table()
-        fixed = {"sizing_mode": "fixed"}
-        rows = [pn.Row(self.columns[n], self.units[n], **fixed) for n in CHANNELS]
+        rows = [pn.Row(self.columns[n], self.units[n], **NATURAL) for n in CHANNELS]
         more = (self.rate, self.velocity, self.resolution, self.virgin)
         last = (*self._asked_besides(), self.stored, self.run, self.add)
         self._asked = pn.Column(
             self._first,
-            pn.FlexBox(*(pn.Column(*part, **fixed) for part in (rows[:3], rows[3:], more, last)), gap="0 12px"),
+            pn.FlexBox(*(pn.Column(*part, **NATURAL) for part in (rows[:3], rows[3:], more, last)), gap="0 12px"),
             visible=False,
         )  # fmt: skip
         self.view = pn.Column(

@@ -20,19 +20,20 @@ BUTTON = """
 :host(.solid) .bk-btn-group .bk-btn.bk-btn-default.bk-active { background: var(--wb-accent); color: var(--wb-surface); }
 """
 GAP = (0, 10, 0, 0)  # pixels beside what stands in a row
+NATURAL = {"sizing_mode": None}  # of a row or column: as large as its parts; "fixed" would need a width and a height
 Message = dict[str, Any]
 
 
 def button(name: str, call: Callable[[], Any], width: int, **more: Any) -> pn.widgets.Button:
     """A button of that width (pixels) that calls a function; ``more`` as of Panel's own."""
-    made = pn.widgets.Button(name=name, width=width, sizing_mode="fixed", stylesheets=[BUTTON], **more)
+    made = pn.widgets.Button(name=name, width=width, stylesheets=[BUTTON], **more)
     made.on_click(lambda event: call())
     return made
 
 
 def field(kind: type, name: str, width: int, **more: Any) -> Any:
     """A widget of a kind of Panel's, of that width (pixels); ``more`` as of its own."""
-    return kind(name=name, width=width, sizing_mode="fixed", **{"margin": GAP, **more})
+    return kind(name=name, width=width, **{"margin": GAP, **more})
 
 
 def static(*names: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import io
 import re
 import urllib.error
 import urllib.request
@@ -11,7 +12,9 @@ from types import SimpleNamespace
 import numpy as np
 import panel as pn
 import pytest
+from bokeh.resources import INLINE
 
+import stickslip.workbench
 from stickslip.inference.fit.parameters import effect_parameters
 from stickslip.inference.force.candidates import every_form, try_effect
 from stickslip.inference.force.first_order import promise
@@ -89,6 +92,12 @@ def test_the_pages_are_made_and_follow(session, base):
     assert model is not None and missing is not None
     session.by_hand({"weakening.drop": base.values["weakening.drop"] * 1.02})
     session.undo()
+
+
+def test_a_saved_view_and_every_page_give_bokeh_the_sizes_that_it_asks_for(session, base, caplog):
+    for made in (stickslip.workbench.view(base), *(app.module(name).page(session) for name in app.TITLES)):
+        made.save(io.StringIO(), resources=INLINE)
+    assert not [record.message for record in caplog.records if "SIZING" in record.message]
 
 
 def test_the_slip_is_run_freely_and_follows_the_model(session, base):
