@@ -61,9 +61,6 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         *_symbols(cls),
         *(prose(text) for text in re.split(r"\n\s*\n", inspect.cleandoc(cls.__doc__ or ""))),
         f"**Acts on** {' and '.join(acting)}.{memory}",
-        "## Parameters",
-        *_parameters(cls),
-        *_forms(cls),
         "## With and without",
         f"![The demonstration rig with and without {cls.tag}]({cls.tag}.png)",
         "*A small rig (89.4 g, 1 N/mm, four contacts; `stickslip/simulation/scenario/demonstration.py`) with "
@@ -77,6 +74,9 @@ def page(cls: type[Effect], numbers: Mapping[str, Sequence[float | None]] | None
         "[every base fit](../diagnosis.md#the-force-along-the-measured-motion) and of a [forecast](../forecast.md)."
         if cls.drawn
         else f"The same in a fit: `stickslip fit campaign.toml --add {cls.tag}`.",
+        "## Parameters",
+        *_parameters(cls),
+        *_forms(cls),
         "## In a measurement",
         f"{prose(cls.signature[:1].upper() + cls.signature[1:])}.",
         "| similar to | the experiment that separates the two |\n|---|---|\n"

@@ -2,7 +2,7 @@
 
 One table is of docs/challenge.md: the energy balance of the generator.
 
-Tables go to docs/results/verification.json, each with version, date and command; other numbers are printed.
+Tables go to docs/results/verification.json, each with version, date and command; what they do not have is printed.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ def test_an_option_on_the_line_is_named_as_there(monkeypatch, capsys):
     assert capsys.readouterr().err.startswith("stickslip: --jobs: out of range")
 
 
-def test_no_variable_of_the_package_is_taken_for_an_option():
+def test_no_variable_of_the_package_is_read_as_an_option():
     sources = [*ROOT.glob("stickslip/**/*.py"), *ROOT.glob("docs/*.py")]
     found = {name for path in sources for name in re.findall(r'"(STICKSLIP_\w+)"', path.read_text(encoding="utf-8"))}
     own = found - {"STICKSLIP_"}

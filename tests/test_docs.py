@@ -280,6 +280,13 @@ def test_pages_that_draw_a_picture_show_it() -> None:
         assert "%matplotlib inline\nimport pictures\n" in path.read_text("utf-8"), path.name
 
 
+def test_pictures_are_drawn_from_the_kept_results(tables: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS))
+    pictures = importlib.import_module("pictures")
+    assert pictures.damaged(tables.part("robustness", "damaged files")).axes[0].patches
+    assert pictures.challenged(tables.results("sealed")).axes[0].patches
+
+
 def test_every_picture_has_a_script() -> None:
     own = [ROOT / "tests" / f"{name}.py" for name in ("forecast/simulated", "force/ranks")]
     files = [*DOCS.glob("*.py"), *DOCS.glob("*/*.py"), *own]

@@ -84,7 +84,7 @@ def test_a_scenario_of_plain_units_needs_neither_pint_nor_xarray():
 
 
 @pytest.mark.parametrize("text", ["1,31 N", "0,05 N", "1,5e3 N", "0.3.1 N", "1e3,5 N", "1 000 N", "1'000 N", "1. 5 N"])
-def test_a_decimal_comma_is_never_taken_for_something_else(text):
+def test_a_decimal_comma_is_never_read_as_something_else(text):
     with pytest.raises(InputError, match=r"(?s)decimal comma.*0\.05 mm/s"):
         to_si(text, "N")
 

@@ -195,7 +195,8 @@ class Fit(FittedModel, Savable):
         ``points`` are those in use, of so many ``events``. ``free parameters`` are the fitted ones of
         :attr:`parameters`, where others are given or measured; ``effective parameters`` are all that the data
         determine, elements of the contact included, priors taken off; ``sizes`` of noise, misfit and scatter are
-        estimated besides. ``evaluations`` of the model led to the last one.
+        estimated besides. ``evaluations`` of the model led to the last one. Counts are whole numbers, so that the
+        series holds objects: ``fit.statistics.astype(float)`` is one to calculate with.
         ``cost`` is -2 log-likelihood and priors. The likelihood lacks log(2 pi) for each point; an outlier stays in it,
         with the strength of the contact as its deviation.
 

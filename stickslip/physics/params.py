@@ -105,10 +105,19 @@ class Parametrised(eqx.Module):
 
 
 class Ranged(Parametrised):
-    """What is refused where it is made if a value is outside its range, as :func:`check` does."""
+    """What cannot be is refused where it is made: a sign that no value of the range has, and NaN.
+
+    Fits have values beyond the ranges, which :func:`check` compares where a motion is solved for.
+    """
 
     def __check_init__(self) -> None:
-        check(self, where=type(self).__name__.lower())
+        for name, spec in specs(self).items():
+            value = getattr(self, name)
+            if not isinstance(value, jax.core.Tracer):
+                number = np.asarray(value, dtype=float)
+                there = number > 0.0 if spec.lower > 0.0 else number >= 0.0 if spec.lower == 0.0 else number == number
+                if not np.all(there):
+                    raise _outside(spec, f"{type(self).__name__.lower()}.{name}", number)
 
 
 def _said(value: Any, unit: str) -> str:
@@ -185,6 +194,11 @@ def variants(thing: Any) -> dict[str, tuple[str, ...]]:
     return {f.name: f.metadata["choices"] for f in dataclasses.fields(thing) if "choices" in f.metadata}
 
 
+def _outside(spec: Spec, key: str, number: np.ndarray) -> InputError:
+    what = spec.doc or key.rpartition(".")[2]
+    return InputError(f"{what} is outside its range", key=key, value=number.tolist(), allowed=spec.range)
+
+
 def check(thing: Any, *, where: str = "") -> None:
     """Refuse values outside the range of their :class:`Spec` and unknown variants.
 
@@ -198,12 +212,7 @@ def check(thing: Any, *, where: str = "") -> None:
             continue
         number = np.asarray(value, dtype=float)
         if not np.all(np.isfinite(number)) or np.any(number < spec.lower) or np.any(number > spec.upper):
-            raise InputError(
-                f"{spec.doc or name} is outside its range",
-                key=f"{prefix}{name}",
-                value=number.tolist(),
-                allowed=spec.range,
-            )
+            raise _outside(spec, f"{prefix}{name}", number)
     for name, choices in variants(thing).items():
         if getattr(thing, name) not in choices:
             raise InputError(

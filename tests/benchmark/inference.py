@@ -18,7 +18,7 @@ from .measuring import head, keep, last_table, row
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = 10_000_000
 PROCESSES = 27  # creep processes, as many as the paper has
-EMPTY, KEPT, ALONE = "nothing compiled before", "the same again", "in one process, everything compiled"
+EMPTY, KEPT, ALONE = "nothing compiled before", "the same again", "from Python in one process, nothing kept compiled"
 DIAGNOSE = """
 import resource, sys
 import stickslip as ss
@@ -35,7 +35,8 @@ def inspecting(small: bool = False) -> None:
         with tempfile.TemporaryDirectory() as folder:
             path = long_record(Path(folder), ending, samples)
             size = (Path(folder) / f"a.{ending}").stat().st_size / 1e6
-            _, spent, memory = numbers(INSPECT, path)
+            code, spent, memory = numbers(INSPECT, path)
+            assert code == 0, f"inspect ended with {code:.0f}"
         row(f"{ending.upper()}, {size:.0f} MB", f"{spent:.1f}", f"{memory / 2**20:.0f}")
     if not small:
         keep("inspect", "inspect", **last_table(), samples=samples)

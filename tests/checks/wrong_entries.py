@@ -170,9 +170,10 @@ def main() -> None:
             print(one, flush=True)
         if time.monotonic() - began > options.seconds:
             break
-    found = {"seed": options.seed, "campaigns": len({t.campaign for t in tried}), **shares(tried)}
+    number = len({t.campaign for t in tried})
+    found = {"seed": options.seed, "campaigns": number, **shares(tried)}
     print(json.dumps(found, indent=1))
-    command = f"python -m tests.checks.wrong_entries FOLDER --number {options.number} --seed {options.seed}"
+    command = f"python -m tests.checks.wrong_entries FOLDER --number {number} --seed {options.seed}"
     keep("rig_checks", command, **found)
 
 

@@ -32,7 +32,7 @@ def test_noise_of_slip_times_is_noise_over_velocity(stick_slip):
     assert np.all((ratio > 0.6) & (ratio < 1.7)), ratio
 
 
-def test_a_run_pulled_backwards_is_never_taken_for_one_forwards(stick_slip, refuses):
+def test_a_run_pulled_backwards_is_never_read_as_one_forwards(stick_slip, refuses):
     model = stick_slip()
     t = np.arange(0, model.stop, 1e-4)
     x = model.position(t)

@@ -322,6 +322,17 @@ def test_what_cannot_be_is_refused_where_it_is_made(make: Callable[[], object], 
         make()
 
 
+def test_what_a_fit_may_find_beyond_a_range_is_not_refused_where_it_is_made() -> None:
+    assert float(Block(mass=3e-10, damping=5e6).mass) == 3e-10
+    assert float(Weakening(slip_distance=0.02, healing_time=5e-7).healing_time) == 5e-7
+
+
+@pytest.mark.parametrize("name", ["H", "h_rms", "length"])
+def test_rough_lines_have_their_sizes(name: str) -> None:
+    with pytest.raises(InputError, match=f"^{name}: "):
+        RoughLines(**{name: None})
+
+
 def test_what_is_traced_is_not_refused_where_it_is_made() -> None:
     def made(mass: Array) -> Array:
         return Block(mass=mass).mass

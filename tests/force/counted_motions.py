@@ -43,10 +43,11 @@ def moved(
 ) -> Moved:  # fmt: skip
     """The base model, with ``effects``, under a steady drive that may turn at a time (s) and go back.
 
-    In ``holds``, each from a time on and as long (s), it stands.
+    In ``holds``, each from a time on and as long (s), it stands; such a drive does not turn.
 
     ``damping`` and ``healing_time`` may be others than the rig's.
     """
+    assert turn is None or not holds
     times = np.array([0.0, *(t for at, long in holds for t in (at, at + long)), *([] if turn is None else [turn]), end])
     moves = np.where(np.isin(times[:-1], [at for at, _ in holds]), 0.0, speed)
     moves = np.where(times[:-1] == turn, -moves, moves)

@@ -56,7 +56,7 @@ def main() -> None:
             "error": float(shares.std(ddof=1) / np.sqrt(len(noisy))),
             "in deviations": float(deviations.mean()),
         }
-    command = "python -m tests.force.offsets"
+    command = f"python -m tests.force.offsets --number {options.number}"
     keep("offsets", command, readings=len(noisy), noise=NOISE, count=COUNT, parameters=rows)
     print(json.dumps(rows, indent=1))
 

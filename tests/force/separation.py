@@ -1,10 +1,11 @@
-"""Which effects a recording can separate: what is left of each beside the base model, and which are then the same.
+"""Which effects a recording can separate: how small ones it shows beside the base model, and which are then the same.
 
 ``python -m tests.force.separation`` simulates a rig without effects, reads it through a sensor that counts, fits the
-base model to its force, and takes the derivative of that force in the amplitude of every effect of the catalogue (in
-its first form, with its default parameters). *Kept* is the share that the parameters of the base model do not take;
-effects whose rests have a cosine above 0.9 are a group. Waves, which their period tells, and what needs a measured load
-are left out. Writes a table of docs/results/figures.json.
+base model to its force, and takes the derivative of that force, over its floor, in the amplitude of every effect of the
+catalogue (in its first form, with its default parameters). What the parameters of the base model do not take of it is
+its rest: the amplitude that can be seen goes as one over its size, and effects whose rests have a cosine above 0.9 are
+a group. Waves, which their period tells, and what needs a measured load are left out. Writes a table of
+docs/results/figures.json.
 """
 
 from __future__ import annotations
@@ -29,8 +30,10 @@ from tests.kept_results import keep_table
 
 COMMAND = "python -m tests.force.separation"
 COSINE = 0.9  # of effects that count as the same
-TAKEN = 0.02  # share below which the base model does what the effect does
-COLUMNS = ("recorded", "kept (median)", "taken by the base model", "groups that cannot be separated")
+COLUMNS = (
+    "recorded", "smallest amplitude that is seen, over that of the last recording (median)", "the same (largest)",
+    "groups that cannot be separated",
+)  # fmt: skip
 CREEP = (PHASES.index("creep"), PHASES.index("nucleation"))
 
 
@@ -41,8 +44,8 @@ def fitted(runs: Iterable[Moved]) -> Fit:
     return fit_base(ready.problem, ready.start)
 
 
-def rests(fit: Fit, phases: Iterable[int] = range(len(PHASES))) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Effects, the share of each that is kept (m,), and what is kept (p, m), over the floor, in some phases."""
+def rests(fit: Fit, phases: Iterable[int] = range(len(PHASES))) -> dict[str, np.ndarray]:
+    """What is left of each effect, over the floor (p,), in some phases."""
     classes = [catalogue.get(tag) for tag in dict.fromkeys(tag for tag, _ in every_form(catalogue.tags()))]
     effects = [cls() for cls in classes if not cls.measured and not waves(cls())]
     use = np.isin(fit.problem.phase, list(phases)) & ~fit.dropped
@@ -54,25 +57,16 @@ def rests(fit: Fit, phases: Iterable[int] = range(len(PHASES))) -> tuple[list[st
     columns = np.stack([signatures(fit, effect, [{}])[0][use] * weight for effect in effects], axis=1)
     rest = np.vstack([columns, np.zeros((len(prior), len(effects)))])
     rest = rest - base @ (base.T @ rest)
-    return [e.tag for e in effects], np.linalg.norm(rest, axis=0) / np.linalg.norm(columns, axis=0), rest
+    return dict(zip((e.tag for e in effects), rest.T, strict=True))
 
 
-def groups(tags: list[str], rest: np.ndarray) -> list[list[str]]:
+def groups(left: dict[str, np.ndarray]) -> list[list[str]]:
     """Effects of which any two have a cosine above :data:`COSINE`, the largest groups first."""
-    unit = rest / np.linalg.norm(rest, axis=0)
-    apart = 1.0 - np.abs(unit.T @ unit)
-    of = fcluster(linkage(apart[np.triu_indices(len(tags), 1)], "complete"), 1.0 - COSINE, "distance")
-    found = [[tag for tag, g in zip(tags, of, strict=True) if g == number] for number in np.unique(of)]
+    unit = np.stack([rest / np.linalg.norm(rest) for rest in left.values()])
+    apart = 1.0 - np.abs(unit @ unit.T)
+    of = fcluster(linkage(apart[np.triu_indices(len(left), 1)], "complete"), 1.0 - COSINE, "distance")
+    found = [[tag for tag, g in zip(left, of, strict=True) if g == number] for number in np.unique(of)]
     return sorted((g for g in found if len(g) > 1), key=len, reverse=True)
-
-
-def row(name: str, fit: Fit, phases: Iterable[int] = range(len(PHASES))) -> list[str]:
-    """A recording's row of the table."""
-    tags, kept, rest = rests(fit, phases)
-    seen = kept > TAKEN
-    found = groups([t for t, s in zip(tags, seen, strict=True) if s], rest[:, seen])
-    taken = [t for t, s in zip(tags, seen, strict=True) if not s]
-    return [name, f"{np.median(kept):.2f}", ", ".join(taken), "; ".join(", ".join(g) for g in found)]
 
 
 def main() -> None:
@@ -81,13 +75,19 @@ def main() -> None:
     one = moved(1e-4, 7.5, tolerance=1e-5)
     others = [moved(speed, end, tolerance=1e-5) for speed, end in ((5e-5, 14.0), (4e-4, 2.2))]
     held = moved(1e-4, 20.0, tolerance=1e-5, holds=((2.0, 1.0), (5.0, 10.0)))
-    alone, three = fitted([one]), fitted([one, *others])
-    rows = [
-        row("creep, one velocity", alone, CREEP),
-        row("creep, slip and ring-down, one velocity", alone),
-        row("the same at three velocities", three),
-        row("and holds of 1 s and 10 s", fitted([one, *others, held])),
-    ]
+    alone = fitted([one])
+    found = {
+        "creep, one velocity": rests(alone, CREEP),
+        "creep, slip and ring-down, one velocity": rests(alone),
+        "the same at three velocities": rests(fitted([one, *others])),
+        "and holds of 1 s and 10 s": rests(fitted([one, *others, held])),
+    }
+    sizes = {name: np.array([np.linalg.norm(rest) for rest in left.values()]) for name, left in found.items()}
+    last, rows = list(sizes.values())[-1], []
+    for name, left in found.items():
+        times = last / sizes[name]
+        largest = f"{times.max():.2g} ({list(left)[int(np.argmax(times))]})" if times.max() > 1.0 else "1"
+        rows.append([name, f"{np.median(times):.2g}", largest, "; ".join(", ".join(g) for g in groups(left))])
     keep_table("figures", COMMAND, "separation", COLUMNS, rows)
 
 

@@ -50,7 +50,7 @@ def runs_of(case):
     return list(zip(case.traces, case.found, strict=True))
 
 
-def test_it_is_heard_where_it_is_and_nowhere_else(cases):
+def test_it_is_detected_where_it_is_and_nowhere_else(cases):
     told = detect_hum(runs_of(cases[SIZE]), cases[SIZE].times.slip)
     assert told.frequency == 50.0
     assert told.amplitude == pytest.approx(SIZE, rel=0.03)
@@ -75,7 +75,7 @@ def test_it_is_taken_off_to_a_hundredth_where_sticks_are_long(cases, frequency):
         assert np.abs(off - wave).max() < SIZE / 100.0
 
 
-def test_what_is_stated_is_looked_for_where_none_is_heard(short):
+def test_what_is_stated_is_looked_for_where_none_is_detected(short):
     case = short[SIZE]
     told = detect_hum(runs_of(case), case.times.slip)
     assert (told.frequency, told.amplitude) == (50.0, pytest.approx(SIZE))
@@ -83,7 +83,7 @@ def test_what_is_stated_is_looked_for_where_none_is_heard(short):
         assert not hum(trace.time, trace.displacement, trace, found, case.times.slip, case.times.hum).any()
 
 
-def test_a_vibration_beside_the_mains_is_not_taken_for_it(cases):
+def test_a_vibration_beside_the_mains_is_no_hum(cases):
     case = cases[0.0]
     trace, found = runs_of(case)[0]
     t = np.asarray(trace.time)

@@ -42,6 +42,7 @@ PATIENCE = 10  # s of processor time for one input; the slowest valid one takes 
 MEMORY = 6 << 30  # bytes of address space of a child
 CHUNK = 2000  # inputs of a child
 MOST_CRASHES = 200
+MANY = 100_000  # inputs from which a campaign is kept
 GUARDED = "crashed the library that reads them, refused by the guard"
 
 _ODD = [
@@ -319,7 +320,7 @@ def campaign(
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--number", type=int, default=100_000)
+    parser.add_argument("--number", type=int, default=MANY)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
@@ -341,7 +342,7 @@ def main() -> int:
     for what, where in sorted(found["faults"].items(), key=lambda item: -len(item[1])):
         print(f"{len(where)} x {what}\n    inputs {where[:6]}")
     print(f"{found['inputs']} inputs, seed {found['seed']}: {found['counts']}")
-    if not options.first:
+    if not options.first and found["inputs"] >= MANY:
         command = f"python -m tests.robust.fuzz --number {found['inputs']} --seed {options.seed}"
         command += " --commands" * options.commands
         keep_table("robustness", command, "damaged files", ["what", "number"], table(found), seed=options.seed)

@@ -45,7 +45,7 @@ def test_the_colours_are_measured_as_they_should_be():
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
 @pytest.mark.parametrize("eye", SEEN)
-def test_curves_can_be_told_apart_by_the_colour_blind(theme, eye):
+def test_the_colour_blind_can_distinguish_curves(theme, eye):
     pairs = [*combinations(theme.runs, 2), *((theme.measured, c) for c in (*theme.runs, theme.model, theme.accent))]
     assert min(apart(a, b, np.asarray(SEEN[eye])) for a, b in pairs) > LEAST
 

@@ -127,7 +127,7 @@ def test_the_pictures_of_the_docs_are_of_these_pages(session):
     assert now == then, "python docs/make_workbench.py makes them anew"
 
 
-def test_curves_of_many_runs_can_be_told_apart(session, monkeypatch):
+def test_curves_of_many_runs_are_distinguishable(session, monkeypatch):
     names = [f"run {i}" for i in range(28)]
     monkeypatch.setattr(type(session.campaign), "names", names)
     part = residual_view.Residual(session)

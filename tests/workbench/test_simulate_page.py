@@ -185,7 +185,7 @@ def test_a_synthetic_record_can_be_opened(campaign, base, folder):
 
 
 @pytest.mark.slow
-def test_rivals_are_told_apart_by_the_experiment_in_which_only_one_of_them_acts(session, base, campaign, undecided):
+def test_rivals_are_separated_by_the_experiment_in_which_only_one_of_them_acts(session, base, campaign, undecided):
     session.diagnosis = undecided
     assert _undecided(undecided) == [(RIVALS, "holds of 1 s and 10 s")]
     fits = experiments.rivals(base, RIVALS, {}, _silent)
@@ -247,7 +247,7 @@ def test_a_load_and_a_way_back_are_simulated(base):
 
 
 @pytest.mark.slow
-def test_models_that_differ_in_a_hold_only_are_told_apart(base):
+def test_models_that_differ_in_a_hold_only_are_separated(base):
     """As the sensor reads it: a drift shows in no motion of the block."""
     setting = Setting("v400", "400 um/s", hold="2 s")
     drifting = base.scenario().content | {"effect": [{"type": "sensor-drift", "rate": 2e-8}]}

@@ -17,7 +17,7 @@ from ..trace import Trace
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-MOST_COUNTS = 2.0**53  # beyond which whole counts cannot be told from others
+MOST_COUNTS = 2.0**53  # beyond which whole counts cannot be distinguished
 FIRST_SAMPLES = 5  # of a record, which tell where it begins
 
 

@@ -63,7 +63,7 @@ class Shape:
         curve, power: the backbone, and the power law that describes it.
         line, unstated: the rough line nearest to it with what the rig states of its roughness, and without.
         laws: effects on top of ``line``, the best first.
-        close: what is to be named, and behind it what the curve cannot tell from it.
+        close: what is to be named, and behind it what the curve cannot distinguish from it.
         lacking: why there is no rough line.
     """
 

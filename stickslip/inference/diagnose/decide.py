@@ -222,7 +222,7 @@ def best_forms(judged: Sequence[Judged]) -> list[Judged]:
 
 
 def named(judged: Sequence[Judged]) -> list[Judged]:
-    """The effect to be named, and behind it those that these data cannot tell from it; nothing where none is seen."""
+    """The effect to be named, and behind it what these data cannot distinguish from it; nothing where none is seen."""
     seen = [j for j in best_forms(judged) if j.seen]
     if not seen or held_back(judged) is not None:
         return []

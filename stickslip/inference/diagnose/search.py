@@ -135,18 +135,18 @@ class Search:
         name = f"again {tag} with {added} in round {len(self.rounds)}"
         key = name.replace(" ", "-")
         problem, _ = _taken_out(self.base, tag)
-        apart = kept(self._work.store, f"{key}-without", problem, lambda: without(self.base, tag))
+        rest = kept(self._work.store, f"{key}-without", problem, lambda: without(self.base, tag))
         seen = sorted((j for j in best_forms(self.named[tag].judged) if j.seen), key=lambda j: -j.better)
         tags = [j.tag for j in seen if j.tag == tag or j.tag not in {*self.named, *self.gone}][:BEST]
-        done = self._tried(apart, tags, name, self.base)
+        done = self._tried(rest, tags, name, self.base)
         if not done.close:
             del self.named[tag]
-            self._take(apart, None, tag)
+            self._take(rest, None, tag)
         elif done.close[0].tag == tag:
             self.named[tag] = done
         else:
             other = done.close[0].tag
-            self._take(settled(apart, done.close[0].candidate, self._work.store, key), other, tag)
+            self._take(settled(rest, done.close[0].candidate, self._work.store, key), other, tag)
             self.named = {other if t == tag else t: done if t == tag else r for t, r in self.named.items()}
 
     def _tried(self, base: Fit, tags: Sequence[str], name: str, before: Fit | None = None) -> Round:

@@ -22,7 +22,7 @@ class Round:
         base: that model.
         judged: every form that was fitted.
         candidates: everything that was tried.
-        close: what was named, and behind it what these data cannot tell from it.
+        close: what was named, and behind it what these data cannot distinguish from it.
         rival: the model with the spring's stiffness free in place of an effect, where the file states it.
     """
 

@@ -40,7 +40,7 @@ class Verdict:
 
     Attributes:
         kind: "complete", "missing", "ambiguous" or "unknown", and "fitted" where nothing was asked.
-        effects, set: what was named, and what the data cannot tell from it.
+        effects, set: what was named, and what the data cannot distinguish from it.
         structure: of the residual force, where nothing explains it.
         misfit: phase in which the model is off by more than any law of friction should be, and by which share of the
             strength.

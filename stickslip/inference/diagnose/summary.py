@@ -339,7 +339,7 @@ def _sets(d: Diagnosis) -> list[list[str]]:
 
 
 def _of_shape(d: Diagnosis) -> tuple[Law, ...]:
-    """What the backbone names and what it cannot tell from it; nothing where the rig is as wrong as to name nothing."""
+    """What the backbone names, and what it cannot distinguish from it; nothing where the rig is too wrong."""
     return () if d.wrong else d.shape.close
 
 

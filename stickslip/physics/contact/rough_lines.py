@@ -25,10 +25,12 @@ LENGTHS = ("h_rms", "length", "roll_off", "cut_off")
 
 
 def _checked(what: str, key: str, default: float | None, unit: str = "m", below: float | None = None) -> Any:
-    """A field above zero, from a number or text with a unit; None where it is left out."""
+    """A field above zero, from a number or text with a unit; None where it may be left out."""
 
     def read(value: Any) -> Any:
-        return None if value is None else check_within(what, value, above=0.0, below=below, key=key, unit=unit)
+        if value is None and default is None:
+            return None
+        return check_within(what, value, above=0.0, below=below, key=key, unit=unit)
 
     return eqx.field(default=default, converter=read, kw_only=default is None)
 

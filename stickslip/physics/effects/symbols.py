@@ -103,9 +103,9 @@ def marks(effects: Sequence[Effect]) -> list[str]:
     """A short subscript for every effect of a model: initials of its tag, the tag where others have the same."""
     tags = [effect.tag for effect in effects]
     short = {tag: tag if "-" not in tag else "".join(word[0] for word in tag.split("-")) for tag in tags}
-    unlike = {tag: mark if list(short.values()).count(mark) == 1 else tag for tag, mark in short.items()}
+    unique = {tag: mark if list(short.values()).count(mark) == 1 else tag for tag, mark in short.items()}
     numbers = [str(tags[: k + 1].count(tag)) if tags.count(tag) > 1 else "" for k, tag in enumerate(tags)]
-    return [f"{unlike[tag]}{number}" for tag, number in zip(tags, numbers, strict=True)]
+    return [f"{unique[tag]}{number}" for tag, number in zip(tags, numbers, strict=True)]
 
 
 def _own(effect: Effect) -> set[str]:
