@@ -14,7 +14,7 @@ from jax import Array
 
 from stickslip.effects import Threshold, parameter
 from stickslip.errors import InputError
-from stickslip.physics.contact import power_law_bank
+from stickslip.physics.contact import RoughLines, power_law_bank
 from stickslip.physics.effects import catalogue
 from stickslip.physics.effects.equations import of_model, of_tags
 from stickslip.physics.model import Block, LoadPoint, Model, Weakening
