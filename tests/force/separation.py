@@ -86,8 +86,10 @@ def main() -> None:
     last, rows = list(sizes.values())[-1], []
     for name, left in found.items():
         times = last / sizes[name]
-        largest = f"{times.max():.2g} ({list(left)[int(np.argmax(times))]})" if times.max() > 1.0 else "1"
-        rows.append([name, f"{np.median(times):.2g}", largest, "; ".join(", ".join(g) for g in groups(left))])
+        median, largest = (f"{float(f'{x:.2g}'):g}" for x in (np.median(times), times.max()))
+        if times.max() > 1.0:
+            largest += f" (`{list(left)[int(np.argmax(times))]}`)"
+        rows.append([name, median, largest, "; ".join(", ".join(f"`{tag}`" for tag in g) for g in groups(left))])
     keep_table("figures", COMMAND, "separation", COLUMNS, rows)
 
 
