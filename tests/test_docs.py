@@ -30,6 +30,7 @@ RIGS = sorted((ROOT / "scenarios" / "grzemba2014").glob("*.toml"))
 
 
 WRITTEN = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
+SCREEN = 310  # words of a page before its first picture
 RESULTS = sorted((DOCS / "results").glob("*.json"))
 
 
@@ -95,6 +96,7 @@ def test_every_effect_has_its_page(pages: ModuleType, written: Path, tag: str) -
     for other in catalogue.confused(cls.tag):
         assert f"({other}.md)" in text and (written / f"{other}.md").exists()
     assert f"({tag}.png)" in text and (written / f"{tag}.png").exists()
+    assert len(text.partition("![")[0].split()) < SCREEN
     assert "**Acts on** the" in text or "**Acts on** what" in text
     assert "## Source" in text
     assert (f"`stickslip fit --add {tag}` says so" in text) == cls.drawn
@@ -172,6 +174,16 @@ def test_pages_are_easily_read(path: Path) -> None:
     assert max(len(line) for line in lines) <= 300
     cells = [c.strip() for line in lines if line.startswith("|") for c in re.split(r"(?<!\\)\|", line)[1:-1]]
     assert [c for c in cells if len(c) > 200] == []
+
+
+@pytest.mark.parametrize(
+    "name", ["index", "quick-start", "theory", "measuring", "diagnosis", "real-data", "verification"]
+)
+def test_a_page_has_its_first_picture_on_the_first_screen(name: str) -> None:
+    text = (DOCS / f"{name}.md").read_text(encoding="utf-8").partition("![")[0]
+    assert (
+        len(re.sub(r"```\{code-cell\}.*?```|^---.*?^---$", "", text, flags=re.DOTALL | re.MULTILINE).split()) < SCREEN
+    )
 
 
 def test_the_readme_is_short() -> None:
