@@ -20,9 +20,9 @@ from .physics.effects.base import (
     Stiffness,
     Threshold,
 )
-from .physics.effects.catalogue import forms, get, load_file, make, register, roles, table, tags
+from .physics.effects.catalogue import forms, get, make, register, roles, table, tags
 from .physics.params import parameter, variant
-from .simulation.conformance import check_effect
+from .simulation.conformance import check_effect, load_file
 
 __all__ = [
     "BodyForce",

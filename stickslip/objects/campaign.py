@@ -57,7 +57,7 @@ class Campaign(Shown, Mapping[str, Trace]):
 
     @classmethod
     def from_traces(
-        cls, traces: Sequence[Trace], rig: Mapping[str, Any] | None = None, title: str = "",
+        cls, traces: Trace | Sequence[Trace], rig: Mapping[str, Any] | None = None, title: str = "",
         effect_files: str | Path | Sequence[str | Path] = (),
     ) -> Campaign:  # fmt: skip
         """A campaign without a file.
@@ -71,6 +71,7 @@ class Campaign(Shown, Mapping[str, Trace]):
         Raises:
             InputError: no trace, two of one name, a key or value of the rig that cannot be used.
         """
+        traces = [traces] if isinstance(traces, Trace) else traces
         if not traces:
             raise InputError("a campaign needs at least one run", key="traces", hint="ss.Trace.from_arrays makes one")
         _load_effects(effect_files)
@@ -265,6 +266,10 @@ class Campaign(Shown, Mapping[str, Trace]):
         """
         from .fit import fit
 
+        if effects in ("inertial", "static"):
+            raise InputError(
+                "a model is no effect", key="effects", value=effects, hint=f'campaign.fit(model="{effects}")'
+            )
         if model == "inertial":
             return fit(self, effects, holdout=holdout, progress=progress)
         if model != "static":

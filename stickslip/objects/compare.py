@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +13,10 @@ from scipy.optimize import minimize
 from ..errors import InputError
 from ..inference.diagnose.decide import standard_error
 from ..inference.force.errors import of_all, sums
+from ..inference.force.fit import Fit as ForceFit
 from ..inference.force.fit import deviations
 from ..inference.force.heldout import folds, halves, heldout_residual, unseen
+from ..inference.force.noise import left_out as outlying
 from ..system.object_repr import table
 from .fit import Fit
 
@@ -34,7 +37,8 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
         deviations; ``behind``, twice the difference in log-likelihood of the left-out runs (each left out in turn) to
         the first row, and ``+-``, its standard error from event to event. Fits within two or three of it predict
         equally well. ``weight`` is the share of each in the mixture that predicts the left-out events best (stacking,
-        Yao et al., Bayesian Analysis 13 (2018) 917): one that adds nothing to the others has none.
+        Yao et al., Bayesian Analysis 13 (2018) 917): one that adds nothing to the others has none. What is an outlier
+        in one of the fits counts in no likelihood.
 
     Raises:
         InputError: no fit, fits without names, fits of other runs, or a single event, which leaves nothing to predict
@@ -55,7 +59,8 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
         raise InputError("one event cannot be predicted from others", hint="measure more slips")
     own = any(fit.force_fit.problem.composition.phases for fit in fits.values())
     left_out = (halves if own else folds)(first.force_fit)
-    costs = {name: unseen(fit.force_fit, left_out).cost for name, fit in fits.items()}
+    found = on_the_same_points({name: fit.force_fit for name, fit in fits.items()})
+    costs = {name: unseen(fit, left_out).cost for name, fit in found.items()}
     order = sorted(fits, key=lambda name: float(costs[name].sum()))
     best = fits[order[0]].force_fit
     floor = deviations(best)
@@ -69,6 +74,17 @@ def compare(fits: Mapping[str, Fit]) -> pandas.DataFrame:
             "unseen std": unseen_std, "weight": share, "behind": float(worse.sum()), "+-": standard_error(worse),
         }  # fmt: skip
     return table(rows, "fit")
+
+
+def on_the_same_points(fits: Mapping[str, ForceFit]) -> dict[str, ForceFit]:
+    """Fits without what is an outlier in any of them: each has found its own, and a point left out costs likelihood."""
+    dropped = np.any([fit.dropped for fit in fits.values()], axis=0)
+
+    def reduced(fit: ForceFit) -> ForceFit:
+        known = fit.known.without(fit.blocks(outlying(fit.problem, dropped)))
+        return replace(fit, known=known, dropped=dropped)
+
+    return {name: reduced(fit) for name, fit in fits.items()}
 
 
 def stacked(densities: NDArray[np.float64]) -> NDArray[np.float64]:

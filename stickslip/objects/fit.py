@@ -198,7 +198,8 @@ class Fit(FittedModel, Savable):
         estimated besides. ``evaluations`` of the model led to the last one. Counts are whole numbers, so that the
         series holds objects: ``fit.statistics.astype(float)`` is one to calculate with.
         ``cost`` is -2 log-likelihood and priors. The likelihood lacks log(2 pi) for each point; an outlier stays in it,
-        with the strength of the contact as its deviation.
+        with the strength of the contact as its deviation. Each fit finds outliers anew: ``cost``, ``AIC`` and ``BIC``
+        compare fits with the same ``points``, :attr:`ladder` and :func:`stickslip.compare` others too.
 
         ``chi-square`` is that of residuals made independent by their covariance, for those of one event go together;
         reduced, it is over points less effective parameters. The sizes are estimated from the same residuals, so that
@@ -448,8 +449,8 @@ class Fit(FittedModel, Savable):
 
     @cached_property
     def _unseen(self) -> np.ndarray:
-        """Residual force on runs that are left out (N), shape (p,)."""
-        return heldout_residual(self.force_fit)
+        """Residual force on runs that are left out (N), shape (p,); nan where nothing is fitted that could see them."""
+        return np.full(self.force_fit.dropped.shape, np.nan) if self.by_hand else heldout_residual(self.force_fit)
 
     @cached_property
     def _floor(self) -> np.ndarray:
@@ -465,11 +466,13 @@ class Fit(FittedModel, Savable):
         finish(run, self)
 
     def _parts(self) -> list[Any]:
-        unseen = f"{self.unseen_error:.3g}" if np.isfinite(self.unseen_error) else "none, with one event only"
+        unseen = f"{self.unseen_error:.3g} on unseen runs"
+        if not np.isfinite(self.unseen_error):
+            unseen = "none on unseen runs, " + ("for nothing is fitted" if self.by_hand else "with one event only")
         what = {
             "campaign": self.campaign.title,
             "model": " + ".join(self.parts),
-            "error": f"{self.error:.3g} floors of this model on fitted runs, {unseen} on unseen runs",
+            "error": f"{self.error:.3g} floors of this model on fitted runs, {unseen}",
             "parameters": "set by hand" if self.by_hand else None,
         }
         rows = self.correlations.itertuples(index=False)

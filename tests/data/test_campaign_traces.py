@@ -10,6 +10,7 @@ import scipy.io
 from stickslip.cli import run as command
 from stickslip.data.campaign import campaign_text, load_campaign, load_traces
 from stickslip.data.drive import Drive
+from stickslip.data.readers import beside
 from stickslip.data.segment import segment
 from stickslip.data.trace import Trace
 
@@ -390,3 +391,9 @@ def test_slow_noise_is_stated_and_written_again(campaign, run, refuses):
     assert (again["displacement"]["walk"], again["displacement"]["hum"]) == (trace.walk, trace.hum)
     wrong = campaign(TIME + X.replace('"um"', '"um", walk = "-2 nm/s^0.5"') + DRIVE, rows=rows)
     refuses(lambda: only(wrong), "walk", "out of range")
+
+
+def test_of_the_files_beside_it_only_those_that_may_be_records_are_offered(tmp_path):
+    for name in ("mine.CSV", "old.mat", "README.md", "script.py", "picture.png", ".hidden.csv", "c.toml"):
+        (tmp_path / name).write_text("")
+    assert sorted(beside(tmp_path / "missing.csv")) == ["mine.CSV", "old.mat"]

@@ -7,7 +7,7 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.physics.effects import catalogue
-from stickslip.simulation.conformance import blamed, compile_check, load_effects, try_laws
+from stickslip.simulation.conformance import blamed, compile_check, load_file, try_laws
 
 LAW = """from jax import numpy as jnp
 from stickslip.effects import Memory, Threshold
@@ -41,7 +41,7 @@ def load(tmp_path, monkeypatch):
             text = text.replace(old, new)
         path = tmp_path / "mine.py"
         path.write_text(text, encoding="utf-8")
-        return path, load_effects([path])
+        return path, load_file(path)
 
     return load
 
@@ -68,6 +68,12 @@ def test_a_bad_one_is_refused_with_its_place(load, tmp_path, old, new, line, wor
     assert refused.value.key == (None if line is None else f"line {line}")
     assert "'mine'" in str(refused.value)
     assert "jax.numpy" in str(refused.value)
+    assert "mine" not in catalogue.all()
+
+
+def test_a_unit_that_is_none_is_refused(load):
+    with pytest.raises(InputError, match=r"mine.*metre-ish"):
+        load(('unit="1"', 'unit="metre-ish"'))
     assert "mine" not in catalogue.all()
 
 

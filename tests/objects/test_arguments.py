@@ -131,6 +131,15 @@ def test_fits_to_be_compared_have_names(campaign):
     assert "allowed: fits by name" in str(refused.value)
 
 
+def test_what_is_given_in_the_wrong_place_is_told_where_it_goes(campaign):
+    with pytest.raises(InputError, match=r"(?s)effects: a model is no effect.*campaign\.fit\(model=\"static\"\)"):
+        campaign.fit("static")
+    for given in (str(SHIPPED), campaign):
+        with pytest.raises(ArgumentError, match=r"(?s)^scenario: no scenario.*ss\.load_scenario"):
+            ss.simulate(given)
+    assert ss.Campaign.from_traces(campaign.traces[0]).names == [campaign.names[0]]
+
+
 def test_where_there_is_nothing_to_choose_from_no_list_is_offered():
     with pytest.raises(InputError, match="not in the model") as refused:
         ss.Fit.remove(SimpleNamespace(effects=()), "wear")

@@ -1,5 +1,6 @@
 """Objects for Python: what they say is what the records and an independent computation say."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,11 @@ from matplotlib.figure import Figure
 import stickslip as ss
 from stickslip.errors import InputError, RunFolderError
 from stickslip.inference.diagnose.decide import Judge
+from stickslip.inference.force.heldout import unseen
 from stickslip.inference.force.linearised import moved, prior_rows
+from stickslip.inference.force.noise import left_out
 from stickslip.inference.force.problem import Problem
+from stickslip.objects.compare import on_the_same_points
 from stickslip.system.runstore import read_result
 
 pytestmark = pytest.mark.slow
@@ -87,6 +91,7 @@ def test_values_set_by_hand_move_the_force_as_the_derivatives_say(base):
     """A step in a parameter, small against where the force bends, against the slopes of the fit."""
     name, step = "weakening.drop", 1e-6
     moved = base.with_values({name: base.values[name] + step})
+    assert np.isnan(moved.unseen_error) and "none on unseen runs, for nothing is fitted" in repr(moved)
     i = [f.name for f in base.free].index(name)
     f = base.free[i]
     slope = base.force_fit.slopes.shared[:, i] / f.slope(float(base.force_fit.point.z[i]))
@@ -359,8 +364,9 @@ def test_fits_are_compared_by_what_they_predict(campaign, base, aged):
     assert list(found.index) == ["aged", "base"] and found.loc["aged", ["behind", "+-"]].tolist() == [0.0, 0.0]
     columns = ["error", "error std", "unseen error", "unseen std"]  # all in floors of the better one, as its ladder has
     assert np.allclose(found.loc[["base", "aged"], columns], aged.ladder[columns].iloc[1:], rtol=1e-9)
-    # as a diagnosis judges the effect beside the base
-    judged = Judge(base.force_fit, 1).beside(aged.force_fit, 1)
+    # as a diagnosis judges the effect beside the base, on common points
+    same = on_the_same_points({"base": base.force_fit, "aged": aged.force_fit})
+    judged = Judge(same["base"], 1).beside(same["aged"], 1)
     assert found.loc["base", "behind"] == pytest.approx(judged.unseen.sum(), rel=1e-9)
     assert 0.0 < found.loc["base", "+-"] < 0.2 * found.loc["base", "behind"]
     assert found.weight.sum() == pytest.approx(1.0) and found.loc["aged", "weight"] > 0.95
@@ -368,6 +374,18 @@ def test_fits_are_compared_by_what_they_predict(campaign, base, aged):
         ss.compare({"all": base, "holds": campaign.fit(holdout=["v050", "v100", "v200"])})
     with pytest.raises(InputError, match="nothing to compare"):
         ss.compare({})
+
+
+def test_another_set_of_outliers_is_no_difference_of_models(base):
+    """A point left out costs likelihood: two fits of one model with other outliers are still equally good."""
+    found = base.force_fit
+    dropped = found.dropped.copy()
+    dropped[np.flatnonzero(~dropped)[::400]] = True
+    known = found.known.without(found.blocks(left_out(found.problem, dropped)))
+    fewer = replace(found, known=known, dropped=dropped)
+    one, other = on_the_same_points({"all": found, "fewer": fewer}).values()
+    assert unseen(fewer).cost.sum() - unseen(found).cost.sum() > 30.0
+    assert unseen(one).cost == pytest.approx(unseen(other).cost, rel=1e-9)
 
 
 def test_pictures_have_units(aged):

@@ -62,10 +62,12 @@ def _knows(reader: Reader, path: Path, head: bytes) -> bool:
 
 
 def beside(path: Path) -> list[str]:
-    """Names of files in the same folder that may hold a record: all but hidden ones and descriptions."""
+    """Names of files in the same folder that may hold a record, by their endings; hidden ones do not."""
     if not path.parent.is_dir():
         return []
-    return [p.name for p in path.parent.iterdir() if p.is_file() and p.suffix != ".toml" and p.name[0] != "."]
+    endings = {ending for reader in (*READERS.values(), _TEXT) for ending in reader.suffixes}
+    files = (p for p in path.parent.iterdir() if p.is_file() and p.name[0] != ".")
+    return [p.name for p in files if p.suffix.lower() in endings]
 
 
 def find_reader(path: str | Path, name: str | None = None) -> Reader:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import InputError, nearest
 from ...system import object_repr
 from ...system.registry import Registry
+from ...system.units import to_si
 from ..params import Spec, check, specs, variants
 from .base import Effect, Memory
 
@@ -75,6 +76,9 @@ def accept(cls: object) -> type[Effect]:
         _accept_prior(spec, f"{here}.{name}", name == cls.amplitude)
     if cls.__module__.startswith(f"{__package__}."):
         return cls  # making all of ours takes a quarter of the time of an import, and their tests do it
+    for name, spec in known.items():
+        if spec.unit != "1":
+            to_si(f"1 * ({spec.unit})", spec.unit, key=f"{here}.{name}")  # there is such a unit
     check(cls(), where=cls.tag)
     if float(getattr(cls(), cls.amplitude)) != known[cls.amplitude].null:
         raise InputError("the amplitude's default must be its null value", key=f"{here}.{cls.amplitude}")

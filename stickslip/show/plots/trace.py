@@ -43,7 +43,7 @@ def creep(axes: Axes, data: Run) -> None:
     if onset.size:
         begin = arrest[-2] if onset.size > 1 else t[0]
         end = onset[-1]
-        part = (t >= begin + 0.01 * (end - begin)) & (t <= end - 0.002 * (end - begin))
+        part = (t >= begin + 0.01 * (end - begin)) & (t <= end)
         clock = f"time before slip {onset.size} / s"
     else:
         part, end, clock = t >= t[0], 0.0, "time / s"

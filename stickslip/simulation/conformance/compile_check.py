@@ -20,13 +20,24 @@ from .rig import base_model
 _OURS = "stickslip."
 
 
-def load_effects(paths: Iterable[str | Path]) -> list[type[Effect]]:
-    """Put the effects of users' Python files into the catalogue, and try their laws.
+def load_file(path: str | Path) -> list[type[Effect]]:
+    """Execute a user's Python file, try its laws, and put its effects into the catalogue. Again, it replaces them.
+
+    Every class in it that inherits a role and has a ``tag`` is taken; ``@register`` is not needed.
+
+    Args:
+        path: of the file.
 
     Raises:
-        InputError: as of :func:`stickslip.effects.load_file` and of :func:`try_laws`.
+        InputError: no such file, an error in it (with its line), no effect in it, an effect that lacks something, or a
+            law with which the model cannot be compiled (with its line). The catalogue then stays as it was.
     """
-    return [cls for path in paths for cls in catalogue.load_file(path, try_laws)]
+    return catalogue.load_file(path, try_laws)
+
+
+def load_effects(paths: Iterable[str | Path]) -> list[type[Effect]]:
+    """:func:`load_file` for several files."""
+    return [cls for path in paths for cls in load_file(path)]
 
 
 def try_laws(classes: Iterable[type[Effect]]) -> None:

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from ...errors import InputError
+from ...errors import ArgumentError, InputError
 from ...physics.effects.base import Drive, Spring
 from ...physics.model import Model
 from ...physics.sensor import Vibrometer, measure
@@ -77,6 +77,9 @@ def simulate(
 
 def record(scenario: Scenario, progress: Tell | None = None, until: Callable[[Steps], Any] | None = None) -> Recording:
     """`simulate` without making a data set of it; arguments and errors as there."""
+    if not isinstance(scenario, Scenario):
+        hint = "ss.load_scenario(path) reads a file; a fit has its own: fit.simulate()"
+        raise ArgumentError("no scenario", key="scenario", value=type(scenario).__name__, hint=hint)
     setup = build(scenario)
     file = scenario.file
     sliding = steady_sliding(file.block, file.weakening, setup.contact.strength, setup.motion.fastest)
