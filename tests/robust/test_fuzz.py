@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 
 from stickslip.cli import run
 from stickslip.data.readers import guarded_reading, read_columns
@@ -58,6 +59,16 @@ def test_a_file_that_would_take_the_program_down_is_refused(tmp_path, monkeypatc
     (tmp_path / name).write_bytes((Path(__file__).parent / "crashing" / name).read_bytes())
     with pytest.raises(InputError, match=r"damaged: the library .* (fails|does not end)"):
         read_columns(tmp_path / name)
+
+
+def test_what_fails_by_chance_is_not_read_again(tmp_path, monkeypatch):
+    """A library that reads beyond its memory may raise an error in one process, and take the next one down."""
+    (tmp_path / "5.mat").write_bytes(dict(seeds())["5.mat"])
+    failed = guarded_reading.subprocess.CompletedProcess([], 1, stderr="Traceback\nZeroDivisionError: by chance\n")
+    monkeypatch.setattr(guarded_reading.subprocess, "run", lambda *a, **k: failed)
+    monkeypatch.setattr(scipy.io, "loadmat", lambda *a, **k: pytest.fail("read again"))
+    with pytest.raises(InputError, match=r"not a readable MATLAB file \(ZeroDivisionError: by chance\)"):
+        read_columns(tmp_path / "5.mat")
 
 
 def test_the_precaution_is_taken_once_for_a_file(tmp_path, monkeypatch):

@@ -38,7 +38,11 @@ with h5py.File(sys.argv[1], "r") as file:
     file.visititems(look)
 """,
     "mat": """
-import sys, scipy.io
+import sys
+try:
+    import scipy.io
+except ImportError:  # which is elsewhere than a process without surroundings looks
+    sys.exit()
 scipy.io.loadmat(sys.argv[1], squeeze_me=True, struct_as_record=False)
 """,
 }
@@ -46,12 +50,16 @@ _XCPU, _KILL = 24, 9
 _sound: set[tuple[str, int, int]] = set()
 
 
-def guard(path: Path, library: str) -> None:
-    """Have another process read the file once; what it finds wrong is left for the reader to say.
+def guard(path: Path, library: str) -> str:
+    """Have another process read the file once.
 
     Args:
         path: the file.
         library: ``"hdf5"`` or ``"mat"``.
+
+    Returns:
+        What the library raised there; empty where it read the file. One that reads beyond its memory raises something
+        at times, and fails at others: a reader that must not fail repeats these words and does not read again.
 
     Raises:
         InputError: that process was killed by the system or did not come to an end.
@@ -59,13 +67,13 @@ def guard(path: Path, library: str) -> None:
     facts = path.stat()
     key = (str(path.resolve()), facts.st_mtime_ns, facts.st_size)
     if not ENABLED or key in _sound or not sys.executable:
-        return
+        return ""
     patience = max(int(PATIENCE + facts.st_size / 1e7), 1)
     command = [sys.executable, "-I", "-W", "ignore", "-c", _LIMIT + _PROGRAMS[library], str(path), str(patience)]
     try:
         done = subprocess.run(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            timeout=WALL * patience,
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+            errors="replace", timeout=WALL * patience,
         )  # fmt: skip
         if done.returncode in (-_XCPU, -_KILL):
             fault = _LATE
@@ -74,8 +82,11 @@ def guard(path: Path, library: str) -> None:
     except subprocess.TimeoutExpired:
         fault = _LATE
     except OSError:  # no other process can be had: then without this precaution
-        return
+        return ""
     if fault:
         hint = "export it again, or as CSV"
         raise InputError(f"the file is damaged: the library that reads this format {fault} on it", file=path, hint=hint)
+    if done.returncode:
+        return (done.stderr.strip().splitlines() or ["an error"])[-1]
     _sound.add(key)
+    return ""

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...errors import InputError
 from .base import Columns, add_array, need_columns, reading
 from .guarded_reading import guard
 from .hdf import read_hdf
 
+HINT = "save it again with -v7"
 _MOST_CELLS = 1000  # of a cell array
 
 
@@ -30,8 +32,10 @@ class MatReader:
             return read_hdf(path, skip=("#refs#", "#subsystem#"))
         import scipy.io
 
-        guard(path, "mat")
-        with reading("MATLAB", path, hint="save it again with -v7"):
+        raised = guard(path, "mat")
+        if raised:
+            raise InputError(f"not a readable MATLAB file ({raised})", file=path, hint=HINT)
+        with reading("MATLAB", path, hint=HINT):
             content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
         columns = Columns({})
         for name, value in content.items():
