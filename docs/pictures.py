@@ -43,7 +43,7 @@ def damaged(found: dict[str, Any]) -> Figure:
     made, axes = figure(width=7.0, height=2.0)
     ax, left = axes[0, 0], 0
     for what, color in parts:
-        name = f"{what.split(':')[0]} ({count[what]:,})".replace(",", " ")
+        name = f"{what} ({f'{count[what]:,}'.replace(',', ' ')})"
         ax.barh(0, count[what], left=left, color=color, label=name)
         left += count[what]
     ax.plot([], [], " ", label=f"{lost} ({count[lost]})")
