@@ -300,7 +300,7 @@ def test_one_step_of_the_velocity_is_fitted_but_not_diagnosed():
     found = campaign.fit()
     assert found.error < 2.0
     assert np.isnan(found.unseen_error)  # nothing can be held out
-    assert "none, with one event only" in repr(found)
+    assert "none on unseen runs, with one event only" in repr(found)
     with pytest.raises(InputError, match="no part of the record can be left out to test an effect"):
         campaign.diagnose()
     still = Trace.from_arrays("steady", time=t, drive_position=SPEED * t, spring_force=jenkins(SPEED * t), noise=NOISE)
