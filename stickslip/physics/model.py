@@ -70,6 +70,16 @@ class Weakening(Ranged):
         """Factor mu(psi)/mu_s on the caps."""
         return self.ratio + (1.0 - self.ratio) * psi
 
+    def mean_strength(self, psi0: Array, psi: Array, motion: Motion) -> Array:
+        """Mean of the factor over the path of an increment, from psi at its two ends.
+
+        By the law itself: the mean of psi is ``D_c`` times what it loses on the path, healing included.
+        """
+        mean = 0.5 * (psi0 + psi)
+        lost = psi0 - psi + (1.0 - mean) * motion.dt / self.healing_time
+        moves = motion.path > 1e-6 * self.slip_distance
+        return self.strength(jnp.where(moves, self.slip_distance * lost / jnp.where(moves, motion.path, 1.0), mean))
+
     def steady(self, speed: Array) -> Array:
         """psi of steady sliding at ``speed`` (m/s): 1/(1 + v/v_c), v_c = D_c/t_h."""
         return 1.0 / (1.0 + speed * self.healing_time / self.slip_distance)
@@ -274,7 +284,9 @@ class Model(Parametrised):
             if isinstance(e, BodyForce):
                 body = body + e.force(m, motion, contact)
         slides = jnp.abs(state.force) >= (1.0 - 1e-9) * state.cap
-        mean_cap = jnp.where(slides, 0.5 * (state.cap + cap), cap)
+        law = self.weakening
+        bulge = law.mean_strength(state.psi, psi, motion) - 0.5 * (law.strength(state.psi) + law.strength(psi))
+        mean_cap = jnp.where(slides, 0.5 * (state.cap + cap) + cap * (bulge / law.strength(psi)), cap)
         compliance = _compliance(stiffness)
         force = _stuck_within(state.force, stiffness, compliance, state.cap, cap, motion)
         slid = jnp.abs(state.force - force)

@@ -28,7 +28,7 @@ def test_energy_balance_closes():
 
 def test_energy_balance_at_the_default_tolerance():
     made = run(rig(), 5.6)
-    assert np.max(np.abs(imbalance(made.trajectory.steps))) < 2e-5
+    assert np.max(np.abs(imbalance(made.trajectory.steps))) < 2e-6
 
 
 @pytest.mark.slow
