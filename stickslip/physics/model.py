@@ -73,12 +73,14 @@ class Weakening(Ranged):
     def mean_strength(self, psi0: Array, psi: Array, motion: Motion) -> Array:
         """Mean of the factor over the path of an increment, from psi at its two ends.
 
-        By the law itself: the mean of psi is ``D_c`` times what it loses on the path, healing included.
+        By the law itself: the mean of psi is ``D_c`` times what it loses on the path, healing included. It lies between
+        the ends: healing over a long rest is known too coarsely to say more of a short path.
         """
         mean = 0.5 * (psi0 + psi)
         lost = psi0 - psi + (1.0 - mean) * motion.dt / self.healing_time
         moves = motion.path > 1e-6 * self.slip_distance
-        return self.strength(jnp.where(moves, self.slip_distance * lost / jnp.where(moves, motion.path, 1.0), mean))
+        along = jnp.where(moves, self.slip_distance * lost / jnp.where(moves, motion.path, 1.0), mean)
+        return self.strength(jnp.clip(along, jnp.minimum(psi0, psi), jnp.maximum(psi0, psi)))
 
     def steady(self, speed: Array) -> Array:
         """psi of steady sliding at ``speed`` (m/s): 1/(1 + v/v_c), v_c = D_c/t_h."""
@@ -286,7 +288,9 @@ class Model(Parametrised):
         slides = jnp.abs(state.force) >= (1.0 - 1e-9) * state.cap
         law = self.weakening
         bulge = law.mean_strength(state.psi, psi, motion) - 0.5 * (law.strength(state.psi) + law.strength(psi))
-        mean_cap = jnp.where(slides, 0.5 * (state.cap + cap) + cap * (bulge / law.strength(psi)), cap)
+        mean_cap = jnp.where(
+            slides, 0.5 * (state.cap + cap) + cap * (bulge / jnp.maximum(law.strength(psi), 1e-300)), cap
+        )
         compliance = _compliance(stiffness)
         force = _stuck_within(state.force, stiffness, compliance, state.cap, cap, motion)
         slid = jnp.abs(state.force - force)
